@@ -41,10 +41,7 @@ impl BoardClock {
     /// One of 32 bits that has told nothing yet.
     #[must_use]
     pub const fn new(nanos_per_tick: u64) -> Self {
-        Self {
-            nanos_per_tick,
-            last: None,
-        }
+        Self { nanos_per_tick, last: None }
     }
 
     /// The time of a stamp that has arrived now.
@@ -52,12 +49,7 @@ impl BoardClock {
         let Some(last) = self.last else {
             // The first count of the board is its time; whatever came before is nobody's business.
             let time = Nanos(u64::from(ticks) * self.nanos_per_tick);
-            self.last = Some(Last {
-                ticks,
-                time,
-                at: now,
-                from: (time, now),
-            });
+            self.last = Some(Last { ticks, time, at: now, from: (time, now) });
             return BoardTime::At(time);
         };
         let step = ticks.wrapping_sub(last.ticks);
@@ -70,12 +62,7 @@ impl BoardClock {
         if run > host * (1.0 + FAST_MAX) + AHEAD_MAX.0 as f64 {
             return BoardTime::Restarted(self.restart(now, ticks));
         }
-        self.last = Some(Last {
-            ticks,
-            time,
-            at: now,
-            ..last
-        });
+        self.last = Some(Last { ticks, time, at: now, ..last });
         BoardTime::At(time)
     }
 
@@ -85,12 +72,7 @@ impl BoardClock {
             return Nanos::ZERO;
         };
         let time = Nanos(last.time.0 + now.since(last.at).0.max(1));
-        *last = Last {
-            ticks,
-            time,
-            at: now,
-            from: (time, now),
-        };
+        *last = Last { ticks, time, at: now, from: (time, now) };
         time
     }
 }

@@ -65,17 +65,13 @@ impl fmt::Display for Found {
 /// Galil controller's `^R^V`.
 pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
     let mut heard = Vec::new();
-    hear(link, clock, LISTEN, &mut heard, |heard| {
-        recognise(heard).is_some()
-    })?;
+    hear(link, clock, LISTEN, &mut heard, |heard| recognise(heard).is_some())?;
     if let Some(found) = recognise(&heard) {
         return Ok(found);
     }
     heard.clear();
     link.write(b"?\r\n")?;
-    hear(link, clock, ANSWER_MAX, &mut heard, |heard| {
-        recognise(heard).is_some()
-    })?;
+    hear(link, clock, ANSWER_MAX, &mut heard, |heard| recognise(heard).is_some())?;
     if let Some(found) = recognise(&heard) {
         return Ok(found);
     }
@@ -83,9 +79,7 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
     if heard.iter().any(|byte| matches!(byte, b'?' | b':')) {
         let mut answer = Vec::new();
         link.write(b"\x12\x16\r")?;
-        hear(link, clock, ANSWER_MAX, &mut answer, |answer| {
-            answer.ends_with(b":")
-        })?;
+        hear(link, clock, ANSWER_MAX, &mut answer, |answer| answer.ends_with(b":"))?;
         let text = readable(&answer);
         let from = text.find("DMC").or_else(|| text.find("RIO"));
         if let Some(from) = from {
@@ -94,18 +88,10 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
                 Ok(board) => board.revision,
                 Err(err) => format!("{revision}: {err}"),
             };
-            return Ok(Found::Device(
-                galil::KIND.word,
-                galil::KIND.introduction,
-                said,
-            ));
+            return Ok(Found::Device(galil::KIND.word, galil::KIND.introduction, said));
         }
     }
-    Ok(if heard.is_empty() {
-        Found::Silent
-    } else {
-        Found::Unknown(readable(&heard))
-    })
+    Ok(if heard.is_empty() { Found::Silent } else { Found::Unknown(readable(&heard)) })
 }
 
 /// Collects what comes in a time, until it is enough.
@@ -127,9 +113,7 @@ fn hear(
 
 /// A device that says who it is in whole lines; a line without its end may be half a line.
 fn recognise(heard: &[u8]) -> Option<Found> {
-    let end = heard
-        .iter()
-        .rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
+    let end = heard.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
     let text = String::from_utf8_lossy(&heard[..end]);
     let (kind, said) = DeviceKind::of_lines(&lines_of(&text))?;
     Some(Found::of(kind, said))
@@ -152,22 +136,11 @@ mod tests {
         let of = |heard: &str| recognise(heard.as_bytes()).and_then(|found| found.device());
         // gnea/grbl, doc/markdown/interface.md.
         assert_eq!(of("\r\nGrbl 1.1h ['$' for help]\r\n"), Some("grbl"));
-        assert_eq!(
-            of("<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\nok\r\n"),
-            Some("grbl")
-        );
+        assert_eq!(of("<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\nok\r\n"), Some("grbl"));
         // Series 5 user's guide, page 19.
         assert_eq!(of("-18.78 lbF\r\n"), Some("mark10"));
         assert_eq!(of("4.285 N\r\n"), Some("mark10"));
-        for nothing in [
-            "",
-            "?",
-            "ok\r\n",
-            "4.285 N",
-            "<>\r\n",
-            "nan N\r\n",
-            "4 X\r\n",
-        ] {
+        for nothing in ["", "?", "ok\r\n", "4.285 N", "<>\r\n", "nan N\r\n", "4 X\r\n"] {
             assert_eq!(of(nothing), None, "{nothing:?}");
         }
     }

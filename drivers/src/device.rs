@@ -165,9 +165,7 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
             Some(Err(_)) => "too many commands at once",
             None => "the rig is not connected",
         };
-        self.refused.push_back(Fault::CommandRefused {
-            detail: detail.into(),
-        });
+        self.refused.push_back(Fault::CommandRefused { detail: detail.into() });
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
@@ -188,13 +186,10 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
         self.opened.raw.extend(closed);
         self.pending.clear();
         self.refused.clear();
-        let mut opened = self
-            .device
-            .open(&self.clock)
-            .map_err(|error| RigError::Device {
-                file: self.opened.description.name.clone(),
-                error,
-            })?;
+        let mut opened = self.device.open(&self.clock).map_err(|error| RigError::Device {
+            file: self.opened.description.name.clone(),
+            error,
+        })?;
         opened.raw.splice(..0, self.opened.raw.drain(..));
         self.pending = opened.lines.iter().map(|_| None).collect();
         self.opened = opened;
@@ -223,8 +218,6 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
 
     fn links(&self) -> Vec<(String, LinkStats)> {
         let lines = self.opened.lines.iter();
-        lines
-            .map(|line| (line.device().to_owned(), line.stats()))
-            .collect()
+        lines.map(|line| (line.device().to_owned(), line.stats())).collect()
     }
 }

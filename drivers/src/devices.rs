@@ -59,9 +59,7 @@ impl DeviceKind {
     /// Which device has said whole lines, if one is recognised, and the line that gave it away.
     #[must_use]
     pub fn of_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
-        DEVICES
-            .iter()
-            .find_map(|kind| Some((kind, (kind.recognise)(lines)?)))
+        DEVICES.iter().find_map(|kind| Some((kind, (kind.recognise)(lines)?)))
     }
 }
 

@@ -15,17 +15,12 @@ use std::io::Read;
 pub fn open(name: &str, settings: &SimSettings) -> Result<Box<dyn Rig>, RigError> {
     let is_sim = name == "sim"
         || name.strip_prefix("sim:").is_some_and(|own| {
-            !own.is_empty()
-                && !own
-                    .chars()
-                    .any(|c| !(c.is_alphanumeric() || " _-".contains(c)))
+            !own.is_empty() && !own.chars().any(|c| !(c.is_alphanumeric() || " _-".contains(c)))
         });
     if is_sim {
         Ok(Box::new(SimRig::named(name, *settings)))
     } else {
-        Err(RigError::Unknown {
-            name: name.to_owned(),
-        })
+        Err(RigError::Unknown { name: name.to_owned() })
     }
 }
 
@@ -37,16 +32,12 @@ pub fn is_rig_file(name: &str) -> bool {
 
 /// Reads a rig file.
 pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
-    let unreadable = |detail: String| RigError::File {
-        file: file.to_owned(),
-        detail,
-    };
+    let unreadable = |detail: String| RigError::File { file: file.to_owned(), detail };
     let mut bytes = Vec::new();
     std::fs::File::open(file)
         .and_then(|open| {
             // One more than allowed, so that too much is noticed and nothing endless is read.
-            open.take(rig_file::BYTES_MAX as u64 + 1)
-                .read_to_end(&mut bytes)
+            open.take(rig_file::BYTES_MAX as u64 + 1).read_to_end(&mut bytes)
         })
         .map_err(|err| unreadable(err.to_string()))?;
     let text = String::from_utf8(bytes).map_err(|_| unreadable("it is no text".into()))?;
@@ -57,10 +48,7 @@ pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
 pub fn open_wired(file: &str, clock: &HostClock) -> Result<Box<dyn Rig>, RigError> {
     read_rig_file(file)?
         .open(clock)
-        .map_err(|error| RigError::Device {
-            file: file.to_owned(),
-            error,
-        })
+        .map_err(|error| RigError::Device { file: file.to_owned(), error })
 }
 
 impl<R: Rig + ?Sized> Rig for Box<R> {
@@ -129,10 +117,7 @@ mod tests {
     /// A box that answers for its rig hides whatever it does not hand on.
     #[test]
     fn boxed_rig_tells_what_its_sensors_say() {
-        let settings = SimSettings {
-            bath: "37".parse().unwrap(),
-            ..SimSettings::default()
-        };
+        let settings = SimSettings { bath: "37".parse().unwrap(), ..SimSettings::default() };
         let mut rig = open("sim", &settings).unwrap();
         while rig.next_event(Nanos::from_millis(2_000)).is_some() {}
         assert!(!Rig::take_sensors(&mut rig).is_empty());

@@ -34,8 +34,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     recognise: |lines| match lines {
         [_, first, second, rest @ ..] => {
             let mut all = [first, second].into_iter().chain(rest);
-            all.all(|line| Decimal::parse(line).is_some())
-                .then_some(*first)
+            all.all(|line| Decimal::parse(line).is_some()).then_some(*first)
         }
         _ => None,
     },
@@ -174,10 +173,7 @@ impl PlainNumbers {
                 all.clear();
                 continue;
             };
-            if all
-                .last()
-                .is_some_and(|(last, ..)| at.since(*last) > PAUSE_MAX)
-            {
+            if all.last().is_some_and(|(last, ..)| at.since(*last) > PAUSE_MAX) {
                 all.clear();
             }
             all.push((at, ticks, number));
@@ -216,10 +212,7 @@ impl PlainNumbers {
         let heard = String::from_utf8_lossy(&console.heard);
         let other = DeviceKind::of_lines(&lines_of(&heard));
         if let Some((kind, _)) = other.filter(|(kind, _)| kind.word != KIND.word) {
-            return DeviceError::Other {
-                device: DEVICE,
-                found: kind.title.into(),
-            };
+            return DeviceError::Other { device: DEVICE, found: kind.title.into() };
         }
         let quote: String = line.chars().take(QUOTE_MAX).collect();
         let wanted = match self.nanos_per_tick {
@@ -336,11 +329,7 @@ impl CellProtocol for Numbers {
             );
         }
         self.is_beyond = is_beyond;
-        let counts = if self.cell.is_reversed {
-            -number.digits
-        } else {
-            number.digits
-        };
+        let counts = if self.cell.is_reversed { -number.digits } else { number.digits };
         reports.sample(CellSample {
             at: now,
             device_time,
@@ -359,10 +348,7 @@ impl CellProtocol for Numbers {
 }
 
 fn unfit(detail: String) -> DeviceError {
-    DeviceError::Unfit {
-        device: DEVICE,
-        detail,
-    }
+    DeviceError::Unfit { device: DEVICE, detail }
 }
 
 #[cfg(test)]

@@ -30,9 +30,7 @@ fn numbers(keys: &str, decimals: u8) -> LineCell<Numbers> {
 }
 
 fn counts(line: &mut dyn CellDialogue) -> Vec<i32> {
-    std::iter::from_fn(|| line.take_sample())
-        .map(|sample| sample.counts)
-        .collect()
+    std::iter::from_fn(|| line.take_sample()).map(|sample| sample.counts).collect()
 }
 
 const COUNTS: &str = "unit = \"counts\"\nfull_scale = 8388607\n";
@@ -81,21 +79,11 @@ fn pieces_of_a_line_are_put_together() {
 fn units_become_volts() {
     for (keys, decimals, text, volts) in [
         (COUNTS, 0, "8388607", 5.0),
-        (
-            "unit = \"counts\"\nfull_scale = 1000\nfull_scale_v = 2.5\n",
-            0,
-            "-100",
-            -0.25,
-        ),
+        ("unit = \"counts\"\nfull_scale = 1000\nfull_scale_v = 2.5\n", 0, "-100", -0.25),
         ("unit = \"V\"\nfull_scale = 10\n", 3, "1.234", 1.234),
         ("unit = \"mV\"\nfull_scale = 5000\n", 1, "1234.5", 1.2345),
         ("unit = \"N\"\nfull_scale = 25\n", 3, "4.285", 4.285),
-        (
-            "unit = \"gF\"\nfull_scale = 2000\ndirection = \"tension\"\n",
-            0,
-            "-1000",
-            9.806_65,
-        ),
+        ("unit = \"gF\"\nfull_scale = 2000\ndirection = \"tension\"\n", 0, "-1000", 9.806_65),
     ] {
         let mut line = numbers(keys, decimals);
         line.received(Nanos(1), format!("{text}\r\n").as_bytes());
@@ -116,16 +104,7 @@ fn times_of_the_board_neither_wrap_nor_go_back() {
     assert_eq!(times[1].since(times[0]), ms(10));
     assert_eq!((line.take_sample(), line.garbled()), (None, 1));
     assert_eq!(line.take_trouble(), None);
-    for wrong in [
-        "3",
-        "+30,3",
-        "-1,3",
-        "30.5,3",
-        "4294967296,3",
-        ",3",
-        "30,",
-        "30,3,4",
-    ] {
+    for wrong in ["3", "+30,3", "-1,3", "30.5,3", "4294967296,3", ",3", "30,", "30,3,4"] {
         line.received(ms(30), format!("{wrong}\r\n").as_bytes());
         assert_eq!(line.take_sample(), None, "{wrong}");
     }
@@ -156,11 +135,7 @@ fn mistakes_in_the_rig_file_are_told() {
         let mut fields = Fields::read(&format!("[cell]\n{keys}")).unwrap();
         assert_eq!(PlainNumbers::read(&mut fields), None, "{keys}");
         let mistakes = fields.finish();
-        mistakes
-            .iter()
-            .map(|it| it.message.clone())
-            .collect::<Vec<_>>()
-            .join("; ")
+        mistakes.iter().map(|it| it.message.clone()).collect::<Vec<_>>().join("; ")
     };
     assert!(told("full_scale = 1\n").contains("cell.unit"));
     assert!(told("unit = \"N\"\n").contains("cell.full_scale"));

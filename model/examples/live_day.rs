@@ -14,9 +14,7 @@ const PER_HOUR: u64 = 3_600_000;
 
 #[expect(clippy::disallowed_methods, reason = "this program measures time")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let hours: u64 = std::env::args()
-        .nth(1)
-        .map_or(Ok(24), |word| word.parse())?;
+    let hours: u64 = std::env::args().nth(1).map_or(Ok(24), |word| word.parse())?;
     let mut trace = LiveTrace::new(BUCKETS);
     println!(
         "hours  ns a sample  samples a bucket  points  bytes of points  ms for the points of a frame"

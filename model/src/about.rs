@@ -38,31 +38,15 @@ pub struct Key {
 }
 
 const fn text(name: &'static str, meaning: &'static str) -> Key {
-    Key {
-        name,
-        meaning,
-        kind: Kind::Text,
-    }
+    Key { name, meaning, kind: Kind::Text }
 }
 
 const fn count(name: &'static str, meaning: &'static str) -> Key {
-    Key {
-        name,
-        meaning,
-        kind: Kind::Count,
-    }
+    Key { name, meaning, kind: Kind::Count }
 }
 
 const fn length(name: &'static str, meaning: &'static str) -> Key {
-    Key {
-        name,
-        meaning,
-        kind: Kind::Number {
-            unit: "mm",
-            above: 0.0,
-            is_limit_allowed: false,
-        },
-    }
+    Key { name, meaning, kind: Kind::Number { unit: "mm", above: 0.0, is_limit_allowed: false } }
 }
 
 /// Everything that can be told, in the order it is shown. The first three are labels of their own in the
@@ -71,18 +55,11 @@ pub const KEYS: &[Key] = &[
     text("operator", "who runs it"),
     text("specimen", "what is indented: the specimen's name"),
     text("indenter", "the probe, in words"),
-    text(
-        "specimen.source",
-        "animal or material, organ, and who supplied it",
-    ),
+    text("specimen.source", "animal or material, organ, and who supplied it"),
     Key {
         name: "specimen.time_since_death_h",
         meaning: "hours from death to the test",
-        kind: Kind::Number {
-            unit: "h",
-            above: 0.0,
-            is_limit_allowed: true,
-        },
+        kind: Kind::Number { unit: "h", above: 0.0, is_limit_allowed: true },
     },
     text("specimen.storage", "how and how long it was stored"),
     Key {
@@ -101,10 +78,7 @@ pub const KEYS: &[Key] = &[
     length("indenter.diameter_mm", "diameter of the probe"),
     text("indenter.tip", "shape of its tip: flat, spherical, conical"),
     text("indenter.material", "what the probe is made of"),
-    text(
-        "signal.filter",
-        "what filter there is between cell and converter",
-    ),
+    text("signal.filter", "what filter there is between cell and converter"),
     text("series.id", "name of the series the session belongs to"),
     count("series.specimen", "number of the specimen in the series"),
     count("series.repeat", "which repeat on this specimen, from 1"),
@@ -156,27 +130,20 @@ fn names() -> String {
 pub fn key(name: &str) -> Result<&'static Key, AboutError> {
     KEYS.iter()
         .find(|key| key.name == name)
-        .ok_or_else(|| AboutError::UnknownKey {
-            key: name.to_owned(),
-        })
+        .ok_or_else(|| AboutError::UnknownKey { key: name.to_owned() })
 }
 
 /// Key and value of a `KEY=VALUE`, not yet checked.
 pub fn pair_of(pair: &str) -> Result<(&str, &str), AboutError> {
-    pair.split_once('=').ok_or_else(|| AboutError::NotAPair {
-        text: pair.to_owned(),
-    })
+    pair.split_once('=').ok_or_else(|| AboutError::NotAPair { text: pair.to_owned() })
 }
 
 impl Key {
     /// The value of a text, or what is wrong with it.
     pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
         let value = value.trim();
-        let refused = |wanted: String| AboutError::Value {
-            key: self.name,
-            value: value.to_owned(),
-            wanted,
-        };
+        let refused =
+            |wanted: String| AboutError::Value { key: self.name, value: value.to_owned(), wanted };
         match self.kind {
             Kind::Text if value.is_empty() => Err(refused("some words".into())),
             Kind::Text => Ok(value.into()),
@@ -184,11 +151,7 @@ impl Key {
                 Ok(count) if count > 0 => Ok(count.into()),
                 _ => Err(refused("a whole number from 1".into())),
             },
-            Kind::Number {
-                unit,
-                above,
-                is_limit_allowed,
-            } => match value.parse::<f64>() {
+            Kind::Number { unit, above, is_limit_allowed } => match value.parse::<f64>() {
                 Ok(number)
                     if number.is_finite()
                         && (number > above || is_limit_allowed && number >= above) =>
@@ -231,14 +194,8 @@ impl About {
         let mut told: Vec<(&str, &Value)> =
             self.told.iter().map(|(k, v)| (k.as_str(), v)).collect();
         told.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
-        let plain = |value: &Value| {
-            value
-                .as_str()
-                .map_or_else(|| value.to_string(), str::to_owned)
-        };
-        told.into_iter()
-            .map(|(name, value)| (name, plain(value)))
-            .collect()
+        let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        told.into_iter().map(|(name, value)| (name, plain(value))).collect()
     }
 }
 

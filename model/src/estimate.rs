@@ -56,10 +56,8 @@ impl LiveEstimate {
     /// A parameter by name, if the record so far identifies it.
     #[must_use]
     pub fn identified(&self, name: &str) -> Option<&Parameter> {
-        let is_refused = self
-            .verdicts
-            .iter()
-            .any(|verdict| verdict.parameter == name && !verdict.is_identified);
+        let is_refused =
+            self.verdicts.iter().any(|verdict| verdict.parameter == name && !verdict.is_identified);
         self.parameters
             .iter()
             .find(|parameter| parameter.name == name)

@@ -7,33 +7,13 @@ type Unit = (&'static str, f64, f64);
 
 /// Every unit by quantity; the first is the base unit, in which numbers are kept.
 const UNITS: [&[Unit]; 9] = [
-    &[
-        ("mm/s", 1.0, 1.0),
-        ("mm/min", 1.0, 60.0),
-        ("um/s", 1.0, 1e3),
-        ("µm/s", 1.0, 1e3),
-    ],
-    &[
-        ("mm", 1.0, 1.0),
-        ("cm", 10.0, 1.0),
-        ("um", 1.0, 1e3),
-        ("µm", 1.0, 1e3),
-    ],
+    &[("mm/s", 1.0, 1.0), ("mm/min", 1.0, 60.0), ("um/s", 1.0, 1e3), ("µm/s", 1.0, 1e3)],
+    &[("mm", 1.0, 1.0), ("cm", 10.0, 1.0), ("um", 1.0, 1e3), ("µm", 1.0, 1e3)],
     &[("N", 1.0, 1.0), ("mN", 1.0, 1e3)],
-    &[
-        ("s", 1.0, 1.0),
-        ("ms", 1.0, 1e3),
-        ("min", 60.0, 1.0),
-        ("h", 3600.0, 1.0),
-    ],
+    &[("s", 1.0, 1.0), ("ms", 1.0, 1e3), ("min", 60.0, 1.0), ("h", 3600.0, 1.0)],
     &[("g", 1.0, 1.0), ("kg", 1e3, 1.0)],
     &[("Hz", 1.0, 1.0), ("mHz", 1.0, 1e3)],
-    &[
-        ("N/s", 1.0, 1.0),
-        ("N/min", 1.0, 60.0),
-        ("mN/s", 1.0, 1e3),
-        ("mN/min", 1.0, 6e4),
-    ],
+    &[("N/s", 1.0, 1.0), ("N/min", 1.0, 60.0), ("mN/s", 1.0, 1e3), ("mN/min", 1.0, 6e4)],
     &[("V", 1.0, 1.0), ("mV", 1.0, 1e3)],
     &[("°C", 1.0, 1.0), ("degC", 1.0, 1.0)],
 ];
@@ -69,10 +49,7 @@ pub fn split(text: &str) -> Option<(f64, &str)> {
     let bytes = text.as_bytes();
     let digits_from = |start: usize| {
         let rest = bytes.iter().skip(start);
-        start
-            + rest
-                .take_while(|byte| byte.is_ascii_digit() || **byte == b'.')
-                .count()
+        start + rest.take_while(|byte| byte.is_ascii_digit() || **byte == b'.').count()
     };
     let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
     let mut end = digits_from(sign);

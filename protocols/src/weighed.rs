@@ -51,10 +51,7 @@ impl Readings {
     pub fn record(&mut self, record: &Record) {
         match record {
             // Where the run went back, what was read from there on will be read again.
-            Record::PhaseStarted {
-                phase: Phase::Prompt | Phase::Weigh,
-                step_index,
-            } => {
+            Record::PhaseStarted { phase: Phase::Prompt | Phase::Weigh, step_index } => {
                 self.step_index = *step_index;
                 self.all.retain(|one| one.step_index < *step_index);
             }
@@ -102,10 +99,7 @@ mod tests {
 
     fn reading(step_index: usize, mass_g: f64, volts: f64) -> [Record; 2] {
         [
-            Record::PhaseStarted {
-                phase: Phase::Weigh,
-                step_index,
-            },
+            Record::PhaseStarted { phase: Phase::Weigh, step_index },
             Record::Weighed {
                 mass_g,
                 is_loading: true,
@@ -132,17 +126,11 @@ mod tests {
         assert_eq!(found, [1.28, 1.5]);
         records.extend(reading(5, 240.0, 1.6));
         let all = Readings::of(&records);
-        let found: Vec<(f64, f64)> = all
-            .all()
-            .iter()
-            .map(|one| (one.mass_g(), one.volts().0))
-            .collect();
+        let found: Vec<(f64, f64)> =
+            all.all().iter().map(|one| (one.mass_g(), one.volts().0)).collect();
         assert_eq!(found, [(0.0, 1.28), (140.0, 1.5), (240.0, 1.6)]);
         // The end of the run is none of its steps.
-        records.push(Record::PhaseStarted {
-            phase: Phase::Stopped,
-            step_index: 5,
-        });
+        records.push(Record::PhaseStarted { phase: Phase::Stopped, step_index: 5 });
         assert_eq!(Readings::of(&records).all().len(), 3);
     }
 }

@@ -100,50 +100,27 @@ fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
 fn main() -> Outcome<()> {
     let mut words = std::env::args().skip(1);
     let sessions: usize = words.next().map_or(Ok(10_000), |word| word.parse())?;
-    let folder = words
-        .next()
-        .unwrap_or_else(|| "target/catalog_speed".into());
+    let folder = words.next().unwrap_or_else(|| "target/catalog_speed".into());
     let library = Path::new(&folder);
     let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab");
     let original = Session::open(&recorded)?;
-    timed(
-        &format!("{sessions} sessions written"),
-        || -> Outcome<()> { (0..sessions).try_for_each(|number| make(library, &original, number)) },
-    )?;
+    timed(&format!("{sessions} sessions written"), || -> Outcome<()> {
+        (0..sessions).try_for_each(|number| make(library, &original, number))
+    })?;
     let mut catalog = Catalog::open(library)?;
     let changes = timed("catalog made", || catalog.rebuild(&mut |_, _| {}))?;
     println!("  {} sessions read", changes.read);
-    let changes = timed("brought up to date, nothing new", || {
-        catalog.update(&mut |_, _| {})
-    })?;
+    let changes = timed("brought up to date, nothing new", || catalog.update(&mut |_, _| {}))?;
     println!("  {} sessions read", changes.read);
     let text = |text: &str| text.to_owned();
-    let page = Query {
-        limit: Some(20),
-        ..Query::default()
-    };
+    let page = Query { limit: Some(20), ..Query::default() };
     for (what, query) in [
         ("the latest", page.clone()),
-        (
-            "a specimen",
-            Query {
-                specimen: Some(text("stomach 77")),
-                ..page.clone()
-            },
-        ),
-        (
-            "words",
-            Query {
-                words: text("pig fund ada"),
-                ..page.clone()
-            },
-        ),
+        ("a specimen", Query { specimen: Some(text("stomach 77")), ..page.clone() }),
+        ("words", Query { words: text("pig fund ada"), ..page.clone() }),
         (
             "one value",
-            Query {
-                conditions: vec!["depth>=28mm".parse::<Condition>()?],
-                ..page.clone()
-            },
+            Query { conditions: vec!["depth>=28mm".parse::<Condition>()?], ..page.clone() },
         ),
         (
             "words, operator and two values",

@@ -15,9 +15,8 @@ use std::time::Instant;
 
 /// A session of the simulated rig's kind at 20 kHz: noise in every digit of the signal.
 fn row(index: u64, random: &mut u64) -> Row {
-    *random = random
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
+    *random =
+        random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let noise = (*random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
     let depth = 0.015 * (index / 500 % 500) as f64;
     let volts = 0.5 + 0.1 * depth + 1e-3 * noise;
@@ -41,10 +40,7 @@ fn timed<T>(what: &str, samples: u64, body: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let done = body();
     let seconds = start.elapsed().as_secs_f64();
-    println!(
-        "{what}: {seconds:.3} s, {:.2} million samples/s",
-        samples as f64 / seconds / 1e6
-    );
+    println!("{what}: {seconds:.3} s, {:.2} million samples/s", samples as f64 / seconds / 1e6);
     done
 }
 
@@ -97,31 +93,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let manifest = manifest();
     let path = std::path::Path::new(&folder).join(&manifest.session_id);
     let mut random = 1;
-    timed(
-        "write",
-        samples,
-        || -> Result<(), Box<dyn std::error::Error>> {
-            let mut writer = SessionWriter::start(
-                SessionFolder::create(&path)?,
-                None,
-                &manifest,
-                Pace::Virtual,
-            )?;
-            for index in 0..samples {
-                writer.push_row(row(index, &mut random))?;
-            }
-            let end = EndRecord {
-                outcome: "finished".into(),
-                reason: "done".into(),
-                samples: 0,
-                entries: 0,
-                raw_bytes: 0,
-                ended_at: Nanos(samples * 50_000),
-                time_use: Vec::new(),
-            };
-            Ok(writer.close(end)?)
-        },
-    )?;
+    timed("write", samples, || -> Result<(), Box<dyn std::error::Error>> {
+        let mut writer =
+            SessionWriter::start(SessionFolder::create(&path)?, None, &manifest, Pace::Virtual)?;
+        for index in 0..samples {
+            writer.push_row(row(index, &mut random))?;
+        }
+        let end = EndRecord {
+            outcome: "finished".into(),
+            reason: "done".into(),
+            samples: 0,
+            entries: 0,
+            raw_bytes: 0,
+            ended_at: Nanos(samples * 50_000),
+            time_use: Vec::new(),
+        };
+        Ok(writer.close(end)?)
+    })?;
     let mut bytes = 0;
     for item in std::fs::read_dir(&path)? {
         bytes += item?.metadata()?.len();

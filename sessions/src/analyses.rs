@@ -190,10 +190,8 @@ impl Analyses {
     /// The file as an input; none where there is no analysis.
     #[must_use]
     pub fn input(&self) -> Option<Input> {
-        (!self.all.is_empty()).then(|| Input {
-            what: ANALYSES_FILE.to_owned(),
-            sha256: self.sha256.clone(),
-        })
+        (!self.all.is_empty())
+            .then(|| Input { what: ANALYSES_FILE.to_owned(), sha256: self.sha256.clone() })
     }
 
     /// The withdrawal of an analysis, if there is one.
@@ -213,16 +211,14 @@ impl Analyses {
 
     /// One that counts, by its name.
     pub fn get(&self, name: &str) -> Result<&Analysis, AnalysisError> {
-        self.counting()
-            .find(|one| one.name == name)
-            .ok_or_else(|| AnalysisError::None {
-                name: name.to_owned(),
-                known: match self.withdrawal(name) {
-                    Some(by) => format!(" any more, {} withdrew it: {}", by.by, by.reason),
-                    None if self.all.is_empty() => ", it has none".to_owned(),
-                    None => String::new(),
-                },
-            })
+        self.counting().find(|one| one.name == name).ok_or_else(|| AnalysisError::None {
+            name: name.to_owned(),
+            known: match self.withdrawal(name) {
+                Some(by) => format!(" any more, {} withdrew it: {}", by.by, by.reason),
+                None if self.all.is_empty() => ", it has none".to_owned(),
+                None => String::new(),
+            },
+        })
     }
 }
 
@@ -236,11 +232,7 @@ pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
     files.extend(edits.is_file().then_some(edits));
     let input = |path: PathBuf| match sha256_of_file(&path) {
         Ok(sha256) => Ok(Input {
-            what: path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            what: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             sha256,
         }),
         Err(source) => Err(AnalysisError::Input { path, source }),
@@ -251,10 +243,7 @@ pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
 /// A document as an input.
 #[must_use]
 pub fn document_input(what: &str, document: &Value) -> Input {
-    Input {
-        what: what.to_owned(),
-        sha256: sha256(document.to_string().as_bytes()),
-    }
+    Input { what: what.to_owned(), sha256: sha256(document.to_string().as_bytes()) }
 }
 
 /// Which of the files that went into an analysis are others now. Only those of [`inputs_of`] are compared.
@@ -265,21 +254,12 @@ pub fn changed_inputs(analysis: &Analysis, now: &[Input]) -> Vec<String> {
         found.map(|one| one.sha256.clone())
     };
     let is_file = |one: &&Input| one.what == EDITS_FILE || segment_number(&one.what).is_some();
-    let mut names: Vec<&str> = analysis
-        .inputs
-        .iter()
-        .filter(is_file)
-        .chain(now)
-        .map(|one| one.what.as_str())
-        .collect();
+    let mut names: Vec<&str> =
+        analysis.inputs.iter().filter(is_file).chain(now).map(|one| one.what.as_str()).collect();
     names.sort_unstable();
     names.dedup();
     let is_other = |name: &&str| of(&analysis.inputs, name) != of(now, name);
-    names
-        .into_iter()
-        .filter(is_other)
-        .map(str::to_owned)
-        .collect()
+    names.into_iter().filter(is_other).map(str::to_owned).collect()
 }
 
 /// Adds a record to a session folder whose recording has ended.
@@ -294,9 +274,7 @@ pub fn add_analysis(
         return Err(AnalysisError::Name { name: name.clone() });
     }
     if !folder.is_dir() {
-        return Err(AnalysisError::NotAFolder {
-            path: folder.into(),
-        });
+        return Err(AnalysisError::NotAFolder { path: folder.into() });
     }
     let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
     let there = Analyses::read(folder, session_id)?;
@@ -331,9 +309,7 @@ mod tests {
     }
 
     fn mask(from: f64) -> Analysed {
-        Analysed::Mask {
-            left_out_s: vec![[from, from + 1.0]],
-        }
+        Analysed::Mask { left_out_s: vec![[from, from + 1.0]] }
     }
 
     #[test]
@@ -346,21 +322,12 @@ mod tests {
         let taken = add(&analysis("bump", "", mask(5.0))).unwrap_err();
         assert!(taken.to_string().contains("never used twice"), "{taken}");
         let withdrawal = |name, reason| analysis(name, reason, Analysed::Withdrawal);
-        assert!(matches!(
-            add(&withdrawal("bump", " ")),
-            Err(AnalysisError::NoReason)
-        ));
-        assert!(matches!(
-            add(&withdrawal("other", "why")),
-            Err(AnalysisError::None { .. })
-        ));
+        assert!(matches!(add(&withdrawal("bump", " ")), Err(AnalysisError::NoReason)));
+        assert!(matches!(add(&withdrawal("other", "why")), Err(AnalysisError::None { .. })));
         add(&withdrawal("bump", "wrong stretch")).unwrap();
         let again = add(&withdrawal("bump", "again")).unwrap_err().to_string();
         assert!(again.contains("wrong stretch"), "{again}");
-        assert!(matches!(
-            add(&analysis("bump", "", mask(5.0))),
-            Err(AnalysisError::Taken { .. })
-        ));
+        assert!(matches!(add(&analysis("bump", "", mask(5.0))), Err(AnalysisError::Taken { .. })));
         let read = Analyses::read(at, "id").unwrap();
         assert_eq!(read.all.len(), 3);
         assert_eq!(read.all[0].what, mask(0.1 + 0.2));
@@ -369,10 +336,7 @@ mod tests {
         assert!(read.get("bump").is_err() && read.get("µ \"two\"").is_ok());
         for name in ["", " ", "a\nb", "\u{0}", &"x".repeat(81)] {
             let refused = add(&analysis(name, "", mask(0.0)));
-            assert!(
-                matches!(refused, Err(AnalysisError::Name { .. })),
-                "{name:?}"
-            );
+            assert!(matches!(refused, Err(AnalysisError::Name { .. })), "{name:?}");
         }
         // What was written is never changed unnoticed.
         let path = at.join(ANALYSES_FILE);
@@ -392,10 +356,7 @@ mod tests {
         assert_eq!(calibration.sha256, expected);
         let mut inputs = inputs_of(at).unwrap();
         inputs.push(calibration);
-        let one = Analysis {
-            inputs,
-            ..analysis("a", "", mask(0.0))
-        };
+        let one = Analysis { inputs, ..analysis("a", "", mask(0.0)) };
         assert!(changed_inputs(&one, &inputs_of(at).unwrap()).is_empty());
         std::fs::write(at.join(EDITS_FILE), "edit").unwrap();
         let changed = changed_inputs(&one, &inputs_of(at).unwrap());

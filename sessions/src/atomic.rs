@@ -35,11 +35,7 @@ impl Draft {
     /// Begins the file that is to be at `path`.
     pub fn new(path: &Path) -> io::Result<Self> {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-        let name: String = name
-            .to_string_lossy()
-            .chars()
-            .take(NAME_LETTERS_MAX)
-            .collect();
+        let name: String = name.to_string_lossy().chars().take(NAME_LETTERS_MAX).collect();
         let prefix = format!(".{name}.");
         loop {
             let file = Builder::new()
@@ -122,11 +118,7 @@ pub fn sweep(folder: &Path, depth: usize) -> Vec<PathBuf> {
 
 fn unowned(folder: &Path, depth: usize) -> Vec<(PathBuf, File)> {
     let here = Path::new(".");
-    let folder = if folder == Path::new("") {
-        here
-    } else {
-        folder
-    };
+    let folder = if folder == Path::new("") { here } else { folder };
     let entries = WalkDir::new(folder).max_depth(depth).sort_by_file_name();
     let is_draft = |name: &str| name.starts_with('.') && name.ends_with(ENDING);
     let files = entries.into_iter().flatten().filter(|entry| {
@@ -169,9 +161,8 @@ mod tests {
 
     fn names(folder: &Path) -> Vec<String> {
         let names = fs::read_dir(folder).unwrap();
-        let mut names: Vec<String> = names
-            .map(|one| one.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut names: Vec<String> =
+            names.map(|one| one.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -204,11 +195,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let written = Draft::new(&at.join("now.csv")).unwrap();
-        let (_, abandoned) = Draft::new(&at.join("old.csv"))
-            .unwrap()
-            .file
-            .keep()
-            .unwrap();
+        let (_, abandoned) = Draft::new(&at.join("old.csv")).unwrap().file.keep().unwrap();
         fs::write(at.join(".another.tmp"), "somebody else's").unwrap();
         fs::create_dir(at.join("deep")).unwrap();
         let deep = Draft::new(&at.join("deep/old.csv")).unwrap().file.keep();

@@ -56,30 +56,18 @@ pub(crate) struct DerivedBlock {
 
 /// Which of its optional values a row has: age, counts, volts and pulses.
 fn held(row: &Row) -> [bool; 4] {
-    [
-        row.age.is_some(),
-        row.counts.is_some(),
-        row.volts.is_some(),
-        row.pulses.is_some(),
-    ]
+    [row.age.is_some(), row.counts.is_some(), row.volts.is_some(), row.pulses.is_some()]
 }
 
 /// Cuts rows where a block must end: at its size limit, and where optional values appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
-    rows.chunk_by(|a, b| held(a) == held(b))
-        .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
+    rows.chunk_by(|a, b| held(a) == held(b)).flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
 }
 
 /// The pair of blocks of some rows that all have the same of their optional values.
 pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, DerivedBlock) {
-    let mut daq = DaqBlock {
-        first_sample,
-        ..DaqBlock::default()
-    };
-    let mut derived = DerivedBlock {
-        first_sample,
-        ..DerivedBlock::default()
-    };
+    let mut daq = DaqBlock { first_sample, ..DaqBlock::default() };
+    let mut derived = DerivedBlock { first_sample, ..DerivedBlock::default() };
     let (mut tick, mut host, mut pulses) = (0u64, 0u64, 0i64);
     for row in rows {
         daq.tick_delta.push(row.tick.wrapping_sub(tick) as i64);
@@ -106,10 +94,7 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
 }
 
 fn age(daq: &DaqBlock, index: usize) -> Option<Age> {
-    Some(Age {
-        by: Nanos(*daq.age_ns.get(index)?),
-        within: Nanos(*daq.age_within_ns.get(index)?),
-    })
+    Some(Age { by: Nanos(*daq.age_ns.get(index)?), within: Nanos(*daq.age_within_ns.get(index)?) })
 }
 
 /// Bytes of the largest block: every value of a sample in its longest form.
@@ -219,25 +204,19 @@ impl Block {
     pub(crate) fn take_derived(&mut self, data: &[u8]) -> Result<(), String> {
         let derived = &mut self.derived;
         prost::Message::clear(derived);
-        read_fields(data, "derived samples", |number, field| {
-            match (number, field) {
-                (1, Field::Number(value)) => {
-                    derived.first_sample = value;
-                    Ok(())
-                }
-                (2, Field::Bytes(bytes)) => extend_doubles(&mut derived.force_newtons, bytes),
-                (3, Field::Bytes(bytes)) => extend_doubles(&mut derived.depth_mm, bytes),
-                (4, Field::Bytes(bytes)) => {
-                    extend_numbers(&mut derived.validity, bytes, |it| it as u32)
-                }
-                (5, Field::Bytes(bytes)) => {
-                    extend_numbers(&mut derived.phase, bytes, |it| it as u32)
-                }
-                (6, Field::Bytes(bytes)) => {
-                    extend_numbers(&mut derived.cycle, bytes, |it| it as u32)
-                }
-                _ => Ok(()),
+        read_fields(data, "derived samples", |number, field| match (number, field) {
+            (1, Field::Number(value)) => {
+                derived.first_sample = value;
+                Ok(())
             }
+            (2, Field::Bytes(bytes)) => extend_doubles(&mut derived.force_newtons, bytes),
+            (3, Field::Bytes(bytes)) => extend_doubles(&mut derived.depth_mm, bytes),
+            (4, Field::Bytes(bytes)) => {
+                extend_numbers(&mut derived.validity, bytes, |it| it as u32)
+            }
+            (5, Field::Bytes(bytes)) => extend_numbers(&mut derived.phase, bytes, |it| it as u32),
+            (6, Field::Bytes(bytes)) => extend_numbers(&mut derived.cycle, bytes, |it| it as u32),
+            _ => Ok(()),
         })?;
         self.check()
     }
@@ -290,11 +269,7 @@ impl Block {
                 return Err(format!("the {name} of a sample is not a number"));
             }
         }
-        for column in [
-            &mut daq.tick_delta,
-            &mut daq.host_delta_ns,
-            &mut daq.pulses_delta,
-        ] {
+        for column in [&mut daq.tick_delta, &mut daq.host_delta_ns, &mut daq.pulses_delta] {
             let mut sum = 0i64;
             for value in column {
                 sum = sum.wrapping_add(*value);
@@ -313,9 +288,7 @@ fn read_fields<'a>(
 ) -> Result<(), String> {
     if data.len() > BLOCK_BYTES_MAX {
         let count = data.len();
-        return Err(format!(
-            "a block of {what} has {count} bytes, more than any has"
-        ));
+        return Err(format!("a block of {what} has {count} bytes, more than any has"));
     }
     while !data.is_empty() {
         next_field(&mut data)
@@ -352,28 +325,10 @@ mod tests {
             row(u64::MAX, None),
             row(0, None),
             row(7, Some(i32::MIN)),
-            Row {
-                volts: None,
-                ..row(12, Some(0))
-            },
-            Row {
-                pulses: None,
-                ..row(13, Some(1))
-            },
-            Row {
-                age: Some(Age {
-                    by: Nanos(u64::MAX),
-                    within: Nanos(1),
-                }),
-                ..row(14, Some(2))
-            },
-            Row {
-                age: Some(Age {
-                    by: Nanos(0),
-                    within: Nanos(u64::MAX),
-                }),
-                ..row(15, Some(2))
-            },
+            Row { volts: None, ..row(12, Some(0)) },
+            Row { pulses: None, ..row(13, Some(1)) },
+            Row { age: Some(Age { by: Nanos(u64::MAX), within: Nanos(1) }), ..row(14, Some(2)) },
+            Row { age: Some(Age { by: Nanos(0), within: Nanos(u64::MAX) }), ..row(15, Some(2)) },
         ];
         let mut back = Vec::new();
         let mut first = 0;

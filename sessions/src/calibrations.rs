@@ -33,10 +33,7 @@ impl Document for Calibration {
     }
 
     fn superseding(self, id: String) -> Self {
-        Self {
-            supersedes: Some(id),
-            ..self
-        }
+        Self { supersedes: Some(id), ..self }
     }
 
     /// Its signal must rise and make a curve.
@@ -73,17 +70,11 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let first = taken("Cell 4711 (new)", "2026-03-05");
         let kept = save(home.path(), &first).unwrap();
-        assert!(
-            kept.id.starts_with("20260305-cell-4711-new-"),
-            "{}",
-            kept.id
-        );
+        assert!(kept.id.starts_with("20260305-cell-4711-new-"), "{}", kept.id);
         assert_eq!(read_calibration(&kept.path).unwrap(), first);
         let again = save(home.path(), &first).unwrap_err();
         assert!(again.to_string().contains(&kept.id), "{again}");
-        let names: Vec<_> = fs::read_dir(home.path().join("calibrations"))
-            .unwrap()
-            .collect();
+        let names: Vec<_> = fs::read_dir(home.path().join("calibrations")).unwrap().collect();
         assert_eq!(names.len(), 1, "no temporary file is left");
         let mut broken = first.clone();
         broken.steps.truncate(1);
@@ -91,22 +82,13 @@ mod tests {
         broken = first.clone();
         broken.curve = palpate_model::calibration::CurveKind::Polynomial { degree: 1 };
         broken.steps[1].volts = Volts(1.2);
-        for refusal in [
-            save(home.path(), &broken),
-            supersede(home.path(), &kept.id, &broken),
-        ] {
+        for refusal in [save(home.path(), &broken), supersede(home.path(), &kept.id, &broken)] {
             let refusal = refusal.unwrap_err().to_string();
             assert!(refusal.contains("140 g"), "{refusal}");
         }
-        broken = Calibration {
-            taken_at: Some("yesterday".into()),
-            ..first
-        };
+        broken = Calibration { taken_at: Some("yesterday".into()), ..first };
         let refusal = save(home.path(), &broken).unwrap_err();
-        assert!(
-            refusal.to_string().contains("no RFC 3339 time"),
-            "{refusal}"
-        );
+        assert!(refusal.to_string().contains("no RFC 3339 time"), "{refusal}");
     }
 
     #[test]
@@ -116,25 +98,15 @@ mod tests {
         let text = fs::read_to_string(&kept.path).unwrap();
         fs::write(&kept.path, text.replace("1.73", "1.74")).unwrap();
         let refusal = read_calibration(&kept.path).unwrap_err();
-        assert!(
-            refusal.to_string().contains("was changed after"),
-            "{refusal}"
-        );
+        assert!(refusal.to_string().contains("was changed after"), "{refusal}");
         let shelf = Shelf::open(home.path());
         assert!(shelf.kept.is_empty() && shelf.unreadable.len() == 1);
         // A bare document carries no checksum and is taken as it is.
         let bare = home.path().join("bare.json");
-        fs::write(
-            &bare,
-            serde_json::to_string(&Calibration::thesis()).unwrap(),
-        )
-        .unwrap();
+        fs::write(&bare, serde_json::to_string(&Calibration::thesis()).unwrap()).unwrap();
         assert_eq!(read_calibration(&bare).unwrap(), Calibration::thesis());
         fs::write(&bare, "{\"checksum\": 1}").unwrap();
-        assert!(matches!(
-            read_calibration(&bare),
-            Err(LibraryError::NotOne { .. })
-        ));
+        assert!(matches!(read_calibration(&bare), Err(LibraryError::NotOne { .. })));
     }
 
     #[test]
@@ -163,10 +135,7 @@ mod tests {
         assert!(matches!(shelf.find("z"), Err(LibraryError::Unknown { .. })));
         save(home.path(), &taken("a", "2026-03-06")).unwrap();
         let shelf = Shelf::open(home.path());
-        assert!(matches!(
-            shelf.find("a"),
-            Err(LibraryError::Ambiguous { .. })
-        ));
+        assert!(matches!(shelf.find("a"), Err(LibraryError::Ambiguous { .. })));
     }
 
     #[test]

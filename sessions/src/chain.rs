@@ -131,17 +131,10 @@ impl Head {
             Ok(_) => {}
             Err(err) if err.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(source) => {
-                return Err(ChainError::Io {
-                    what: "read",
-                    path,
-                    source,
-                });
+                return Err(ChainError::Io { what: "read", path, source });
             }
         }
-        let bad = |reason: String| ChainError::BadHead {
-            path: path.clone(),
-            reason,
-        };
+        let bad = |reason: String| ChainError::BadHead { path: path.clone(), reason };
         let file: HeadFile = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
         match file.head_version {
             HEAD_VERSION => Ok(file.head),
@@ -150,10 +143,7 @@ impl Head {
     }
 
     fn write(self, lines: &Path) -> io::Result<()> {
-        let file = HeadFile {
-            head_version: HEAD_VERSION,
-            head: self,
-        };
+        let file = HeadFile { head_version: HEAD_VERSION, head: self };
         let mut text = serde_json::to_vec(&file)?;
         text.push(b'\n');
         atomic::replace(&Self::file_of(lines), &text)
@@ -181,10 +171,7 @@ impl Chain {
     pub fn head(&self) -> Head {
         match self.bodies.len() {
             0 => Head::default(),
-            lines => Head {
-                lines: lines as u64,
-                checksum: self.last(),
-            },
+            lines => Head { lines: lines as u64, checksum: self.last() },
         }
     }
 
@@ -238,11 +225,7 @@ pub(crate) fn read_since(path: &Path, name: &str, since: Head) -> Result<Chain, 
     let chain = match std::fs::read(path) {
         Ok(bytes) => parse(path, name, &bytes),
         Err(err) if err.kind() == io::ErrorKind::NotFound => parse(path, name, &[]),
-        Err(source) => Err(ChainError::Io {
-            what: "read",
-            path: path.into(),
-            source,
-        }),
+        Err(source) => Err(ChainError::Io { what: "read", path: path.into(), source }),
     }?;
     chain.check(path, head)?;
     chain.check(path, since)?;
@@ -250,27 +233,18 @@ pub(crate) fn read_since(path: &Path, name: &str, since: Head) -> Result<Chain, 
 }
 
 fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
-    let whole = bytes
-        .iter()
-        .rposition(|byte| *byte == b'\n')
-        .map_or(0, |at| at + 1);
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
     let mut chain = Chain {
         bodies: Vec::new(),
         checksums: vec![crc32fast::hash(name.as_bytes())],
         whole,
         is_torn: whole < bytes.len(),
     };
-    for (index, line) in bytes[..whole]
-        .split_inclusive(|byte| *byte == b'\n')
-        .enumerate()
-    {
+    for (index, line) in bytes[..whole].split_inclusive(|byte| *byte == b'\n').enumerate() {
         let line = serde_json::from_slice::<Line>(line).ok();
         let line = line.filter(|line| line.checksum == checksum(chain.last(), &line.body));
         let Some(Line { body, checksum }) = line else {
-            return Err(ChainError::Changed {
-                path: path.into(),
-                line: index + 1,
-            });
+            return Err(ChainError::Changed { path: path.into(), line: index + 1 });
         };
         chain.checksums.push(checksum);
         chain.bodies.push(body);
@@ -281,22 +255,13 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
 /// Adds a line and sees it to the disk. What a crash left unfinished at the end is first moved to a file beside it,
 /// which is named like it with `.torn` behind.
 pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(), ChainError> {
-    let failed = |source| ChainError::Io {
-        what: "added to",
-        path: path.into(),
-        source,
-    };
+    let failed = |source| ChainError::Io { what: "added to", path: path.into(), source };
     let body = serde_json::to_value(body).map_err(|err| failed(err.into()))?;
     if let Some(folder) = path.parent() {
         create_folder(folder).map_err(failed)?;
     }
     let mut options = OpenOptions::new();
-    let mut file = options
-        .read(true)
-        .append(true)
-        .create(true)
-        .open(path)
-        .map_err(failed)?;
+    let mut file = options.read(true).append(true).create(true).open(path).map_err(failed)?;
     // Two programs that add at the same time: the second continues the line of the first.
     lock_soon(&file, path).map_err(|err| match err {
         NotLocked::Busy(busy) => busy.into(),
@@ -310,15 +275,9 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
         keep_torn(path, &bytes[chain.whole..]).map_err(failed)?;
         file.set_len(chain.whole as u64).map_err(failed)?;
     }
-    let line = Line {
-        checksum: checksum(chain.last(), &body),
-        body,
-    };
+    let line = Line { checksum: checksum(chain.last(), &body), body };
     write_line(&mut file, &line).map_err(failed)?;
-    let head = Head {
-        lines: chain.bodies.len() as u64 + 1,
-        checksum: line.checksum,
-    };
+    let head = Head { lines: chain.bodies.len() as u64 + 1, checksum: line.checksum };
     head.write(path).map_err(failed)?;
     if chain.bodies.is_empty() {
         sync_folder_of(path).map_err(failed)?;
@@ -329,10 +288,7 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
 /// Adds what was never finished to the file beside, a line for each time.
 fn keep_torn(path: &Path, torn: &[u8]) -> io::Result<()> {
     let mut options = OpenOptions::new();
-    let mut file = options
-        .append(true)
-        .create(true)
-        .open(named(path, ".torn"))?;
+    let mut file = options.append(true).create(true).open(named(path, ".torn"))?;
     file.write_all(torn)?;
     file.write_all(b"\n")?;
     file.sync_all()

@@ -6,12 +6,7 @@ use std::fs;
 
 fn three(path: &Path) {
     for (number, word) in [(1, "one"), (2, "two"), (3, "three")] {
-        append(
-            path,
-            "session",
-            &json!({"word": word, "depth": 0.1 * f64::from(number)}),
-        )
-        .unwrap();
+        append(path, "session", &json!({"word": word, "depth": 0.1 * f64::from(number)})).unwrap();
     }
 }
 
@@ -23,10 +18,7 @@ fn lines_come_back_and_every_change_is_noticed() {
     three(&path);
     let chain = read(&path, "session").unwrap();
     assert_eq!(chain.bodies.len(), 3);
-    assert_eq!(
-        chain.bodies[2],
-        json!({"word": "three", "depth": 0.1 * 3.0})
-    );
+    assert_eq!(chain.bodies[2], json!({"word": "three", "depth": 0.1 * 3.0}));
     assert!(!chain.is_torn);
     let text = fs::read_to_string(&path).unwrap();
     let lines: Vec<&str> = text.lines().collect();
@@ -42,10 +34,7 @@ fn lines_come_back_and_every_change_is_noticed() {
     ] {
         fs::write(&path, changed).unwrap();
         let refusal = read(&path, "session").unwrap_err().to_string();
-        assert!(
-            refusal.starts_with(&format!("line {line} of ")),
-            "{refusal}"
-        );
+        assert!(refusal.starts_with(&format!("line {line} of ")), "{refusal}");
         // Nothing is added to what was changed.
         assert!(append(&path, "session", &json!({})).is_err());
     }
@@ -76,10 +65,7 @@ fn lines_taken_off_the_end_are_noticed_wherever_the_head_is_known() {
         // Without the file only who remembers notices.
         fs::remove_file(&head_file).unwrap();
         assert_eq!(read(&path, "session").unwrap().bodies.len(), kept);
-        assert_eq!(
-            told(read_since(&path, "session", known)),
-            Some((kept as u64, 3))
-        );
+        assert_eq!(told(read_since(&path, "session", known)), Some((kept as u64, 3)));
         fs::write(&head_file, &head).unwrap();
     }
     fs::remove_file(&path).unwrap();
@@ -147,9 +133,7 @@ fn what_a_crash_left_unfinished_is_moved_away_and_kept() {
     let chain = read(&path, "session").unwrap();
     assert_eq!(chain.bodies[2], json!({"word": "four"}));
     let kept = fs::read(folder.path().join("lines.jsonl.torn")).unwrap();
-    let line = bytes[..bytes.len() - 1]
-        .rsplit(|byte| *byte == b'\n')
-        .next();
+    let line = bytes[..bytes.len() - 1].rsplit(|byte| *byte == b'\n').next();
     let torn = &line.unwrap()[..line.unwrap().len() - 8];
     assert_eq!(kept, [torn, b"\n"].concat());
     assert!(!chain.is_torn);

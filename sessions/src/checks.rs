@@ -48,10 +48,7 @@ impl DailyCheck {
 /// The file of a rig: its name, with what a file name cannot hold replaced and told apart by a checksum.
 fn file_of(library: &Path, rig: &str) -> PathBuf {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    let mut name: String = rig
-        .chars()
-        .map(|c| if is_plain(c) { c } else { '-' })
-        .collect();
+    let mut name: String = rig.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
     if name != rig {
         name += &format!("-{:08x}", crc32fast::hash(rig.as_bytes()));
     }
@@ -102,10 +99,7 @@ mod tests {
         let library = tempfile::tempdir().unwrap();
         let at = library.path();
         // Noon of the computer's own day, so that no time zone turns it into another one.
-        let noon = Local
-            .with_ymd_and_hms(2026, 3, 5, 12, 0, 0)
-            .unwrap()
-            .to_utc();
+        let noon = Local.with_ymd_and_hms(2026, 3, 5, 12, 0, 0).unwrap().to_utc();
         let hour = Duration::hours(1);
         for one in [
             check("sim:bench 2", noon - hour * 24, false),
@@ -122,22 +116,15 @@ mod tests {
         assert_eq!((last.at, last.is_passed), (noon, false));
         assert!(last.failures().contains("0.3 N"));
         assert!(last_of_day(&own, noon + hour * 24).is_none());
-        assert!(
-            last_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon)
-                .unwrap()
-                .is_passed
-        );
+        assert!(last_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon).unwrap().is_passed);
         assert_eq!(read_checks(at, "never").unwrap(), []);
         // A name never leads out of the folder.
         // Each with its head.
         assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 6);
         let file = file_of(at, "sim:bench 2");
         let text = std::fs::read_to_string(&file).unwrap();
-        std::fs::write(
-            &file,
-            text.replacen("\"is_passed\":false", "\"is_passed\":true", 1),
-        )
-        .unwrap();
+        std::fs::write(&file, text.replacen("\"is_passed\":false", "\"is_passed\":true", 1))
+            .unwrap();
         let refusal = read_checks(at, "sim:bench 2").unwrap_err().to_string();
         assert!(refusal.starts_with("line 1 of"), "{refusal}");
     }

@@ -33,10 +33,7 @@ impl Document for RigCompliance {
     }
 
     fn superseding(self, id: String) -> Self {
-        Self {
-            supersedes: Some(id),
-            ..self
-        }
+        Self { supersedes: Some(id), ..self }
     }
 
     fn check(&self) -> Result<(), String> {

@@ -228,11 +228,9 @@ impl Edits {
     #[must_use]
     pub fn contact(&self, number: u32) -> Option<(Position, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
-            Change::Contact {
-                number: own,
-                position_mm,
-                ..
-            } if own == number => Some((position_mm, edit)),
+            Change::Contact { number: own, position_mm, .. } if own == number => {
+                Some((position_mm, edit))
+            }
             _ => None,
         })
     }
@@ -302,26 +300,21 @@ fn check_tag(tag: &str) -> Result<(), EditError> {
     if is_word && tag.chars().count() <= TAG_MAX {
         return Ok(());
     }
-    Err(EditError::Tag {
-        tag: tag.to_owned(),
-    })
+    Err(EditError::Tag { tag: tag.to_owned() })
 }
 
 /// Adds an edit to a session folder whose recording has ended.
 pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
     match &edit.change {
         // A tag says by itself why it is there.
-        Change::Tags { add, remove } => add
-            .iter()
-            .chain(remove)
-            .try_for_each(|tag| check_tag(tag))?,
+        Change::Tags { add, remove } => {
+            add.iter().chain(remove).try_for_each(|tag| check_tag(tag))?
+        }
         _ if edit.reason.trim().is_empty() => return Err(EditError::NoReason),
         _ => {}
     }
     if !folder.is_dir() {
-        return Err(EditError::NotAFolder {
-            path: folder.into(),
-        });
+        return Err(EditError::NotAFolder { path: folder.into() });
     }
     let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
     Ok(chain::append(&folder.join(EDITS_FILE), session_id, edit)?)
@@ -367,20 +360,14 @@ mod tests {
         let read = Edits::read(at, "id").unwrap();
         assert_eq!(read.all, edits);
         let (worth, why) = read.verdict().unwrap();
-        assert_eq!(
-            (worth, why.reason.as_str()),
-            (Verdict::Rejected, "hair on the probe")
-        );
+        assert_eq!((worth, why.reason.as_str()), (Verdict::Rejected, "hair on the probe"));
         assert_eq!(read.contact(1).unwrap().0, Position(0.1 + 0.2));
         assert!(read.contact(2).is_none());
         let notes: Vec<&str> = read.notes().map(|one| one.reason.as_str()).collect();
         assert_eq!(notes, ["the gel was warm"]);
         // A segment belongs to the same session; a file of another name to none.
         assert_eq!(Edits::read(&at.join("001.mcap"), "id").unwrap(), read);
-        assert_eq!(
-            Edits::read(&at.join("alone.mcap"), "id").unwrap(),
-            Edits::default()
-        );
+        assert_eq!(Edits::read(&at.join("alone.mcap"), "id").unwrap(), Edits::default());
     }
 
     #[test]
@@ -388,10 +375,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect();
-        let tags = |add: &[&str], remove: &[&str]| Change::Tags {
-            add: words(add),
-            remove: words(remove),
-        };
+        let tags =
+            |add: &[&str], remove: &[&str]| Change::Tags { add: words(add), remove: words(remove) };
         add_edit(at, "id", &edit("", tags(&["pilot", "µ-gel"], &[]))).unwrap();
         add_edit(at, "id", &edit("", tags(&["good"], &["pilot", "none"]))).unwrap();
         let read = Edits::read(at, "id").unwrap();
@@ -404,39 +389,23 @@ mod tests {
 
     #[test]
     fn a_review_stands_until_something_it_saw_changes() {
-        let input = |what: &str, sha256: &str| Input {
-            what: what.into(),
-            sha256: sha256.into(),
-        };
+        let input = |what: &str, sha256: &str| Input { what: what.into(), sha256: sha256.into() };
         let seen = vec![input("000.mcap", "a"), input("analyses.jsonl", "b")];
         let decision = Decision::Accepted;
-        let review = Change::Review {
-            decision,
-            seen: seen.clone(),
-        };
+        let review = Change::Review { decision, seen: seen.clone() };
         let mut edits = Edits::default();
         assert_eq!(edits.review(&seen), None);
-        edits.all = vec![
-            edit("before", verdict(Verdict::Suspect)),
-            edit("I looked", review),
-        ];
+        edits.all = vec![edit("before", verdict(Verdict::Suspect)), edit("I looked", review)];
         let changed = |edits: &Edits, now: &[Input]| edits.review(now).unwrap().changed;
         assert!(changed(&edits, &seen).is_empty());
         assert!(changed(&edits, &seen[1..]).is_empty());
         assert_eq!(changed(&edits, &seen[..1]), ["analyses.jsonl"]);
         assert_eq!(changed(&edits, &[]), ["analyses.jsonl"]);
-        let other = [
-            input("000.mcap", "c"),
-            input("001.mcap", "d"),
-            seen[1].clone(),
-        ];
+        let other = [input("000.mcap", "c"), input("001.mcap", "d"), seen[1].clone()];
         assert_eq!(changed(&edits, &other), ["000.mcap", "001.mcap"]);
         let other = [input("001.mcap", "d"), seen[1].clone()];
         assert_eq!(changed(&edits, &other), ["001.mcap", "000.mcap"]);
-        let tags = Change::Tags {
-            add: vec!["good".into()],
-            remove: Vec::new(),
-        };
+        let tags = Change::Tags { add: vec!["good".into()], remove: Vec::new() };
         edits.all.push(edit("", tags));
         edits.all.push(edit("seen by two", Change::Note));
         assert!(changed(&edits, &seen).is_empty());
@@ -451,12 +420,7 @@ mod tests {
         let none = add_edit(at, "id", &edit(" ", verdict(Verdict::Valid))).unwrap_err();
         assert!(none.to_string().contains("needs a reason"));
         let no_folder = add_edit(&at.join("x"), "id", &edit("why", verdict(Verdict::Valid)));
-        assert!(
-            no_folder
-                .unwrap_err()
-                .to_string()
-                .contains("name the folder")
-        );
+        assert!(no_folder.unwrap_err().to_string().contains("name the folder"));
         let held = HolderLock::acquire(&at.join(LOCK_FILE)).unwrap();
         let busy = add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap_err();
         let id = std::process::id().to_string();

@@ -73,10 +73,7 @@ pub struct SessionFolder {
 impl SessionFolder {
     /// Makes the folder and its parents and locks it. Refuses a folder that holds anything.
     pub fn create(path: &Path) -> Result<Self, FolderError> {
-        let failed = |source| FolderError::Io {
-            path: path.into(),
-            source,
-        };
+        let failed = |source| FolderError::Io { path: path.into(), source };
         if path.exists() && !path.is_dir() {
             return Err(FolderError::NotAFolder { path: path.into() });
         }
@@ -92,10 +89,7 @@ impl SessionFolder {
         if holds_more_than_lock(path).map_err(failed)? {
             return Err(FolderError::NotEmpty { path: path.into() });
         }
-        Ok(Self {
-            path: path.into(),
-            _lock: lock,
-        })
+        Ok(Self { path: path.into(), _lock: lock })
     }
 
     /// The folder.
@@ -124,8 +118,7 @@ pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
 /// synchronised (fsync(2)).
 pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
     let path = std::path::absolute(path)?;
-    path.parent()
-        .map_or(Ok(()), |folder| fs::File::open(folder)?.sync_all())
+    path.parent().map_or(Ok(()), |folder| fs::File::open(folder)?.sync_all())
 }
 
 fn holds_more_than_lock(path: &Path) -> io::Result<bool> {
@@ -212,17 +205,11 @@ pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderErro
         .ancestors()
         .find(|one| !one.as_os_str().is_empty() && one.exists())
         .unwrap_or(Path::new("."));
-    let disk = rustix::fs::statvfs(existing).map_err(|errno| FolderError::Io {
-        path: existing.into(),
-        source: errno.into(),
-    })?;
+    let disk = rustix::fs::statvfs(existing)
+        .map_err(|errno| FolderError::Io { path: existing.into(), source: errno.into() })?;
     let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
     if free_bytes < needed_bytes.saturating_mul(2) {
-        return Err(FolderError::NoSpace {
-            path: existing.into(),
-            free_bytes,
-            needed_bytes,
-        });
+        return Err(FolderError::NoSpace { path: existing.into(), free_bytes, needed_bytes });
     }
     Ok(())
 }

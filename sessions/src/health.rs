@@ -113,11 +113,7 @@ impl HealthSummary {
                 Some(worst) => worst.worsen(state),
                 None => self.worst = Some(*state),
             },
-            Told::Anchor {
-                why: Why::Jump,
-                shift_s,
-                ..
-            } => {
+            Told::Anchor { why: Why::Jump, shift_s, .. } => {
                 self.clock_jumps += 1;
                 if shift_s.abs() > self.clock_jump_s.abs() {
                     self.clock_jump_s = *shift_s;
@@ -136,10 +132,7 @@ mod tests {
     use super::*;
 
     fn at(now: u64, told: Told) -> Health {
-        Health {
-            now: Nanos(now),
-            told,
-        }
+        Health { now: Nanos(now), told }
     }
 
     #[test]
@@ -160,11 +153,7 @@ mod tests {
         for told in [Told::State(state), anchor, event] {
             let one = at(7, told);
             let text = serde_json::to_string(&one).unwrap();
-            assert_eq!(
-                serde_json::from_str::<Health>(&text).unwrap(),
-                one,
-                "{text}"
-            );
+            assert_eq!(serde_json::from_str::<Health>(&text).unwrap(), one, "{text}");
         }
         let later: Health =
             serde_json::from_str(r#"{"now_ns":5,"kind":"temperature","kelvin":300}"#).unwrap();

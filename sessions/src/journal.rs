@@ -111,11 +111,7 @@ impl Journal {
 
     /// Appends one entry; when this returns it is on disk.
     pub fn push<T: Serialize>(&mut self, entry: &T) -> Result<(), JournalError> {
-        let failed = |source| JournalError::Io {
-            what: "written",
-            path: self.path.clone(),
-            source,
-        };
+        let failed = |source| JournalError::Io { what: "written", path: self.path.clone(), source };
         match self.is_plain {
             true => push_plain(&self.path, entry).map_err(failed),
             false => chain::append(&self.path, JOURNAL_FILE, entry).map_err(told),
@@ -153,25 +149,15 @@ fn push_plain(path: &Path, entry: &impl Serialize) -> io::Result<()> {
 
 fn told(err: ChainError) -> JournalError {
     match err {
-        ChainError::Changed { path, line } => JournalError::Line {
-            line,
-            reason: "it is not as it was written".into(),
-            path,
-        },
-        ChainError::Io { what, path, source } => JournalError::Io {
-            what: if what == "read" { what } else { "written" },
-            path,
-            source,
-        },
-        ChainError::Shortened {
-            path,
-            found,
-            written,
-        } => JournalError::Shortened {
-            found,
-            written,
-            path,
-        },
+        ChainError::Changed { path, line } => {
+            JournalError::Line { line, reason: "it is not as it was written".into(), path }
+        }
+        ChainError::Io { what, path, source } => {
+            JournalError::Io { what: if what == "read" { what } else { "written" }, path, source }
+        }
+        ChainError::Shortened { path, found, written } => {
+            JournalError::Shortened { found, written, path }
+        }
         other => JournalError::Chain(other),
     }
 }
@@ -219,14 +205,7 @@ mod tests {
         let two: Vec<&str> = text.split_inclusive('\n').take(2).collect();
         fs::write(&path, two.concat()).unwrap();
         let refused = Journal::open::<u32>(folder.path());
-        assert!(matches!(
-            refused,
-            Err(JournalError::Shortened {
-                found: 2,
-                written: 3,
-                ..
-            })
-        ));
+        assert!(matches!(refused, Err(JournalError::Shortened { found: 2, written: 3, .. })));
         assert!(journal.push(&4).is_err());
     }
 
@@ -241,10 +220,7 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("22", "23", 1)).unwrap();
         let refusal = Journal::open::<u32>(folder.path()).unwrap_err();
-        assert!(
-            matches!(refusal, JournalError::Line { line: 2, .. }),
-            "{refusal:?}"
-        );
+        assert!(matches!(refusal, JournalError::Line { line: 2, .. }), "{refusal:?}");
         assert!(journal.push(&4).is_err());
     }
 
@@ -253,9 +229,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(JOURNAL_FILE), "1\nx\n3\n").unwrap();
         let refusal = Journal::open::<u32>(folder.path()).unwrap_err();
-        assert!(
-            matches!(refusal, JournalError::Line { line: 2, .. }),
-            "{refusal:?}"
-        );
+        assert!(matches!(refusal, JournalError::Line { line: 2, .. }), "{refusal:?}");
     }
 }

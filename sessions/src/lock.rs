@@ -58,17 +58,12 @@ pub struct Busy {
 
 impl Busy {
     pub(crate) fn of(path: &Path) -> Self {
-        Self {
-            path: path.into(),
-            holder: holder_of(path),
-        }
+        Self { path: path.into(), holder: holder_of(path) }
     }
 }
 
 pub(crate) fn named(holder: Option<u32>) -> String {
-    holder.map_or("another program".into(), |number| {
-        format!("process {number}")
-    })
+    holder.map_or("another program".into(), |number| format!("process {number}"))
 }
 
 /// Why a file was not locked.
@@ -93,10 +88,7 @@ pub(crate) fn lock_soon(file: &File, path: &Path) -> Result<(), NotLocked> {
 /// Who holds a lock on a file, whichever of the two kinds there are (proc(5), `/proc/locks`).
 pub(crate) fn holder_of(path: &Path) -> Option<u32> {
     let facts = std::fs::metadata(path).ok()?;
-    let (major, minor) = (
-        rustix::fs::major(facts.dev()),
-        rustix::fs::minor(facts.dev()),
-    );
+    let (major, minor) = (rustix::fs::major(facts.dev()), rustix::fs::minor(facts.dev()));
     let file = format!("{major:02x}:{minor:02x}:{}", facts.ino());
     let locks = std::fs::read_to_string("/proc/locks").ok()?;
     let of_line = |line: &str| {
@@ -131,10 +123,7 @@ impl HolderLock {
     /// Takes the lock at `path`, making the file and its folder if needed, and writes our process
     /// number in it.
     pub fn acquire(path: &Path) -> Result<Self, LockError> {
-        let failed = |source| LockError::Io {
-            path: path.into(),
-            source,
-        };
+        let failed = |source| LockError::Io { path: path.into(), source };
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(failed)?;
         }
@@ -149,10 +138,7 @@ impl HolderLock {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
-                return Err(LockError::Held {
-                    path: path.into(),
-                    holder: read_holder(&file),
-                });
+                return Err(LockError::Held { path: path.into(), holder: read_holder(&file) });
             }
             Err(TryLockError::Error(source)) => return Err(failed(source)),
         }
@@ -161,10 +147,7 @@ impl HolderLock {
             .and_then(|()| file.seek(SeekFrom::Start(0)))
             .and_then(|_| file.write_all(text.as_bytes()))
             .map_err(failed)?;
-        Ok(Self {
-            file,
-            path: path.into(),
-        })
+        Ok(Self { file, path: path.into() })
     }
 
     /// As [`acquire`](Self::acquire), for work that is done in a moment: whoever else does such work is waited for,
@@ -189,16 +172,9 @@ fn read_holder(file: &File) -> String {
     let mut bytes = Vec::new();
     // A process number has at most 10 digits.
     let has_read = file.take(16).read_to_end(&mut bytes).is_ok();
-    let digits: String = bytes
-        .iter()
-        .map(|&byte| char::from(byte))
-        .take_while(char::is_ascii_digit)
-        .collect();
-    if has_read && !digits.is_empty() {
-        digits
-    } else {
-        "unknown".into()
-    }
+    let digits: String =
+        bytes.iter().map(|&byte| char::from(byte)).take_while(char::is_ascii_digit).collect();
+    if has_read && !digits.is_empty() { digits } else { "unknown".into() }
 }
 
 #[cfg(test)]
@@ -212,10 +188,7 @@ mod tests {
         let path = folder.path().join("lock");
         let held = HolderLock::acquire(&path).unwrap();
         let of_a_child = held.file.try_clone().unwrap();
-        assert!(matches!(
-            HolderLock::acquire(&path),
-            Err(LockError::Held { .. })
-        ));
+        assert!(matches!(HolderLock::acquire(&path), Err(LockError::Held { .. })));
         drop(held);
         HolderLock::acquire(&path).unwrap();
         drop(of_a_child);

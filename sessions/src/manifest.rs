@@ -72,9 +72,7 @@ impl Manifest {
     /// Length of one tick of the samples.
     #[must_use]
     pub fn tick(&self) -> Seconds {
-        self.rig
-            .as_ref()
-            .map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
+        self.rig.as_ref().map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
     }
 
     /// The length of so many ticks. Of an imported session it is the float that the file's decimal number is.
@@ -118,11 +116,7 @@ mod tests {
     fn session_ids_sort_by_time_and_do_not_repeat() {
         let first = Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap();
         let second = Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 8).unwrap();
-        let ids = [
-            new_session_id(first),
-            new_session_id(first),
-            new_session_id(second),
-        ];
+        let ids = [new_session_id(first), new_session_id(first), new_session_id(second)];
         assert!(ids[0].starts_with("20260305T141507Z-"), "{}", ids[0]);
         assert_eq!(ids[0].len(), "20260305T141507Z-".len() + 8);
         assert_ne!(ids[0], ids[1]);

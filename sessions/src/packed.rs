@@ -23,9 +23,7 @@ pub(crate) fn next_field<'a>(bytes: &mut &'a [u8]) -> Result<(u32, Field<'a>), S
         2 => {
             let length = varint(bytes)?;
             let length = usize::try_from(length).unwrap_or(usize::MAX);
-            let (head, tail) = bytes
-                .split_at_checked(length)
-                .ok_or("an array is cut short")?;
+            let (head, tail) = bytes.split_at_checked(length).ok_or("an array is cut short")?;
             *bytes = tail;
             Field::Bytes(head)
         }

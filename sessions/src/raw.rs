@@ -128,11 +128,7 @@ impl<'a> RawBlock<'a> {
             // Checked when the block was read.
             let (bytes, tail) = rest.split_at(*length as usize);
             rest = tail;
-            RawPiece {
-                at: Nanos(*at as u64),
-                is_sent: *is_sent,
-                bytes,
-            }
+            RawPiece { at: Nanos(*at as u64), is_sent: *is_sent, bytes }
         })
     }
 
@@ -184,9 +180,7 @@ impl<'a> RawBlock<'a> {
         let total: u64 = self.length.iter().map(|length| u64::from(*length)).sum();
         if total != self.data.len() as u64 {
             let held = self.data.len();
-            return Err(format!(
-                "a block of raw bytes holds {held} bytes, its pieces {total}"
-            ));
+            return Err(format!("a block of raw bytes holds {held} bytes, its pieces {total}"));
         }
         let mut sum = 0i64;
         for at in &mut self.at_ns {
@@ -216,12 +210,7 @@ mod tests {
     use prost::Message;
 
     fn piece(at: u64, device: &str, is_sent: bool, bytes: &[u8]) -> RawBytes {
-        RawBytes {
-            at: Nanos(at),
-            device: device.into(),
-            is_sent,
-            bytes: bytes.into(),
-        }
+        RawBytes { at: Nanos(at), device: device.into(), is_sent, bytes: bytes.into() }
     }
 
     #[test]
@@ -252,14 +241,10 @@ mod tests {
             let stream = |pieces: &[RawBytes], is_sent: bool| -> Vec<(u64, u8)> {
                 let own = pieces.iter().filter(|one| &*one.device == device);
                 let own = own.filter(|one| one.is_sent == is_sent);
-                own.flat_map(|one| one.bytes.iter().map(|byte| (one.at.0, *byte)))
-                    .collect()
+                own.flat_map(|one| one.bytes.iter().map(|byte| (one.at.0, *byte))).collect()
             };
             for is_sent in [false, true] {
-                assert!(
-                    stream(&back, is_sent) == stream(&pieces, is_sent),
-                    "{device}"
-                );
+                assert!(stream(&back, is_sent) == stream(&pieces, is_sent), "{device}");
             }
         }
     }

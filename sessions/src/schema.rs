@@ -160,10 +160,7 @@ impl Channel {
             ],
             Self::Manifest | Self::Rewrite => &[],
         };
-        units
-            .iter()
-            .map(|(field, unit)| (format!("unit.{field}"), (*unit).to_owned()))
-            .collect()
+        units.iter().map(|(field, unit)| (format!("unit.{field}"), (*unit).to_owned())).collect()
     }
 }
 
@@ -254,11 +251,8 @@ fn descriptor_set_with(
     fields: &[Field],
     may_be_absent: impl Fn(&str) -> bool,
 ) -> Vec<u8> {
-    let absent: Vec<&str> = fields
-        .iter()
-        .map(|(name, ..)| *name)
-        .filter(|name| may_be_absent(name))
-        .collect();
+    let absent: Vec<&str> =
+        fields.iter().map(|(name, ..)| *name).filter(|name| may_be_absent(name)).collect();
     let oneof_of = |name: &str| absent.iter().position(|one| *one == name);
     let field = |&(name, number, label, kind): &Field| FieldDescriptorProto {
         name: Some(name.into()),
@@ -357,10 +351,7 @@ mod tests {
             phase: vec![1],
             cycle: vec![1],
         };
-        assert_eq!(
-            wire_fields(&derived.encode_to_vec()),
-            promised(DERIVED_FIELDS)
-        );
+        assert_eq!(wire_fields(&derived.encode_to_vec()), promised(DERIVED_FIELDS));
         let raw = RawMessage {
             first_byte: 1,
             device: "a".into(),

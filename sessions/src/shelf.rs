@@ -164,10 +164,7 @@ pub struct Shelf<D> {
 
 impl<D> Default for Shelf<D> {
     fn default() -> Self {
-        Self {
-            kept: Vec::new(),
-            unreadable: Vec::new(),
-        }
+        Self { kept: Vec::new(), unreadable: Vec::new() }
     }
 }
 
@@ -179,11 +176,7 @@ impl<D: Document> Shelf<D> {
         for path in json_files(&library.join(D::FOLDER)) {
             match read(&path) {
                 Ok(document) => shelf.kept.push(Kept {
-                    id: path
-                        .file_stem()
-                        .unwrap_or_default()
-                        .to_string_lossy()
-                        .into(),
+                    id: path.file_stem().unwrap_or_default().to_string_lossy().into(),
                     path,
                     document,
                 }),
@@ -214,9 +207,7 @@ impl<D: Document> Shelf<D> {
             return Ok(exact);
         }
         let named = self.kept.iter().filter(|one| one.document.name() == name);
-        let open: Vec<&Kept<D>> = named
-            .filter(|one| self.successor(&one.id).is_none())
-            .collect();
+        let open: Vec<&Kept<D>> = named.filter(|one| self.successor(&one.id).is_none()).collect();
         match open.as_slice() {
             [one] => Ok(one),
             [] => Err(LibraryError::Unknown {
@@ -243,10 +234,8 @@ fn checksum(document: &Value) -> serde_json::Result<u32> {
 /// When a document was taken.
 pub fn taken_at<D: Document>(document: &D) -> Result<Option<DateTime<FixedOffset>>, LibraryError> {
     let parse = |text: &str| {
-        DateTime::parse_from_rfc3339(text).map_err(|_| LibraryError::Date {
-            kind: D::KIND,
-            date: text.to_owned(),
-        })
+        DateTime::parse_from_rfc3339(text)
+            .map_err(|_| LibraryError::Date { kind: D::KIND, date: text.to_owned() })
     };
     document.taken_at().map(parse).transpose()
 }
@@ -267,17 +256,10 @@ pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, Librar
     let as_io = |err: serde_json::Error| io::Error::from(err);
     let failed = |path: &Path| {
         let path = path.to_owned();
-        move |source| LibraryError::Io {
-            kind: D::KIND,
-            what: "stored",
-            path,
-            source,
-        }
+        move |source| LibraryError::Io { kind: D::KIND, what: "stored", path, source }
     };
     let folder = library.join(D::FOLDER);
-    let value = serde_json::to_value(document)
-        .map_err(as_io)
-        .map_err(failed(&folder))?;
+    let value = serde_json::to_value(document).map_err(as_io).map_err(failed(&folder))?;
     let checksum = checksum(&value).map_err(as_io).map_err(failed(&folder))?;
     let id = format!("{day}-{}-{checksum:08x}", slug(document.name()));
     let path = folder.join(format!("{id}.json"));
@@ -285,23 +267,15 @@ pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, Librar
         return Err(LibraryError::AlreadyThere { kind: D::KIND, id });
     }
     fs::create_dir_all(&folder).map_err(failed(&folder))?;
-    let file = Map::from_iter([
-        ("checksum".to_owned(), checksum.into()),
-        (D::KIND.to_owned(), value),
-    ]);
-    let text = serde_json::to_vec_pretty(&file)
-        .map_err(as_io)
-        .map_err(failed(&path))?;
+    let file =
+        Map::from_iter([("checksum".to_owned(), checksum.into()), (D::KIND.to_owned(), value)]);
+    let text = serde_json::to_vec_pretty(&file).map_err(as_io).map_err(failed(&path))?;
     match atomic::create(&path, &text) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {
             Err(LibraryError::AlreadyThere { kind: D::KIND, id })
         }
         Err(err) => Err(failed(&path)(err)),
-        Ok(()) => Ok(Kept {
-            id,
-            path,
-            document: document.clone(),
-        }),
+        Ok(()) => Ok(Kept { id, path, document: document.clone() }),
     }
 }
 
@@ -310,10 +284,7 @@ pub fn supersede<D: Document>(library: &Path, old: &str, new: &D) -> Result<Kept
     let shelf = Shelf::<D>::open(library);
     let old = shelf.find(old)?;
     if let Some(by) = shelf.successor(&old.id) {
-        return Err(LibraryError::Superseded {
-            id: old.id.clone(),
-            by: by.to_owned(),
-        });
+        return Err(LibraryError::Superseded { id: old.id.clone(), by: by.to_owned() });
     }
     save(library, &new.clone().superseding(old.id.clone()))
 }
@@ -334,10 +305,7 @@ pub fn read<D: Document>(path: &Path) -> Result<D, LibraryError> {
     let mut value: Value = serde_json::from_str(&text).map_err(not_one)?;
     if let Some(written) = value.get("checksum").cloned() {
         let Some(inner) = value.get_mut(D::KIND).map(Value::take) else {
-            return Err(not_one(serde_json::Error::custom(format!(
-                "it has no field {}",
-                D::KIND
-            ))));
+            return Err(not_one(serde_json::Error::custom(format!("it has no field {}", D::KIND))));
         };
         if written != checksum(&inner).map_err(not_one)? {
             return Err(LibraryError::Changed {
@@ -355,10 +323,7 @@ pub fn read<D: Document>(path: &Path) -> Result<D, LibraryError> {
 
 fn check<D: Document>(document: &D, what: &str) -> Result<(), LibraryError> {
     taken_at(document)?;
-    document.check().map_err(|reason| LibraryError::Unsound {
-        what: what.to_owned(),
-        reason,
-    })
+    document.check().map_err(|reason| LibraryError::Unsound { what: what.to_owned(), reason })
 }
 
 /// A name as part of a file's: small letters, digits and single dashes.
@@ -370,9 +335,5 @@ fn slug(name: &str) -> String {
     let slug = words.collect::<Vec<_>>().join("-");
     // File names have an end; 40 letters tell one document from another.
     let short: String = slug.chars().take(40).collect();
-    if short.is_empty() {
-        "unnamed".into()
-    } else {
-        short
-    }
+    if short.is_empty() { "unnamed".into() } else { short }
 }

@@ -63,10 +63,7 @@ impl<const W: usize, const R: usize> Row<W, R> {
 
     fn of(line: &str) -> Option<Self> {
         let mut cells = line.split(',');
-        let mut row = Self {
-            whole: [0; W],
-            real: [0.0; R],
-        };
+        let mut row = Self { whole: [0; W], real: [0.0; R] };
         for value in &mut row.whole {
             *value = cells.next()?.parse().ok()?;
         }
@@ -146,12 +143,7 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
             .name("tick-writer".into())
             .spawn(move || write(lines, &rows))
             .map_err(told)?;
-        Ok(Self {
-            ring,
-            lost: Arc::new(AtomicU64::new(0)),
-            thread,
-            file,
-        })
+        Ok(Self { ring, lost: Arc::new(AtomicU64::new(0)), thread, file })
     }
 
     /// Hands over a tick; where there is no room it is lost, and counted.
@@ -163,26 +155,17 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
 
     /// Writes what is still to be written, and the end with a hash of what the loop left.
     pub fn finish(self, left: u64) -> Result<Recorded, String> {
-        let Self {
-            ring,
-            lost,
-            thread,
-            file,
-        } = self;
+        let Self { ring, lost, thread, file } = self;
         drop(ring);
         let lost = lost.load(Ordering::Relaxed);
-        let written = thread
-            .join()
-            .unwrap_or_else(|_| Err(io::Error::other("the writing thread failed")));
+        let written =
+            thread.join().unwrap_or_else(|_| Err(io::Error::other("the writing thread failed")));
         let ended = written.and_then(|mut lines| {
             let end = format!("end,{},{lost},{left:016x},", lines.ticks);
             let hash = hashed(lines.hash, end.as_bytes());
             lines.put(&format!("{end}{hash:016x}\n"))?;
             lines.to.flush()?;
-            Ok(Recorded {
-                ticks: lines.ticks,
-                lost,
-            })
+            Ok(Recorded { ticks: lines.ticks, lost })
         });
         ended.map_err(|err| {
             format!(
@@ -296,20 +279,12 @@ impl<const W: usize, const R: usize> Recording<W, R> {
                 if lines.next().is_some() {
                     return Err(damaged(number + 1, "something follows the end"));
                 }
-                return Ok(Self {
-                    settings,
-                    rows,
-                    end,
-                });
+                return Ok(Self { settings, rows, end });
             }
             hash = hashed(hash, line.as_bytes());
             rows.push(Row::of(content).ok_or_else(|| damaged(number, "this is no tick"))?);
         }
-        Ok(Self {
-            settings,
-            rows,
-            end: End::CutOff,
-        })
+        Ok(Self { settings, rows, end: End::CutOff })
     }
 }
 
@@ -332,10 +307,7 @@ mod tests {
     const COLUMNS: ([&str; 1], [&str; 2]) = (["tick"], ["x", "y"]);
 
     fn row(tick: u64, x: f64) -> Row<1, 2> {
-        Row {
-            whole: [tick],
-            real: [x, -1.0 / x],
-        }
+        Row { whole: [tick], real: [x, -1.0 / x] }
     }
 
     fn recorded(at: &Path, values: &[f64]) -> Recorded {
@@ -382,10 +354,7 @@ mod tests {
         for (from, to) in [("0.2", "0.4"), ("end,3", "end,2"), ("end,3,0,", "end,3,1,")] {
             std::fs::write(&file, whole.replacen(from, to, 1)).unwrap();
             let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
-            assert!(
-                said.contains("line 5") && said.contains("damaged"),
-                "{said}"
-            );
+            assert!(said.contains("line 5") && said.contains("damaged"), "{said}");
         }
         std::fs::write(&file, format!("{whole}3,0.4,-2.5")).unwrap();
         let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
@@ -400,11 +369,8 @@ mod tests {
         let (ring, rows) = sync_channel(ROOM);
         let at = tempfile::tempdir().unwrap();
         let file = at.path().join(TICKS);
-        let lines = Lines {
-            to: BufWriter::new(File::create_new(&file).unwrap()),
-            hash: BASIS,
-            ticks: 0,
-        };
+        let lines =
+            Lines { to: BufWriter::new(File::create_new(&file).unwrap()), hash: BASIS, ticks: 0 };
         let (go, gone) = sync_channel::<()>(1);
         let thread = std::thread::Builder::new()
             .spawn(move || {
@@ -412,12 +378,7 @@ mod tests {
                 write::<1, 2>(lines, &rows)
             })
             .unwrap();
-        let recorder = Recorder {
-            ring,
-            lost: Arc::default(),
-            thread,
-            file,
-        };
+        let recorder = Recorder { ring, lost: Arc::default(), thread, file };
         for tick in 0..ROOM as u64 + 10 {
             recorder.push(row(tick, 1.0));
         }

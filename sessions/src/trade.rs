@@ -99,16 +99,9 @@ pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, Trad
         true => quick_trade_file(library, &curves.machine),
         false => trade_file(library, &curves.machine),
     };
-    let failed = |source| TradeFileError::Io {
-        what: "stored",
-        path: path.clone(),
-        source,
-    };
+    let failed = |source| TradeFileError::Io { what: "stored", path: path.clone(), source };
     fs::create_dir_all(folder(library)).map_err(failed)?;
-    let stored = Stored {
-        checksum: checksum(curves).map_err(failed)?,
-        curves: curves.clone(),
-    };
+    let stored = Stored { checksum: checksum(curves).map_err(failed)?, curves: curves.clone() };
     let text = serde_json::to_vec_pretty(&stored).map_err(|err| failed(err.into()))?;
     atomic::replace(&path, &text).map_err(failed)?;
     Ok(path)
@@ -116,19 +109,12 @@ pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, Trad
 
 /// Reads curves and checks that they are what was written and can have been measured.
 pub fn read_trade(path: &Path) -> Result<TradeCurves, TradeFileError> {
-    let failed = |source| TradeFileError::Io {
-        what: "read",
-        path: path.into(),
-        source,
-    };
+    let failed = |source| TradeFileError::Io { what: "read", path: path.into(), source };
     let none = |err: serde_json::Error| TradeFileError::NotCurves {
         path: path.into(),
         reason: err.to_string(),
     };
-    let impossible = |source| TradeFileError::Curves {
-        path: path.into(),
-        source,
-    };
+    let impossible = |source| TradeFileError::Curves { path: path.into(), source };
     let text = fs::read_to_string(path).map_err(failed)?;
     let any: AnyStored = serde_json::from_str(&text).map_err(none)?;
     if any.curves.format != TRADE_FORMAT {

@@ -18,9 +18,7 @@ const TIMES: usize = 5;
 fn heading(window: &Window) -> Option<String> {
     let found = window.query_all_by_label_contains("found in").next()?;
     let node = found.accesskit_node();
-    node.value()
-        .or_else(|| node.label())
-        .map(|text| text.to_owned())
+    node.value().or_else(|| node.label()).map(|text| text.to_owned())
 }
 
 /// Draws until the heading tells of so many sessions; tells the time since `watch` began in ms, and the heading.
@@ -45,14 +43,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{count} sessions written: {:.1} s", watch.seconds());
     let mut flow = Flow::open_in(folder, TimeScale::Max);
     let watch = Stopwatch::start();
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     let all = format!("{count} sessions");
     let (ms, _) = until(&mut flow, &all, &watch);
-    println!(
-        "opened, all of them read for the first time: {:.2} s",
-        ms / 1e3
-    );
+    println!("opened, all of them read for the first time: {:.2} s", ms / 1e3);
     let with = |is_so: &dyn Fn(usize) -> bool| (0..count).filter(|&number| is_so(number)).count();
     for (line, found) in [
         ("pig fund ada", with(&|number| number % 4 == 0)),

@@ -73,14 +73,10 @@ fn put<S: palpate_sessions::Sink>(
 ) -> Result<(), palpate_sessions::LogError> {
     match part {
         Part::Samples(block) => log.append(&block.rows().collect::<Vec<Row>>(), &[]),
-        Part::Raw(block) => log.append_parts(&Parts {
-            raw: &pieces(block),
-            ..Parts::default()
-        }),
-        Part::Health(health) => log.append_parts(&Parts {
-            health: std::slice::from_ref(health),
-            ..Parts::default()
-        }),
+        Part::Raw(block) => log.append_parts(&Parts { raw: &pieces(block), ..Parts::default() }),
+        Part::Health(health) => {
+            log.append_parts(&Parts { health: std::slice::from_ref(health), ..Parts::default() })
+        }
     }
 }
 
@@ -97,11 +93,7 @@ fn pieces(block: &RawBlock<'_>) -> Vec<RawBytes> {
 /// Time in ns, device, whether it was sent, the bytes in hexadecimal.
 fn print(block: &RawBlock<'_>) {
     for piece in block.pieces() {
-        let hex: String = piece
-            .bytes
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let hex: String = piece.bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         println!("{} {} {} {hex}", piece.at.0, block.device(), piece.is_sent);
     }
 }

@@ -63,10 +63,7 @@ impl Flow {
     /// The same with a folder for sessions that may hold some.
     #[must_use]
     pub fn open_in(folder: TempDir, scale: TimeScale) -> Self {
-        let settings = SimSettings {
-            seed: 7,
-            ..SimSettings::default()
-        };
+        let settings = SimSettings { seed: 7, ..SimSettings::default() };
         let options = WindowOptions::open("sim", &settings, scale).unwrap();
         Self::open_on(options, folder)
     }
@@ -79,9 +76,7 @@ impl Flow {
             .with_size((1280.0, 800.0))
             .build_eframe(|cc| WorkbenchApp::new(options, &cc.egui_ctx).unwrap());
         let mut flow = Self { window, folder };
-        flow.wait("the first sample", |window| {
-            window.state().snapshot().rig.reading.is_some()
-        });
+        flow.wait("the first sample", |window| window.state().snapshot().rig.reading.is_some());
         flow
     }
 
@@ -100,9 +95,7 @@ impl Flow {
 
     /// Draws frames until a label has these words, and some more.
     pub fn wait_for_words(&mut self, words: &str) {
-        self.wait(words, |window| {
-            window.query_all_by_label_contains(words).next().is_some()
-        });
+        self.wait(words, |window| window.query_all_by_label_contains(words).next().is_some());
         self.window.run_steps(2);
     }
 
@@ -123,11 +116,7 @@ impl Flow {
             let run = window.state().snapshot().run.as_ref();
             run.is_some_and(|run| is_there(run) || is_stopped(run))
         });
-        assert!(
-            self.run().is_some_and(|run| is_there(&run)),
-            "{}",
-            self.story()
-        );
+        assert!(self.run().is_some_and(|run| is_there(&run)), "{}", self.story());
     }
 
     /// The run on the screen.
@@ -140,9 +129,7 @@ impl Flow {
     pub fn type_into(&mut self, name: &str, text: &str) {
         self.window.get_by_label(name).focus();
         self.window.step();
-        self.window
-            .get_by_label(name)
-            .set_text_value_accesskit(text);
+        self.window.get_by_label(name).set_text_value_accesskit(text);
         self.window.run_steps(2);
     }
 
@@ -156,20 +143,13 @@ impl Flow {
     /// Whether a named control can be pressed.
     #[must_use]
     pub fn is_enabled(&self, name: &str) -> bool {
-        !self
-            .window
-            .get_by_label(name)
-            .accesskit_node()
-            .is_disabled()
+        !self.window.get_by_label(name).accesskit_node().is_disabled()
     }
 
     /// Whether any label has these words.
     #[must_use]
     pub fn says(&self, words: &str) -> bool {
-        self.window
-            .query_all_by_label_contains(words)
-            .next()
-            .is_some()
+        self.window.query_all_by_label_contains(words).next().is_some()
     }
 
     /// Sessions written.

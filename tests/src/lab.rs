@@ -68,16 +68,9 @@ impl<R: Rig> Lab<R> {
     /// A rig with a plan that has not started.
     #[must_use]
     pub fn new(rig: R, curve: Curve, plan: Plan) -> Self {
-        let limits = plan
-            .limits
-            .tighten(Limits::for_travel(rig.description().travel));
-        let config = Config {
-            rig: rig.description().clone(),
-            limits,
-            curve,
-            plan,
-            is_homed: false,
-        };
+        let limits = plan.limits.tighten(Limits::for_travel(rig.description().travel));
+        let config =
+            Config { rig: rig.description().clone(), limits, curve, plan, is_homed: false };
         Self {
             rig,
             state: Some(State::new(Arc::new(config))),
@@ -211,14 +204,8 @@ impl<R: Rig> Lab<R> {
     /// The first and the last sample of a step, if it had any.
     #[must_use]
     pub fn ticks_of(&self, step_index: usize) -> Option<(u64, u64)> {
-        let mut own = self
-            .seen
-            .iter()
-            .filter(|seen| seen.step_index == step_index);
+        let mut own = self.seen.iter().filter(|seen| seen.step_index == step_index);
         let first = own.next()?.reading.tick;
-        Some((
-            first,
-            own.next_back().map_or(first, |seen| seen.reading.tick),
-        ))
+        Some((first, own.next_back().map_or(first, |seen| seen.reading.tick)))
     }
 }

@@ -18,15 +18,9 @@ use std::path::{Path, PathBuf};
 /// If there is no such protocol, or it does not take these values.
 #[must_use]
 pub fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
-    let values = values
-        .iter()
-        .map(|(key, value)| ((*key).into(), (*value).into()));
-    let protocol = built_in(name)
-        .expect("a sound protocol")
-        .expect("a built-in protocol");
-    protocol
-        .plan(&values.collect::<BTreeMap<String, String>>())
-        .expect("values that it takes")
+    let values = values.iter().map(|(key, value)| ((*key).into(), (*value).into()));
+    let protocol = built_in(name).expect("a sound protocol").expect("a built-in protocol");
+    protocol.plan(&values.collect::<BTreeMap<String, String>>()).expect("values that it takes")
 }
 
 /// The root of the source tree.
@@ -44,11 +38,7 @@ pub fn workspace() -> PathBuf {
 pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     gather(folder, extension, &mut files);
-    assert!(
-        !files.is_empty(),
-        "no .{extension} below {}",
-        folder.display()
-    );
+    assert!(!files.is_empty(), "no .{extension} below {}", folder.display());
     files.sort();
     files
 }

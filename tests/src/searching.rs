@@ -154,12 +154,8 @@ pub fn bound_mm(body: &ModifiedKelvin, depths_mm: [f64; 2], speed: MmPerS, noise
             let depth = Depth(from + speed.0 * t + by);
             forces[k] = states[k].step(body, depth, Seconds(dt)).0;
         }
-        let row = [
-            (forces[1] - forces[2]) / (2.0 * shift),
-            forces[0],
-            1.0,
-            t / (count as f64 * dt),
-        ];
+        let row =
+            [(forces[1] - forces[2]) / (2.0 * shift), forces[0], 1.0, t / (count as f64 * dt)];
         for (i, a) in row.iter().enumerate() {
             for (j, b) in row.iter().enumerate() {
                 information[i][j] += a * b / noise.0.powi(2);
@@ -176,9 +172,7 @@ fn first_of_inverse(mut matrix: [[f64; 4]; 4]) -> f64 {
         let pivot = matrix[k];
         for row in matrix.iter_mut().take(k) {
             let factor = row[k] / pivot[k];
-            row.iter_mut()
-                .zip(pivot)
-                .for_each(|(entry, top)| *entry -= factor * top);
+            row.iter_mut().zip(pivot).for_each(|(entry, top)| *entry -= factor * top);
         }
     }
     1.0 / matrix[0][0]

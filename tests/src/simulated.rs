@@ -36,22 +36,14 @@ pub fn run(settings: SimSettings, params: RampHold) -> Run {
     let config = Config {
         rig: rig.description().clone(),
         limits: Limits::for_travel(rig.description().travel),
-        curve: rig
-            .calibration()
-            .curve()
-            .expect("the rig's calibration is sound"),
+        curve: rig.calibration().curve().expect("the rig's calibration is sound"),
         plan: params.plan(),
         is_homed: false,
     };
     let mut state = State::new(Arc::new(config));
     let (mut records, mut samples) = (Vec::new(), Vec::new());
     let (mut force_peak, mut hold_ticks, mut first_tick) = (0.0f64, 0, None);
-    let mut next = (
-        Nanos::ZERO,
-        Input::Operator {
-            choice: Operator::Start,
-        },
-    );
+    let mut next = (Nanos::ZERO, Input::Operator { choice: Operator::Start });
     let end = Nanos::from_seconds(Seconds(600.0));
     let tick_secs = rig.description().tick().0;
     while state.outcome().is_none() && state.holding().is_none() {
@@ -76,12 +68,7 @@ pub fn run(settings: SimSettings, params: RampHold) -> Run {
         {
             let first = *first_tick.get_or_insert(tick);
             let t = Seconds((tick - first) as f64 * tick_secs);
-            samples.push(FitSample {
-                t,
-                depth,
-                force,
-                sigma,
-            });
+            samples.push(FitSample { t, depth, force, sigma });
             hold_ticks += u64::from(state.phase() == Phase::Hold);
         }
         let event = rig.next_event(end).expect("the run takes too long");
@@ -95,12 +82,5 @@ pub fn run(settings: SimSettings, params: RampHold) -> Run {
         };
         next = (event.at, input);
     }
-    Run {
-        rig,
-        state,
-        records,
-        force_peak_in_contact_search: force_peak,
-        hold_ticks,
-        samples,
-    }
+    Run { rig, state, records, force_peak_in_contact_search: force_peak, hold_ticks, samples }
 }

@@ -53,11 +53,7 @@ pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
     if let Some((_, calibration)) = &read_by.calibration {
         recalibrate(session, calibration)?;
     }
-    Ok(Opened {
-        edited,
-        analyses,
-        left_out_s: read_by.left_out_s,
-    })
+    Ok(Opened { edited, analyses, left_out_s: read_by.left_out_s })
 }
 
 /// What an analysis reads a session with.
@@ -126,11 +122,8 @@ impl Opened {
         let Some(first) = session.rows.first().copied() else {
             return;
         };
-        let times: Vec<f64> = session
-            .rows
-            .iter()
-            .map(|row| time_between(session, &first, row).0)
-            .collect();
+        let times: Vec<f64> =
+            session.rows.iter().map(|row| time_between(session, &first, row).0).collect();
         for (row, at) in session.rows.iter_mut().zip(times) {
             let is_in = |[from, to]: &[f64; 2]| (*from..=*to).contains(&at);
             if self.left_out_s.iter().any(is_in) {
@@ -155,17 +148,13 @@ impl Opened {
 }
 
 fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
-    SourceError::Calibration {
-        detail: err.to_string(),
-    }
+    SourceError::Calibration { detail: err.to_string() }
 }
 
 /// Controller time from one sample to a later one.
 pub(super) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds {
     let ticks = row.tick.saturating_sub(first.tick);
-    session
-        .manifest
-        .time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
+    session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
 
 /// The tares among decisions, each after so many samples.
@@ -245,12 +234,7 @@ pub fn of_outline(
         anew = Some((curve, tares(&found).collect()));
         outline.manifest.calibration = document;
     }
-    Ok(Passing {
-        edited,
-        analyses,
-        left_out_s: read_by.left_out_s,
-        anew,
-    })
+    Ok(Passing { edited, analyses, left_out_s: read_by.left_out_s, anew })
 }
 
 impl Passing {
@@ -293,9 +277,7 @@ pub fn recalibration(
 ) -> Result<(Opened, Vec<Input>, Analysed, ForceChange), SourceError> {
     let mut opened = open(path, None)?;
     if let Some(imported) = &opened.edited.session.manifest.imported {
-        return Err(SourceError::NoSignal {
-            file: imported.file.clone(),
-        });
+        return Err(SourceError::NoSignal { file: imported.file.clone() });
     }
     // That the session's own can be read tells that its forces came from one.
     calibration_of(&opened.edited.session)?;
@@ -345,9 +327,7 @@ mod tests {
             assert!(change.max_n <= 1e-9, "{name}: {change:?}");
             // Were they not made anew at all, this would be so too: other forces are.
             let rows = &mut session.rows;
-            rows.iter_mut()
-                .filter_map(|row| row.force.as_mut())
-                .for_each(|force| *force = -1.0);
+            rows.iter_mut().filter_map(|row| row.force.as_mut()).for_each(|force| *force = -1.0);
             recalibrate(&mut session, &own).unwrap();
             for (row, old) in session.rows.iter().zip(&before.rows) {
                 assert_eq!(row.force.is_some(), old.force.is_some());
@@ -379,9 +359,7 @@ mod tests {
             let passing = passing(&path, name).unwrap();
             assert_eq!(passing.is_changed(), name.is_some());
             let mut rows = Vec::new();
-            passing
-                .rows(&path, &mut |some| rows.extend_from_slice(some))
-                .unwrap();
+            passing.rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();
             assert!(rows == opened.rows);
             let outline = &passing.edited.outline;
             assert_eq!(outline.notes, opened.notes);

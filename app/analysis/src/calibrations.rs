@@ -69,11 +69,7 @@ pub fn read(
         let age = age_days(&kept.document, now.into());
         Shown::of(Entry::of(&shelf, kept, age), kept.document.clone(), &rig)
     }));
-    Shelved {
-        shown,
-        unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(),
-        kept,
-    }
+    Shelved { shown, unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(), kept }
 }
 
 /// Stores the calibration a session measured, in the place of the one in force for its rig; tells its id.

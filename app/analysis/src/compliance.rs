@@ -69,10 +69,7 @@ pub fn measured(
     let seating = seating.unwrap_or(Newtons(FindBase::SEATED_SHARE * highest));
     let manifest = &session.manifest;
     Ok(RigCompliance {
-        rig: manifest
-            .rig
-            .as_ref()
-            .map_or_else(String::new, |rig| rig.name.clone()),
+        rig: manifest.rig.as_ref().map_or_else(String::new, |rig| rig.name.clone()),
         taken_at: manifest.started_at_text(),
         operator: manifest.operator.clone(),
         session_id: manifest.session_id.clone(),
@@ -87,15 +84,10 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
-    let found = decisions
-        .iter()
-        .rev()
-        .find_map(|(after, effect)| match effect {
-            Effect::Record(Record::BaseFound { position, .. }) => {
-                Some((*after as usize, *position))
-            }
-            _ => None,
-        });
+    let found = decisions.iter().rev().find_map(|(after, effect)| match effect {
+        Effect::Record(Record::BaseFound { position, .. }) => Some((*after as usize, *position)),
+        _ => None,
+    });
     let (after, surface) = found.ok_or(MeasureError::NoSurface)?;
     let trusted = trusted_samples(&decisions);
     let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
@@ -176,10 +168,7 @@ impl Corrections {
     /// Depths stay raw; with a library, what the compliance in force would change is told.
     #[must_use]
     pub fn none(library: Option<&Path>) -> Self {
-        Self {
-            asked: Asked::Raw,
-            shelf: library.map(Shelf::open).unwrap_or_default(),
-        }
+        Self { asked: Asked::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
     }
 
     /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
@@ -324,9 +313,8 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
                 end += 1;
             }
             let near = samples[first..end].iter().filter(|one| one.is_measured());
-            let (sum, count) = near.fold((0.0, 0.0), |(sum, count), one| {
-                (sum + one.force.0, count + 1.0)
-            });
+            let (sum, count) =
+                near.fold((0.0, 0.0), |(sum, count), one| (sum + one.force.0, count + 1.0));
             if count > 0.0 {
                 force = Newtons(sum / count);
             }

@@ -75,11 +75,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let first_tick = session.rows.first().map_or(0, |row| row.tick);
     let mut source = CycleSource {
         notes: session.notes.clone(),
-        pulse: session
-            .manifest
-            .rig
-            .as_ref()
-            .map(|rig| Depth(rig.mm_per_pulse)),
+        pulse: session.manifest.rig.as_ref().map(|rig| Depth(rig.mm_per_pulse)),
         calibration: calibration_of(session).ok(),
         ..CycleSource::default()
     };
@@ -183,10 +179,7 @@ fn motion_after(rows: &[Row], after: usize) -> Option<std::ops::Range<usize>> {
     let is_moving = |row: &Row| AxisStatus(row.status).has(AxisStatus::MOVING);
     let later = rows.get(after..)?;
     let start = after + later.iter().position(is_moving)?;
-    let count = rows[start..]
-        .iter()
-        .take_while(|row| is_moving(row))
-        .count();
+    let count = rows[start..].iter().take_while(|row| is_moving(row)).count();
     Some(start..start + count)
 }
 
@@ -217,16 +210,9 @@ mod tests {
         let source = of_session(&session).unwrap();
         let known = |phase: Phase| {
             let rows = session.rows.iter().filter(|row| row.phase == phase);
-            rows.filter(|row| row.depth.is_some() && row.force.is_some())
-                .count()
+            rows.filter(|row| row.depth.is_some() && row.force.is_some()).count()
         };
-        let read = |phase: Phase| {
-            source
-                .samples
-                .iter()
-                .filter(|one| one.phase == phase)
-                .count()
-        };
+        let read = |phase: Phase| source.samples.iter().filter(|one| one.phase == phase).count();
         for phase in [Phase::Ramp, Phase::Hold] {
             assert!(read(phase) > 1000 && read(phase) == known(phase), "{phase}");
         }
@@ -257,43 +243,26 @@ mod tests {
     fn a_second_contact_keeps_depths_comparable() {
         let mut session = recorded();
         let first = contacts(&decisions(&session).unwrap())[0].1;
-        let hold = session
-            .rows
-            .iter()
-            .position(|row| row.phase == Phase::Hold)
-            .unwrap();
+        let hold = session.rows.iter().position(|row| row.phase == Phase::Hold).unwrap();
         let again = Effect::Record(Record::ContactFound {
             position: first.moved_by(0.25),
             std_error_mm: 0.01,
         });
         session.entries.push(decided(&again, hold));
         let source = of_session(&session).unwrap();
-        let held = source
-            .samples
-            .iter()
-            .position(|one| one.phase == Phase::Hold)
-            .unwrap();
+        let held = source.samples.iter().position(|one| one.phase == Phase::Hold).unwrap();
         let depth = session.rows[hold].depth.unwrap();
         assert!((source.samples[held].depth.0 - depth - 0.25).abs() < 1e-12);
         assert!((source.own_depth(held).0 - depth).abs() < 1e-12);
         assert!(source.contact_offsets[held - 1].0 == 0.0);
-        assert!(
-            source
-                .notes
-                .iter()
-                .any(|note| note.contains("found 2 times"))
-        );
+        assert!(source.notes.iter().any(|note| note.contains("found 2 times")));
     }
 
     #[test]
     fn a_sine_is_the_motion_after_its_command() {
         let mut session = recorded();
         // The ramp stands for a sine: it is the motion that begins after the hold of the step before.
-        let ramp = session
-            .rows
-            .iter()
-            .position(|row| row.phase == Phase::Ramp)
-            .unwrap();
+        let ramp = session.rows.iter().position(|row| row.phase == Phase::Ramp).unwrap();
         let command = Effect::Command(RigCommand::Oscillate(Oscillation {
             amplitude_pulses: 10,
             period_ticks: 500,

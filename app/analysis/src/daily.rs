@@ -27,11 +27,7 @@ const HOME_PULSES: i64 = 1;
 /// A part and what was found.
 fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
     let (is_passed, sentence) = found.unwrap_or_else(|missing| (false, missing));
-    CheckPart {
-        what: what.into(),
-        is_passed,
-        sentence,
-    }
+    CheckPart { what: what.into(), is_passed, sentence }
 }
 
 /// A daily check with what its session measured.
@@ -67,11 +63,7 @@ pub fn past_checks(
         }
         let folder = folders.get(&check.session_id);
         let [zero, weight] = folder.map_or([None; 2], |folder| deviations(&library.join(folder)));
-        past.push(PastCheck {
-            check,
-            zero,
-            weight,
-        });
+        past.push(PastCheck { check, zero, weight });
     }
     Ok(past)
 }
@@ -89,10 +81,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
     let weight = weight_of(&calibration, &records).ok();
     [
         zero_of(&calibration, &records).ok().map(|(_, zero)| zero),
-        weight.map(|weight| Deviation {
-            newtons: weight.error_n,
-            limit: weight.limit_n,
-        }),
+        weight.map(|weight| Deviation { newtons: weight.error_n, limit: weight.limit_n }),
     ]
 }
 
@@ -119,14 +108,10 @@ pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
     let finished = EndingKind::Finish.name();
     match &session.end {
         Some(end) if end.outcome == finished => {}
-        Some(end) => parts.push(part(
-            "run",
-            Err(format!("the check did not finish: {}", end.reason)),
-        )),
-        None => parts.push(part(
-            "run",
-            Err("the check was interrupted; make it again".into()),
-        )),
+        Some(end) => {
+            parts.push(part("run", Err(format!("the check did not finish: {}", end.reason))))
+        }
+        None => parts.push(part("run", Err("the check was interrupted; make it again".into()))),
     }
     Ok(parts)
 }
@@ -155,10 +140,8 @@ fn zero_of(calibration: &Calibration, records: &[&Record]) -> Result<(Volts, Dev
         .ok_or("the empty cell was not read; make the check again")?;
     let curve = calibration.curve().map_err(|err| err.to_string())?;
     let (_, heaviest) = curve.force_range();
-    let deviation = Deviation {
-        newtons: curve.newtons_from_volts(volts).0,
-        limit: ZERO_SHARE * heaviest.0,
-    };
+    let deviation =
+        Deviation { newtons: curve.newtons_from_volts(volts).0, limit: ZERO_SHARE * heaviest.0 };
     Ok((volts, deviation))
 }
 
@@ -195,23 +178,13 @@ fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<CheckResu
         return Err(reason);
     }
     calibration
-        .check(&KnownWeight {
-            mass_g,
-            tolerance_g: None,
-            volts,
-            tare,
-            limit_percent: None,
-        })
+        .check(&KnownWeight { mass_g, tolerance_g: None, volts, tare, limit_percent: None })
         .map_err(|err| err.to_string())
 }
 
 fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let result = weight_of(calibration, records)?;
-    let doubts: Vec<String> = result
-        .doubts
-        .iter()
-        .map(|doubt| format!("; {doubt}"))
-        .collect();
+    let doubts: Vec<String> = result.doubts.iter().map(|doubt| format!("; {doubt}")).collect();
     Ok((result.is_passed, result.sentence + &doubts.concat()))
 }
 
@@ -321,11 +294,8 @@ mod tests {
     fn each_part_passes_up_to_its_limit_and_no_further() {
         let calibration = Calibration::thesis();
         let curve = calibration.curve().unwrap();
-        let volts = |newtons: f64| {
-            curve
-                .volts_from_newtons(palpate_model::units::Newtons(newtons))
-                .0
-        };
+        let volts =
+            |newtons: f64| curve.volts_from_newtons(palpate_model::units::Newtons(newtons)).0;
         let heaviest = curve.force_range().1.0;
         // 0 g lies at the first point, 800 g between 740 g and 840 g.
         let weight_n = 0.8 * 9.80665;
@@ -342,9 +312,7 @@ mod tests {
             let records = [
                 weighed(0.0, zero_volts),
                 weighed(800.0, volts(weight_n * (1.0 + error)) + shift),
-                Record::HomeChecked {
-                    missed_pulses: missed,
-                },
+                Record::HomeChecked { missed_pulses: missed },
             ];
             let records: Vec<&Record> = records.iter().collect();
             let (_, off) = zero_of(&calibration, &records).unwrap();
@@ -357,11 +325,7 @@ mod tests {
                 weight(&calibration, &records).unwrap(),
                 home(&records).unwrap(),
             ];
-            assert_eq!(
-                parts.clone().map(|(passed, _)| passed),
-                expected,
-                "{parts:?}"
-            );
+            assert_eq!(parts.clone().map(|(passed, _)| passed), expected, "{parts:?}");
         }
         assert!(zero(&calibration, &[]).is_err());
         assert!(weight(&calibration, &[&weighed(200.0, 1.7)]).is_err());
@@ -374,9 +338,7 @@ mod tests {
 
     #[test]
     fn the_usual_weight_is_one_that_the_thesis_s_cell_knows_without_a_doubt() {
-        let protocol = palpate_protocols::file::built_in(DAILY_CHECK)
-            .unwrap()
-            .unwrap();
+        let protocol = palpate_protocols::file::built_in(DAILY_CHECK).unwrap().unwrap();
         let plan = protocol.plan(&std::collections::BTreeMap::new()).unwrap();
         let masses = plan.steps.iter().filter_map(|one| match &one.step {
             Step::Weigh(weigh) if weigh.mass_g > 0.0 => Some(weigh.mass_g),
@@ -388,12 +350,7 @@ mod tests {
         for mass_g in masses {
             let weight = palpate_model::units::Newtons(mass_g * 9.80665e-3);
             let records = [
-                weighed(
-                    0.0,
-                    curve
-                        .volts_from_newtons(palpate_model::units::Newtons(0.0))
-                        .0,
-                ),
+                weighed(0.0, curve.volts_from_newtons(palpate_model::units::Newtons(0.0)).0),
                 weighed(mass_g, curve.volts_from_newtons(weight).0),
             ];
             let records: Vec<&Record> = records.iter().collect();
@@ -427,16 +384,10 @@ mod tests {
         let Gate::Acknowledge(why) = gate(true) else {
             panic!("a failed check is to be acknowledged");
         };
-        assert!(
-            why.contains("two homings differ") && why.contains("palpate daily-check"),
-            "{why}"
-        );
+        assert!(why.contains("two homings differ") && why.contains("palpate daily-check"), "{why}");
         // The remedy itself is never refused.
         let calibration = Plan::of("load-cell-calibration", 1, Vec::new());
-        assert_eq!(
-            Gate::of(&calibration, at, "bench", false, now).unwrap(),
-            Gate::Open
-        );
+        assert_eq!(Gate::of(&calibration, at, "bench", false, now).unwrap(), Gate::Open);
         // Of the built-in protocols, those that cannot touch stay open.
         let built_in = |name: &str, values: &[(&str, &str)]| {
             let protocol = palpate_protocols::file::built_in(name).unwrap().unwrap();
@@ -447,17 +398,12 @@ mod tests {
             let gate = Gate::of(plan, at, "bench", false, now).unwrap();
             gate == Gate::Open
         };
-        let names = palpate_protocols::file::BUILT_IN
-            .iter()
-            .map(|(name, _)| *name);
+        let names = palpate_protocols::file::BUILT_IN.iter().map(|(name, _)| *name);
         let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
         assert_eq!(open, ["daily-check", "load-cell-calibration", "check-home"]);
         assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));
         // Nor does the name of the check open what it does not do.
-        let plan = Plan {
-            name: DAILY_CHECK.into(),
-            ..RampHold::default().plan()
-        };
+        let plan = Plan { name: DAILY_CHECK.into(), ..RampHold::default().plan() };
         assert!(!is_open(&plan));
         check.is_passed = true;
         add_check(library.path(), &check).unwrap();

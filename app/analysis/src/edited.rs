@@ -77,11 +77,7 @@ pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceEr
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
     outline.notes.extend(notes);
     outline.notes.extend(doubts(&edits));
-    Ok(Passing {
-        outline,
-        edits,
-        shifts,
-    })
+    Ok(Passing { outline, edits, shifts })
 }
 
 impl Passing {
@@ -167,17 +163,9 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
             None => next,
         };
         let from = found.after_sample.min(last);
-        shifts.push(Shift {
-            samples: from..until.unwrap_or(last).clamp(from, last),
-            deeper,
-        });
-        let mut entries = entries
-            .iter_mut()
-            .filter(|entry| contact_position(entry).is_some());
-        if let Some(at) = entries
-            .nth(index)
-            .and_then(|entry| entry.body.get_mut("position"))
-        {
+        shifts.push(Shift { samples: from..until.unwrap_or(last).clamp(from, last), deeper });
+        let mut entries = entries.iter_mut().filter(|entry| contact_position(entry).is_some());
+        if let Some(at) = entries.nth(index).and_then(|entry| entry.body.get_mut("position")) {
             *at = position.0.into();
         }
         notes.push(format!(
@@ -214,18 +202,11 @@ mod tests {
         let first = contacts(&session.entries);
         assert_eq!(first.len(), 1);
         let known = |row: &palpate_sessions::record::Row| row.depth.is_some();
-        assert_eq!(
-            session.rows.iter().position(known),
-            Some(first[0].after_sample as usize)
-        );
+        assert_eq!(session.rows.iter().position(known), Some(first[0].after_sample as usize));
         // A second one, found later, as a protocol that searches again leaves it.
         let second = (first[0].after_sample as usize + session.rows.len()) / 2;
-        let mut again = session
-            .entries
-            .iter()
-            .find(|entry| contact_position(entry).is_some())
-            .unwrap()
-            .clone();
+        let mut again =
+            session.entries.iter().find(|entry| contact_position(entry).is_some()).unwrap().clone();
         again.after_sample = second as u64;
         session.entries.push(again.clone());
         // Then the base behind it: depths count from there.
@@ -246,10 +227,7 @@ mod tests {
                 false => 0.0,
             };
             let moved = new.depth.unwrap_or(0.0) - old.depth.unwrap_or(0.0);
-            assert!(
-                (moved - expected).abs() < 1e-12 || old.depth.is_none(),
-                "{index}: {moved}"
-            );
+            assert!((moved - expected).abs() < 1e-12 || old.depth.is_none(), "{index}: {moved}");
         }
         let base = session.entries.last().unwrap();
         assert_eq!(base.body["thickness_mm"], 19.5);
@@ -259,13 +237,7 @@ mod tests {
         assert_eq!(session.notes.len(), before.notes.len() + 1);
         // A contact that was never found cannot be moved.
         let mut same = before.clone();
-        correct(
-            &mut same,
-            &Edits {
-                all: vec![edit(3, 1.0)],
-                ..Edits::default()
-            },
-        );
+        correct(&mut same, &Edits { all: vec![edit(3, 1.0)], ..Edits::default() });
         assert!(same == before);
     }
 }

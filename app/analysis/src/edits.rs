@@ -16,10 +16,7 @@ use thiserror::Error;
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
     let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    given.map_or_else(
-        || login().unwrap_or_else(|_| "somebody".into()),
-        str::to_owned,
-    )
+    given.map_or_else(|| login().unwrap_or_else(|_| "somebody".into()), str::to_owned)
 }
 
 /// Nothing was said of a session.
@@ -51,11 +48,7 @@ impl Subject {
     /// Reads what the session says of itself, and its edits.
     pub fn read(folder: &Path) -> Result<Self, SayFailure> {
         let id = Summary::read(folder)?.manifest.session_id;
-        Ok(Self {
-            edits: Edits::read(folder, &id)?,
-            folder: folder.to_owned(),
-            id,
-        })
+        Ok(Self { edits: Edits::read(folder, &id)?, folder: folder.to_owned(), id })
     }
 
     /// Adds an edit.
@@ -127,10 +120,7 @@ struct Step {
 /// The part of an edit that an opposite has.
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
-    Tags {
-        add: Vec<String>,
-        remove: Vec<String>,
-    },
+    Tags { add: Vec<String>, remove: Vec<String> },
     Verdict(Verdict, String),
 }
 
@@ -172,10 +162,7 @@ fn each<T>(
     let (mut steps, mut failed, mut written) = (Vec::new(), Vec::new(), 0);
     for (done, item) in of.iter().enumerate() {
         let name = folder(item).file_name().unwrap_or_default();
-        if progress
-            .tell(done, of.len(), &name.to_string_lossy())
-            .is_break()
-        {
+        if progress.tell(done, of.len(), &name.to_string_lossy()).is_break() {
             let left = sessions(of.len() - done);
             failed.push(format!("nothing was said of {left}: cancelled"));
             break;
@@ -189,14 +176,7 @@ fn each<T>(
         }
     }
     let words = format!("{words} on {}", sessions(written));
-    Said {
-        act: (!steps.is_empty()).then(|| Act {
-            words: words.clone(),
-            steps,
-        }),
-        words,
-        failed,
-    }
+    Said { act: (!steps.is_empty()).then(|| Act { words: words.clone(), steps }), words, failed }
 }
 
 /// Says something of sessions. Notes and reviews stay: only tags and verdicts can be taken back.
@@ -205,13 +185,7 @@ pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &dyn Progre
     let folder = |folder: &PathBuf| -> Result<_, String> {
         say_one(saying, folder, by).map_err(|err| err.to_string())
     };
-    each(
-        &saying.words(),
-        folders,
-        progress,
-        |it| it.as_path(),
-        folder,
-    )
+    each(&saying.words(), folders, progress, |it| it.as_path(), folder)
 }
 
 fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bool), SayFailure> {
@@ -226,28 +200,16 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
         Saying::Tags { add, remove } => {
             let has = subject.edits.tags();
             // Only what changes is written, so that only that is taken back.
-            let add: Vec<String> = add
-                .iter()
-                .filter(|tag| !has.contains(tag.as_str()))
-                .cloned()
-                .collect();
-            let remove: Vec<String> = remove
-                .iter()
-                .filter(|tag| has.contains(tag.as_str()))
-                .cloned()
-                .collect();
+            let add: Vec<String> =
+                add.iter().filter(|tag| !has.contains(tag.as_str())).cloned().collect();
+            let remove: Vec<String> =
+                remove.iter().filter(|tag| has.contains(tag.as_str())).cloned().collect();
             if add.is_empty() && remove.is_empty() {
                 return Ok((None, false));
             }
             let (written, opposite) = (
-                Part::Tags {
-                    add: add.clone(),
-                    remove: remove.clone(),
-                },
-                Part::Tags {
-                    add: remove.clone(),
-                    remove: add.clone(),
-                },
+                Part::Tags { add: add.clone(), remove: remove.clone() },
+                Part::Tags { add: remove.clone(), remove: add.clone() },
             );
             let edit = subject.say(by, "", Change::Tags { add, remove })?;
             Ok((Some(step(edit, written, opposite)), true))
@@ -301,9 +263,7 @@ fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
             (reason.clone(), Change::Verdict { verdict: *verdict })
         }
     };
-    let edit = subject
-        .say(by, &reason, change)
-        .map_err(|err| err.to_string())?;
+    let edit = subject.say(by, &reason, change).map_err(|err| err.to_string())?;
     Ok(Step {
         folder: step.folder.clone(),
         wrote: edit.at,

@@ -71,11 +71,7 @@ impl Target {
                 (path, rows)
             }
         };
-        Ok(Written {
-            path,
-            rows,
-            notes: table.notes.to_vec(),
-        })
+        Ok(Written { path, rows, notes: table.notes.to_vec() })
     }
 }
 
@@ -113,10 +109,7 @@ fn stem(session: &Path, manifest: &Manifest) -> String {
         true => path.file_name(),
         false => path.file_stem(),
     });
-    stem.map_or_else(
-        || manifest.session_id.clone(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    stem.map_or_else(|| manifest.session_id.clone(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Takes away what killed exports left in a lake.
@@ -133,9 +126,7 @@ pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
         return Err(ExportFailure::BeingRecorded(session.into()));
     }
     let verdict = passing.edits.verdict();
-    let told = Told {
-        verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())),
-    };
+    let told = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
     let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
     Ok(lake::add(lake, &passing.outline, told, &mut feed)?)
 }
@@ -150,24 +141,15 @@ pub fn without_copied(
     let ids: Vec<Option<(String, Option<String>)>> = found
         .iter()
         .map(|path| {
-            let manifest = Summary::read(path)
-                .ok()
-                .filter(|_| is_session(path))?
-                .manifest;
+            let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
             Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
         })
         .collect();
-    let copied: BTreeSet<&String> = ids
-        .iter()
-        .flatten()
-        .filter_map(|it| it.1.as_ref())
-        .collect();
+    let copied: BTreeSet<&String> = ids.iter().flatten().filter_map(|it| it.1.as_ref()).collect();
     let is_copied =
         |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));
-    let (originals, rest): (Vec<_>, Vec<_>) = found
-        .into_iter()
-        .zip(&ids)
-        .partition(|(_, one)| is_copied(one));
+    let (originals, rest): (Vec<_>, Vec<_>) =
+        found.into_iter().zip(&ids).partition(|(_, one)| is_copied(one));
     let paths = |of: Vec<(PathBuf, _)>| of.into_iter().map(|(path, _)| path).collect();
     (paths(rest), paths(originals))
 }
@@ -204,10 +186,7 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
     if let Destination::Tables(_, folder) = to
         && let Err(err) = std::fs::create_dir_all(folder)
     {
-        let sentence = format!(
-            "{} cannot be made ({err}); nothing was written",
-            folder.display()
-        );
+        let sentence = format!("{} cannot be made ({err}); nothing was written", folder.display());
         return Exported { sentence, remarks };
     }
     match to {
@@ -217,10 +196,7 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {
         if progress.tell(done, of, &name(session)).is_break() {
-            remarks.push(format!(
-                "cancelled: {} were not begun",
-                sessions.len() - done
-            ));
+            remarks.push(format!("cancelled: {} were not begun", sessions.len() - done));
             break;
         }
         let one = match to {
@@ -242,11 +218,7 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
         match one {
             Ok(notes) => {
                 written += 1;
-                remarks.extend(
-                    notes
-                        .iter()
-                        .map(|note| format!("{}: {note}", name(session))),
-                );
+                remarks.extend(notes.iter().map(|note| format!("{}: {note}", name(session))));
             }
             Err(err) => remarks.push(format!("{}: {err}", name(session))),
         }
@@ -267,8 +239,7 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
 }
 
 fn name(session: &Path) -> String {
-    session.file_name().map_or_else(
-        || session.display().to_string(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    session
+        .file_name()
+        .map_or_else(|| session.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

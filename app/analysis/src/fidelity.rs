@@ -15,10 +15,8 @@ pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
             return Err(SourceError::Imported { file });
         }
     };
-    let plan: Plan =
-        serde_json::from_value(session.manifest.plan.clone()).map_err(|err| SourceError::Plan {
-            detail: err.to_string(),
-        })?;
+    let plan: Plan = serde_json::from_value(session.manifest.plan.clone())
+        .map_err(|err| SourceError::Plan { detail: err.to_string() })?;
     let decisions = decisions(session)?;
     let mut meter = FidelityMeter::new(&plan, rig);
     let mut next = decisions.iter().peekable();
@@ -47,12 +45,7 @@ mod tests {
 
     fn of(found: &Fidelity, step: &str, quantity: &str) -> Achieved {
         let is_it = |one: &&Achieved| (one.step, one.quantity) == (step, quantity);
-        found
-            .targets
-            .iter()
-            .find(is_it)
-            .cloned()
-            .unwrap_or_else(|| panic!("{found:?}"))
+        found.targets.iter().find(is_it).cloned().unwrap_or_else(|| panic!("{found:?}"))
     }
 
     #[test]
@@ -60,10 +53,7 @@ mod tests {
         let session = recorded();
         let found = of_session(&session).unwrap();
         assert_eq!(found.samples, session.rows.len() as u64);
-        assert_eq!(
-            (found.dropped, found.late, found.missed().count()),
-            (0, 0, 0)
-        );
+        assert_eq!((found.dropped, found.late, found.missed().count()), (0, 0, 0));
         for quantity in ["speed", "speed by pulses", "depth"] {
             of(&found, "ramp", quantity);
         }
@@ -94,17 +84,10 @@ mod tests {
         let found = of_session(&session).unwrap();
         assert_eq!((found.dropped, found.late), (3, 1));
         // Arrival itself varies by half a millisecond.
-        assert!(
-            (found.late_worst_s - 0.05).abs() < 1e-3,
-            "{}",
-            found.late_worst_s
-        );
+        assert!((found.late_worst_s - 0.05).abs() < 1e-3, "{}", found.late_worst_s);
         // A ramp that ends short takes some of its braking for cruise.
         let speed = of(&found, "ramp", "speed");
-        assert!(
-            !speed.is_within && (speed.error_percent.unwrap() + 3.0).abs() < 0.05,
-            "{speed:?}"
-        );
+        assert!(!speed.is_within && (speed.error_percent.unwrap() + 3.0).abs() < 0.05, "{speed:?}");
         assert!(of(&found, "ramp", "speed by pulses").is_within);
         let short = of(&found, "ramp", "depth");
         assert!(!short.is_within && (short.achieved - 0.97 * depth).abs() < 1e-9);

@@ -106,9 +106,7 @@ pub fn session_folders(
 ) -> Result<BTreeMap<String, String>, String> {
     update(library, progress)?;
     let all = with(library, &mut Vec::new(), |catalog| catalog.all())?;
-    let pairs = all
-        .into_iter()
-        .map(|entry| (entry.session_id, entry.folder));
+    let pairs = all.into_iter().map(|entry| (entry.session_id, entry.folder));
     Ok(pairs.collect())
 }
 
@@ -130,8 +128,5 @@ pub fn told((library, entry): &(PathBuf, Entry)) -> Result<Told, String> {
     let mut events: Vec<Event> = said.chain(made).collect();
     // Times of one form sort as they are written.
     events.sort_by(|a, b| a.at.cmp(&b.at));
-    Ok(Told {
-        notes: edits.notes().cloned().collect(),
-        events,
-    })
+    Ok(Told { notes: edits.notes().cloned().collect(), events })
 }

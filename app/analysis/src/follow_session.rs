@@ -17,9 +17,7 @@ pub fn keep_followed(followed: &Followed, source: &str, folder: &Path) -> Result
     let foreign = parse_foreign(TABLE, table, &Told::default())?;
     let at = wall_now().into();
     for mut part in foreign.parts {
-        part.imported
-            .remarks
-            .insert(0, provenance(followed, source));
+        part.imported.remarks.insert(0, provenance(followed, source));
         part.imported.facts = facts(followed, source);
         let kept = Kept {
             folder,
@@ -61,10 +59,7 @@ fn facts(followed: &Followed, source: &str) -> Vec<(String, String)> {
         ("speed (mm/s)", settings.speed.0.to_string()),
         ("depth (mm)", settings.depth.0.to_string()),
         ("hold (s)", settings.hold.0.to_string()),
-        (
-            "share of friction made up for",
-            settings.friction_share.to_string(),
-        ),
+        ("share of friction made up for", settings.friction_share.to_string()),
     ];
     all.map(|(name, value)| (name.to_owned(), value)).into()
 }

@@ -52,9 +52,7 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
     let options = FitOptions::default();
     let fitted =
         fit_source(source, None, Wanted::default(), &options).map_err(|err| err.to_string())?;
-    let report = fitted
-        .result
-        .map_err(|err| format!("{} has no fit: {err}", source.display()))?;
+    let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
     let value = |name: &str| {
         let parameter = report.parameter(name);
         parameter
@@ -132,15 +130,8 @@ impl Setting {
     /// The simulation of a body with a firm hand that presses to the end of the stroke and holds there.
     #[must_use]
     pub fn simulation(&self, body: ModifiedKelvin, is_guarded: bool) -> SimulationSettings {
-        let path = HandPath::RampHold {
-            from: 0.0,
-            to: self.deepest.0,
-            speed: self.speed.0,
-        };
-        let hand = Hand {
-            damping: GRIP_DAMPING,
-            ..Hand::firm(path)
-        };
+        let path = HandPath::RampHold { from: 0.0, to: self.deepest.0, speed: self.speed.0 };
+        let hand = Hand { damping: GRIP_DAMPING, ..Hand::firm(path) };
         let mut all = SimulationSettings::of(body, self.period, hand);
         all.plant.damping = self.damping;
         all.plant.delay = self.delay;
@@ -222,9 +213,7 @@ pub fn check(
     let watch = setting.simulation(body, true).system.watch();
     let margin = watch.before_play(setting.deepest, setting.speed);
     let without = try_out(body, setting, false, &mut |share| is_going(0.5 * share))?;
-    let with = try_out(body, setting, true, &mut |share| {
-        is_going(0.5 + 0.5 * share)
-    })?;
+    let with = try_out(body, setting, true, &mut |share| is_going(0.5 + 0.5 * share))?;
     Ok(Checked {
         body,
         sentences: margin.sentences(),

@@ -47,9 +47,9 @@ pub fn recorded(TapedLed { led, recorder }: TapedLed) -> Ended {
 fn text(body: ModifiedKelvin, setting: &Setting, is_guarded: bool) -> String {
     let is_current = matches!(setting.drive, DriveKind::Current { .. });
     let drive = DRIVES.iter().find(|(_, current)| *current == is_current);
-    let friction = setting.friction.map_or(String::new(), |friction| {
-        format!("friction_n = {:?}\n", friction.0)
-    });
+    let friction = setting
+        .friction
+        .map_or(String::new(), |friction| format!("friction_n = {:?}\n", friction.0));
     format!(
         "[body]\n{}\n\n[device]\nperiod_ns = {}\ndrive = \"{}\"\ndamping_n_s_per_mm = {:?}\n{friction}delay_ticks = {}\ndepth_mm = {:?}\nspeed_mm_per_s = {:?}\nguards = {is_guarded}\n",
         body_text(&body),

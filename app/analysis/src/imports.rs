@@ -87,10 +87,7 @@ pub fn import(
     let of = request.files.len() * if request.is_dry_run { 1 } else { 2 };
     let (mut taken, mut reports) = (BTreeSet::new(), Vec::new());
     for (done, path) in request.files.iter().enumerate() {
-        if progress
-            .tell(done, of, &path.display().to_string())
-            .is_break()
-        {
+        if progress.tell(done, of, &path.display().to_string()).is_break() {
             return Err(ImportFailure::Cancelled);
         }
         let foreign = read(path)?;
@@ -161,11 +158,7 @@ fn told_of(path: &Path, foreign: Foreign) -> FileReport {
             imported: part.imported,
         }
     });
-    FileReport {
-        file: path.into(),
-        parts: parts.collect(),
-        left_out: foreign.left_out,
-    }
+    FileReport { file: path.into(), parts: parts.collect(), left_out: foreign.left_out }
 }
 
 /// What was made of a file, in lines.

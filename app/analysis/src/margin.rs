@@ -22,13 +22,7 @@ pub struct MarginPoint {
 /// Over a stroke entered at a speed, with the criterion that the check has.
 #[must_use]
 pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginPoint> {
-    let prompt = Watch {
-        device: Device {
-            delay_ticks: 0.0,
-            ..watch.device
-        },
-        ..*watch
-    };
+    let prompt = Watch { device: Device { delay_ticks: 0.0, ..watch.device }, ..*watch };
     let point = |i: u32| {
         // Closer together near the surface, where most changes.
         let share = f64::from(i) / f64::from(DEPTHS);
@@ -38,12 +32,7 @@ pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginP
         let tick = prompt.exactly_at(depth, speed).needed.max(lag);
         let delay = watch.exactly_at(depth, speed).needed.max(tick);
         // N s/m, as catalogues have it.
-        MarginPoint {
-            depth: depth.0,
-            lag: 1e3 * lag,
-            tick: 1e3 * tick,
-            delay: 1e3 * delay,
-        }
+        MarginPoint { depth: depth.0, lag: 1e3 * lag, tick: 1e3 * tick, delay: 1e3 * delay }
     };
     (0..=DEPTHS).map(point).collect()
 }
@@ -56,14 +45,8 @@ mod tests {
     use palpate_model::viscoelastic::ModifiedKelvin;
 
     fn curve(rate: f64, delay: usize) -> (Vec<MarginPoint>, f64) {
-        let setting = Setting {
-            delay,
-            ..Setting::source(Period::of_rate(rate).unwrap())
-        };
-        let watch = setting
-            .simulation(ModifiedKelvin::THESIS, true)
-            .system
-            .watch();
+        let setting = Setting { delay, ..Setting::source(Period::of_rate(rate).unwrap()) };
+        let watch = setting.simulation(ModifiedKelvin::THESIS, true).system.watch();
         let verdict = watch.before_play(setting.deepest, setting.speed);
         let curve = margin_curve(&watch, setting.deepest, setting.speed);
         (curve, 1e3 * verdict.worst.needed)
@@ -75,10 +58,7 @@ mod tests {
             let (curve, worst) = curve(rate, delay);
             let top = curve.iter().map(|one| one.delay).fold(0.0, f64::max);
             // The check looks at other depths.
-            assert!(
-                (top - worst).abs() < 0.01 * worst,
-                "{rate} {delay}: {top} {worst}"
-            );
+            assert!((top - worst).abs() < 0.01 * worst, "{rate} {delay}: {top} {worst}");
             for one in &curve {
                 assert!(one.lag <= one.tick && one.tick <= one.delay, "{one:?}");
             }

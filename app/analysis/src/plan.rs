@@ -172,10 +172,7 @@ pub fn plan(
     bench: Bench<'_>,
 ) -> Result<PlanReport, PlanFailure> {
     let rig = request.rig(bench)?;
-    let noise = Noise {
-        white: request.white.unwrap_or(assumed.noise),
-        memory: request.memory,
-    };
+    let noise = Noise { white: request.white.unwrap_or(assumed.noise), memory: request.memory };
     let (body, unknowns) = (assumed.body, request.unknowns);
     let proposals = shortest(&body, &noise, unknowns, &request.targets, &rig)?;
     let curves = curves(&body, &noise, unknowns, &rig, drawn(&proposals))?;
@@ -214,10 +211,7 @@ impl PlanRequest<'_> {
             });
         }
         if rig.force_max > interlock {
-            return Err(PlanFailure::TooStrong {
-                wanted: rig.force_max,
-                most: interlock,
-            });
+            return Err(PlanFailure::TooStrong { wanted: rig.force_max, most: interlock });
         }
         Ok(rig)
     }
@@ -248,12 +242,7 @@ fn offer(
     let runs: Option<Vec<(String, Preview)>> = presses
         .into_iter()
         .map(|(speed, hold)| {
-            let press = RampHold {
-                speed,
-                depth,
-                hold,
-                ..RampHold::default()
-            };
+            let press = RampHold { speed, depth, hold, ..RampHold::default() };
             let told = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
             (told.refusals.is_empty()).then(|| (command(&press), told))
         })

@@ -84,10 +84,7 @@ impl Replayed {
             (true, false) => "every number that is left bit for bit as recorded",
             (false, _) => "not as recorded",
         };
-        let mut lines = vec![format!(
-            "{}: {} ticks computed again, {how}",
-            self.name, self.ticks
-        )];
+        let mut lines = vec![format!("{}: {} ticks computed again, {how}", self.name, self.ticks)];
         if !self.is_whole {
             lines.push(
                 "the recording was cut off; it was compared to its last whole tick".to_owned(),

@@ -71,9 +71,8 @@ pub fn play(
     record: Option<&Path>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Played, String> {
-    let nodes = file
-        .nodes
-        .ok_or("a scene without nodes was played; this is a mistake in palpate")?;
+    let nodes =
+        file.nodes.ok_or("a scene without nodes was played; this is a mistake in palpate")?;
     let scene = file.scene(nodes)?;
     let settings = *scene.settings();
     let recorder = record.map(|folder| SceneRecorder::start(folder, &file.text(), COLUMNS));
@@ -94,9 +93,7 @@ pub fn play(
         }
         progress(settings.period.time_of(tick.tick).seconds().0 / whole);
     }
-    let end = live
-        .stop()
-        .ok_or("the scene's loop failed; this is a mistake in palpate")?;
+    let end = live.stop().ok_or("the scene's loop failed; this is a mistake in palpate")?;
     let recorded = end.recorded.transpose()?;
     seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let frames = seen.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
@@ -108,10 +105,7 @@ pub fn play(
         ticks: end.scene.ticks(),
         depth_max_mm,
         force_max_n,
-        why: seen
-            .iter()
-            .map(|(why, count)| (why.words(), *count as f64 / frames))
-            .collect(),
+        why: seen.iter().map(|(why, count)| (why.words(), *count as f64 / frames)).collect(),
         surface_hash: format!("{:016x}", end.scene.hash()),
         tick_us,
         is_within_budget: 1e6 * end.kept.work.p99_9.0 <= tick_us,

@@ -95,9 +95,7 @@ pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<Sc
     let mut own = curves.clone();
     own.steps.retain(|step| off(step) <= nearest);
     let larger = file.side_mm * file.slope / (SCENE_SIDE_MM * SCENE_SLOPE);
-    own.meshes
-        .iter_mut()
-        .for_each(|mesh| mesh.error_mm *= larger);
+    own.meshes.iter_mut().for_each(|mesh| mesh.error_mm *= larger);
     own.cuts.retain(|cut| cut.range.is_none());
     for cut in &mut own.cuts {
         cut.error_mm = cut.threshold_mm;
@@ -138,12 +136,7 @@ pub fn planned_again(
 fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
     let grid = Grid::new(nodes, nodes, 1.0).map_err(|err| err.to_string())?;
     let middle = 0.5 * (nodes - 1) as f64;
-    let contact = [Contact {
-        x: middle,
-        y: middle,
-        z: -0.5 * middle,
-        side: Side::Push,
-    }];
+    let contact = [Contact { x: middle, y: middle, z: -0.5 * middle, side: Side::Push }];
     let field = HeightField::flat(grid, 1.0).map_err(|err| err.to_string())?;
     let surface = Surface::new(field, method, Recovery::ELASTIC, Cut::NONE);
     let mut surface = surface.map_err(|err| err.to_string())?;

@@ -93,10 +93,7 @@ fn specimens(
     };
     let known = names.iter().filter(|name| !name.is_empty()).count();
     if known != names.len() || known != records.all.len() {
-        return Err(SelectFailure::Specimens {
-            names: known,
-            sources: records.all.len(),
-        });
+        return Err(SelectFailure::Specimens { names: known, sources: records.all.len() });
     }
     Ok(names.into_iter().map(Some).collect())
 }

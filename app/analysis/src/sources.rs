@@ -181,10 +181,7 @@ pub enum Naming {
 impl Naming {
     fn name(self, path: &Path) -> String {
         let stem = path.file_stem().filter(|_| self == Self::Stem);
-        stem.map_or_else(
-            || path.display().to_string(),
-            |stem| stem.to_string_lossy().into_owned(),
-        )
+        stem.map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
     }
 }
 
@@ -279,10 +276,9 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
     match paths.len() - read.all.len() {
         0 => {}
         all if all == paths.len() => return Err(SourcesError::Rejected(all)),
-        rejected => read.notes.push(format!(
-            "{} sources, {rejected} of them rejected",
-            paths.len()
-        )),
+        rejected => {
+            read.notes.push(format!("{} sources, {rejected} of them rejected", paths.len()))
+        }
     }
     Ok(read)
 }
@@ -346,17 +342,8 @@ mod tests {
         std::os::unix::fs::symlink(at, at.join("a/loop")).unwrap();
         std::os::unix::fs::symlink(at.join("b"), at.join("again")).unwrap();
         let found = all(&[at.to_path_buf()]).unwrap();
-        let names: Vec<_> = found
-            .iter()
-            .map(|path| path.strip_prefix(at).unwrap())
-            .collect();
-        let expected = [
-            "a/alone.mcap",
-            "a/deep/t.tsv",
-            "b/s10",
-            "b/s9",
-            "b/table.CSV",
-        ];
+        let names: Vec<_> = found.iter().map(|path| path.strip_prefix(at).unwrap()).collect();
+        let expected = ["a/alone.mcap", "a/deep/t.tsv", "b/s10", "b/s9", "b/table.CSV"];
         assert_eq!(names, expected.map(Path::new));
         // Named itself, a link is what it leads to; a session is a source and not a folder of some.
         assert_eq!(all(&[at.join("again")]).unwrap().len(), 3);

@@ -87,10 +87,7 @@ pub enum BundleError {
 
 /// Makes a bundle, and tells what is in it.
 pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError> {
-    let unwritable = |source| BundleError::Write {
-        path: request.to.display().to_string(),
-        source,
-    };
+    let unwritable = |source| BundleError::Write { path: request.to.display().to_string(), source };
     let draft = Draft::new(&request.to).map_err(unwritable)?;
     let files = fill(request, &draft)?;
     draft.persist(Existing::Keep).map_err(unwritable)?;
@@ -103,16 +100,8 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
         files: Vec::new(),
         to: request.to.display().to_string(),
     };
-    bundle.text(
-        "versions.txt",
-        "versions and parts of the program",
-        &versions(request),
-    )?;
-    bundle.text(
-        "findings.txt",
-        "what the doctor says of the sessions",
-        &request.findings,
-    )?;
+    bundle.text("versions.txt", "versions and parts of the program", &versions(request))?;
+    bundle.text("findings.txt", "what the doctor says of the sessions", &request.findings)?;
     for log in log_files(&log_folder(&request.library)) {
         let name = format!("log/{}", file_name(&log));
         bundle.file(&name, "the program's log", &log)?;
@@ -120,19 +109,11 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
     let settings = request.library.join(SETTINGS_FILE);
     if settings.is_file() {
         let text = read(&settings)?;
-        bundle.text(
-            SETTINGS_FILE,
-            "settings of the window",
-            &without_secrets(&text),
-        )?;
+        bundle.text(SETTINGS_FILE, "settings of the window", &without_secrets(&text))?;
     }
     for rig in &request.rigs {
         let name = format!("rigs/{}", file_name(rig));
-        bundle.text(
-            &name,
-            "a rig file, secrets removed",
-            &without_secrets(&read(rig)?),
-        )?;
+        bundle.text(&name, "a rig file, secrets removed", &without_secrets(&read(rig)?))?;
     }
     if request.has_manifests {
         bundle.manifests(&request.library)?;
@@ -175,15 +156,8 @@ impl Bundle<'_> {
             .start_file(name, SimpleFileOptions::default())
             .map_err(io::Error::from)
             .and_then(|()| io::copy(content, &mut self.zip))
-            .map_err(|source| BundleError::Write {
-                path: self.to.clone(),
-                source,
-            })?;
-        self.files.push(Bundled {
-            name: name.into(),
-            bytes,
-            what,
-        });
+            .map_err(|source| BundleError::Write { path: self.to.clone(), source })?;
+        self.files.push(Bundled { name: name.into(), bytes, what });
         Ok(())
     }
 
@@ -218,10 +192,7 @@ impl Bundle<'_> {
 }
 
 fn unreadable(path: &Path, source: io::Error) -> BundleError {
-    BundleError::Read {
-        path: path.display().to_string(),
-        source,
-    }
+    BundleError::Read { path: path.display().to_string(), source }
 }
 
 fn read(path: &Path) -> Result<String, BundleError> {
@@ -244,11 +215,7 @@ fn versions(request: &BundleRequest) -> String {
         env!("CARGO_PKG_VERSION"),
         std::env::consts::ARCH,
         std::env::consts::OS,
-        if cfg!(debug_assertions) {
-            "for debugging"
-        } else {
-            "for release"
-        },
+        if cfg!(debug_assertions) { "for debugging" } else { "for release" },
     )
 }
 

@@ -45,9 +45,7 @@ fn positive(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     if args.plot.is_some() && args.sources.len() > 1 {
-        return Err(Failure::usage(
-            "a plot shows one source; give one, or leave out --plot",
-        ));
+        return Err(Failure::usage("a plot shows one source; give one, or leave out --plot"));
     }
     new_file::check("plot", args.plot.as_deref())?;
     let columns = args.columns.as_deref().map(str::parse).transpose();
@@ -56,10 +54,7 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     let fitted = fitted.map(|path| KnownFit::of(path, columns.as_ref())?.0.body());
     let question = Question {
         at: args.at.map(Depth),
-        rule: SteadyRule {
-            percent: args.steady,
-            ..SteadyRule::default()
-        },
+        rule: SteadyRule { percent: args.steady, ..SteadyRule::default() },
         frequency: args.frequency,
         body: fitted.transpose().map_err(known_fit_failure)?,
     };
@@ -70,10 +65,7 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
         AnalyseFailure::Source(err) => source_failure(err),
         err => Failure::failed(err),
     })?;
-    let fitted = args
-        .validate
-        .as_ref()
-        .map(|path| path.display().to_string());
+    let fitted = args.validate.as_ref().map(|path| path.display().to_string());
     output.object(&object(&reports, fitted.as_deref()));
     output.text_only(|| {
         let parts: Vec<String> = reports.iter().map(whole).collect();

@@ -62,14 +62,7 @@ impl Asking {
                 }
             })
             .map_err(Failure::failed)?;
-        Ok(Self {
-            requests,
-            lines,
-            asked: None,
-            is_closed: false,
-            stopped: Stopped::No,
-            is_asking,
-        })
+        Ok(Self { requests, lines, asked: None, is_closed: false, stopped: Stopped::No, is_asking })
     }
 
     /// Tells a new question and passes on an answer to it. What was typed before the question is no answer.

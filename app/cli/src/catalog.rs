@@ -49,12 +49,9 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
         Ok((changes, catalog.all()?))
     })?;
     drop(bar);
-    let unreadable = entries.into_iter().filter_map(|entry| {
-        Some(Unreadable {
-            folder: entry.folder,
-            reason: entry.trouble?,
-        })
-    });
+    let unreadable = entries
+        .into_iter()
+        .filter_map(|entry| Some(Unreadable { folder: entry.folder, reason: entry.trouble? }));
     let report = RebuildReport {
         file: library.join(CATALOG_FILE),
         changes,
@@ -90,18 +87,12 @@ fn check(library: &Path, output: &Output) -> Result<(), Failure> {
         Ok((catalog.all()?.len(), doubts))
     })?;
     drop(bar);
-    let report = CheckReport {
-        file: library.join(CATALOG_FILE),
-        sessions,
-        doubts,
-    };
-    output.answer("catalog check", &report, || {
-        match report.doubts.as_slice() {
-            [] => format!("the catalog agrees with its {sessions} sessions"),
-            doubts => {
-                let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
-                doubts.iter().map(line).collect::<Vec<_>>().join("\n")
-            }
+    let report = CheckReport { file: library.join(CATALOG_FILE), sessions, doubts };
+    output.answer("catalog check", &report, || match report.doubts.as_slice() {
+        [] => format!("the catalog agrees with its {sessions} sessions"),
+        doubts => {
+            let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
+            doubts.iter().map(line).collect::<Vec<_>>().join("\n")
         }
     });
     match report.doubts.len() {
@@ -159,12 +150,7 @@ const SHORT_S: f64 = 1.0;
 
 impl<'a> LateBar<'a> {
     fn new(output: &'a Output, message: &'static str) -> Self {
-        Self {
-            output,
-            message,
-            watch: Stopwatch::start(),
-            bar: None,
-        }
+        Self { output, message, watch: Stopwatch::start(), bar: None }
     }
 
     fn show(&mut self, done: usize, of: usize) {

@@ -45,11 +45,7 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
         )));
     }
     let edited = edited::open(&args.session).map_err(super::source_failure)?;
-    edited
-        .session
-        .notes
-        .iter()
-        .for_each(|note| output.note(note));
+    edited.session.notes.iter().for_each(|note| output.note(note));
     if let Some(reason) = edited.rejection() {
         return Err(Failure::usage(format!(
             "the session was rejected ({reason}) and tells no compliance; 'palpate verdict' changes the verdict"
@@ -73,10 +69,9 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
 fn keep(found: &RigCompliance) -> Result<Kept, Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let kept = match Shelf::open(&library).in_force(&found.rig) {
-        Some(old) if is_same(&old.document, found) => Err(LibraryError::AlreadyThere {
-            kind: "compliance",
-            id: old.id.clone(),
-        }),
+        Some(old) if is_same(&old.document, found) => {
+            Err(LibraryError::AlreadyThere { kind: "compliance", id: old.id.clone() })
+        }
         Some(old) => supersede(&library, &old.id, found),
         None => save(&library, found),
     };
@@ -88,10 +83,7 @@ fn keep(found: &RigCompliance) -> Result<Kept, Failure> {
 
 /// Whether two differ in nothing but whose place they take.
 fn is_same(kept: &RigCompliance, found: &RigCompliance) -> bool {
-    let kept = RigCompliance {
-        supersedes: None,
-        ..kept.clone()
-    };
+    let kept = RigCompliance { supersedes: None, ..kept.clone() };
     kept == *found
 }
 

@@ -69,11 +69,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         is_acknowledged: false,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
-        answers: if bench.rig.is_virtual() {
-            Answers::Confirm
-        } else {
-            Answers::Operator
-        },
+        answers: if bench.rig.is_virtual() { Answers::Confirm } else { Answers::Operator },
         leader: None,
     };
     let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
@@ -141,14 +137,8 @@ fn text(checked: &Checked<'_>) -> String {
         word(checked.is_passed),
         checked.session.display()
     )];
-    let part = |part: &CheckPart| {
-        format!(
-            "{:<7} {}: {}",
-            part.what,
-            word(part.is_passed),
-            part.sentence
-        )
-    };
+    let part =
+        |part: &CheckPart| format!("{:<7} {}: {}", part.what, word(part.is_passed), part.sentence);
     lines.extend(checked.parts.iter().map(part));
     lines.join("\n")
 }

@@ -30,10 +30,7 @@ pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
         let library = library_folder().map_err(Failure::usage)?;
         // Exports go to where the user is, if nothing else is said.
         let here = PathBuf::from(".");
-        (
-            all_sessions(&library)?,
-            vec![(library, usize::MAX), (here, 1)],
-        )
+        (all_sessions(&library)?, vec![(library, usize::MAX), (here, 1)])
     } else {
         let places = args.sessions.iter().map(|path| (path.clone(), usize::MAX));
         (args.sessions.clone(), places.collect())
@@ -58,9 +55,7 @@ pub(super) fn findings(library: &Path, output: &Output) -> Result<String, Failur
 
 fn visit(paths: &[PathBuf], places: &[(PathBuf, usize)], output: &Output) -> Visit {
     let sessions = each(paths, output, examine);
-    let left = places
-        .iter()
-        .flat_map(|(place, depth)| leftovers(place, *depth));
+    let left = places.iter().flat_map(|(place, depth)| leftovers(place, *depth));
     Visit {
         unwell: sessions.iter().filter(|one| is_unwell(one)).count(),
         sessions,
@@ -103,10 +98,8 @@ pub(super) fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -
 }
 
 fn is_unwell(patient: &Patient) -> bool {
-    !matches!(
-        patient.health,
-        Health::Healthy | Health::BeingRecorded | Health::Interrupted
-    ) || !patient.wrong_beside.is_empty()
+    !matches!(patient.health, Health::Healthy | Health::BeingRecorded | Health::Interrupted)
+        || !patient.wrong_beside.is_empty()
 }
 
 fn patient_text(patient: &Patient) -> String {
@@ -133,14 +126,12 @@ fn patient_text(patient: &Patient) -> String {
     lines.extend(sentences.map(|one| format!("  {one}")));
     let can_be_kept = matches!(patient.health, Health::Damaged { .. } | Health::Interrupted);
     match &patient.recovered {
-        Some(folder) => lines.push(format!(
-            "  what is whole was recovered into {}",
-            folder.display()
-        )),
-        None if can_be_kept => lines.push(format!(
-            "  palpate recover {} keeps what is whole",
-            patient.path.display()
-        )),
+        Some(folder) => {
+            lines.push(format!("  what is whole was recovered into {}", folder.display()))
+        }
+        None if can_be_kept => {
+            lines.push(format!("  palpate recover {} keeps what is whole", patient.path.display()))
+        }
         None => {}
     }
     lines.join("\n")
@@ -150,10 +141,7 @@ fn patient_text(patient: &Patient) -> String {
 fn all_sessions(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     let folder = library.join("sessions");
     let failed = |err: std::io::Error| {
-        Failure::failed(format!(
-            "cannot read {} ({err}); check its permissions",
-            folder.display()
-        ))
+        Failure::failed(format!("cannot read {} ({err}); check its permissions", folder.display()))
     };
     if !folder.is_dir() {
         return Ok(Vec::new());

@@ -124,10 +124,7 @@ enum HomePin {
 fn setting(text: &str) -> Result<(u16, f64), String> {
     let wrong = || "give NUMBER=VALUE, such as 22=1".to_owned();
     let (number, value) = text.split_once('=').ok_or_else(wrong)?;
-    let number = number
-        .trim_start_matches('$')
-        .parse()
-        .map_err(|_| wrong())?;
+    let number = number.trim_start_matches('$').parse().map_err(|_| wrong())?;
     let value = value.parse().ok().filter(|value: &f64| value.is_finite());
     Ok((number, value.ok_or_else(wrong)?))
 }
@@ -184,25 +181,11 @@ fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
         serial_number: args.serial_number,
     });
     let mut ready = |at: &str| {
-        let object = Ready {
-            device: "galil",
-            model: args.model.to_string(),
-            at,
-            cell_at: None,
-            is_serial,
-        };
-        output.answer("emulate", &object, || {
-            format!("{} at {at}; Ctrl-C ends it", args.model)
-        });
+        let object =
+            Ready { device: "galil", model: args.model.to_string(), at, cell_at: None, is_serial };
+        output.answer("emulate", &object, || format!("{} at {at}; Ctrl-C ends it", args.model));
     };
-    emulate(
-        &mut device,
-        &args.wire,
-        None,
-        args.bench.seed,
-        &mut ready,
-        output,
-    )
+    emulate(&mut device, &args.wire, None, args.bench.seed, &mut ready, output)
 }
 
 fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
@@ -255,24 +238,14 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
     let seed = args.bench.seed;
     let mut device = EmulatedStand::new(EmulatedStandSettings {
         sim: args.bench.settings(),
-        gauge: EmulatedGaugeSettings {
-            seed,
-            ..EmulatedGaugeSettings::default()
-        },
+        gauge: EmulatedGaugeSettings { seed, ..EmulatedGaugeSettings::default() },
         ..EmulatedStandSettings::default()
     });
     let is_serial = args.wire.tcp.is_none();
     let mut ready = |at: &str| {
-        let object = Ready {
-            device: "mark10",
-            model: "ESM303".into(),
-            at,
-            cell_at: None,
-            is_serial,
-        };
-        output.answer("emulate", &object, || {
-            format!("ESM303 at {at}; Ctrl-C ends it")
-        });
+        let object =
+            Ready { device: "mark10", model: "ESM303".into(), at, cell_at: None, is_serial };
+        output.answer("emulate", &object, || format!("ESM303 at {at}; Ctrl-C ends it"));
     };
     emulate(&mut device, &args.wire, None, seed, &mut ready, output)
 }

@@ -133,11 +133,7 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let (found, doubts) = with_updated(&library, output, |catalog| {
         let found = catalog.find(&query)?;
         let is_none = found.count == 0;
-        let doubts = if is_none {
-            catalog.doubts(&query.conditions)?
-        } else {
-            Vec::new()
-        };
+        let doubts = if is_none { catalog.doubts(&query.conditions)? } else { Vec::new() };
         Ok((found, doubts))
     })?;
     doubts.iter().for_each(|doubt| output.note(doubt));

@@ -87,9 +87,7 @@ impl DeviceArgs {
                 Failure::usage(format!("--{name} {value} is not possible; give 0 or more"))
             })
         };
-        let friction = self
-            .friction
-            .map(|friction| not_negative("friction", friction));
+        let friction = self.friction.map(|friction| not_negative("friction", friction));
         let period = Period::of_rate(self.rate).map_err(Failure::usage)?;
         let usual = Setting::source(period);
         Ok(Setting {
@@ -199,9 +197,7 @@ pub(super) fn body(
 ) -> Result<ModifiedKelvin, Failure> {
     let found = body_of(source).map_err(Failure::usage)?;
     let notes = found.notes.iter().cloned();
-    notes
-        .chain(found.beyond(deepest))
-        .for_each(|note| output.note(&note));
+    notes.chain(found.beyond(deepest)).for_each(|note| output.note(&note));
     Ok(found.body)
 }
 
@@ -236,9 +232,7 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
     let followed = followed.map_err(Failure::usage)?;
     output.answer("haptics-follow", &followed, || follow_text(&followed));
     let source = args.source.display().to_string();
-    new_file::write("picture", args.plot.as_deref(), || {
-        follow_plot(&source, &followed)
-    })?;
+    new_file::write("picture", args.plot.as_deref(), || follow_plot(&source, &followed))?;
     new_file::write("table", args.table.as_deref(), || follow_table(&followed))?;
     match &args.out {
         Some(folder) => keep_followed(&followed, &source, folder).map_err(Failure::failed),
@@ -251,16 +245,11 @@ fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let seconds = checked_seconds(args.seconds)?;
     new_file::check("recording", args.record.as_deref())?;
     let body = body(&args.source, setting.deepest, output)?;
-    let recorder = args
-        .record
-        .as_deref()
-        .map(|to| recorder(to, body, &setting));
+    let recorder = args.record.as_deref().map(|to| recorder(to, body, &setting));
     let recorder = recorder.transpose().map_err(Failure::failed)?;
     let bar = output.share_bar();
     let settings = setting.simulation(body, true);
-    let paced = pace(&settings, seconds, 0, recorder, &mut |share| {
-        bar.share(share, "")
-    });
+    let paced = pace(&settings, seconds, 0, recorder, &mut |share| bar.share(share, ""));
     drop(bar);
     let paced = paced.map_err(Failure::failed)?;
     output.answer("haptics-run", &paced, || run_text(&paced));

@@ -51,9 +51,7 @@ struct HistoryReport<'a> {
 pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let subject = Subject::from(args.subject);
-    let found = with_updated(&library, output, |catalog| {
-        catalog.history(subject, &args.name)
-    });
+    let found = with_updated(&library, output, |catalog| catalog.history(subject, &args.name));
     let (events, remarks) = found?;
     remarks.iter().for_each(|remark| output.note(remark));
     if events.is_empty() {
@@ -62,12 +60,7 @@ pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
             args.name
         )));
     }
-    let object = HistoryReport {
-        subject,
-        name: &args.name,
-        events: &events,
-        remarks: &remarks,
-    };
+    let object = HistoryReport { subject, name: &args.name, events: &events, remarks: &remarks };
     output.answer("history", &object, || report::history(&events));
     Ok(())
 }

@@ -114,10 +114,7 @@ pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
         is_dry_run: args.dry_run,
     };
     let files = import(&request, &output.count_bar(0));
-    let report = Report {
-        is_dry_run: args.dry_run,
-        files: files.map_err(import_failure)?,
-    };
+    let report = Report { is_dry_run: args.dry_run, files: files.map_err(import_failure)? };
     output.answer("import", &report, || {
         let files = report.files.iter().map(text);
         files.collect::<Vec<_>>().join("\n\n")
@@ -142,9 +139,9 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
         ImportFailure::Keep(_) => Failure::failed(err),
         ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
-        ImportFailure::Foreign(_) => Failure::usage(format!(
-            "{err}; 'palpate import --help' tells how to say so"
-        )),
+        ImportFailure::Foreign(_) => {
+            Failure::usage(format!("{err}; 'palpate import --help' tells how to say so"))
+        }
         _ => Failure::usage(err),
     }
 }

@@ -120,11 +120,7 @@ fn phases(session: &Session) -> Vec<(String, usize)> {
 
 fn text(info: &Info<'_>) -> String {
     let or_dash = |text: &str| {
-        if text.is_empty() {
-            "-".to_string()
-        } else {
-            one_line(text)
-        }
+        if text.is_empty() { "-".to_string() } else { one_line(text) }
     };
     let mut lines = vec![
         format!("session    {}", info.session_id),
@@ -169,44 +165,26 @@ fn recorded(info: &Info<'_>) -> Vec<String> {
         "written by palpate {}, engine {}",
         info.software_version, info.engine_version
     )];
-    lines.push(format!(
-        "samples    {} over {:.1} s",
-        info.samples, info.duration_s
-    ));
-    let phases: Vec<String> = info
-        .phases
-        .iter()
-        .map(|(name, count)| format!("{name} {count}"))
-        .collect();
+    lines.push(format!("samples    {} over {:.1} s", info.samples, info.duration_s));
+    let phases: Vec<String> =
+        info.phases.iter().map(|(name, count)| format!("{name} {count}")).collect();
     lines.push(format!("phases     {}", phases.join(", ")));
-    lines.extend(
-        info.acknowledgements
-            .iter()
-            .map(|line| format!("accepted   {line}")),
-    );
+    lines.extend(info.acknowledgements.iter().map(|line| format!("accepted   {line}")));
     lines.push(match (info.ending, info.reason) {
         (Some(ending), Some(reason)) => format!("ending     {ending}: {reason}"),
         _ => "ending     none: the recording was interrupted".into(),
     });
     if let Some(time_use) = info.time_use_s.filter(|use_s| !use_s.is_empty()) {
-        let spent: Vec<String> = time_use
-            .iter()
-            .map(|(phase, secs)| format!("{phase} {secs:.1} s"))
-            .collect();
+        let spent: Vec<String> =
+            time_use.iter().map(|(phase, secs)| format!("{phase} {secs:.1} s")).collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
     if info.raw_bytes > 0 {
         let count = info.raw_bytes;
-        lines.push(format!(
-            "raw        {count} bytes as exchanged with devices"
-        ));
+        lines.push(format!("raw        {count} bytes as exchanged with devices"));
     }
     let health = info.health.map(said::health).unwrap_or_default();
-    lines.extend(
-        health
-            .iter()
-            .map(|(name, text)| format!("{name:<10} {text}")),
-    );
+    lines.extend(health.iter().map(|(name, text)| format!("{name:<10} {text}")));
     let facts = info.base.facts();
     lines.extend(facts.map(|(name, mm, error)| format!("{name:<10} {mm:.3} ± {error:.3} mm")));
     lines
@@ -246,11 +224,8 @@ fn analysis_text(one: &Analysis) -> String {
 
 /// The protocol by name and version with the values chosen, where the plan is one of ours.
 fn protocol_text(plan: &serde_json::Value) -> Option<String> {
-    let mut line = format!(
-        "protocol   {}, version {}",
-        plan["name"].as_str()?,
-        plan["version"].as_u64()?
-    );
+    let mut line =
+        format!("protocol   {}, version {}", plan["name"].as_str()?, plan["version"].as_u64()?);
     if let Some(values) = plan["source"]["values"].as_object() {
         for (name, value) in values {
             line += &format!("\n           {name} {}", value.as_str().unwrap_or_default());

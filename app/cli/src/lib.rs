@@ -248,9 +248,7 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
 /// Adds what `--about` tells and checks that all of it can stand together.
 fn tell(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
     for pair in about {
-        labels
-            .tell_pair(pair)
-            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+        labels.tell_pair(pair).map_err(|err| Failure::usage(format!("--about: {err}")))?;
     }
     labels.check().map_err(Failure::usage)
 }
@@ -269,9 +267,9 @@ fn sources_failure(err: SourcesError) -> Failure {
     match err {
         SourcesError::Folder { .. } => Failure::failed(err),
         SourcesError::Source { reason, .. } => source_failure(*reason),
-        SourcesError::Rejected(_) => Failure::usage(format!(
-            "{err}; add --include-rejected to take them all the same"
-        )),
+        SourcesError::Rejected(_) => {
+            Failure::usage(format!("{err}; add --include-rejected to take them all the same"))
+        }
         SourcesError::Table(_) => {
             Failure::usage(format!("{err}; 'palpate import' makes one of a table"))
         }

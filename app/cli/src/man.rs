@@ -19,9 +19,7 @@ pub(super) fn run(args: &ManArgs, output: &Output) -> Result<(), Failure> {
     let mut command = Cli::command();
     let Some(folder) = &args.to else {
         let mut page = Vec::new();
-        Man::new(command)
-            .render(&mut page)
-            .map_err(Failure::failed)?;
+        Man::new(command).render(&mut page).map_err(Failure::failed)?;
         let page = String::from_utf8_lossy(&page);
         let object = serde_json::json!({ "page": page });
         output.answer("man", &object, || page.trim_end().to_owned());
@@ -55,10 +53,7 @@ fn write_pages(
     page.render(&mut text)?;
     palpate_sessions::atomic::replace(&path, &text)?;
     pages.push(path);
-    for below in command
-        .get_subcommands()
-        .filter(|one| one.get_name() != "help")
-    {
+    for below in command.get_subcommands().filter(|one| one.get_name() != "help") {
         write_pages(Man::new(below.clone()), below, folder, pages)?;
     }
     Ok(())

@@ -33,11 +33,7 @@ pub(super) fn run(args: &NoteArgs, output: &Output) -> Result<(), Failure> {
     });
     output.answer("note", &object, || {
         let line = |session: &PathBuf| format!("{}: noted by {by}: {text}", session.display());
-        args.sessions
-            .iter()
-            .map(line)
-            .collect::<Vec<_>>()
-            .join("\n")
+        args.sessions.iter().map(line).collect::<Vec<_>>().join("\n")
     });
     Ok(())
 }

@@ -42,10 +42,7 @@ pub(super) struct Who {
 impl Who {
     /// As an analysis names them.
     pub fn who(&self) -> analyses::Who {
-        analyses::Who {
-            by: author(self.by.as_deref()),
-            reason: self.reason.clone(),
-        }
+        analyses::Who { by: author(self.by.as_deref()), reason: self.reason.clone() }
     }
 }
 
@@ -59,10 +56,7 @@ struct Recalibrated {
 pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure> {
     let source = Source::find(&args.calibration)?;
     let own = source.id.as_ref().unwrap_or(&source.calibration.name);
-    let name = args
-        .name
-        .clone()
-        .unwrap_or_else(|| format!("recalibrated {own}"));
+    let name = args.name.clone().unwrap_or_else(|| format!("recalibrated {own}"));
     let who = args.who.who();
     let bar = output.count_bar(args.sessions.len() as u64);
     let mut done = Vec::new();
@@ -73,10 +67,7 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
         for doubt in source.doubts(&made.rig) {
             bar.suspend(|| output.note(&format!("{}: {doubt}", session.display())));
         }
-        done.push(Recalibrated {
-            session: session.clone(),
-            change: made.change,
-        });
+        done.push(Recalibrated { session: session.clone(), change: made.change });
         bar.inc(1);
     }
     drop(bar);

@@ -51,10 +51,7 @@ pub(super) fn run(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
     } else {
         args.sessions.clone()
     };
-    let mut recoveries = Recoveries {
-        sessions: Vec::new(),
-        not_recovered: Vec::new(),
-    };
+    let mut recoveries = Recoveries { sessions: Vec::new(), not_recovered: Vec::new() };
     let mut lines = Vec::new();
     for (path, outcome) in paths.iter().zip(each(&paths, output, one)) {
         match outcome {
@@ -90,10 +87,7 @@ pub(super) fn run(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
 
 fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     examine_library(library).map_err(|err| {
-        Failure::failed(format!(
-            "cannot read {} ({err}); check its permissions",
-            library.display()
-        ))
+        Failure::failed(format!("cannot read {} ({err}); check its permissions", library.display()))
     })
 }
 

@@ -55,28 +55,14 @@ pub(super) fn run(
     for path in &args.sessions {
         bar.set_message(path.display().to_string());
         let report = replay_one(path, args.check, output)?;
-        sessions.push(Replayed {
-            session: path.clone(),
-            report,
-        });
+        sessions.push(Replayed { session: path.clone(), report });
         bar.inc(1);
     }
     drop(bar);
-    let differing = sessions
-        .iter()
-        .filter(|one| one.report.first_difference.is_some())
-        .count();
-    let replays = Replays {
-        sessions,
-        differing,
-    };
+    let differing = sessions.iter().filter(|one| one.report.first_difference.is_some()).count();
+    let replays = Replays { sessions, differing };
     output.answer("replay", &replays, || {
-        replays
-            .sessions
-            .iter()
-            .map(text)
-            .collect::<Vec<_>>()
-            .join("\n")
+        replays.sessions.iter().map(text).collect::<Vec<_>>().join("\n")
     });
     if differing > 0 {
         return Err(Failure::failed(format!(
@@ -123,10 +109,7 @@ fn replay_one(path: &Path, is_strict: bool, output: &Output) -> Result<ReplayRep
     session.notes.iter().for_each(|note| output.note(note));
     if is_strict && !session.is_whole() {
         let reason = session.notes.join("; ");
-        return Err(Failure::failed(format!(
-            "{} is not whole: {reason}",
-            path.display()
-        )));
+        return Err(Failure::failed(format!("{} is not whole: {reason}", path.display())));
     }
     let blessings = blessings_of(path).map_err(Failure::usage)?;
     replay(&session, &blessings).map_err(|err| failure(&err, path))
@@ -147,19 +130,15 @@ fn text(replayed: &Replayed) -> String {
             difference.at_s,
             difference.step,
             difference.after_sample,
-            difference
-                .decision
-                .map(|index| format!(", decision {index}"))
-                .unwrap_or_default(),
+            difference.decision.map(|index| format!(", decision {index}")).unwrap_or_default(),
         );
     }
     let decisions = match (report.is_same_engine, report.blessed) {
         (false, _) => "decisions not compared, another engine version made them".to_string(),
         (true, 0) => format!("{} decisions identical", report.decisions),
-        (true, blessed) => format!(
-            "{} decisions, {blessed} of them differ as blessed",
-            report.decisions
-        ),
+        (true, blessed) => {
+            format!("{} decisions, {blessed} of them differ as blessed", report.decisions)
+        }
     };
     format!(
         "{name}: {} samples, {decisions}; force within {:.1e} N, depth within {:.1e} mm",

@@ -70,9 +70,7 @@ pub(super) fn run(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
     let decision = args.decision.decision();
     let change = subject.review(decision).map_err(say_failure)?;
     let who = args.why.who();
-    let edit = subject
-        .say(&who.by, &who.reason, change)
-        .map_err(say_failure)?;
+    let edit = subject.say(&who.by, &who.reason, change).map_err(say_failure)?;
     let Change::Review { seen, .. } = &edit.change else {
         return Ok(());
     };
@@ -80,10 +78,8 @@ pub(super) fn run(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
         "reason": edit.reason, "seen": seen,
     });
     output.answer("review", &object, || {
-        let files: Vec<String> = seen
-            .iter()
-            .map(|one| format!("  {} {}", one.sha256, one.what))
-            .collect();
+        let files: Vec<String> =
+            seen.iter().map(|one| format!("  {} {}", one.sha256, one.what)).collect();
         format!(
             "{}: {} by {}: {}\nseen (SHA-256):\n{}",
             args.session.display(),

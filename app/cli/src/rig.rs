@@ -129,11 +129,7 @@ impl RigArgs {
     /// The settings of the simulated rig.
     #[must_use]
     pub fn settings(&self) -> SimSettings {
-        SimSettings {
-            clock: self.clock,
-            rate: self.rate,
-            ..self.bench.settings()
-        }
+        SimSettings { clock: self.clock, rate: self.rate, ..self.bench.settings() }
     }
 }
 
@@ -166,40 +162,27 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     let limits = Limits::for_travel(travel(args, rig.description().travel)?);
     // The built-in one belongs to its rig.
     let (calibration, doubts) = match &args.calibration {
-        None => (
-            palpate_drivers::sim::calibration(settings.profile),
-            Vec::new(),
-        ),
+        None => (palpate_drivers::sim::calibration(settings.profile), Vec::new()),
         Some(name) => {
             let source = Source::find(name)?;
             let doubts = source.doubts(&rig.description().name);
             (source.calibration, doubts)
         }
     };
-    Ok(OpenRig {
-        rig,
-        calibration,
-        doubts,
-        limits,
-        _locks: locks,
-    })
+    Ok(OpenRig { rig, calibration, doubts, limits, _locks: locks })
 }
 
 /// Opens the rig that a file describes.
 fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     if args.time_scale != TimeScale::Factor(1.0) {
-        return Err(Failure::usage(
-            "--time-scale is for simulated rigs; leave it out",
-        ));
+        return Err(Failure::usage("--time-scale is for simulated rigs; leave it out"));
     }
     // A wrong name is told before anything is opened.
     let source = args.calibration.as_deref().map(Source::find).transpose()?;
     let (rig, locks) = open_rig_file(&args.rig)?;
     let description = rig.description();
     let mut limits = Limits::for_travel(travel(args, description.travel)?);
-    let full_scale = description
-        .adc
-        .map(|adc| f64::from(adc.counts_max) * adc.volts_per_count);
+    let full_scale = description.adc.map(|adc| f64::from(adc.counts_max) * adc.volts_per_count);
     let (calibration, doubts) = match (source, rig.newtons_per_volt(), full_scale) {
         (Some(source), ..) => {
             let doubts = source.doubts(&description.name);
@@ -224,13 +207,7 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
             )));
         }
     };
-    Ok(OpenRig {
-        rig,
-        calibration,
-        doubts,
-        limits,
-        _locks: locks,
-    })
+    Ok(OpenRig { rig, calibration, doubts, limits, _locks: locks })
 }
 
 /// Opens the rig of a file and keeps other programs off it.

@@ -213,7 +213,5 @@ pub(super) fn told(
 ) -> Result<(), Failure> {
     let replayed = replayed.map_err(Failure::usage)?;
     output.answer(command, &replayed, || replayed.words());
-    replayed
-        .failure()
-        .map_or(Ok(()), |why| Err(Failure::failed(why)))
+    replayed.failure().map_or(Ok(()), |why| Err(Failure::failed(why)))
 }

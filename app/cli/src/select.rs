@@ -58,12 +58,7 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
             is_rejected_included: args.include_rejected,
         },
         options: options(args)?,
-        specimens: names.map(|names| {
-            names
-                .split(',')
-                .map(|name| name.trim().to_owned())
-                .collect()
-        }),
+        specimens: names.map(|names| names.split(',').map(|name| name.trim().to_owned()).collect()),
         naming: Naming::Path,
     };
     new_file::check("plot", args.plot.as_deref())?;

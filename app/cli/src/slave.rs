@@ -56,9 +56,7 @@ impl SlaveArgs {
             ("depth", self.depth, Setting::DEPTH_MAX, "mm"),
             ("speed", self.speed, speed_max.0, "mm/s"),
         ];
-        let bad = wanted
-            .into_iter()
-            .find(|(_, value, most, _)| !(*value > 0.0 && value <= most));
+        let bad = wanted.into_iter().find(|(_, value, most, _)| !(*value > 0.0 && value <= most));
         bad.map_or(Ok(()), |(name, value, most, unit)| {
             Err(Failure::usage(format!(
                 "--{name} {value} is not possible; give a number above 0 and up to {most} {unit}"

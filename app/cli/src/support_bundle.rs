@@ -69,20 +69,11 @@ pub(super) fn run(
         BundleError::Write { .. } => Failure::failed(err),
         BundleError::Read { .. } | BundleError::Session(_) => Failure::usage(err),
     })?;
-    let made = BundleReport {
-        file: request.to,
-        files,
-    };
+    let made = BundleReport { file: request.to, files };
     output.answer("support-bundle", &made, || {
-        let lines = made
-            .files
-            .iter()
-            .map(|one| format!("{}: {}, {} bytes", one.name, one.what, one.bytes));
-        let end = format!(
-            "{} holds these {} files",
-            made.file.display(),
-            made.files.len()
-        );
+        let lines =
+            made.files.iter().map(|one| format!("{}: {}, {} bytes", one.name, one.what, one.bytes));
+        let end = format!("{} holds these {} files", made.file.display(), made.files.len());
         lines.chain([end]).collect::<Vec<_>>().join("\n")
     });
     Ok(())

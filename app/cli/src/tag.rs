@@ -13,11 +13,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct TagArgs {
     /// Session folders, then tags: +TAG to give one, -TAG to take one away; options come before
-    #[arg(
-        required = true,
-        value_name = "SESSION|+TAG|-TAG",
-        allow_hyphen_values = true
-    )]
+    #[arg(required = true, value_name = "SESSION|+TAG|-TAG", allow_hyphen_values = true)]
     words: Vec<String>,
     /// Who says so; without it the login name
     #[arg(long, value_name = "NAME")]

@@ -78,11 +78,7 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
         let file = write_trade(&library, &curves).map_err(failure)?;
         (curves, file)
     };
-    let doubts = curves.doubts(
-        &trade::this_machine(),
-        trade::version(),
-        trade::age_days(&curves),
-    );
+    let doubts = curves.doubts(&trade::this_machine(), trade::version(), trade::age_days(&curves));
     doubts.iter().for_each(|doubt| output.note(doubt));
     if args.check {
         check(&curves, output)?;
@@ -95,18 +91,12 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
         recommendation,
         curves: &curves,
     };
-    output.answer("trade", &report, || {
-        trade::text(&curves, &report.recommendation)
-    });
+    output.answer("trade", &report, || trade::text(&curves, &report.recommendation));
     new_file::write("plot", args.plot.as_deref(), || trade::svg(&curves))
 }
 
 fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
-    let extent = if is_quick {
-        Extent::Quick
-    } else {
-        Extent::Full
-    };
+    let extent = if is_quick { Extent::Quick } else { Extent::Full };
     with_bar(output, |progress| trade::measure(extent, progress))
 }
 
@@ -125,24 +115,18 @@ fn stored(library: &Path) -> Result<(TradeCurves, PathBuf), Failure> {
     let here = trade::this_machine();
     let own = [trade_file(library, &here), quick_trade_file(library, &here)];
     let own = own.into_iter().find(|file| file.exists());
-    let file = own
-        .or_else(|| trade_files(library).into_iter().next())
-        .ok_or_else(|| {
-            Failure::usage(format!(
-                "no curves are stored in {}; measure with 'palpate trade'",
-                library.display()
-            ))
-        })?;
+    let file = own.or_else(|| trade_files(library).into_iter().next()).ok_or_else(|| {
+        Failure::usage(format!(
+            "no curves are stored in {}; measure with 'palpate trade'",
+            library.display()
+        ))
+    })?;
     let curves = read_trade(&file).map_err(failure)?;
     Ok((curves, file))
 }
 
 fn check(curves: &TradeCurves, output: &Output) -> Result<(), Failure> {
-    let extent = if curves.quick {
-        Extent::Quick
-    } else {
-        Extent::Full
-    };
+    let extent = if curves.quick { Extent::Quick } else { Extent::Full };
     let now = with_bar(output, |progress| trade::errors(extent, progress))?;
     curves.agrees_with(&now).map_err(Failure::failed)?;
     output.note("every stored error was found again");

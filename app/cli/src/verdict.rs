@@ -35,10 +35,7 @@ pub(super) struct Why {
 impl Why {
     /// As an analysis names them.
     pub(super) fn who(&self) -> Who {
-        Who {
-            by: author(self.by.as_deref()),
-            reason: self.reason.clone(),
-        }
+        Who { by: author(self.by.as_deref()), reason: self.reason.clone() }
     }
 }
 
@@ -51,12 +48,7 @@ pub(super) fn run(args: &VerdictArgs, output: &Output) -> Result<(), Failure> {
     });
     output.answer("verdict", &object, || {
         let was = before.map_or("had no verdict".into(), |was| format!("was {was}"));
-        format!(
-            "{}: {} ({was}); {}",
-            args.session.display(),
-            args.verdict,
-            one_line(&edit.reason)
-        )
+        format!("{}: {} ({was}); {}", args.session.display(), args.verdict, one_line(&edit.reason))
     });
     Ok(())
 }

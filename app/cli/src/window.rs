@@ -22,13 +22,7 @@ pub(super) fn run(
     let windows = windows.ok_or_else(|| Failure::usage(NO_WINDOW))?;
     let bench = open(&args.rig)?;
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
-    let OpenRig {
-        rig,
-        calibration,
-        doubts,
-        limits,
-        _locks,
-    } = bench;
+    let OpenRig { rig, calibration, doubts, limits, _locks } = bench;
     doubts.iter().for_each(|doubt| output.note(doubt));
     windows
         .workbench(WorkbenchRequest {

@@ -134,11 +134,7 @@ fn who_is_at(at: &str, baud: u32) -> Result<Found, String> {
     let place = if is_address {
         Place::Tcp(at.to_owned())
     } else {
-        Place::Serial {
-            port: at.to_owned(),
-            baud,
-            has_handshake: false,
-        }
+        Place::Serial { port: at.to_owned(), baud, has_handshake: false }
     };
     let mut link = place.open().map_err(|err| err.to_string())?;
     ask(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
@@ -267,16 +263,8 @@ impl Stretch {
             return;
         }
         let is_first = self.samples == 0;
-        self.min_v = if is_first {
-            other.min_v
-        } else {
-            self.min_v.min(other.min_v)
-        };
-        self.max_v = if is_first {
-            other.max_v
-        } else {
-            self.max_v.max(other.max_v)
-        };
+        self.min_v = if is_first { other.min_v } else { self.min_v.min(other.min_v) };
+        self.max_v = if is_first { other.max_v } else { self.max_v.max(other.max_v) };
         self.samples += other.samples;
         self.sum_v += other.sum_v;
         self.age_max = self.age_max.max(other.age_max);
@@ -378,10 +366,8 @@ fn told(rig: &dyn Rig, newest: Option<&Reading>, recent: &Stretch, since: Nanos)
         (AxisStatus::REVERSE_LIMIT, "limit switch behind home"),
         (AxisStatus::MOTOR_ON, "motor on"),
     ];
-    let states = named
-        .into_iter()
-        .filter(|(bit, _)| reading.status.has(*bit))
-        .map(|(_, name)| name);
+    let states =
+        named.into_iter().filter(|(bit, _)| reading.status.has(*bit)).map(|(_, name)| name);
     let states = states.collect::<Vec<&str>>().join(", ");
     format!(
         "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old within {:.2}  {states}",

@@ -24,35 +24,15 @@ pub struct Svg {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A text, turned a quarter to the left if upright.
-    Text {
-        at: [f64; 2],
-        is_upright: bool,
-        ink: Ink,
-        text: String,
-    },
+    Text { at: [f64; 2], is_upright: bool, ink: Ink, text: String },
     /// A line through points, dashed by so many px if not 0.
-    Line {
-        points: Vec<[f64; 2]>,
-        color: Color32,
-        width: f64,
-        dash: f64,
-    },
+    Line { points: Vec<[f64; 2]>, color: Color32, width: f64, dash: f64 },
     /// What lies within a line.
-    Band {
-        points: Vec<[f64; 2]>,
-        color: Color32,
-    },
+    Band { points: Vec<[f64; 2]>, color: Color32 },
     /// A rectangle by its upper left and its lower right corner.
-    Rectangle {
-        corners: [[f64; 2]; 2],
-        color: Color32,
-    },
+    Rectangle { corners: [[f64; 2]; 2], color: Color32 },
     /// A filled circle.
-    Dot {
-        at: [f64; 2],
-        color: Color32,
-        radius: f64,
-    },
+    Dot { at: [f64; 2], color: Color32, radius: f64 },
 }
 
 /// Where a text stands relative to its point.
@@ -73,11 +53,7 @@ pub struct Ink {
 
 impl Ink {
     pub fn plain(color: Color32) -> Self {
-        Self {
-            color,
-            size: FONT,
-            anchor: Anchor::Start,
-        }
+        Self { color, size: FONT, anchor: Anchor::Start }
     }
 
     pub fn anchored(self, anchor: Anchor) -> Self {
@@ -119,12 +95,7 @@ impl Drawing {
 impl Shape {
     fn element(&self) -> String {
         match self {
-            Self::Text {
-                at: [x, y],
-                is_upright,
-                ink,
-                text,
-            } => {
+            Self::Text { at: [x, y], is_upright, ink, text } => {
                 let place = match is_upright {
                     false => format!("x=\"{x:.1}\" y=\"{y:.1}\""),
                     true => format!("transform=\"translate({x:.1} {y:.1}) rotate(-90)\""),
@@ -141,12 +112,7 @@ impl Shape {
                     escape(text)
                 )
             }
-            Self::Line {
-                points,
-                color,
-                width,
-                dash,
-            } => {
+            Self::Line { points, color, width, dash } => {
                 let dashes = match *dash {
                     dash if dash > 0.0 => format!(" stroke-dasharray=\"{dash}\""),
                     _ => String::new(),
@@ -163,21 +129,14 @@ impl Shape {
                 list(points),
                 hex(*color)
             ),
-            Self::Rectangle {
-                corners: [[left, top], [right, bottom]],
-                color,
-            } => format!(
+            Self::Rectangle { corners: [[left, top], [right, bottom]], color } => format!(
                 "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{}\" \
                  fill-opacity=\"{SHADE_OPACITY}\"/>",
                 right - left,
                 bottom - top,
                 hex(*color)
             ),
-            Self::Dot {
-                at: [x, y],
-                color,
-                radius,
-            } => format!(
+            Self::Dot { at: [x, y], color, radius } => format!(
                 "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
                 hex(*color)
             ),
@@ -197,10 +156,7 @@ fn list(points: &[[f64; 2]]) -> String {
 
 impl Svg {
     pub fn new(width: f64) -> Self {
-        Self {
-            width,
-            shapes: Vec::new(),
-        }
+        Self { width, shapes: Vec::new() }
     }
 
     /// The document, `height` px high, on a ground; `title` is what a screen reader says.
@@ -228,12 +184,7 @@ impl Svg {
     }
 
     fn put(&mut self, at: [f64; 2], is_upright: bool, ink: Ink, text: &str) {
-        self.shapes.push(Shape::Text {
-            at,
-            is_upright,
-            ink,
-            text: text.to_owned(),
-        });
+        self.shapes.push(Shape::Text { at, is_upright, ink, text: text.to_owned() });
     }
 
     pub fn line(&mut self, points: &[[f64; 2]], color: Color32, width: f64) {
@@ -245,20 +196,12 @@ impl Svg {
         if points.is_empty() {
             return;
         }
-        self.shapes.push(Shape::Line {
-            points: points.to_vec(),
-            color,
-            width,
-            dash,
-        });
+        self.shapes.push(Shape::Line { points: points.to_vec(), color, width, dash });
     }
 
     /// A rectangle between two corners.
     pub fn rectangle(&mut self, [left, top]: [f64; 2], [right, bottom]: [f64; 2], color: Color32) {
-        self.shapes.push(Shape::Rectangle {
-            corners: [[left, top], [right, bottom]],
-            color,
-        });
+        self.shapes.push(Shape::Rectangle { corners: [[left, top], [right, bottom]], color });
     }
 
     /// A band between an upper and a lower edge.
@@ -305,9 +248,6 @@ mod tests {
 
     #[test]
     fn any_text_becomes_valid_xml() {
-        assert_eq!(
-            escape("a<b> & \"c\"\u{0}'d'"),
-            "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;"
-        );
+        assert_eq!(escape("a<b> & \"c\"\u{0}'d'"), "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;");
     }
 }

@@ -52,10 +52,8 @@ impl Body {
 
     /// Sentences one under another; nothing without any.
     pub fn list<'a>(&mut self, items: impl IntoIterator<Item = &'a str>) {
-        let items: String = items
-            .into_iter()
-            .map(|item| format!("<li>{}</li>\n", escape(item)))
-            .collect();
+        let items: String =
+            items.into_iter().map(|item| format!("<li>{}</li>\n", escape(item))).collect();
         if !items.is_empty() {
             self.0 += &format!("<ul>\n{items}</ul>\n");
         }
@@ -98,10 +96,8 @@ impl Body {
         rows: &[Vec<String>],
         attributes: impl Fn(usize) -> String,
     ) {
-        let heads: String = heads
-            .iter()
-            .map(|head| format!("<th scope=\"col\">{}</th>", escape(head)))
-            .collect();
+        let heads: String =
+            heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
         self.0 += &format!(
             "<table>\n<caption>{}</caption>\n<thead>\n<tr>{heads}</tr>\n</thead>\n<tbody>\n",
             escape(caption)
@@ -148,9 +144,7 @@ fn style() -> String {
         ("$line", LIGHT.line),
         ("$ground", LIGHT.canvas),
     ];
-    inks.iter().fold(STYLE.to_owned(), |style, (name, ink)| {
-        style.replace(name, &hex(*ink))
-    })
+    inks.iter().fold(STYLE.to_owned(), |style, (name, ink)| style.replace(name, &hex(*ink)))
 }
 
 /// The whole page.
@@ -182,10 +176,7 @@ mod tests {
         body.table(hostile, &[hostile], &[vec![hostile.to_owned()]]);
         body.figure("<svg/>", hostile);
         let page = document(hostile, body);
-        assert!(
-            !page.contains("<script") && !page.contains("onload='"),
-            "{page}"
-        );
+        assert!(!page.contains("<script") && !page.contains("onload='"), "{page}");
         assert!(!page.contains('\u{202e}'));
         assert_eq!(page.matches("&lt;script&gt;").count(), 13);
     }

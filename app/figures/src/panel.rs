@@ -53,21 +53,14 @@ impl Panel {
             // A little room for dots at the edge.
             [low - 0.25, high + 0.25]
         };
-        Self {
-            place,
-            x: range(0),
-            y: range(1),
-        }
+        Self { place, x: range(0), y: range(1) }
     }
 
     /// Where a point lies in the picture, in px.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [left, top, right, bottom] = self.place;
         let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
-        [
-            left + share(x, self.x) * (right - left),
-            bottom - share(y, self.y) * (bottom - top),
-        ]
+        [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
     }
 
     pub fn line(&self, svg: &mut Svg, points: &[[f64; 2]], color: Color32, width: f64) {
@@ -85,21 +78,13 @@ impl Panel {
     /// Grid, numbers and names of the axes.
     pub fn axes(&self, svg: &mut Svg, names: [&str; 2], look: Look) {
         let [_, top, _, bottom] = self.place;
-        let marks = [
-            marks(self.x, MARKS_MAX),
-            marks(self.y, (bottom - top) / HEIGHT_OF_MARK),
-        ];
+        let marks = [marks(self.x, MARKS_MAX), marks(self.y, (bottom - top) / HEIGHT_OF_MARK)];
         self.frame(svg, names, look, &marks);
     }
 
     /// Grid, numbers and name of the time alone.
     pub fn time_axis(&self, svg: &mut Svg, name: &str, look: Look) {
-        self.frame(
-            svg,
-            [name, ""],
-            look,
-            &[marks(self.x, MARKS_MAX), Vec::new()],
-        );
+        self.frame(svg, [name, ""], look, &[marks(self.x, MARKS_MAX), Vec::new()]);
     }
 
     /// The same where the numbers along some of them are decimal logarithms.
@@ -143,11 +128,7 @@ impl Panel {
             let beside = [left - 6.0, y + 0.35 * FONT];
             svg.text(beside, ink.anchored(Anchor::End), text);
         }
-        svg.line(
-            &[[left, top], [left, bottom], [right, bottom]],
-            look.text,
-            1.0,
-        );
+        svg.line(&[[left, top], [left, bottom], [right, bottom]], look.text, 1.0);
         let middle = ink.anchored(Anchor::Middle);
         let x_place = [0.5 * (left + right), bottom + 2.0 * FONT + 10.0];
         svg.text(x_place, middle, x_name);
@@ -184,9 +165,7 @@ fn marks([low, high]: [f64; 2], steps_max: f64) -> Vec<(f64, String)> {
 pub fn round_up(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     // 1e-9 forgives the rounding of the logarithm.
-    let round = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|factor| factor * power >= least * (1.0 - 1e-9));
+    let round = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * power >= least * (1.0 - 1e-9));
     round.unwrap_or(10.0) * power
 }
 
@@ -199,9 +178,7 @@ fn decades([low, high]: [f64; 2], count_max: f64) -> Vec<(f64, String)> {
     if last - first < 1 {
         return between_decades(low, high);
     }
-    let every = ((last - first + 1) as f64 / count_max.max(1.0))
-        .ceil()
-        .max(1.0) as i64;
+    let every = ((last - first + 1) as f64 / count_max.max(1.0)).ceil().max(1.0) as i64;
     (first..=last)
         .filter(|power| power.rem_euclid(every) == 0)
         .map(|power| {
@@ -231,16 +208,10 @@ mod tests {
     #[test]
     fn marks_are_round_and_inside() {
         let texts = |range| -> Vec<String> {
-            marks(range, 5.0)
-                .into_iter()
-                .map(|(_, text)| text)
-                .collect()
+            marks(range, 5.0).into_iter().map(|(_, text)| text).collect()
         };
         assert_eq!(texts([-0.2, 9.7]), ["0", "2", "4", "6", "8"]);
-        assert_eq!(
-            texts([-0.012, 0.011]),
-            ["-0.010", "-0.005", "0.000", "0.005", "0.010"]
-        );
+        assert_eq!(texts([-0.012, 0.011]), ["-0.010", "-0.005", "0.000", "0.005", "0.010"]);
         assert!(texts([1.0, 1.0]).is_empty());
     }
 
@@ -259,10 +230,7 @@ mod tests {
     #[test]
     fn decades_are_named() {
         let texts = |range, count| -> Vec<String> {
-            decades(range, count)
-                .into_iter()
-                .map(|(_, text)| text)
-                .collect()
+            decades(range, count).into_iter().map(|(_, text)| text).collect()
         };
         assert_eq!(texts([-2.2, 1.1], 9.0), ["0.01", "0.1", "1", "10"]);
         assert_eq!(texts([-8.5, 4.5], 5.0), ["1e-6", "1e-3", "1", "1000"]);
@@ -273,11 +241,7 @@ mod tests {
 
     #[test]
     fn points_lie_where_the_axes_say() {
-        let panel = Panel {
-            place: [100.0, 10.0, 300.0, 110.0],
-            x: [0.0, 10.0],
-            y: [-1.0, 1.0],
-        };
+        let panel = Panel { place: [100.0, 10.0, 300.0, 110.0], x: [0.0, 10.0], y: [-1.0, 1.0] };
         assert_eq!(panel.at([5.0, 0.0]), [200.0, 60.0]);
         assert_eq!(panel.at([10.0, 1.0]), [300.0, 10.0]);
         let nothing = Panel::around(panel.place, [0.0, 1.0], &[&[]]);

@@ -52,11 +52,8 @@ fn encoded(pixels: &Pixmap) -> io::Result<Vec<u8>> {
         yppu: dots_per_m,
         unit: png::Unit::Meter,
     }));
-    let bytes: Vec<u8> = pixels
-        .data()
-        .iter()
-        .flat_map(|pixel| [pixel.r, pixel.g, pixel.b])
-        .collect();
+    let bytes: Vec<u8> =
+        pixels.data().iter().flat_map(|pixel| [pixel.r, pixel.g, pixel.b]).collect();
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&bytes)?;
     writer.finish()?;
@@ -81,12 +78,7 @@ fn path(points: &[[f64; 2]]) -> BezPath {
 
 fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
     match shape {
-        Shape::Text {
-            at,
-            is_upright,
-            ink: own,
-            text,
-        } => {
+        Shape::Text { at, is_upright, ink: own, text } => {
             context.set_paint(ink(own.color, 1.0));
             let place = Affine::translate((at[0], at[1]));
             let turn = match is_upright {
@@ -95,15 +87,8 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
             };
             context.fill_path(&(place * turn * letters.line(text, *own)));
         }
-        Shape::Line {
-            points,
-            color,
-            width,
-            dash,
-        } => {
-            let stroke = Stroke::new(*width)
-                .with_join(Join::Round)
-                .with_caps(Cap::Butt);
+        Shape::Line { points, color, width, dash } => {
+            let stroke = Stroke::new(*width).with_join(Join::Round).with_caps(Cap::Butt);
             context.set_stroke(match *dash {
                 dash if dash > 0.0 => stroke.with_dashes(0.0, [dash]),
                 _ => stroke,
@@ -117,10 +102,7 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
             area.close_path();
             context.fill_path(&area);
         }
-        Shape::Rectangle {
-            corners: [[left, top], [right, bottom]],
-            color,
-        } => {
+        Shape::Rectangle { corners: [[left, top], [right, bottom]], color } => {
             context.set_paint(ink(*color, SHADE_OPACITY));
             let area = vello_cpu::kurbo::Rect::new(*left, *top, *right, *bottom);
             context.fill_rect(&area);
@@ -139,12 +121,7 @@ struct Letters(Vec<FontRef<'static>>);
 impl Default for Letters {
     fn default() -> Self {
         let fonts = [UBUNTU_LIGHT, HACK_REGULAR];
-        Self(
-            fonts
-                .iter()
-                .filter_map(|font| FontRef::new(font).ok())
-                .collect(),
-        )
+        Self(fonts.iter().filter_map(|font| FontRef::new(font).ok()).collect())
     }
 }
 
@@ -220,9 +197,7 @@ mod tests {
 
     /// The pixels of a file, row by row, and its width.
     fn read(file: &[u8]) -> (Vec<[u8; 3]>, usize) {
-        let mut reader = png::Decoder::new(io::Cursor::new(file))
-            .read_info()
-            .unwrap();
+        let mut reader = png::Decoder::new(io::Cursor::new(file)).read_info().unwrap();
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut bytes).unwrap();
         let pixels = bytes.chunks_exact(3).map(|it| [it[0], it[1], it[2]]);
@@ -242,14 +217,8 @@ mod tests {
         let at = |x: usize, y: usize| pixels[2 * y * width + 2 * x];
         let rgb = |color: Color32| [color.r(), color.g(), color.b()];
         assert_eq!(at(95, 75), rgb(LIGHT.canvas));
-        assert_eq!(
-            (at(5, 30), at(95, 30)),
-            (rgb(LIGHT.limit), rgb(LIGHT.limit))
-        );
-        assert_eq!(
-            (at(5, 40), at(15, 40)),
-            (rgb(LIGHT.limit), rgb(LIGHT.canvas))
-        );
+        assert_eq!((at(5, 30), at(95, 30)), (rgb(LIGHT.limit), rgb(LIGHT.limit)));
+        assert_eq!((at(5, 40), at(15, 40)), (rgb(LIGHT.limit), rgb(LIGHT.canvas)));
         assert_eq!(at(50, 60), rgb(LIGHT.series));
         // Half of text on canvas.
         let half = at(10, 10)[0];

@@ -22,11 +22,7 @@ pub fn thin(points: impl Iterator<Item = [f64; 2]> + Clone, columns: usize) -> V
         match &mut open {
             Some(column) if column.index == index => column.take(order, point),
             _ => {
-                let next = Column {
-                    index,
-                    least: (order, point),
-                    most: (order, point),
-                };
+                let next = Column { index, least: (order, point), most: (order, point) };
                 if let Some(column) = open.replace(next) {
                     column.close(&mut thinned);
                 }
@@ -85,13 +81,7 @@ mod tests {
     #[test]
     fn every_peak_survives() {
         let wave = |i: i32| [f64::from(i), f64::from(i % 7)];
-        let spiked = (0..100_000).map(|i| {
-            if i == 54_321 {
-                [f64::from(i), 40.0]
-            } else {
-                wave(i)
-            }
-        });
+        let spiked = (0..100_000).map(|i| if i == 54_321 { [f64::from(i), 40.0] } else { wave(i) });
         let thinned = thin(spiked, 500);
         assert!(thinned.len() <= 1000, "{}", thinned.len());
         assert!(thinned.contains(&[54_321.0, 40.0]));

@@ -177,11 +177,7 @@ mod tests {
     fn luminance(color: Color32) -> f64 {
         let linear = |channel: u8| {
             let value = f64::from(channel) / 255.0;
-            if value <= 0.040_45 {
-                value / 12.92
-            } else {
-                ((value + 0.055) / 1.055).powf(2.4)
-            }
+            if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
         };
         0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
     }
@@ -241,9 +237,8 @@ mod tests {
 
     #[test]
     fn viridis_grows_lighter_all_the_way() {
-        let lightness: Vec<f64> = (0..=256)
-            .map(|step| luminance(viridis(step as f32 / 256.0)))
-            .collect();
+        let lightness: Vec<f64> =
+            (0..=256).map(|step| luminance(viridis(step as f32 / 256.0))).collect();
         assert!(lightness.windows(2).all(|pair| pair[0] < pair[1] + 0.001));
         assert!(lightness[0] < 0.03 && lightness[256] > 0.75);
         assert_eq!(viridis(f32::NAN), viridis(0.0));

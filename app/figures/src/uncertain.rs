@@ -43,11 +43,7 @@ pub fn error_alone(error: f64) -> String {
     let Some(digits) = Digits::of(error, error) else {
         return plain(error);
     };
-    let scaled = format!(
-        "{:.*}",
-        digits.decimals,
-        error / 10f64.powi(digits.exponent)
-    );
+    let scaled = format!("{:.*}", digits.decimals, error / 10f64.powi(digits.exponent));
     match digits.exponent {
         0 => scaled,
         exponent => format!("{scaled}e{exponent}"),
@@ -74,10 +70,7 @@ impl Digits {
         if scaled < 5e-7 {
             return None;
         }
-        Some(Self {
-            exponent,
-            decimals: (1 - scaled.log10().floor() as i32).clamp(0, 6) as usize,
-        })
+        Some(Self { exponent, decimals: (1 - scaled.log10().floor() as i32).clamp(0, 6) as usize })
     }
 
     /// Two numbers between three marks, in brackets where a power of ten is common to both.
@@ -98,11 +91,7 @@ pub fn plain(value: f64) -> String {
     if !value.is_finite() {
         return "not a number".into();
     }
-    let magnitude = if value == 0.0 {
-        0
-    } else {
-        value.abs().log10().floor() as i32
-    };
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     if (-3..5).contains(&magnitude) {
         let decimals = (3 - magnitude).clamp(0, 6) as usize;
         format!("{value:.decimals$}")
@@ -133,11 +122,7 @@ pub fn shortest(value: f64) -> String {
 #[must_use]
 pub fn clock(seconds: f64) -> String {
     // A time left that cannot be known is no time left.
-    let whole = if seconds.is_finite() {
-        seconds.max(0.0).round() as u64
-    } else {
-        0
-    };
+    let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
     let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
     if hours > 0 {
         format!("{hours}:{minutes:02}:{seconds:02}")
@@ -181,12 +166,7 @@ mod tests {
     fn an_interval_has_the_digits_of_its_value() {
         for (ends, value, error, text) in [
             ([1.019_4, 1.027_6], 1.023_47, 0.002_1, "[1.0194, 1.0276]"),
-            (
-                [-8.737_8e-3, -8.726_3e-3],
-                -0.008_732,
-                2.9e-6,
-                "[-8.7378, -8.7263]e-3",
-            ),
+            ([-8.737_8e-3, -8.726_3e-3], -0.008_732, 2.9e-6, "[-8.7378, -8.7263]e-3"),
             ([1185.2, 1283.8], 1234.5, 25.0, "[1185, 1284]"),
             ([0.5, 2.0], 1.0, 0.0, "[0.5000, 2.000]"),
         ] {
@@ -199,18 +179,8 @@ mod tests {
     fn a_value_before_its_interval_has_its_own_power() {
         for (value, error, ends, text) in [
             (1.023_47, 0.002_1, [1.0, 2.0], "1.0235 [1.0000, 2.0000]"),
-            (
-                4.12e-5,
-                3.1e-7,
-                [4.0e-5, 5.0e-5],
-                "4.120e-5 [4.000, 5.000]e-5",
-            ),
-            (
-                -0.008_732,
-                2.9e-6,
-                [-0.009, 0.0],
-                "-8.7320e-3 [-9.0000, 0.0000]e-3",
-            ),
+            (4.12e-5, 3.1e-7, [4.0e-5, 5.0e-5], "4.120e-5 [4.000, 5.000]e-5"),
+            (-0.008_732, 2.9e-6, [-0.009, 0.0], "-8.7320e-3 [-9.0000, 0.0000]e-3"),
         ] {
             assert_eq!(with_interval(value, error, ends), text);
         }

@@ -33,12 +33,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     assert_ne!(report["verdict"], "valid", "{report}");
     assert!(report["samples_lost"].as_u64().unwrap() > 0, "{report}");
     let said = stderr(&done);
-    for words in [
-        "000.mcap",
-        "another program",
-        "are missing",
-        "palpate recover",
-    ] {
+    for words in ["000.mcap", "another program", "are missing", "palpate recover"] {
         assert!(said.contains(words), "{words}: {said}");
     }
     // What came after is kept, and can be recovered.
@@ -46,26 +41,16 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     succeeded(&palpate(at, &["recover", "emptied"]));
     let info = json(&palpate(at, &["info", "emptied.recovered", "--json"]));
     assert_eq!(info["samples"], report["samples"]);
-    assert_eq!(
-        (&info["is_complete"], &info["verdict"]),
-        (&true.into(), &report["verdict"])
-    );
+    assert_eq!((&info["is_complete"], &info["verdict"]), (&true.into(), &report["verdict"]));
 }
 
 #[test]
 fn a_review_that_was_cut_off_is_told_by_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    succeeded(&short_run(
-        at,
-        "library/sessions/one",
-        &["--specimen", "gel"],
-    ));
+    succeeded(&short_run(at, "library/sessions/one", &["--specimen", "gel"]));
     let one = "library/sessions/one";
-    succeeded(&palpate(
-        at,
-        &["review", one, "--reject", "--reason", "hair on the probe"],
-    ));
+    succeeded(&palpate(at, &["review", one, "--reject", "--reason", "hair on the probe"]));
     let edits = at.join(one).join("edits.jsonl");
     let text = fs::read_to_string(&edits).unwrap();
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
@@ -79,17 +64,9 @@ fn a_review_that_was_cut_off_is_told_by_every_command() {
         (vec!["history", "specimen", "gel"], 0),
     ] {
         let output = palpate(at, &words);
-        assert_eq!(
-            output.status.code(),
-            Some(code),
-            "{words:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(code), "{words:?}: {}", stderr(&output));
         let said = stdout(&output) + &stderr(&output);
-        assert!(
-            said.contains("edits.jsonl") && said.contains("1 of 2"),
-            "{words:?}: {said}"
-        );
+        assert!(said.contains("edits.jsonl") && said.contains("1 of 2"), "{words:?}: {said}");
     }
     let history = json(&palpate(at, &["history", "specimen", "gel", "--json"]));
     assert_eq!(history["events"].as_array().unwrap().len(), 1);
@@ -101,14 +78,9 @@ fn what_a_killed_export_left_is_named_by_doctor_and_swept_by_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeded(&short_run(at, "demo", &[]));
-    let names = [
-        "tables/.demo.csv.aBcDeF.palpate.tmp",
-        ".demo.csv.123456.palpate.tmp",
-    ];
+    let names = ["tables/.demo.csv.aBcDeF.palpate.tmp", ".demo.csv.123456.palpate.tmp"];
     fs::create_dir(at.join("tables")).unwrap();
-    names
-        .iter()
-        .for_each(|name| fs::write(at.join(name), "half").unwrap());
+    names.iter().for_each(|name| fs::write(at.join(name), "half").unwrap());
     let named = || {
         let visit = json(&palpate(at, &["doctor", "--json"]));
         let left = visit["leftovers"].as_array().unwrap().clone();
@@ -119,10 +91,7 @@ fn what_a_killed_export_left_is_named_by_doctor_and_swept_by_the_next() {
     assert_eq!(named(), [names[1]]);
     assert!(stdout(&palpate(at, &["doctor", "tables"])).contains(names[0]));
     for (to, left) in [("tables", vec![names[1]]), (".", vec![])] {
-        succeeded(&palpate(
-            at,
-            &["export", "demo", "--format", "csv", "--to", to],
-        ));
+        succeeded(&palpate(at, &["export", "demo", "--format", "csv", "--to", to]));
         assert_eq!(named(), left, "{to}");
         assert!(!at.join(names[0]).exists());
     }

@@ -21,9 +21,7 @@ fn table(at: &Path, name: &str, cycles: u32, speed: f64) {
                 _ => share(2 * count + held - i),
             };
             let dt = if i == 0 { 0.0 } else { 0.02 };
-            let force = state
-                .step(&ModifiedKelvin::THESIS, Depth(x - set), Seconds(dt))
-                .0;
+            let force = state.step(&ModifiedKelvin::THESIS, Depth(x - set), Seconds(dt)).0;
             let t = f64::from(cycle) * 1000.0 + 0.02 * f64::from(i);
             let _ = writeln!(text, "{t},{x},{}", force.max(0.0));
         }
@@ -41,16 +39,10 @@ fn cycles_of_a_table_are_told_and_drawn() {
     let object = json(&output);
     let record = &object["records"][0];
     let cycles = record["cycles"].as_array().unwrap();
-    assert_eq!(
-        (cycles.len(), object["command"].as_str()),
-        (10, Some("analyse"))
-    );
+    assert_eq!((cycles.len(), object["command"].as_str()), (10, Some("analyse")));
     for (k, cycle) in cycles.iter().enumerate().skip(1) {
         let shift = cycle["shift_mm"].as_f64().unwrap();
-        assert!(
-            (shift - 0.8 * 0.5f64.powi(k as i32)).abs() < 2e-3,
-            "{k}: {shift}"
-        );
+        assert!((shift - 0.8 * 0.5f64.powi(k as i32)).abs() < 2e-3, "{k}: {shift}");
         let change = cycle["peak_change_percent"].as_f64().unwrap();
         assert!((-5.0..0.0).contains(&change), "{k}: {change}");
     }
@@ -59,19 +51,9 @@ fn cycles_of_a_table_are_told_and_drawn() {
     assert!((first["force_peak_n"][0].as_f64().unwrap() - 7.1973).abs() < 2e-3);
     let end = first["relaxation"]["equilibrium_n"][0].as_f64().unwrap();
     assert!((end - 5.5914).abs() < 1e-3, "{end}");
-    assert!(
-        record["steady_from"]
-            .as_u64()
-            .is_some_and(|cycle| (2..=5).contains(&cycle))
-    );
+    assert!(record["steady_from"].as_u64().is_some_and(|cycle| (2..=5).contains(&cycle)));
     let drawn = std::fs::read_to_string(at.join("ten.svg")).unwrap();
-    for word in [
-        "depth (mm)",
-        "peak (N)",
-        "cycle 1 (mm)",
-        "time of hold (s)",
-        "cycle 10",
-    ] {
+    for word in ["depth (mm)", "peak (N)", "cycle 1 (mm)", "time of hold (s)", "cycle 10"] {
         assert!(drawn.contains(word), "{word}");
     }
     assert!(!drawn.contains("NaN"));
@@ -99,10 +81,8 @@ fn a_fit_predicts_a_second_speed() {
     )
     .unwrap();
     let predicted = |args: &[&str]| {
-        let output = palpate(
-            at,
-            &[&["analyse", "fast.csv", "--json", "--validate"], args].concat(),
-        );
+        let output =
+            palpate(at, &[&["analyse", "fast.csv", "--json", "--validate"], args].concat());
         succeeded(&output);
         let object = json(&output);
         assert_eq!(object["fitted"], args[0]);
@@ -110,10 +90,7 @@ fn a_fit_predicts_a_second_speed() {
     };
     let right = predicted(&["thesis.json"]);
     assert!(right["rms_n"].as_f64().unwrap() < 1e-9, "{right}");
-    assert!(
-        (right["peak_n"].as_f64().unwrap() - 7.1973).abs() < 5e-3,
-        "{right}"
-    );
+    assert!((right["peak_n"].as_f64().unwrap() - 7.1973).abs() < 5e-3, "{right}");
     // Fitted on the fly; the table's way back is no ramp and hold, which a fit of a table without phases takes whole.
     let other = predicted(&["slow.csv"]);
     assert!(other["rms_percent"].as_f64().unwrap() < 30.0, "{other}");
@@ -144,41 +121,16 @@ fn wrong_use_gets_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(at, "one.csv", 1, 3.0);
-    std::fs::write(
-        at.join("few.csv"),
-        "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,0,0\n",
-    )
-    .unwrap();
+    std::fs::write(at.join("few.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,0,0\n").unwrap();
     for (args, code, said) in [
-        (
-            &["analyse", "one.csv", "--steady", "0"][..],
-            2,
-            "not a positive number",
-        ),
+        (&["analyse", "one.csv", "--steady", "0"][..], 2, "not a positive number"),
         (&["analyse", "nowhere.csv"], 2, "nowhere.csv"),
-        (
-            &["analyse", "one.csv", "one.csv", "--plot", "x.svg"],
-            2,
-            "one source",
-        ),
+        (&["analyse", "one.csv", "one.csv", "--plot", "x.svg"], 2, "one source"),
         (&["analyse", "few.csv"], 1, "at least 20 samples"),
-        (
-            &["analyse", "one.csv", "--validate", "few.csv"],
-            1,
-            "cannot be fitted",
-        ),
+        (&["analyse", "one.csv", "--validate", "few.csv"], 1, "cannot be fitted"),
     ] {
         let output = palpate(at, args);
-        assert_eq!(
-            output.status.code(),
-            Some(code),
-            "{args:?}: {}",
-            stderr(&output)
-        );
-        assert!(
-            stderr(&output).contains(said),
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(said), "{args:?}: {}", stderr(&output));
     }
 }

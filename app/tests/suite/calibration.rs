@@ -19,13 +19,8 @@ fn table(folder: &Path, name: &str, shift: f64) {
     for step in steps.iter().rev() {
         // 1 mV of hysteresis in the middle.
         let gap = 1e-3 * (step.mass_g / 1040.0) * (1.0 - step.mass_g / 1040.0) * 4.0;
-        writeln!(
-            text,
-            "{},{:.5},unloading",
-            step.mass_g,
-            step.volts.0 + gap + shift
-        )
-        .expect("a table");
+        writeln!(text, "{},{:.5},unloading", step.mass_g, step.volts.0 + gap + shift)
+            .expect("a table");
     }
     fs::write(folder.join(name), text).expect("a table");
 }
@@ -37,10 +32,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     table(at, "cell.csv", 0.0);
     let import = split_words("calibration import cell.csv --name bench --rig sim");
     let more = split_words("--tolerance 0.05 --taken-at 2020-01-01T00:00:00Z --json");
-    let made = answer(&palpate(
-        at,
-        &[&import[..], &more, &["--picture", "cell.svg"]].concat(),
-    ));
+    let made = answer(&palpate(at, &[&import[..], &more, &["--picture", "cell.svg"]].concat()));
     let id = made["id"].as_str().unwrap().to_owned();
     assert!(id.starts_with("20200101-bench-"), "{id}");
     let finding = made["quality"]["findings"][0].as_str().unwrap();
@@ -48,11 +40,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     assert!(made["candidates"].as_array().unwrap().len() > 8);
     let worst = made["quality"]["hysteresis"]["max_v"].as_f64().unwrap();
     assert!((9e-4..1.01e-3).contains(&worst), "{worst}");
-    assert!(
-        fs::read_to_string(at.join("cell.svg"))
-            .unwrap()
-            .contains("flat stretch")
-    );
+    assert!(fs::read_to_string(at.join("cell.svg")).unwrap().contains("flat stretch"));
 
     let again = palpate(at, &[&import[..], &more].concat());
     assert_refused(&again, 2, "already");
@@ -63,17 +51,9 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     assert_says(&run, "was valid for 365");
     let fit = answer(&palpate(at, &["fit", "session", "--json"]));
     assert_eq!(fit["systematic"]["calibrations"][0]["name"], "bench");
-    let terms = fit["systematic"]["parameters"][0]["terms"]
-        .as_array()
-        .unwrap();
-    let names: Vec<&str> = terms
-        .iter()
-        .map(|one| one["term"].as_str().unwrap())
-        .collect();
-    assert!(
-        names.contains(&"weights") && names.contains(&"hysteresis"),
-        "{names:?}"
-    );
+    let terms = fit["systematic"]["parameters"][0]["terms"].as_array().unwrap();
+    let names: Vec<&str> = terms.iter().map(|one| one["term"].as_str().unwrap()).collect();
+    assert!(names.contains(&"weights") && names.contains(&"hysteresis"), "{names:?}");
     let tau = &fit["parameters"][0];
     assert!(tau["systematic_error"].as_f64().unwrap() > 0.0, "{tau}");
     let plain = json(&typed(at, "fit session --json --no-systematic"));
@@ -83,11 +63,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     );
     assert_eq!(plain["parameters"][0]["std_error"], tau["std_error"]);
     // Two of the same calibration and any other family tell it too.
-    succeeded(&short_run(
-        at,
-        "second",
-        &["--calibration", "bench", "--seed", "5"],
-    ));
+    succeeded(&short_run(at, "second", &["--calibration", "bench", "--seed", "5"]));
     let joint = ["fit", "session", "second", "--share", "body", "--json"];
     let joint = json(&palpate(at, &joint));
     let own = &joint["records"][1]["report"]["parameters"][0];
@@ -97,9 +73,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     assert_eq!(joint["systematic"][1]["calibrations"][0]["name"], "bench");
     let maxwell = ["fit", "session", "--family", "series-3", "--json"];
     let family = json(&palpate(at, &maxwell));
-    let own = family["parameters"][0]["systematic_error"]
-        .as_f64()
-        .unwrap();
+    let own = family["parameters"][0]["systematic_error"].as_f64().unwrap();
     let one = tau["systematic_error"].as_f64().unwrap();
     assert!((own / one - 1.0).abs() < 0.01, "{one} {own}");
     let text = stdout(&palpate(at, &["fit", "session", "--family", "series-3"]));
@@ -117,16 +91,9 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     let old = list.iter().find(|one| one["id"] == id.as_str()).unwrap();
     let new = list.iter().find(|one| one["id"] != id.as_str()).unwrap();
     assert_eq!(old["superseded_by"], new["id"]);
-    assert_eq!(
-        (&new["is_in_force"], &old["is_in_force"]),
-        (&true.into(), &false.into())
-    );
+    assert_eq!((&new["is_in_force"], &old["is_in_force"]), (&true.into(), &false.into()));
     let shown = palpate(at, &["calibration", "show", "bench"]);
-    assert!(
-        stdout(&shown).contains(&format!("supersedes   {id}")),
-        "{}",
-        stdout(&shown)
-    );
+    assert!(stdout(&shown).contains(&format!("supersedes   {id}")), "{}", stdout(&shown));
 }
 
 #[test]
@@ -135,21 +102,14 @@ fn a_check_passes_fails_and_refuses() {
     let at = folder.path();
     let check = |volts: &str, mass: &str| {
         let args = ["--mass", mass, "--volts", volts, "--tare", "1.28", "--json"];
-        palpate(
-            at,
-            &[&["calibration", "check", "thesis"][..], &args].concat(),
-        )
+        palpate(at, &[&["calibration", "check", "thesis"][..], &args].concat())
     };
     let passed = check("2.551", "840");
     succeeded(&passed);
     assert_eq!(json(&passed)["is_passed"], true);
     let failed = check("2.60", "840");
     assert_eq!(failed.status.code(), Some(1));
-    let first = stdout(&failed)
-        .lines()
-        .next()
-        .unwrap_or_default()
-        .to_owned();
+    let first = stdout(&failed).lines().next().unwrap_or_default().to_owned();
     let first: serde_json::Value = serde_json::from_str(&first).unwrap();
     assert_eq!(first["is_passed"], false);
     assert_eq!(check("2.55", "-1").status.code(), Some(2));
@@ -164,65 +124,18 @@ fn mistakes_get_one_sentence() {
     for (args, words) in [
         (&["show", "nothing"][..], "no calibration \"nothing\""),
         (&["import", "cell.csv"], "has no name"),
-        (
-            &["import", "poor.csv", "--name", "p"],
-            "line 3 has \"lots\"",
-        ),
-        (
-            &["import", "none.csv", "--name", "p"],
-            "cannot read none.csv",
-        ),
-        (
-            &[
-                "import",
-                "cell.csv",
-                "--name",
-                "p",
-                "--curve",
-                "polynomial=5",
-            ],
-            "not rise",
-        ),
-        (
-            &[
-                "import",
-                "cell.csv",
-                "--name",
-                "p",
-                "--curve",
-                "segments=11",
-            ],
-            "11 weights",
-        ),
-        (
-            &["import", "cell.csv", "--name", "p", "--curve", "spline"],
-            "give best, monotone",
-        ),
-        (
-            &["import", "cell.csv", "--name", "p", "--tolerance=-1"],
-            "tolerance",
-        ),
-        (
-            &["import", "cell.csv", "--name", "p", "--taken-at", "monday"],
-            "no RFC 3339 time",
-        ),
-        (
-            &["supersede", "none", "cell.csv", "--name", "p"],
-            "no calibration \"none\"",
-        ),
+        (&["import", "poor.csv", "--name", "p"], "line 3 has \"lots\""),
+        (&["import", "none.csv", "--name", "p"], "cannot read none.csv"),
+        (&["import", "cell.csv", "--name", "p", "--curve", "polynomial=5"], "not rise"),
+        (&["import", "cell.csv", "--name", "p", "--curve", "segments=11"], "11 weights"),
+        (&["import", "cell.csv", "--name", "p", "--curve", "spline"], "give best, monotone"),
+        (&["import", "cell.csv", "--name", "p", "--tolerance=-1"], "tolerance"),
+        (&["import", "cell.csv", "--name", "p", "--taken-at", "monday"], "no RFC 3339 time"),
+        (&["supersede", "none", "cell.csv", "--name", "p"], "no calibration \"none\""),
     ] {
         let output = palpate(at, &[&["calibration"][..], args].concat());
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{args:?}: {}",
-            stderr(&output)
-        );
-        assert!(
-            stderr(&output).contains(words),
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{args:?}: {}", stderr(&output));
     }
     let list = palpate(at, &["calibration", "list"]);
     assert_prints(&list, "store one with");
@@ -250,9 +163,6 @@ fn a_table_is_read_whole_or_refused_and_a_falling_signal_is_none() {
     succeeded(&read);
     let read = json(&read);
     let points = read["quality"]["points"].as_array().unwrap();
-    let volts: Vec<f64> = points
-        .iter()
-        .map(|one| one["signal_v"].as_f64().unwrap())
-        .collect();
+    let volts: Vec<f64> = points.iter().map(|one| one["signal_v"].as_f64().unwrap()).collect();
     assert_eq!(volts, [1.28, 1.6, 2.73, 3.78]);
 }

@@ -26,9 +26,7 @@ fn found(at: &Path, args: &[&str]) -> Vec<String> {
     let object = json(&output);
     let sessions = object["sessions"].as_array().expect("a list");
     assert_eq!(object["count"], sessions.len());
-    let names = sessions
-        .iter()
-        .map(|one| one["folder"].as_str().expect("a name").to_owned());
+    let names = sessions.iter().map(|one| one["folder"].as_str().expect("a name").to_owned());
     let mut names: Vec<String> = names.collect();
     names.sort();
     names
@@ -47,28 +45,18 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(found(at, &[]), ["sessions/one", "sessions/two"]);
     assert_eq!(found(at, &["--operator", "Ada"]), ["sessions/one"]);
     assert_eq!(found(at, &["LIV", "3"]), ["sessions/one"]);
-    assert_eq!(
-        found(at, &["--specimen", "liver \"3\" *"]),
-        ["sessions/one"]
-    );
+    assert_eq!(found(at, &["--specimen", "liver \"3\" *"]), ["sessions/one"]);
     assert_eq!(found(at, &["--where", "ramp.depth>=6mm"]).len(), 2);
     assert_eq!(found(at, &["--where", "ramp.depth_mm<6"]).len(), 0);
     assert_eq!(found(at, &["--verdict", "valid"]).len(), 2);
     assert_eq!(found(at, &["--until", "2001-01-01"]).len(), 0);
     // What can never be found is told apart from what is not there.
-    for (condition, word) in [
-        ("ramp.dept>=1mm", "ramp.dept"),
-        ("depth>=1kg", "it is in mm"),
-        ("ramp.depth>=100mm", ""),
-    ] {
+    for (condition, word) in
+        [("ramp.dept>=1mm", "ramp.dept"), ("depth>=1kg", "it is in mm"), ("ramp.depth>=100mm", "")]
+    {
         let none = palpate(at, &["find", "--where", condition]);
         succeeded(&none);
-        assert_eq!(
-            stderr(&none).is_empty(),
-            word.is_empty(),
-            "{}",
-            stderr(&none)
-        );
+        assert_eq!(stderr(&none).is_empty(), word.is_empty(), "{}", stderr(&none));
         assert!(stderr(&none).contains(word), "{}", stderr(&none));
     }
     let order = palpate(at, &["find", "--where", "depth~3"]);
@@ -85,15 +73,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(json(&tagged)["sessions"][0]["tags"][0], "good");
     assert_eq!(found(at, &["--tag", "pilot"]), ["sessions/one"]);
 
-    let note = [
-        "note",
-        &one,
-        &two,
-        "--text",
-        "the gel was warm",
-        "--by",
-        "Ada",
-    ];
+    let note = ["note", &one, &two, "--text", "the gel was warm", "--by", "Ada"];
     succeeded(&palpate(at, &note));
     assert_eq!(found(at, &["warm", "gel"]).len(), 2);
     let info = stdout(&palpate(at, &["info", &two]));
@@ -123,10 +103,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     let history = palpate(at, &["history", "specimen", "liver \"3\" *", "--json"]);
     let events = json(&history);
     let events = events["events"].as_array().unwrap();
-    let kinds: Vec<&str> = events
-        .iter()
-        .map(|one| one["what"].as_str().unwrap())
-        .collect();
+    let kinds: Vec<&str> = events.iter().map(|one| one["what"].as_str().unwrap()).collect();
     let all = ["session", "verdict", "tags", "note", "review", "verdict"];
     assert_eq!(kinds, all);
     let nobody = palpate(at, &["history", "rig", "nobody's"]);
@@ -143,13 +120,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
 
     // A journal that cannot be read hides no verdict: nobody can say that there is none.
     let journal = at.join(&two).join("edits.jsonl");
-    fs::write(
-        &journal,
-        fs::read_to_string(&journal)
-            .unwrap()
-            .replace("good", "food"),
-    )
-    .unwrap();
+    fs::write(&journal, fs::read_to_string(&journal).unwrap().replace("good", "food")).unwrap();
     assert!(found(at, &["--verdict", "none"]).is_empty());
     assert!(found(at, &["--review", "none"]).is_empty());
     let listed = stdout(&palpate(at, &["find"]));
@@ -170,27 +141,13 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     let mut heavier = own.clone();
     heavier.name = "heavier".into();
     heavier.steps.iter_mut().for_each(|step| step.mass_g *= 2.0);
-    fs::write(
-        at.join("two.json"),
-        serde_json::to_string(&heavier).unwrap(),
-    )
-    .unwrap();
+    fs::write(at.join("two.json"), serde_json::to_string(&heavier).unwrap()).unwrap();
 
-    let same = palpate(
-        at,
-        &["recalibrate", &one, "--calibration", "own.json", "--json"],
-    );
+    let same = palpate(at, &["recalibrate", &one, "--calibration", "own.json", "--json"]);
     succeeded(&same);
     let change = json(&same)["sessions"][0]["max_n"].as_f64().unwrap();
     assert!(change <= 1e-9, "{change}");
-    let double = [
-        "recalibrate",
-        &one,
-        "--calibration",
-        "two.json",
-        "--name",
-        "double",
-    ];
+    let double = ["recalibrate", &one, "--calibration", "two.json", "--name", "double"];
     succeeded(&palpate(at, &double));
     let again = palpate(at, &double);
     assert_refused(&again, 2, "never used twice");
@@ -213,10 +170,7 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     let doubled = fit(&["--analysis", "double", "--save", "doubled"]);
     for (name, times) in [("tau_eps", 1.0), ("mu1", 2.0)] {
         let (old, new) = (value(&plain, name), value(&doubled, name));
-        assert!(
-            (new - times * old).abs() < 1e-5 * old.abs(),
-            "{name}: {old}, {new}"
-        );
+        assert!((new - times * old).abs() < 1e-5 * old.abs(), "{name}: {old}, {new}");
     }
     let export = ["export", &one, "--format", "csv", "--analysis", "double"];
     succeeded(&palpate(at, &export));
@@ -250,11 +204,7 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     assert_eq!(records.len(), 5);
     let inputs = records[2]["inputs"].as_array().unwrap();
     assert!(inputs.iter().any(|one| one["what"] == "analysis double"));
-    assert!(
-        inputs
-            .iter()
-            .all(|one| one["sha256"].as_str().unwrap().len() == 64)
-    );
+    assert!(inputs.iter().all(|one| one["sha256"].as_str().unwrap().len() == 64));
     let table = palpate(at, &["fit", "own.json", "--save", "x"]);
     assert_eq!(table.status.code(), Some(2));
 }

@@ -25,11 +25,7 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     // Nothing is kept yet.
     let early = palpate(at, &["fit", "demo", "--compliance", "last"]);
     assert_refused(&early, 2, "rig sim");
-    assert!(
-        json(&palpate(at, &["fit", "demo", "--json"]))
-            .get("compliance")
-            .is_none()
-    );
+    assert!(json(&palpate(at, &["fit", "demo", "--json"])).get("compliance").is_none());
 
     let found = json(&palpate(at, &["compliance", "stiff", "--json"]));
     assert!(found["id"].is_null() && !at.join("library/compliances").exists());
@@ -47,10 +43,7 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     let raw = json(&palpate(at, &["fit", "demo", "--json"]));
     let corrected = json(&typed(at, "fit demo --compliance last --json"));
     let file = kept["file"].as_str().unwrap();
-    let by_file = json(&palpate(
-        at,
-        &["fit", "demo", "--compliance", file, "--json"],
-    ));
+    let by_file = json(&palpate(at, &["fit", "demo", "--compliance", file, "--json"]));
     assert_eq!(raw["compliance"]["is_applied"], false);
     assert_eq!(corrected["compliance"]["is_applied"], true);
     assert_eq!(corrected["compliance"]["id"], id);
@@ -60,26 +53,17 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     assert_eq!(by_file["parameters"], corrected["parameters"]);
     assert_ne!(raw["parameters"], corrected["parameters"]);
     let text = stdout(&palpate(at, &["fit", "demo", "--compliance", id]));
-    assert!(
-        text.contains("depths are corrected for the rig's compliance"),
-        "{text}"
-    );
+    assert!(text.contains("depths are corrected for the rig's compliance"), "{text}");
 
     // A table keeps the raw depth and gets two columns more.
     let export = ["export", "demo", "--compliance", "last", "--json"];
     let csv = json(&palpate(at, &[&export[..], &["--format", "csv"]].concat()));
     assert_eq!(csv["compliance"], id);
-    succeeded(&palpate(
-        at,
-        &[&export[..], &["--format", "parquet"]].concat(),
-    ));
+    succeeded(&palpate(at, &[&export[..], &["--format", "parquet"]].concat()));
     let table = fs::read_to_string(at.join("demo.csv")).unwrap();
     let mut lines = table.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    assert_eq!(
-        names[8..],
-        ["depth_corrected_mm", "depth_corrected_sigma_mm"]
-    );
+    assert_eq!(names[8..], ["depth_corrected_mm", "depth_corrected_sigma_mm"]);
     let mut compared = 0;
     for line in lines.filter(|line| line.contains("ramp")) {
         let cells: Vec<&str> = line.split(',').collect();
@@ -105,24 +89,14 @@ fn what_tells_no_compliance_is_refused() {
     for (args, sentence) in [
         (&["compliance", "demo"][..], "stiff surface"),
         (&["compliance", "demo", "--seating", "-1"], "above 0 N"),
-        (
-            &["fit", "demo", "--compliance", "never"],
-            "no compliance \"never\"",
-        ),
-        (
-            &["export", "demo", "--format", "csv", "--compliance", "last"],
-            "run stiff-surface",
-        ),
+        (&["fit", "demo", "--compliance", "never"], "no compliance \"never\""),
+        (&["export", "demo", "--format", "csv", "--compliance", "last"], "run stiff-surface"),
     ] {
         let refused = palpate(at, args);
         assert_eq!(refused.status.code(), Some(2), "{args:?}");
         assert!(stderr(&refused).contains(sentence), "{}", stderr(&refused));
     }
-    fs::write(
-        at.join("table.csv"),
-        "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,2,2\n",
-    )
-    .unwrap();
+    fs::write(at.join("table.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,2,2\n").unwrap();
     let table = palpate(at, &["fit", "table.csv", "--compliance", "last"]);
     assert_refused(&table, 2, "which rig");
     // A document of another rig, and one that was changed by hand.
@@ -130,11 +104,7 @@ fn what_tells_no_compliance_is_refused() {
     let kept = json(&palpate(at, &["compliance", "stiff", "--save", "--json"]));
     let file = Path::new(kept["file"].as_str().unwrap());
     let text = fs::read_to_string(file).unwrap();
-    fs::write(
-        at.join("changed.json"),
-        text.replace("\"sim\"", "\"bench\""),
-    )
-    .unwrap();
+    fs::write(at.join("changed.json"), text.replace("\"sim\"", "\"bench\"")).unwrap();
     let changed = palpate(at, &["fit", "demo", "--compliance", "changed.json"]);
     assert_says(&changed, "was changed after");
     let mut document = kept["document"].clone();

@@ -72,10 +72,7 @@ fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
     assert_eq!(report["samples"], info["samples"], "{said}");
     let lost = report["samples_lost"].as_u64().unwrap();
     assert!(lost > 0, "{report}");
-    assert!(
-        said.contains(&format!("the last {lost} of ")),
-        "{lost}: {said}"
-    );
+    assert!(said.contains(&format!("the last {lost} of ")), "{lost}: {said}");
 }
 
 #[test]
@@ -91,10 +88,7 @@ fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
     for wrong in ["log cannot be written", "not kept as it was"] {
         assert!(!said.contains(wrong), "{said}");
     }
-    assert!(
-        said.contains("verdict") && said.contains("palpate verdict"),
-        "{said}"
-    );
+    assert!(said.contains("verdict") && said.contains("palpate verdict"), "{said}");
     // Segments elsewhere make it no less whole.
     succeeded(&palpate(at, &["doctor", "saved"]));
     let replayed = json(&palpate(at, &["replay", "--check", "saved", "--json"]));

@@ -35,38 +35,22 @@ fn every_kind_of_file_gets_the_right_word() {
         ("newer", "update palpate", 1),
     ] {
         let visit = palpate(at, &["doctor", name]);
-        assert_eq!(
-            visit.status.code(),
-            Some(code),
-            "{name}: {}",
-            stderr(&visit)
-        );
+        assert_eq!(visit.status.code(), Some(code), "{name}: {}", stderr(&visit));
         assert!(stdout(&visit).contains(word), "{name}: {}", stdout(&visit));
     }
     // The session a newer version wrote, and what is none, are not recovered.
     for (name, code) in [("newer", 2), ("foreign", 2), ("whole", 2)] {
         let refused = palpate(at, &["recover", name]);
-        assert_eq!(
-            refused.status.code(),
-            Some(code),
-            "{name}: {}",
-            stderr(&refused)
-        );
+        assert_eq!(refused.status.code(), Some(code), "{name}: {}", stderr(&refused));
         assert!(!at.join(format!("{name}.recovered")).exists());
     }
 
     let recovered = json(&palpate(at, &["recover", "damaged", "--json"]));
-    let lost = recovered["sessions"][0]["missing"]["gaps"][0]["samples"]
-        .as_u64()
-        .unwrap();
+    let lost = recovered["sessions"][0]["missing"]["gaps"][0]["samples"].as_u64().unwrap();
     let kept = recovered["sessions"][0]["samples"].as_u64().unwrap();
     let all = Session::open(&at.join("whole")).unwrap().rows.len() as u64;
     assert_eq!(lost + kept, all);
-    assert_eq!(
-        fs::read(at.join("damaged/000.mcap")).unwrap(),
-        hurt,
-        "the original was touched"
-    );
+    assert_eq!(fs::read(at.join("damaged/000.mcap")).unwrap(), hurt, "the original was touched");
     // What was recovered is a session like any other, and says what it lacks.
     let info = json(&palpate(at, &["info", "damaged.recovered", "--json"]));
     let note = info["notes"][0].as_str().unwrap();
@@ -112,12 +96,7 @@ fn several_sessions_are_recovered_one_after_the_other() {
     let all = palpate(at, &["recover", "first", "whole", "nowhere", "last"]);
     assert_eq!(all.status.code(), Some(2), "{}", stderr(&all));
     let text = stdout(&all);
-    for part in [
-        "first.recovered",
-        "last.recovered",
-        "whole is whole",
-        "nowhere",
-    ] {
+    for part in ["first.recovered", "last.recovered", "whole is whole", "nowhere"] {
         assert!(text.contains(part), "{part} in {text}");
     }
     assert_says(&all, "2 of 4");
@@ -132,10 +111,7 @@ fn several_sessions_are_recovered_one_after_the_other() {
     let visit = palpate(at, &["doctor", "nowhere", "first", "whole"]);
     assert_eq!(visit.status.code(), Some(1));
     let text = stdout(&visit);
-    assert!(
-        text.contains("whole: healthy") && text.contains("first: interrupted"),
-        "{text}"
-    );
+    assert!(text.contains("whole: healthy") && text.contains("first: interrupted"), "{text}");
 }
 
 #[test]
@@ -152,19 +128,9 @@ fn what_stands_beside_a_healthy_log_is_looked_at_too() {
     assert_eq!(visit.status.code(), Some(1), "{}", stdout(&visit));
     assert_prints(&visit, "edits.jsonl");
 
-    let line = |i: u32| {
-        format!(
-            "{0},{0},{1}\n",
-            f64::from(i) * 0.01,
-            f64::from(i * i) * 1e-4
-        )
-    };
+    let line = |i: u32| format!("{0},{0},{1}\n", f64::from(i) * 0.01, f64::from(i * i) * 1e-4);
     let table: String = (0..300).map(line).collect();
-    fs::write(
-        at.join("table.csv"),
-        format!("t_s,depth_mm,force_N\n{table}"),
-    )
-    .unwrap();
+    fs::write(at.join("table.csv"), format!("t_s,depth_mm,force_N\n{table}")).unwrap();
     succeeded(&palpate(at, &["import", "table.csv", "--into", "in"]));
     succeeded(&palpate(at, &["doctor", "in/table"]));
     let original = at.join("in/table/original/table.csv");
@@ -190,21 +156,13 @@ fn a_session_and_its_recovered_copy_count_once() {
     let told = "because the copy that was recovered from it is there too: ";
     for (args, is_told) in [
         (["export", "L", "--lake", "other", "--json"], true),
-        (
-            ["export", "L/cut.recovered", "--lake", "lake", "--json"],
-            false,
-        ),
+        (["export", "L/cut.recovered", "--lake", "lake", "--json"], false),
         (["fit", "lake", "--jobs", "1", "--json"], true),
         (["fit", "L", "--jobs", "1", "--json"], true),
     ] {
         let output = palpate(at, &args);
         succeeded(&output);
-        assert_eq!(
-            stderr(&output).contains(told),
-            is_told,
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(stderr(&output).contains(told), is_told, "{args:?}: {}", stderr(&output));
         if args[0] == "export" {
             assert_eq!(json(&output)["added"], 1, "{args:?}");
         }

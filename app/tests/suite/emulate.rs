@@ -49,10 +49,7 @@ fn start_device(device: &str, more: &[&str]) -> (Emulator, Value) {
 #[test]
 fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
     let (mut emulator, ready) = start(&[]);
-    assert_eq!(
-        (&ready["device"], &ready["model"]),
-        (&"galil".into(), &"dmc4143".into())
-    );
+    assert_eq!((&ready["device"], &ready["model"]), (&"galil".into(), &"dmc4143".into()));
     assert_eq!(ready["is_serial"], false);
     let mut port = TcpStream::connect(ready["at"].as_str().unwrap()).unwrap();
     port.set_read_timeout(Some(PATIENCE)).unwrap();

@@ -10,15 +10,9 @@ fn the_extremes_agree_with_the_page_of_the_guide() {
     std::fs::write(at.join("notes.md"), "mine").unwrap();
     let refused = palpate(at, &["extremes", "--quick", "--page", "notes.md"]);
     assert_refused(&refused, 2, "exists already");
-    let run = answer(&palpate(
-        at,
-        &["extremes", "--quick", "--json", "--page", "page.md"],
-    ));
+    let run = answer(&palpate(at, &["extremes", "--quick", "--json", "--page", "page.md"]));
     assert_eq!(run["command"], "extremes");
-    assert_eq!(
-        (&run["extent"], &run["wrong"]),
-        (&"quick".into(), &0.into())
-    );
+    assert_eq!((&run["extent"], &run["wrong"]), (&"quick".into(), &0.into()));
     let rows = run["rows"].as_array().unwrap();
     let count = |verdict: &str| rows.iter().filter(|row| row["verdict"] == verdict).count();
     for verdict in ["right", "refused", "flagged"] {
@@ -60,22 +54,15 @@ fn on_page(page: &str, group: &str, case: &str, subject: &str) -> Option<String>
     let mut lines = section.lines().filter(|line| line.starts_with('|'));
     let columns: Vec<&str> = lines.next()?.split('|').map(str::trim).collect();
     let cells = |name: &str| {
-        let found = lines
-            .clone()
-            .find(|line| line.split('|').nth(1).map(str::trim) == Some(name));
-        found.map(|line| {
-            line.split('|')
-                .map(|cell| cell.trim().to_owned())
-                .collect::<Vec<_>>()
-        })
+        let found = lines.clone().find(|line| line.split('|').nth(1).map(str::trim) == Some(name));
+        found.map(|line| line.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>())
     };
     let verdict_of = |cell: &str| match cell.parse::<f64>() {
         Ok(_) => "right".to_owned(),
         Err(_) => cell.to_owned(),
     };
-    if let Some((tau, step)) = case
-        .strip_prefix("tau 1e")
-        .and_then(|rest| rest.split_once(" s, step 1e"))
+    if let Some((tau, step)) =
+        case.strip_prefix("tau 1e").and_then(|rest| rest.split_once(" s, step 1e"))
     {
         let (tau, step): (i32, i32) = (tau.parse().ok()?, step.strip_suffix(" s")?.parse().ok()?);
         let (line, column) = if group.starts_with("integrators") {
@@ -94,10 +81,7 @@ fn on_page(page: &str, group: &str, case: &str, subject: &str) -> Option<String>
     let (most, others) = cell.split_once(" but for ")?;
     let named = others.split("; ").find_map(|part| {
         let (verdict, subjects) = part.split_once(": ")?;
-        subjects
-            .split(" + ")
-            .any(|name| name == subject)
-            .then(|| verdict.to_owned())
+        subjects.split(" + ").any(|name| name == subject).then(|| verdict.to_owned())
     });
     Some(named.unwrap_or_else(|| most.to_owned()))
 }
@@ -110,10 +94,7 @@ fn one_family_in_words_and_an_unknown_one() {
     succeeded(&run);
     let text = stdout(&run);
     assert!(text.contains("9 right, 0 refused"), "{text}");
-    assert!(
-        text.contains("closest") && !text.contains("WRONG "),
-        "{text}"
-    );
+    assert!(text.contains("closest") && !text.contains("WRONG "), "{text}");
 
     let run = palpate(at, &["extremes", "--family", "burgers"]);
     assert_refused(&run, 2, "'burgers'");

@@ -67,14 +67,10 @@ fn a_batch_prints_the_same_bytes_with_any_number_of_jobs() {
             assert!(lines[9].contains("failed: ") && lines[9].contains("line 2"));
             continue;
         }
-        let objects: Vec<Value> = lines
-            .iter()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect();
-        let sources: Vec<&str> = objects
-            .iter()
-            .filter_map(|object| object["source"].as_str())
-            .collect();
+        let objects: Vec<Value> =
+            lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let sources: Vec<&str> =
+            objects.iter().filter_map(|object| object["source"].as_str()).collect();
         let expected: Vec<String> = (0..6)
             .map(|i| format!("lib/deep/t{i}.csv"))
             .chain(["lib/ramp.csv", "lib/session", "lib/words.csv"].map(String::from))
@@ -88,10 +84,7 @@ fn a_batch_prints_the_same_bytes_with_any_number_of_jobs() {
             assert!((mu3(i) / truth - 1.0).abs() < 1e-3, "{i}: {}", mu3(i));
         }
         assert!(objects[6]["error"].as_str().unwrap().contains("tau_sig"));
-        assert_eq!(
-            (&objects[6]["exit"], &objects[8]["exit"]),
-            (&1.into(), &2.into())
-        );
+        assert_eq!((&objects[6]["exit"], &objects[8]["exit"]), (&1.into(), &2.into()));
         assert_eq!(objects[9]["exit"], 1);
     }
 }
@@ -103,13 +96,8 @@ fn one_source_prints_what_the_window_shows() {
     table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
     let output = palpate(at, &["fit", "t.csv"]);
     succeeded(&output);
-    let fitted = fit_source(
-        &at.join("t.csv"),
-        None,
-        Wanted::default(),
-        &FitOptions::default(),
-    )
-    .unwrap();
+    let fitted =
+        fit_source(&at.join("t.csv"), None, Wanted::default(), &FitOptions::default()).unwrap();
     let report = fitted.result.unwrap();
     assert_eq!(stdout(&output).trim_end(), text::whole(&report));
     assert!(stdout(&output).contains("tau_eps    1.0"));
@@ -126,10 +114,7 @@ fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
     let picture = std::fs::read_to_string(at.join("t.svg")).unwrap();
     let first = stdout(&output).lines().nth(1).unwrap().to_owned();
     let interval = first.split("95 % ").nth(1).unwrap();
-    assert!(
-        picture.starts_with("<svg") && picture.contains(interval),
-        "{interval}"
-    );
+    assert!(picture.starts_with("<svg") && picture.contains(interval), "{interval}");
 
     let again = palpate(at, &["fit", "t.csv", "--picture", "t.csv"]);
     assert_refused(&again, 2, "exists already");
@@ -184,25 +169,14 @@ fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
     let mut text = String::new();
     reader.read_line(&mut text).unwrap();
     let kill = format!("kill -INT {}", batch.id());
-    assert!(
-        Command::new("sh")
-            .args(["-c", &kill])
-            .status()
-            .unwrap()
-            .success()
-    );
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     reader.read_to_string(&mut text).unwrap();
     assert_eq!(batch.wait().unwrap().code(), Some(1));
-    let objects: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let objects: Vec<Value> =
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     // One line for every source, then why the command failed.
     assert_eq!(objects.len(), 41);
-    let fitted = objects
-        .iter()
-        .filter(|object| object["r2"].is_f64())
-        .count();
+    let fitted = objects.iter().filter(|object| object["r2"].is_f64()).count();
     let not_begun = |object: &&Value| {
         let error = object["error"].as_str();
         error.is_some_and(|error| error.starts_with("not begun"))
@@ -223,9 +197,7 @@ fn recordings_are_fitted_together_and_say_what_they_share() {
     let object = json(&joint);
     assert_eq!(object["shared"], serde_json::json!(["tau_eps", "tau_sig"]));
     let value = |record: usize, parameter: usize| {
-        object["records"][record]["report"]["parameters"][parameter]["value"]
-            .as_f64()
-            .unwrap()
+        object["records"][record]["report"]["parameters"][parameter]["value"].as_f64().unwrap()
     };
     assert_eq!(value(0, 0), value(1, 0));
     // The second specimen is a fifth stiffer in its cubic term, and told so.
@@ -235,10 +207,7 @@ fn recordings_are_fitted_together_and_say_what_they_share() {
     let taus = text.lines().filter(|line| line.starts_with("  tau_eps "));
     assert_eq!(taus.count(), 1, "{text}");
     for (arguments, words) in [
-        (
-            &["fit", "a.csv", "b.csv", "--share", "f0"][..],
-            "cannot be shared",
-        ),
+        (&["fit", "a.csv", "b.csv", "--share", "f0"][..], "cannot be shared"),
         (&["fit", "a.csv", "b.csv", "--share", "mu9"], "'mu9'"),
         (&["fit", "a.csv", "--share", "body"], "at least two"),
         (&["fit", "a.csv", "--seed", "3"], "--bootstrap"),
@@ -261,11 +230,8 @@ fn more_intervals_come_on_request_and_repeat_with_their_seed() {
     assert_eq!(first["bootstrap"], second["bootstrap"]);
     assert_eq!(first["bootstrap_seed"], 4);
     assert_eq!(first["profile"].as_array().unwrap().len(), 7);
-    for (profile, parameter) in first["profile"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .zip(first["parameters"].as_array().unwrap())
+    for (profile, parameter) in
+        first["profile"].as_array().unwrap().iter().zip(first["parameters"].as_array().unwrap())
     {
         let value = parameter["value"].as_f64().unwrap();
         assert!(profile["low"].as_f64().unwrap() < value);
@@ -320,10 +286,7 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
     assert!(number("r2") > 0.9 && number("rmse_n") < 0.03, "{record}");
     // Energy is lost over the loop, and the fit knows how much to a hundredth.
     let (measured, fitted) = (number("work_measured_n_mm"), number("work_fitted_n_mm"));
-    assert!(
-        measured > 0.5 && (fitted / measured - 1.0).abs() < 0.01,
-        "{record}"
-    );
+    assert!(measured > 0.5 && (fitted / measured - 1.0).abs() < 0.01, "{record}");
     let drawn = std::fs::read_to_string(at.join("loop.svg")).unwrap();
     assert!(drawn.contains("depth (mm)") && drawn.contains("softer"));
     assert!(!drawn.contains("NaN"));
@@ -332,10 +295,7 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
     let output = palpate(at, &["fit", "loop", "loop.csv", "--family", "maxwell"]);
     succeeded(&output);
     let text = stdout(&output);
-    assert!(
-        text.starts_with("Maxwell") && text.matches("rmse").count() == 2,
-        "{text}"
-    );
+    assert!(text.starts_with("Maxwell") && text.matches("rmse").count() == 2, "{text}");
 
     // By itself, with some of it shared, kept beside its session, in a lake: like any other fit.
     let both = ["fit", "loop", "loop.csv", "--family", "kelvin", "--json"];
@@ -352,10 +312,7 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
     assert!(kept.contains("straight"), "{kept}");
     succeeded(&palpate(at, &["export", "loop", "--lake", "lake"]));
     let lake = json(&typed(at, "fit lake --family kelvin --json"));
-    assert_eq!(
-        (&lake["model"], &lake["made"]),
-        (&"kelvin".into(), &1.into())
-    );
+    assert_eq!((&lake["model"], &lake["made"]), (&"kelvin".into(), &1.into()));
 
     for (args, code, words) in [
         (&["--family", "unloading-3"][..], 1, "record the unloading"),
@@ -364,19 +321,11 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         (&["--family", "voigt", "--free", "f0"], 2, "'f0'"),
         (&["--family", "voigt", "--share", "k"], 2, "two recordings"),
         (&["--each"], 2, "--family"),
-        (
-            &["--family", "voigt", "--picture", "loop.svg"],
-            2,
-            "exists already",
-        ),
+        (&["--family", "voigt", "--picture", "loop.svg"], 2, "exists already"),
     ] {
         let output = palpate(at, &[&["fit", "loop"][..], args].concat());
         assert_eq!(output.status.code(), Some(code), "{args:?}");
-        assert!(
-            stderr(&output).contains(words),
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert!(stderr(&output).contains(words), "{args:?}: {}", stderr(&output));
     }
     let output = palpate(at, &["run", "ramp-hold", "--softening", "95"]);
     assert_refused(&output, 2, "0 to 90");

@@ -42,19 +42,13 @@ fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
     assert!(run["work"]["p50_s"].as_f64().unwrap() > 0.0, "{run}");
     assert!(!run["priority"].as_str().unwrap().is_empty());
     // A stroke beyond what was measured is extrapolated, and told.
-    let session = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../tests/sessions/ramp-hold-lab"
-    );
+    let session = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/ramp-hold-lab");
     let far = palpate(at.path(), &["haptics", "check", session]);
     assert_says(&far, "extrapolated");
     let near = palpate(at.path(), &["haptics", "check", session, "--depth", "10"]);
     assert!(!stderr(&near).contains("extrapolated"), "{}", stderr(&near));
     for (words, reason) in [
-        (
-            &["check", "thesis", "--rate", "20"][..],
-            "250 Hz to 10000 Hz",
-        ),
+        (&["check", "thesis", "--rate", "20"][..], "250 Hz to 10000 Hz"),
         (&["check", "thesis", "--damping", "-1"], "--damping -1"),
         (&["check", "nowhere"], "nowhere"),
         (&["run", "thesis", "--seconds", "0"], "--seconds 0"),
@@ -79,10 +73,7 @@ fn the_check_of_the_source_follows_and_its_table_is_fitted() {
     let slope = found["calibration"]["slope"].as_f64().unwrap();
     assert!((slope - 5.25).abs() < 0.1, "{found}");
     let fitted = json(&palpate(at.path(), &["fit", "follow.csv", "--json"]));
-    assert!(
-        fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.98),
-        "{fitted}"
-    );
+    assert!(fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.98), "{fitted}");
     let picture = std::fs::read_to_string(at.path().join("follow.svg")).unwrap();
     assert!(picture.contains("torque (N mm)"));
     // Nothing is written over.
@@ -105,11 +96,7 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
     assert_eq!(palpate(at.path(), &words).status.code(), Some(2));
     let settings = at.path().join("run/settings.toml");
     let text = std::fs::read_to_string(&settings).unwrap();
-    std::fs::write(
-        &settings,
-        text.replace("friction_n = 0.1", "friction_n = 0.3"),
-    )
-    .unwrap();
+    std::fs::write(&settings, text.replace("friction_n = 0.1", "friction_n = 0.3")).unwrap();
     let other = palpate(at.path(), &["haptics", "replay", "run"]);
     assert_refused(&other, 1, "error: tick ");
     // Without its end nobody knows what came after, however alike the rest is.
@@ -130,39 +117,23 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
     let value = |fit: &serde_json::Value, name: &str| {
         let all = fit["parameters"].as_array().unwrap().iter();
         let one = all.clone().find(|one| one["name"] == name).unwrap();
-        (
-            one["value"].as_f64().unwrap(),
-            one["std_error"].as_f64().unwrap(),
-        )
+        (one["value"].as_f64().unwrap(), one["std_error"].as_f64().unwrap())
     };
     // What the motor's constants say: 8.1 mN m over 10 mm, and 17.6 N s/m at 0.75 mm/s.
     let [friction, drag] = ["friction_n", "drag_n"].map(|name| found[name].as_f64().unwrap());
-    assert!(
-        (friction - 0.81).abs() < 1e-3 && (drag - 0.0132).abs() < 1e-4,
-        "{found}"
-    );
-    for (name, body) in [
-        ("mu1", 0.05333),
-        ("mu3", 4.345e-4),
-        ("tau_sig", 0.06),
-        ("tau_eps", 1.023),
-    ] {
+    assert!((friction - 0.81).abs() < 1e-3 && (drag - 0.0132).abs() < 1e-4, "{found}");
+    for (name, body) in [("mu1", 0.05333), ("mu3", 4.345e-4), ("tau_sig", 0.06), ("tau_eps", 1.023)]
+    {
         for fit in ["fit", "fit_commanded"] {
             let (found, error) = value(&found[fit], name);
             // The slave is where whole pulses put it, so that a fit is a few per cent off.
-            assert!(
-                (found - body).abs() < 6.0 * error,
-                "{fit} {name}: {found} ± {error}"
-            );
+            assert!((found - body).abs() < 6.0 * error, "{fit} {name}: {found} ± {error}");
         }
     }
     // Friction is all that the two fits differ in.
     let (commanded, _) = value(&found["fit_commanded"], "f_offset");
     let (measured, _) = value(&found["fit"], "f_offset");
-    assert!(
-        (measured - commanded - friction).abs() < 0.02,
-        "{measured} {commanded}"
-    );
+    assert!((measured - commanded - friction).abs() < 0.02, "{measured} {commanded}");
 
     // The session is one like any other, says that it is simulated and has that fit.
     let info = json(&palpate(at.path(), &["info", "followed", "--json"]));
@@ -182,10 +153,7 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
     assert!(stderr(&replayed).contains("no decisions"));
     // It can be followed in its turn, and words explain the difference.
     let again = stdout(&follow(&["followed", "--help-friction", "50"]));
-    assert!(
-        again.contains("commanded") && again.contains("relaxation"),
-        "{again}"
-    );
+    assert!(again.contains("commanded") && again.contains("relaxation"), "{again}");
     let taken = follow(&["thesis", "--out", "followed"]);
     assert_refused(&taken, 2, "followed exists already");
 }
@@ -217,10 +185,7 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
     assert_eq!(told["verdict"], "valid", "{told}");
     let slave = &told["slave"];
     let number = |name: &str| slave[name].as_f64().unwrap_or(f64::NAN);
-    assert!(
-        number("depth_max_mm") > 2.0 && number("depth_max_mm") < 6.0 + 1e-9,
-        "{told}"
-    );
+    assert!(number("depth_max_mm") > 2.0 && number("depth_max_mm") < 6.0 + 1e-9, "{told}");
     assert!(number("cell_max_n") > 0.05, "{told}");
     assert!(slave["lag_ms"]["median"].as_f64().unwrap() > 20.0, "{told}");
     // The same again is the same, but for the folder.
@@ -241,10 +206,7 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
         ["--seconds", "4000"],
         ["--rig", "nowhere"],
     ] {
-        let out = palpate(
-            at.path(),
-            &[&["haptics", "slave", "thesis"], &bad[..]].concat(),
-        );
+        let out = palpate(at.path(), &[&["haptics", "slave", "thesis"], &bad[..]].concat());
         assert_eq!(out.status.code(), Some(2), "{bad:?} {}", stderr(&out));
     }
     let out = palpate(at.path(), &["haptics", "slave", "nothing-there"]);

@@ -12,12 +12,7 @@ fn table() -> String {
         let t = 0.1 * f64::from(i);
         let depth = t.min(5.0);
         let relaxed = 1.0 + (-(t - 5.0).max(0.0) / 3.0).exp();
-        let line = format!(
-            "{:.1};{:.4};{:.1}\n",
-            depth * 1e3,
-            20.0 * depth * relaxed,
-            t * 1e3
-        );
+        let line = format!("{:.1};{:.4};{:.1}\n", depth * 1e3, 20.0 * depth * relaxed, t * 1e3);
         text += &line.replace('.', ",");
     }
     text
@@ -32,22 +27,11 @@ fn an_imported_table_is_a_session_for_every_command() {
     succeeded(&dry);
     assert!(!at.join("in").exists());
     assert_prints(&dry, "decimal sign  comma, from '");
-    let args = [
-        "import",
-        "zug.csv",
-        "--into",
-        "in",
-        "--specimen",
-        "gel 3",
-        "--json",
-    ];
+    let args = ["import", "zug.csv", "--into", "in", "--specimen", "gel 3", "--json"];
     let made = palpate(at, &args);
     succeeded(&made);
     let part = &json(&made)["files"][0]["parts"][0];
-    assert_eq!(
-        (&part["session"], &part["samples"]),
-        (&"in/zug".into(), &200.into())
-    );
+    assert_eq!((&part["session"], &part["samples"]), (&"in/zug".into(), &200.into()));
     assert_eq!(part["readings"][0]["found"], "table");
     let original = at.join("in/zug/original/zug.csv");
     assert_eq!(fs::read_to_string(original).unwrap(), table());
@@ -64,10 +48,7 @@ fn an_imported_table_is_a_session_for_every_command() {
     succeeded(&typed(at, "export in/zug --format csv --to out"));
     let exported = fs::read_to_string(at.join("out/zug.csv")).unwrap();
     // Time, depth and 4 gf as force, and nothing in the columns of a rig.
-    assert_eq!(
-        exported.lines().nth(2),
-        Some("0.1,0.1,0.0392266,,,,imported,0")
-    );
+    assert_eq!(exported.lines().nth(2), Some("0.1,0.1,0.0392266,,,,imported,0"));
 }
 
 #[test]
@@ -80,12 +61,7 @@ fn fits_agree_and_replay_has_nothing_to_do() {
         .chain(table().lines().skip(1).map(|line| {
             let line = line.replace(',', ".");
             let cells: Vec<f64> = line.split(';').map(|cell| cell.parse().unwrap()).collect();
-            format!(
-                "{},{},{}\n",
-                cells[2] / 1e3,
-                cells[0] / 1e3,
-                cells[1] * 980_665.0 / 1e8
-            )
+            format!("{},{},{}\n", cells[2] / 1e3, cells[0] / 1e3, cells[1] * 980_665.0 / 1e8)
         }))
         .collect();
     fs::write(at.join("plain.csv"), plain).unwrap();
@@ -94,25 +70,16 @@ fn fits_agree_and_replay_has_nothing_to_do() {
     assert_eq!(session["samples"], table["samples"]);
     let values = |fit: &serde_json::Value| -> Vec<f64> {
         let all = fit["parameters"].as_array().unwrap();
-        all.iter()
-            .map(|one| one["value"].as_f64().unwrap())
-            .collect()
+        all.iter().map(|one| one["value"].as_f64().unwrap()).collect()
     };
     for (session, table) in values(&session).iter().zip(values(&table)) {
         // The same numbers but for the last digit of a time.
-        assert!(
-            (session - table).abs() <= 1e-9 * table.abs().max(1e-3),
-            "{session} {table}"
-        );
+        assert!((session - table).abs() <= 1e-9 * table.abs().max(1e-3), "{session} {table}");
     }
     for (command, told) in [("replay", "no decisions"), ("report", "nothing to report")] {
         let output = palpate(at, &[command, "in/zug"]);
         assert_eq!(output.status.code(), Some(2), "{command}");
-        assert!(
-            stderr(&output).contains(told),
-            "{command}: {}",
-            stderr(&output)
-        );
+        assert!(stderr(&output).contains(told), "{command}: {}", stderr(&output));
     }
     succeeded(&palpate(at, &["analyse", "in/zug"]));
 }
@@ -125,35 +92,14 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     fs::write(at.join("bad.csv"), "t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n").unwrap();
     let check = |args: &[&str], told: &str| {
         let output = palpate(at, args);
-        assert_eq!(
-            output.status.code(),
-            Some(2),
-            "{args:?}: {}",
-            stdout(&output)
-        );
-        assert!(
-            stderr(&output).contains(told),
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stdout(&output));
+        assert!(stderr(&output).contains(told), "{args:?}: {}", stderr(&output));
         assert!(!at.join("in").exists(), "{args:?}");
     };
-    check(
-        &["import", "good.csv", "bad.csv", "--into", "in"],
-        "decimal sign",
-    );
-    check(
-        &["import", "good.csv", "good.csv", "--into", "in"],
-        "made twice",
-    );
-    check(
-        &["import", "good.csv", "--unit", "force=stone"],
-        "known are N, mN",
-    );
-    check(
-        &["import", "good.csv", "--column", "colour=x"],
-        "time, depth, force, signal",
-    );
+    check(&["import", "good.csv", "bad.csv", "--into", "in"], "decimal sign");
+    check(&["import", "good.csv", "good.csv", "--into", "in"], "made twice");
+    check(&["import", "good.csv", "--unit", "force=stone"], "known are N, mN");
+    check(&["import", "good.csv", "--column", "colour=x"], "time, depth, force, signal");
     check(&["import", "."], "not a file");
     succeeded(&palpate(at, &["import", "good.csv", "--into", "in"]));
     let again = palpate(at, &["import", "good.csv", "--into", "in"]);

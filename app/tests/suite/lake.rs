@@ -25,10 +25,7 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
         "export demo --format csv --phase ramp,hold --from 60 --columns t_s,force_N --decimate 10 --delimiter ; --json",
     );
     let told = answer(&palpate(at, &part));
-    assert_eq!(
-        (&told["every"], &told["is_part"]),
-        (&10.into(), &true.into())
-    );
+    assert_eq!((&told["every"], &told["is_part"]), (&10.into(), &true.into()));
     let thinned = fs::read_to_string(at.join("demo.every10.csv")).unwrap();
     let expected: Vec<String> = whole
         .lines()
@@ -45,22 +42,15 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
     let found: Vec<&str> = thinned.lines().collect();
     assert_eq!(found[0], "sample_every_10;t_s;force_N");
     assert_eq!(found[1..], expected);
-    let dictionary = fs::read_to_string(
-        told["dictionary"]
-            .as_str()
-            .map(|name| at.join(name))
-            .unwrap(),
-    );
+    let dictionary =
+        fs::read_to_string(told["dictionary"].as_str().map(|name| at.join(name)).unwrap());
     assert!(dictionary.unwrap().contains("every 10th"));
 
     succeeded(&palpate(at, &["export", "demo", "--format", "arrow"]));
     for (args, says) in [
         (vec!["--format", "csv", "--phase", "run"], "ramp"),
         (vec!["--format", "csv", "--columns", "force"], "force_N"),
-        (
-            vec!["--format", "csv", "--from", "2", "--until", "1"],
-            "--until",
-        ),
+        (vec!["--format", "csv", "--from", "2", "--until", "1"], "--until"),
         (vec!["--format", "csv", "--decimate", "1"], "2"),
         (vec!["--format", "csv", "--delimiter", "1"], "tab"),
         (vec!["--lake", "x", "--phase", "ramp"], "--phase"),
@@ -71,11 +61,7 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
         all.extend(args);
         let refused = palpate(at, &all);
         assert_eq!(refused.status.code(), Some(2), "{all:?}");
-        assert!(
-            stderr(&refused).contains(says),
-            "{all:?}: {}",
-            stderr(&refused)
-        );
+        assert!(stderr(&refused).contains(says), "{all:?}: {}", stderr(&refused));
     }
 }
 
@@ -116,19 +102,13 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     }
     let told = palpate(at, &["export", "runs", "--lake", "lake", "--json"]);
     succeeded(&told);
-    assert_eq!(
-        (&json(&told)["added"], &json(&told)["were_there"]),
-        (&5.into(), &0.into())
-    );
+    assert_eq!((&json(&told)["added"], &json(&told)["were_there"]), (&5.into(), &0.into()));
     let before = contents(&at.join("lake"));
     // Of each: samples, events, the session itself, and the checksums of the three.
     assert_eq!(before.len(), 20);
     let again = palpate(at, &["export", "runs", "--lake", "lake", "--json"]);
     succeeded(&again);
-    assert_eq!(
-        (&json(&again)["added"], &json(&again)["were_there"]),
-        (&0.into(), &5.into())
-    );
+    assert_eq!((&json(&again)["added"], &json(&again)["were_there"]), (&0.into(), &5.into()));
     assert!(contents(&at.join("lake")) == before, "the lake changed");
     for name in ["serial", "parts", "killed"] {
         copy(&at.join("lake"), &at.join(name));
@@ -157,16 +137,11 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     }
 
     // Three processes at the same time.
-    let parts: Vec<_> = (1..=3)
-        .map(|number| begin(at, "parts", &format!("{number}/3")))
-        .collect();
+    let parts: Vec<_> = (1..=3).map(|number| begin(at, "parts", &format!("{number}/3"))).collect();
     for mut part in parts {
         assert!(part.wait().unwrap().success());
     }
-    assert!(
-        contents(&at.join("parts")) == expected,
-        "the parts are not the whole"
-    );
+    assert!(contents(&at.join("parts")) == expected, "the parts are not the whole");
 
     // One that is killed as soon as it has done something, and run again.
     let mut first = begin(at, "killed", "1/1");
@@ -219,9 +194,7 @@ fn what_cannot_be_fitted_is_listed_and_the_rest_is_fitted() {
     let id = info["session_id"].as_str().unwrap();
     let names = contents(&at.join("lake"));
     let file = format!("{id}.parquet");
-    let samples = names
-        .keys()
-        .find(|name| name.starts_with("v1/samples") && name.ends_with(&file));
+    let samples = names.keys().find(|name| name.starts_with("v1/samples") && name.ends_with(&file));
     fs::write(at.join("lake").join(samples.unwrap()), "no table").unwrap();
     let fit = palpate(at, &["fit", "lake", "--json"]);
     assert_eq!(fit.status.code(), Some(1));

@@ -12,10 +12,7 @@ use std::path::Path;
 /// Half-width of the 95 % interval in percent, as planned or as fitted.
 fn percent(parameters: &Value, name: &str) -> f64 {
     let all = parameters.as_array().expect("the plan names it");
-    let one = all
-        .iter()
-        .find(|one| one["name"] == name)
-        .expect("the plan names it");
+    let one = all.iter().find(|one| one["name"] == name).expect("the plan names it");
     one["percent"].as_f64().unwrap_or_else(|| {
         let [low, high] = [0, 1].map(|side| one["ci95"][side].as_f64().expect("the plan names it"));
         50.0 * (high - low) / one["value"].as_f64().expect("the plan names it").abs()
@@ -45,10 +42,7 @@ fn a_proposed_run_reaches_what_was_promised() {
     let proposals = plan["proposals"].as_array().unwrap();
     assert_eq!(proposals[0]["family"], "ramp-hold");
     for proposal in proposals {
-        assert!(
-            percent(&proposal["parameters"], "tau_eps") <= 1.0,
-            "{proposal}"
-        );
+        assert!(percent(&proposal["parameters"], "tau_eps") <= 1.0, "{proposal}");
         assert!(proposal["force_max"].as_f64().unwrap() < 6.67, "{proposal}");
     }
     let command = proposals[0]["commands"][0].as_str().unwrap();
@@ -68,10 +62,7 @@ fn a_proposed_run_reaches_what_was_promised() {
 fn the_last_fit_is_assumed_and_any_other_can_be() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let body = ModifiedKelvin {
-        tau_eps: 2.5,
-        ..ModifiedKelvin::THESIS
-    };
+    let body = ModifiedKelvin { tau_eps: 2.5, ..ModifiedKelvin::THESIS };
     table(at, &body);
     let fit = palpate(at, &["fit", "press.csv", "--json"]);
     succeeded(&fit);
@@ -91,10 +82,7 @@ fn the_last_fit_is_assumed_and_any_other_can_be() {
         assert!(found.starts_with(source), "{found}");
         // A thousandth of a newton in equal steps: 1 / sqrt(12) of it.
         let noise = plan["noise"]["white"].as_f64().unwrap();
-        assert!(
-            (noise / (1e-3 / 12f64.sqrt()) - 1.0).abs() < 0.05,
-            "{noise}"
-        );
+        assert!((noise / (1e-3 / 12f64.sqrt()) - 1.0).abs() < 0.05, "{noise}");
     }
 }
 
@@ -117,12 +105,7 @@ fn a_remembered_fit_that_was_changed_is_refused_and_one_of_before_is_read() {
     std::fs::write(&file, kept["fit"].to_string()).unwrap();
     let plan = palpate(at, &["plan", "--json"]);
     succeeded(&plan);
-    assert!(
-        json(&plan)["body_source"]
-            .as_str()
-            .unwrap()
-            .starts_with("the last fit, of ")
-    );
+    assert!(json(&plan)["body_source"].as_str().unwrap().starts_with("the last fit, of "));
     succeeded(&palpate(at, &["fit", "press.csv"]));
     assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
 }
@@ -178,11 +161,7 @@ fn wrong_wishes_are_refused_in_one_sentence() {
         (&["--within", "nu=1%"], 2, "'nu'"),
         (&["--within", "tau"], 2, "is not NAME=PERCENT"),
         (&["--within", "tau=0%"], 2, "in percent"),
-        (
-            &["--within", "tau=1", "--within", "tau_eps=2"],
-            2,
-            "given twice",
-        ),
+        (&["--within", "tau=1", "--within", "tau_eps=2"], 2, "given twice"),
         (&["--within", "tau=0.001%"], 1, "reaches 0.0"),
         (&["--force-max", "3"], 2, "allow more force"),
         (&["--force-max", "30"], 2, "interlock"),

@@ -30,10 +30,7 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     let refused = typed(at, "run deep.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
-    assert!(
-        told.contains("line 10: task 'press'") && told.contains("200"),
-        "{told}"
-    );
+    assert!(told.contains("line 10: task 'press'") && told.contains("200"), "{told}");
     assert!(!at.join("day").exists(), "something ran");
 
     fs::write(at.join("two.toml"), TWO.replace("DEPTH", "10 mm")).unwrap();
@@ -45,39 +42,19 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     succeeded(&done);
     let report = json(&done);
     assert_eq!(report["runs"].as_array().map(Vec::len), Some(2), "{report}");
-    assert_eq!(
-        report["tasks"][1]["fits"].as_array().map(Vec::len),
-        Some(1),
-        "{report}"
-    );
+    assert_eq!(report["tasks"][1]["fits"].as_array().map(Vec::len), Some(1), "{report}");
     let page = fs::read_to_string(at.join("day/summary.html")).unwrap();
-    assert!(
-        page.contains("<svg") && page.contains("press/01"),
-        "no page"
-    );
+    assert!(page.contains("<svg") && page.contains("press/01"), "no page");
 
     // Rejected, it stays in the count and is fitted no more.
-    let verdict = [
-        "verdict",
-        "day/press/01",
-        "rejected",
-        "--reason",
-        "a hair on the probe",
-    ];
+    let verdict = ["verdict", "day/press/01", "rejected", "--reason", "a hair on the probe"];
     succeeded(&palpate(at, &verdict));
     let again = palpate(at, &run);
     succeeded(&again);
     let report = json(&again);
     assert_eq!(report["was_continued"], true);
-    assert_eq!(
-        report["tasks"][1]["fits"].as_array().map(Vec::len),
-        Some(0),
-        "{report}"
-    );
-    assert_eq!(
-        report["runs"][1]["verdict"],
-        "rejected: a hair on the probe"
-    );
+    assert_eq!(report["tasks"][1]["fits"].as_array().map(Vec::len), Some(0), "{report}");
+    assert_eq!(report["runs"][1]["verdict"], "rejected: a hair on the probe");
 }
 
 #[test]
@@ -140,18 +117,11 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
         let refused = run(more);
         assert_eq!(refused.status.code(), Some(2));
         let told = stderr(&refused);
-        for fact in [
-            "line 5: task 'press'",
-            "line 10: task 'press-again'",
-            "specimen.storage",
-        ] {
+        for fact in ["line 5: task 'press'", "line 10: task 'press-again'", "specimen.storage"] {
             assert!(told.contains(fact), "{fact}: {told}");
         }
         assert_eq!(told.contains("operator ("), is_nameless, "{told}");
-        assert!(
-            told.contains("[about]") && told.trim_end().lines().count() == 1,
-            "{told}"
-        );
+        assert!(told.contains("[about]") && told.trim_end().lines().count() == 1, "{told}");
         assert!(!at.join("day").exists(), "something ran");
     }
     let check = palpate(at, &["protocol", "check", "asking.toml"]);
@@ -159,19 +129,8 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
     assert_prints(&check, "asking.toml, line 5: warning: ");
 
     let about = "[about]\noperator = \"Ada\"\nspecimen.storage = \"saline\"\nspecimen.temperature_c = 21\n\n[[task]]";
-    write(
-        "asking.toml",
-        ASKING
-            .replace("DEPTH", "5 mm")
-            .replacen("[[task]]", about, 1),
-    );
-    let done = run(&[
-        "--specimen",
-        "<stomach>",
-        "--about",
-        "specimen.temperature_c=4",
-        "--json",
-    ]);
+    write("asking.toml", ASKING.replace("DEPTH", "5 mm").replacen("[[task]]", about, 1));
+    let done = run(&["--specimen", "<stomach>", "--about", "specimen.temperature_c=4", "--json"]);
     succeeded(&done);
     let report = json(&done);
     for i in 0..2 {
@@ -187,11 +146,9 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
         assert_eq!(about.get("specimen.temperature_c"), Some(&4.0.into()));
     }
     let page = fs::read_to_string(at.join("day/summary.html")).unwrap();
-    for words in [
-        "operator",
-        "&lt;stomach&gt;, specimen 2, with the blunt",
-        "specimen.storage: saline",
-    ] {
+    for words in
+        ["operator", "&lt;stomach&gt;, specimen 2, with the blunt", "specimen.storage: saline"]
+    {
         assert!(page.contains(words), "{words}: {page}");
     }
 }
@@ -215,35 +172,23 @@ fn check_looks_at_a_programme_whole() {
     for (text, words) in [
         (told.replace("DEPTH", "12 mm"), "line 17: parameter 'depth'"),
         (
-            told.replace("DEPTH", "5 mm")
-                .replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
+            told.replace("DEPTH", "5 mm").replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
             "line 16: 'theirs.toml'",
         ),
         (
-            told.replace("mine.toml", "ramp-hold")
-                .replace("DEPTH", "200 mm"),
+            told.replace("mine.toml", "ramp-hold").replace("DEPTH", "200 mm"),
             "task 'press-again': step 5",
         ),
-        (
-            told.replace("DEPTH", "5 mm")
-                .replace("palpate-programme = 1\n", ""),
-            "palpate-programme",
-        ),
+        (told.replace("DEPTH", "5 mm").replace("palpate-programme = 1\n", ""), "palpate-programme"),
     ] {
         let refused = check(text);
         assert_eq!(refused.status.code(), Some(2));
-        assert!(
-            stdout(&refused).contains(words),
-            "{words}: {}",
-            stdout(&refused)
-        );
+        assert!(stdout(&refused).contains(words), "{words}: {}", stdout(&refused));
         let run = palpate(at, &["run", "asking.toml", "--out", "day"]);
         assert_eq!(run.status.code(), Some(2));
         assert!(stderr(&run).contains(words), "{words}: {}", stderr(&run));
     }
-    let deep = told
-        .replace("mine.toml", "ramp-hold")
-        .replace("DEPTH", "45 mm");
+    let deep = told.replace("mine.toml", "ramp-hold").replace("DEPTH", "45 mm");
     let warned = check(deep);
     succeeded(&warned);
     assert!(
@@ -266,10 +211,7 @@ fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     let refused = typed(at, "run two.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
-    assert!(
-        told.contains("line 6: task 'look'") && told.contains("daily check"),
-        "{told}"
-    );
+    assert!(told.contains("line 6: task 'look'") && told.contains("daily check"), "{told}");
     assert!(!at.join("day").exists(), "something ran");
 }
 
@@ -334,10 +276,7 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     let length = fs::metadata(&log).unwrap().len() as usize;
     let noise: Vec<u8> = (0..length).map(|i| (i * 7919 % 251) as u8).collect();
     let sound = fs::read(&log).unwrap();
-    for damaged in [
-        noise.clone(),
-        [&sound[..length / 2], &noise[length / 2..]].concat(),
-    ] {
+    for damaged in [noise.clone(), [&sound[..length / 2], &noise[length / 2..]].concat()] {
         fs::write(&log, damaged).unwrap();
         let told = palpate(at, &run);
         assert_eq!(told.status.code(), Some(1), "{}", stdout(&told));
@@ -348,30 +287,20 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
         };
         assert!(row("first").unwrap().contains("finish, now missing  -"));
         let second = row("second").unwrap();
-        assert!(
-            second.contains("now damaged") && !second.contains("valid"),
-            "{second}"
-        );
+        assert!(second.contains("now damaged") && !second.contains("valid"), "{second}");
         assert!(
             stderr(&told).contains("first/02") && stderr(&told).contains("second/01"),
             "{}",
             stderr(&told)
         );
-        for words in [
-            "first/02 is missing",
-            "first/02: missing",
-            "second/01: damaged",
-        ] {
+        for words in ["first/02 is missing", "first/02: missing", "second/01: damaged"] {
             assert!(page().contains(words), "{words}: {}", page());
         }
         let told = palpate(at, &[&run[..], &["--json"]].concat());
         let line = stdout(&told).lines().next().unwrap().to_owned();
         let report: serde_json::Value = serde_json::from_str(&line).unwrap();
         let run = &report["runs"][1];
-        assert_eq!(
-            (&run["lost"], run["duration_s"].is_null()),
-            (&"missing".into(), true)
-        );
+        assert_eq!((&run["lost"], run["duration_s"].is_null()), (&"missing".into(), true));
         assert_eq!(report["runs"][2]["lost"], "damaged");
         assert!(report["runs"][2]["verdict"].is_null(), "{report}");
     }
@@ -410,10 +339,7 @@ protocol = "jog.toml"
         let refused = run(&more);
         assert_eq!(refused.status.code(), Some(2), "{words}");
         let told = stderr(&refused);
-        assert!(
-            told.contains(words) && told.trim_end().lines().count() == 1,
-            "{told}"
-        );
+        assert!(told.contains(words) && told.trim_end().lines().count() == 1, "{told}");
     }
     let longer = stdout(&shown).replace("default = \"5 mm\"", "default = \"6 mm\"");
     fs::write(at.join("jog.toml"), longer).unwrap();

@@ -41,15 +41,7 @@ pub fn with_mine() -> tempfile::TempDir {
 }
 
 fn run_mine(at: &Path, more: &[&str]) -> std::process::Output {
-    let mut args = vec![
-        "run",
-        "mine.toml",
-        "--time-scale",
-        "max",
-        "--out",
-        "s",
-        "--json",
-    ];
+    let mut args = vec!["run", "mine.toml", "--time-scale", "max", "--out", "s", "--json"];
     args.extend(more);
     palpate(at, &args)
 }
@@ -62,10 +54,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
     let run = run_mine(at, &told);
     succeeded(&run);
     let run = json(&run);
-    assert_eq!(
-        (run["plan"].as_str(), run["ending"].as_str()),
-        (Some("mine"), Some("finish"))
-    );
+    assert_eq!((run["plan"].as_str(), run["ending"].as_str()), (Some("mine"), Some("finish")));
     let replay = palpate(at, &["replay", "s", "--json"]);
     succeeded(&replay);
     let session = palpate_sessions::log::Session::open(&at.join("s")).unwrap();
@@ -92,10 +81,9 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
         assert!(stderr(&run).contains(words), "{}", stderr(&run));
         assert!(!at.join("s").exists());
     }
-    for (name, words) in [
-        ("preconditionin", "'preconditioning'"),
-        ("nothing-like-it", "'palpate protocol list'"),
-    ] {
+    for (name, words) in
+        [("preconditionin", "'preconditioning'"), ("nothing-like-it", "'palpate protocol list'")]
+    {
         let run = palpate(at, &["run", name]);
         assert_eq!(run.status.code(), Some(2));
         assert!(stderr(&run).contains(words), "{}", stderr(&run));
@@ -106,13 +94,10 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
 fn check_tells_every_mistake_with_its_line() {
     let folder = with_mine();
     let at = folder.path();
-    let spoilt = MINE
-        .replace("\"ramp\"", "\"rmap\"")
-        .replace("\"3 mm/s\" },", "\"3 mm\" },");
+    let spoilt = MINE.replace("\"ramp\"", "\"rmap\"").replace("\"3 mm/s\" },", "\"3 mm\" },");
     std::fs::write(at.join("spoilt.toml"), spoilt).unwrap();
-    let deep = MINE
-        .replace("max = \"10 mm\"", "max = \"900 mm\"")
-        .replace("\"4 mm\"", "\"400 mm\"");
+    let deep =
+        MINE.replace("max = \"10 mm\"", "max = \"900 mm\"").replace("\"4 mm\"", "\"400 mm\"");
     std::fs::write(at.join("deep.toml"), deep).unwrap();
 
     let sound = palpate(at, &["protocol", "check", "mine.toml", "creep"]);
@@ -141,25 +126,15 @@ fn a_built_in_protocol_is_shown_copied_and_previewed() {
     let at = folder.path();
     let show = palpate(at, &["protocol", "show", "preconditioning"]);
     std::fs::write(at.join("copy.toml"), stdout(&show)).unwrap();
-    let preview = answer(&typed(
-        at,
-        "protocol preview copy.toml --set cycles=3 --plot plan.svg --json",
-    ));
+    let preview =
+        answer(&typed(at, "protocol preview copy.toml --set cycles=3 --plot plan.svg --json"));
     assert_eq!(preview["checkpoints"][2]["name"], "after cycle 3");
     let steps = preview["steps"].as_array().unwrap();
     let rests = steps.iter().filter(|step| step["phase"] == "rest");
-    assert!(
-        rests
-            .clone()
-            .all(|step| step["expected"] == 180.0 && step["is_exact"] == true)
-    );
+    assert!(rests.clone().all(|step| step["expected"] == 180.0 && step["is_exact"] == true));
     assert_eq!(rests.count(), 3);
     let picture = std::fs::read_to_string(at.join("plan.svg")).unwrap();
-    assert_eq!(
-        picture.matches("stroke-width=\"1.6\"").count(),
-        3,
-        "depth, speed and force"
-    );
+    assert_eq!(picture.matches("stroke-width=\"1.6\"").count(), 3, "depth, speed and force");
     let again = typed(at, "protocol preview copy.toml --plot plan.svg");
     assert_eq!(again.status.code(), Some(2), "never over another file");
 
@@ -204,16 +179,10 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
     let cycles = total(&["preconditioning", "--set", "depth=15 mm"]);
     assert_eq!(total(&["preconditioning", "--depth", "15"]), cycles);
     for (more, words) in [
-        (
-            &["ramp-hold", "--hold", "5", "--set", "hold=6 s"][..],
-            "--set hold",
-        ),
+        (&["ramp-hold", "--hold", "5", "--set", "hold=6 s"][..], "--set hold"),
         (&["ramp-hold", "--set", "hold=5"], "5 has no unit"),
         (&["ramp-hold", "--hold-until", "tau"], "'tau'"),
-        (
-            &["load-cell-calibration", "--depth", "5"],
-            "parameter 'depth'",
-        ),
+        (&["load-cell-calibration", "--depth", "5"], "parameter 'depth'"),
         (&["--hold", "5"], "name a protocol"),
     ] {
         let refused = palpate(at, &[&["run"], more].concat());
@@ -234,10 +203,8 @@ fn a_limit_that_changes_nothing_is_told_where_it_stands() {
         ("travel_max = 1000 mm", true),
     ] {
         let (name, value) = limit.split_once(" = ").unwrap();
-        let limited = MINE.replace(
-            "[procedure]",
-            &format!("[limits]\n{name} = \"{value}\"\n\n[procedure]"),
-        );
+        let limited =
+            MINE.replace("[procedure]", &format!("[limits]\n{name} = \"{value}\"\n\n[procedure]"));
         std::fs::write(at.join("mine.toml"), limited).unwrap();
         let check = palpate(at, &["protocol", "check", "mine.toml"]);
         succeeded(&check);
@@ -248,11 +215,7 @@ fn a_limit_that_changes_nothing_is_told_where_it_stands() {
         let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
         succeeded(&preview);
         let said = stdout(&preview) + &stderr(&preview);
-        assert_eq!(
-            said.matches("changes nothing").count(),
-            usize::from(is_told),
-            "{said}"
-        );
+        assert_eq!(said.matches("changes nothing").count(), usize::from(is_told), "{said}");
     }
 }
 

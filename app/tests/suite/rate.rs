@@ -17,10 +17,7 @@ fn a_fast_session_is_run_read_fitted_replayed_and_exported() {
     assert!((samples - expected).abs() < 40.0, "{samples} {expected}");
 
     let report = json(&palpate(at, &["report", "fast", "--json"]));
-    assert_eq!(
-        (&report["dropped"], &report["late"]),
-        (&0.into(), &0.into())
-    );
+    assert_eq!((&report["dropped"], &report["late"]), (&0.into(), &0.into()));
     assert_eq!(report["verdict"], "valid", "{report}");
     let fit = json(&palpate(at, &["fit", "fast", "--json"]));
     assert!(fit["r2"].as_f64().unwrap() > 0.99, "{fit}");
@@ -31,10 +28,7 @@ fn a_fast_session_is_run_read_fitted_replayed_and_exported() {
     let export = "export fast --format csv --phase hold";
     succeeded(&palpate(at, &export.split(' ').collect::<Vec<_>>()));
     // One second of hold, and the header.
-    let lines = fs::read_to_string(at.join("fast.csv"))
-        .unwrap()
-        .lines()
-        .count();
+    let lines = fs::read_to_string(at.join("fast.csv")).unwrap().lines().count();
     assert_eq!(lines, 20_001);
 }
 

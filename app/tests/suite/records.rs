@@ -46,22 +46,12 @@ fn a_run_ends_with_a_verdict_and_a_report_of_its_targets() {
     let run = json(&short_run(at, "fine", &["--unload", "1.5", "--json"]));
     assert_eq!(run["verdict"], "valid", "{run}");
     let report = json(&palpate(at, &["report", "fine", "--json"]));
-    assert_eq!(
-        (&report["ending"], &report["verdict"]),
-        (&"finish".into(), &"valid".into())
-    );
-    assert_eq!(
-        (&report["dropped"], &report["late"]),
-        (&0.into(), &0.into())
-    );
+    assert_eq!((&report["ending"], &report["verdict"]), (&"finish".into(), &"valid".into()));
+    assert_eq!((&report["dropped"], &report["late"]), (&0.into(), &0.into()));
     let targets = report["targets"].as_array().unwrap();
     let achieved = |step: &str, quantity: &str| {
-        let one = targets
-            .iter()
-            .find(|one| one["step"] == step && one["quantity"] == quantity);
-        one.unwrap_or_else(|| panic!("{step} {quantity} in {report}"))["achieved"]
-            .as_f64()
-            .unwrap()
+        let one = targets.iter().find(|one| one["step"] == step && one["quantity"] == quantity);
+        one.unwrap_or_else(|| panic!("{step} {quantity} in {report}"))["achieved"].as_f64().unwrap()
     };
     // A whole number of 15 um pulses is 6 mm, and the clock is exact.
     assert!((achieved("ramp", "depth") - 6.0).abs() <= 0.0075);
@@ -77,10 +67,7 @@ fn a_run_ends_with_a_verdict_and_a_report_of_its_targets() {
     assert!((total - run["duration_s"].as_f64().unwrap()).abs() < 0.01);
     assert!((time["hold_s"].as_f64().unwrap() - 1.0).abs() < 0.002);
     let text = stdout(&palpate(at, &["report", "fine"]));
-    assert!(
-        text.contains("all met") && text.contains("waiting"),
-        "{text}"
-    );
+    assert!(text.contains("all met") && text.contains("waiting"), "{text}");
 }
 
 #[test]
@@ -91,9 +78,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     let info = json(&palpate(at, &["info", "run", "--json"]));
     assert_eq!(info["edits"].as_array().unwrap().len(), 1);
     let before = Session::open(&at.join("run")).unwrap();
-    let found = palpate_analysis::edited::contacts(&before.entries)[0]
-        .position
-        .0;
+    let found = palpate_analysis::edited::contacts(&before.entries)[0].position.0;
     let log = fs::read(at.join("run/000.mcap")).unwrap();
     let position = format!("{}", found - 0.25);
     let correct = |position: &str, reason: &str| {
@@ -116,9 +101,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     succeeded(&corrected);
     let change = json(&corrected)["depth_change_mm"].as_f64().unwrap();
     assert!((change - 0.25).abs() < 1e-12);
-    let after = palpate_analysis::edited::open(&at.join("run"))
-        .unwrap()
-        .session;
+    let after = palpate_analysis::edited::open(&at.join("run")).unwrap().session;
     let mut moved = 0;
     for (old, new) in before.rows.iter().zip(&after.rows) {
         match (old.depth, new.depth) {
@@ -128,10 +111,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
             }
             (old, new) => assert_eq!(old, new),
         }
-        assert_eq!(
-            (old.force, old.volts, old.pulses),
-            (new.force, new.volts, new.pulses)
-        );
+        assert_eq!((old.force, old.volts, old.pulses), (new.force, new.volts, new.pulses));
     }
     assert!(moved > 3000);
     // Every reader says so, and the log is what it was.
@@ -151,10 +131,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     assert_eq!(fs::read(at.join("run/000.mcap")).unwrap(), log);
     let replay = json(&palpate(at, &["replay", "run", "--json"]));
     assert_eq!(
-        (
-            &replay["differing"],
-            &replay["sessions"][0]["depth_difference_mm"]
-        ),
+        (&replay["differing"], &replay["sessions"][0]["depth_difference_mm"]),
         (&0.into(), &0.0.into())
     );
     // Where it cannot have been.
@@ -187,20 +164,15 @@ fn a_rejected_session_is_left_out_and_counted() {
             "--json",
         ],
     ));
-    assert_eq!(
-        (&reject["was"], &reject["verdict"]),
-        (&"valid".into(), &"rejected".into())
-    );
+    assert_eq!((&reject["was"], &reject["verdict"]), (&"valid".into(), &"rejected".into()));
     let alone = palpate(at, &["fit", "all/b"]);
     assert_refused(&alone, 2, "rejected (hair under the probe)");
     succeeded(&palpate(at, &["fit", "all/b", "--include-rejected"]));
     let batch = palpate(at, &["fit", "all", "--json"]);
     succeeded(&batch);
     let text = stdout(&batch);
-    let lines: Vec<serde_json::Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let lines: Vec<serde_json::Value> =
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 3);
     assert_eq!(lines[1]["rejected"], "hair under the probe");
     assert!(lines[0]["samples"].is_u64() && lines[2]["samples"].is_u64());
@@ -210,33 +182,20 @@ fn a_rejected_session_is_left_out_and_counted() {
     assert_prints(&together, "2 records together");
     assert!(stderr(&together).contains("3 sources, 1"));
     // A second thought is one more line; the first stays.
-    let again = [
-        "verdict",
-        "all/b",
-        "suspect",
-        "--reason",
-        "the hair was outside",
-    ];
+    let again = ["verdict", "all/b", "suspect", "--reason", "the hair was outside"];
     succeeded(&palpate(at, &again));
     let info = json(&palpate(at, &["info", "all/b", "--json"]));
-    assert_eq!(
-        (&info["verdict"], info["edits"].as_array().unwrap().len()),
-        (&"suspect".into(), 3)
-    );
+    assert_eq!((&info["verdict"], info["edits"].as_array().unwrap().len()), (&"suspect".into(), 3));
     let fit = palpate(at, &["fit", "all/b"]);
     succeeded(&fit);
     assert!(stderr(&fit).contains("the hair was outside"));
     // Words put into somebody's mouth are noticed by every reader.
     let edits = at.join("all/b/edits.jsonl");
-    let changed = fs::read_to_string(&edits)
-        .unwrap()
-        .replace("hair under", "air under");
+    let changed = fs::read_to_string(&edits).unwrap().replace("hair under", "air under");
     fs::write(&edits, changed).unwrap();
-    for args in [
-        &["fit", "all/b"][..],
-        &["info", "all/b"],
-        &["verdict", "all/b", "valid", "--reason", "x"],
-    ] {
+    for args in
+        [&["fit", "all/b"][..], &["info", "all/b"], &["verdict", "all/b", "valid", "--reason", "x"]]
+    {
         let refused = palpate(at, args);
         assert_eq!(refused.status.code(), Some(1), "{args:?}");
         assert_says(&refused, "line 2 of");
@@ -251,14 +210,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     succeeded(&first);
     assert_says(&first, "daily check");
     let check = |more: &[&str]| {
-        let mut args = vec![
-            "daily-check",
-            "--time-scale",
-            "max",
-            "--operator",
-            "Ada",
-            "--json",
-        ];
+        let mut args = vec!["daily-check", "--time-scale", "max", "--operator", "Ada", "--json"];
         args.extend(more);
         palpate(at, &args)
     };
@@ -282,10 +234,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let refused = short_run(at, "refused", &[]);
     assert_eq!(refused.status.code(), Some(2));
     let why = stderr(&refused);
-    assert!(
-        why.contains("failed its daily check") && why.contains("--acknowledge"),
-        "{why}"
-    );
+    assert!(why.contains("failed its daily check") && why.contains("--acknowledge"), "{why}");
     assert!(!at.join("refused").exists());
     succeeded(&short_run(at, "acknowledged", &["--acknowledge"]));
     let info = json(&palpate(at, &["info", "acknowledged", "--json"]));
@@ -312,10 +261,7 @@ fn a_jog_is_motion_and_has_no_cycles() {
     let nothing = palpate(at, &["analyse", "jog"]);
     assert_eq!(nothing.status.code(), Some(1));
     let told = stderr(&nothing);
-    assert!(
-        told.contains("no cycles") && !told.contains("fit"),
-        "{told}"
-    );
+    assert!(told.contains("no cycles") && !told.contains("fit"), "{told}");
 }
 
 #[test]
@@ -323,23 +269,15 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let check = ["daily-check", "--time-scale", "max"];
-    for (more, words) in [
-        (&[][..], "operator"),
-        (&["--operator", "Ada", "--mass", "500"], "0.501 N"),
-    ] {
+    for (more, words) in
+        [(&[][..], "operator"), (&["--operator", "Ada", "--mass", "500"], "0.501 N")]
+    {
         let refused = palpate(at, &[&check[..], more].concat());
         assert_eq!(refused.status.code(), Some(2), "{more:?}");
         assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
     }
     // The same steps without a judgement keep no check, and say so.
-    let run = [
-        "run",
-        "daily-check",
-        "--time-scale",
-        "max",
-        "--operator",
-        "Ada",
-    ];
+    let run = ["run", "daily-check", "--time-scale", "max", "--operator", "Ada"];
     let run = palpate(at, &run);
     succeeded(&run);
     assert_says(&run, "'palpate daily-check'");
@@ -350,16 +288,8 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
 fn a_thickness_is_told_by_the_run_and_by_its_session() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let run = [
-        "run",
-        "zeroing",
-        "--set",
-        "thickness=true",
-        "--thickness",
-        "20",
-        "--compliance",
-        "20",
-    ];
+    let run =
+        ["run", "zeroing", "--set", "thickness=true", "--thickness", "20", "--compliance", "20"];
     let how = ["--time-scale", "max", "--out", "thick", "--json"];
     let run = answer(&palpate(at, &[&run[..], &how].concat()));
     let number = |name: &str| run[name].as_f64().unwrap();
@@ -371,12 +301,7 @@ fn a_thickness_is_told_by_the_run_and_by_its_session() {
     let line = format!("thickness  {thickness:.3} ± {error:.3} mm");
     for command in ["info", "report"] {
         let told = json(&palpate(at, &[command, "thick", "--json"]));
-        for name in [
-            "base_mm",
-            "base_std_error_mm",
-            "thickness_mm",
-            "thickness_std_error_mm",
-        ] {
+        for name in ["base_mm", "base_std_error_mm", "thickness_mm", "thickness_std_error_mm"] {
             assert_eq!(told[name], run[name], "{command} {name}");
         }
         let text = stdout(&palpate(at, &[command, "thick"]));
@@ -393,44 +318,22 @@ fn samples_are_exported_as_messages() {
     let session = palpate_sessions::Session::open(&at.join("run")).unwrap();
     let all = json(&typed(at, "export run --mcap-full all.mcap --json"));
     assert_eq!(all["rows"].as_u64(), Some(session.rows.len() as u64));
-    assert_eq!(
-        (&all["format"], &all["dictionary"]),
-        (&"mcap".into(), &serde_json::Value::Null)
-    );
+    assert_eq!((&all["format"], &all["dictionary"]), (&"mcap".into(), &serde_json::Value::Null));
     let hold = ["--phase", "hold", "--decimate", "10", "--json"];
     let part = [&["export", "run", "--mcap-full", "hold.mcap"][..], &hold].concat();
     let part = json(&palpate(at, &part));
     let held = session.rows.iter();
-    let held = held
-        .filter(|row| row.phase == palpate_model::rig::Phase::Hold)
-        .count();
+    let held = held.filter(|row| row.phase == palpate_model::rig::Phase::Hold).count();
     assert_eq!(part["rows"].as_u64(), Some(held.div_ceil(10) as u64));
     for (args, code, word) in [
-        (
-            &["export", "run", "--mcap-full", "all.mcap"][..],
-            2,
-            "exists already",
-        ),
-        (
-            &["export", "run", "--mcap-full", "b.mcap", "--columns", "t_s"],
-            2,
-            "used with",
-        ),
+        (&["export", "run", "--mcap-full", "all.mcap"][..], 2, "exists already"),
+        (&["export", "run", "--mcap-full", "b.mcap", "--columns", "t_s"], 2, "used with"),
         (&["export", "run", "--mcap-full", "none/b.mcap"], 1, "none"),
         (&["info", "all.mcap"], 2, "not a palpate session"),
     ] {
         let refused = palpate(at, args);
-        assert_eq!(
-            refused.status.code(),
-            Some(code),
-            "{args:?}: {}",
-            stderr(&refused)
-        );
-        assert!(
-            stderr(&refused).contains(word),
-            "{args:?}: {}",
-            stderr(&refused)
-        );
+        assert_eq!(refused.status.code(), Some(code), "{args:?}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(word), "{args:?}: {}", stderr(&refused));
     }
     assert!(!at.join("b.mcap").exists());
 }
@@ -449,8 +352,7 @@ fn words_of_a_session_give_the_terminal_no_orders() {
         let text = stdout(output) + &stderr(output);
         assert!(!text.contains('\u{1b}'), "{text:?}");
         assert!(
-            text.lines()
-                .all(|line| !line.contains("other") || line.contains("hair")),
+            text.lines().all(|line| !line.contains("other") || line.contains("hair")),
             "{text}"
         );
     }

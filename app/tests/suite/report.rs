@@ -30,11 +30,7 @@ fn strict(page: &str) -> Vec<String> {
         let (tag, more) = more.split_once('>').expect("a tag that ends");
         rest = more;
         if let Some(name) = tag.strip_prefix('/') {
-            assert_eq!(
-                open.pop().as_deref(),
-                Some(name),
-                "</{name}> closes something else"
-            );
+            assert_eq!(open.pop().as_deref(), Some(name), "</{name}> closes something else");
             continue;
         }
         let (tag, is_closed) = match tag.strip_suffix('/') {
@@ -52,10 +48,7 @@ fn strict(page: &str) -> Vec<String> {
             assert!(attributes.contains("scope=\"row\"") || attributes.contains("scope=\"col\""));
         }
         if name == "svg" {
-            assert!(
-                rest.trim_start().starts_with("<title>"),
-                "a figure without a title"
-            );
+            assert!(rest.trim_start().starts_with("<title>"), "a figure without a title");
         }
         if !is_closed && !EMPTY.contains(&name) {
             open.push(name.to_owned());
@@ -63,22 +56,14 @@ fn strict(page: &str) -> Vec<String> {
     }
     assert!(open.is_empty(), "{open:?} stay open");
     assert!(page.contains("<html lang=\"en\">"));
-    assert_eq!(
-        page.matches("<figure>").count(),
-        page.matches("<figcaption>").count()
-    );
+    assert_eq!(page.matches("<figure>").count(), page.matches("<figcaption>").count());
     texts
 }
 
 fn check_attributes(mut attributes: &str) {
     while !attributes.trim().is_empty() {
-        let (name, value) = attributes
-            .trim_start()
-            .split_once("=\"")
-            .expect("a quoted value");
-        let is_name = name
-            .chars()
-            .all(|letter| letter.is_ascii_alphanumeric() || letter == '-');
+        let (name, value) = attributes.trim_start().split_once("=\"").expect("a quoted value");
+        let is_name = name.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '-');
         assert!(is_name && !name.starts_with("on"), "{name}");
         assert!(!["href", "src", "style"].contains(&name), "{name}");
         let (value, more) = value.split_once('"').expect("a value that ends");
@@ -95,10 +80,7 @@ fn check_text(text: &str, place: &str) {
     assert!(!text.contains('>'), "{text}");
     for part in text.split('&').skip(1) {
         let (name, _) = part.split_once(';').expect("an entity that ends");
-        assert!(
-            ["amp", "lt", "gt", "quot", "apos"].contains(&name),
-            "&{name};"
-        );
+        assert!(["amp", "lt", "gt", "quot", "apos"].contains(&name), "&{name};");
     }
     let is_bad = |letter: char| letter.is_control() && letter != '\n' || letter == '\u{202e}';
     assert!(!text.contains(is_bad), "{text:?}");
@@ -106,45 +88,16 @@ fn check_text(text: &str, place: &str) {
 
 /// A session with everything that can be said of one, all of it hostile; returns its folder's name.
 fn talked_of(at: &Path) -> &'static str {
-    let more = [
-        "--specimen",
-        HOSTILE,
-        "--operator",
-        HOSTILE,
-        "--indenter",
-        HOSTILE,
-        "--seed",
-        "3",
-    ];
+    let more = ["--specimen", HOSTILE, "--operator", HOSTILE, "--indenter", HOSTILE, "--seed", "3"];
     succeeded(&short_run(at, "press", &more));
     let reason = ["--reason", HOSTILE, "--by", HOSTILE];
     for words in [
         &["verdict", "press", "suspect"][..],
-        &[
-            "mask",
-            "press",
-            "--name",
-            "knock <b>",
-            "--leave-out",
-            "70..71",
-        ],
+        &["mask", "press", "--name", "knock <b>", "--leave-out", "70..71"],
         &["mask", "press", "--name", "other", "--leave-out", "60..61"],
         &["withdraw", "press", "other"],
-        &[
-            "recalibrate",
-            "press",
-            "--calibration",
-            "thesis",
-            "--name",
-            "anew",
-        ],
-        &[
-            "fit",
-            "press",
-            "--save",
-            "all & \"more\"",
-            "--include-rejected",
-        ],
+        &["recalibrate", "press", "--calibration", "thesis", "--name", "anew"],
+        &["fit", "press", "--save", "all & \"more\"", "--include-rejected"],
         &["review", "press", "--accept"],
     ] {
         succeeded(&palpate(at, &[words, &reason].concat()));
@@ -177,9 +130,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
         "contact at",
         "knock &lt;b&gt;",
         "withdrawn by",
-        "Fit 'all &amp; &quot;more&quot;' found:"
-            .replace('\'', "&apos;")
-            .as_str(),
+        "Fit 'all &amp; &quot;more&quot;' found:".replace('\'', "&apos;").as_str(),
         "interlocks",
         "SHA-256",
         "edits.jsonl",
@@ -210,17 +161,12 @@ fn the_same_sessions_make_the_same_page_but_for_its_date() {
     succeeded(&short_run(at, "a", &["--seed", "3"]));
     succeeded(&short_run(at, "b", &["--seed", "4"]));
     for name in ["one.html", "two.html"] {
-        succeeded(&palpate(
-            at,
-            &["report", "a", "b", "--html", name, "--align", "contact"],
-        ));
+        succeeded(&palpate(at, &["report", "a", "b", "--html", name, "--align", "contact"]));
     }
     let read = |name: &str| {
         let page = fs::read_to_string(at.join(name)).unwrap();
         strict(&page);
-        let lines = page
-            .lines()
-            .filter(|line| !line.starts_with("<p class=\"made\">"));
+        let lines = page.lines().filter(|line| !line.starts_with("<p class=\"made\">"));
         let kept: Vec<String> = lines.map(str::to_owned).collect();
         assert_eq!(kept.len() + 1, page.lines().count());
         kept
@@ -228,11 +174,7 @@ fn the_same_sessions_make_the_same_page_but_for_its_date() {
     let page = read("one.html");
     assert_eq!(page, read("two.html"));
     let page = page.join("\n");
-    for words in [
-        "Comparison of 2 sessions",
-        "Parameters",
-        "contact was found",
-    ] {
+    for words in ["Comparison of 2 sessions", "Parameters", "contact was found"] {
         assert!(page.contains(words), "{words}");
     }
     assert_eq!(page.matches("<section class=\"session\">").count(), 2);
@@ -264,11 +206,7 @@ fn a_page_proves_what_it_describes() {
     let why = ["--reason", "hair under the probe", "--by", "Ada"];
     succeeded(&palpate(
         at,
-        &[
-            &["mask", "press", "--name", "m", "--leave-out", "70..71"],
-            &why[..],
-        ]
-        .concat(),
+        &[&["mask", "press", "--name", "m", "--leave-out", "70..71"], &why[..]].concat(),
     ));
     let later = check(&["page.html", "--json"]);
     assert_eq!(later.status.code(), Some(1));
@@ -278,11 +216,7 @@ fn a_page_proves_what_it_describes() {
     fs::remove_file(at.join("press/analyses.jsonl")).unwrap();
     succeeded(&check(&["page.html"]));
     let log = at.join("press/000.mcap");
-    let log = if log.is_file() {
-        log
-    } else {
-        at.join("press/session.mcap")
-    };
+    let log = if log.is_file() { log } else { at.join("press/session.mcap") };
     let mut bytes = fs::read(&log).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
@@ -303,64 +237,34 @@ fn figures_are_drawn_and_wrong_use_is_told() {
     succeeded(&short_run(at, "press", &["--seed", "3"]));
     for of in ["force-time", "force-depth", "residual", "calibration"] {
         let file = format!("{of}.svg");
-        succeeded(&palpate(
-            at,
-            &["report", "press", "--figure", &file, "--of", of],
-        ));
+        succeeded(&palpate(at, &["report", "press", "--figure", &file, "--of", of]));
         let svg = fs::read_to_string(at.join(&file)).unwrap();
-        assert!(
-            svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"),
-            "{of}"
-        );
+        assert!(svg.starts_with("<svg xmlns=") && svg.ends_with("</svg>\n"), "{of}");
         assert!(svg.contains("<title>") && !svg.contains("NaN"), "{of}");
     }
     let png = ["report", "press", "--figure", "figure.png"];
     succeeded(&palpate(at, &png));
     let pixels = fs::read(at.join("figure.png")).unwrap();
     assert!(pixels.starts_with(b"\x89PNG\r\n\x1a\n") && pixels.len() > 10_000);
-    let part = [
-        "report", "press", "--figure", "part.svg", "--from", "70", "--until", "71",
-    ];
+    let part = ["report", "press", "--figure", "part.svg", "--from", "70", "--until", "71"];
     succeeded(&palpate(at, &part));
     for (words, told) in [
         (&["report"][..], "name a session"),
         (&["report", "press", "press"], "one session"),
         (&["report", "--html", "p.html"], "name the sessions"),
         (&["report", "press", "--figure", "a.gif"], "end in"),
+        (&["report", "press", "--figure", "a.svg", "--from", "2", "--until", "1"], "not before"),
         (
-            &[
-                "report", "press", "--figure", "a.svg", "--from", "2", "--until", "1",
-            ],
-            "not before",
-        ),
-        (
-            &[
-                "report", "press", "--figure", "a.svg", "--of", "residual", "--from", "2",
-            ],
+            &["report", "press", "--figure", "a.svg", "--of", "residual", "--from", "2"],
             "are for force-time",
         ),
-        (
-            &["report", "press", "--html", "p.html", "--analysis", "none"],
-            "has no analysis",
-        ),
-        (
-            &["report", "press", "--analysis", "none"],
-            "--analysis is for",
-        ),
+        (&["report", "press", "--html", "p.html", "--analysis", "none"], "has no analysis"),
+        (&["report", "press", "--analysis", "none"], "--analysis is for"),
         (&["report", "nowhere", "--html", "p.html"], "nowhere"),
     ] {
         let refused = palpate(at, words);
-        assert_eq!(
-            refused.status.code(),
-            Some(2),
-            "{words:?}: {}",
-            stderr(&refused)
-        );
-        assert!(
-            stderr(&refused).contains(told),
-            "{words:?}: {}",
-            stderr(&refused)
-        );
+        assert_eq!(refused.status.code(), Some(2), "{words:?}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(told), "{words:?}: {}", stderr(&refused));
         assert!(!at.join("p.html").exists() && !at.join("a.svg").exists());
     }
 }
@@ -379,29 +283,14 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
         "time (s),depth (mm),force (N)\n".to_owned() + &(0..200).map(row).collect::<String>();
     fs::write(at.join("gel <3>.csv"), table).unwrap();
     succeeded(&palpate(at, &["import", "gel <3>.csv", "--into", "in"]));
-    let session = fs::read_dir(at.join("in"))
-        .unwrap()
-        .next()
-        .unwrap()
-        .unwrap()
-        .path();
+    let session = fs::read_dir(at.join("in")).unwrap().next().unwrap().unwrap().path();
     let session = session.display().to_string();
     succeeded(&palpate(at, &["report", &session, "--html", "page.html"]));
     let texts = strict(&fs::read_to_string(at.join("page.html")).unwrap()).join("\n");
     for words in ["imported from", "of its file", "tau_eps", "no decisions"] {
         assert!(texts.contains(words), "no '{words}'");
     }
-    let refused = palpate(
-        at,
-        &[
-            "report",
-            &session,
-            "--figure",
-            "c.svg",
-            "--of",
-            "calibration",
-        ],
-    );
+    let refused = palpate(at, &["report", &session, "--figure", "c.svg", "--of", "calibration"]);
     assert_eq!(refused.status.code(), Some(1), "{}", stderr(&refused));
 }
 
@@ -427,9 +316,6 @@ fn the_strict_reading_refuses_what_it_should() {
         "<svg width=\"1\"></svg>",
     ] {
         let page = page(wrong);
-        assert!(
-            std::panic::catch_unwind(|| strict(&page)).is_err(),
-            "{wrong}"
-        );
+        assert!(std::panic::catch_unwind(|| strict(&page)).is_err(), "{wrong}");
     }
 }

@@ -25,10 +25,7 @@ fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
     assert_eq!(other.status.code(), Some(1));
     assert!(stdout(&other).contains("not as recorded"));
     let said = stderr(&other);
-    assert!(
-        said.contains("error: tick ") && said.contains("force_z_n"),
-        "{said}"
-    );
+    assert!(said.contains("error: tick ") && said.contains("force_z_n"), "{said}");
     std::fs::write(&settings, text).unwrap();
     // A changed line is damage; a missing end is a recording that was cut off.
     let ticks = at.path().join("poke/ticks.csv");
@@ -71,10 +68,7 @@ fn what_is_impossible_is_refused_in_words() {
     std::fs::write(at.path().join("bad.toml"), "[tissue]\nsidemm = 3\n").unwrap();
     std::fs::write(at.path().join("gone.toml"), "[tissue]\nsource = \"gone\"\n").unwrap();
     for (words, reason) in [
-        (
-            &["run", "bad.toml"][..],
-            "bad.toml, line 2: 'tissue.sidemm'",
-        ),
+        (&["run", "bad.toml"][..], "bad.toml, line 2: 'tissue.sidemm'"),
         (&["run", "gone.toml"], "gone"),
         (&["run", "nowhere.toml"], "cannot read nowhere.toml"),
         (&["run", "--path", "pork"], "taps"),
@@ -112,10 +106,7 @@ fn a_mesh_is_planned_from_what_is_measured() {
     assert_eq!(bench["plan"]["mesh"]["nodes"], 51, "{bench}");
     // How much faster the closed form is, `scripts/measure surface` tells.
     let methods = bench["methods"].as_array().unwrap();
-    let names: Vec<&str> = methods
-        .iter()
-        .filter_map(|one| one["method"].as_str())
-        .collect();
+    let names: Vec<&str> = methods.iter().filter_map(|one| one["method"].as_str()).collect();
     assert_eq!(names[..2], ["closed form", "first moved first"], "{bench}");
     let mut speeds = methods.iter().map(|one| one["nodes_per_ms"].as_f64());
     assert!(speeds.all(|speed| speed > Some(0.0)), "{bench}");

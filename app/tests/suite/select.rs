@@ -48,9 +48,7 @@ fn three_tables(at: &Path) {
 
 fn candidate<'a>(selection: &'a Value, family: &str) -> &'a Value {
     let all = selection["candidates"].as_array().expect("candidates");
-    all.iter()
-        .find(|one| one["family"] == family)
-        .expect("the family")
+    all.iter().find(|one| one["family"] == family).expect("the family")
 }
 
 #[test]
@@ -62,11 +60,7 @@ fn the_body_that_was_pressed_is_recommended() {
     let by_criterion = palpate(at, &[&args[..], &["--json"]].concat());
     succeeded(&by_criterion);
     let found = json(&by_criterion);
-    assert_eq!(
-        found["verdict"]["outcome"], "recommended",
-        "{}",
-        found["verdict"]
-    );
+    assert_eq!(found["verdict"]["outcome"], "recommended", "{}", found["verdict"]);
     assert_eq!(found["verdict"]["family"], "kelvin");
     assert_eq!(found["tolerance_n"], Value::Null);
     let kelvin = candidate(&found, "kelvin");
@@ -88,19 +82,13 @@ fn the_body_that_was_pressed_is_recommended() {
     let text = palpate(at, &[&args[..], &coarse].concat());
     succeeded(&text);
     let text = stdout(&text);
-    assert!(
-        text.contains("use maxwell") || text.contains("use voigt"),
-        "{text}"
-    );
+    assert!(text.contains("use maxwell") || text.contains("use voigt"), "{text}");
     assert!(text.contains("extra term"));
     let plot = std::fs::read_to_string(at.join("plot.svg")).unwrap();
     assert!(plot.starts_with("<svg") && plot.contains("tolerance") && plot.contains("kelvin"));
 
     // A tolerance below the noise has no winner.
-    let fine = answer(&palpate(
-        at,
-        &[&args[..], &["--tolerance", "0.1%", "--json"]].concat(),
-    ));
+    let fine = answer(&palpate(at, &[&args[..], &["--tolerance", "0.1%", "--json"]].concat()));
     assert_eq!(fine["verdict"]["outcome"], "none-within");
     assert_eq!(fine["verdict"]["family"], Value::Null);
 }
@@ -112,12 +100,8 @@ fn one_record_is_split_in_time() {
     table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
     let args = split_words("select slow.csv --families maxwell,kelvin,series-2 --json");
     let found = answer(&palpate(at, &args));
-    let names: Vec<&Value> = found["candidates"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|one| &one["family"])
-        .collect();
+    let names: Vec<&Value> =
+        found["candidates"].as_array().unwrap().iter().map(|one| &one["family"]).collect();
     assert_eq!(names, ["maxwell", "kelvin", "series-2"]);
     let records = &candidate(&found, "kelvin")["prediction"]["records"];
     assert_eq!(records[0]["unseen"], "rest");
@@ -131,10 +115,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let soft = kelvin();
-    let stiff = Model {
-        linear: soft.linear.iter().map(|one| 2.0 * one).collect(),
-        ..soft.clone()
-    };
+    let stiff = Model { linear: soft.linear.iter().map(|one| 2.0 * one).collect(), ..soft.clone() };
     for (name, body) in [("soft", &soft), ("stiff", &stiff)] {
         table(at, &format!("{name}-slow.csv"), body, [1.0, 10.0]);
         table(at, &format!("{name}-fast.csv"), body, [5.0, 10.0]);
@@ -148,10 +129,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     assert!(found["effective_samples"].as_f64().unwrap() < 200.0);
     let candidates = found["candidates"].as_array().unwrap();
     let rms = |one: &&Value| one["rms_n"].as_f64().unwrap();
-    let closest = candidates
-        .iter()
-        .min_by(|a, b| rms(a).total_cmp(&rms(b)))
-        .unwrap();
+    let closest = candidates.iter().min_by(|a, b| rms(a).total_cmp(&rms(b))).unwrap();
     let even = format!("what even {} leaves", closest["family"].as_str().unwrap());
     let said = found["verdict"]["sentences"][0].as_str().unwrap();
     assert!(said.contains(&even), "{said}");
@@ -168,11 +146,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let prediction = &candidate(&held, "kelvin")["prediction"];
     for record in prediction["records"].as_array().unwrap() {
         let scale = record["scale"].as_f64().unwrap();
-        let wanted = if record["record"].as_str().unwrap().starts_with("soft") {
-            0.5
-        } else {
-            2.0
-        };
+        let wanted = if record["record"].as_str().unwrap().starts_with("soft") { 0.5 } else { 2.0 };
         assert!((scale / wanted - 1.0).abs() < 0.05, "{record}");
     }
     assert!(prediction["scaled_rms_n"].as_f64().unwrap() < 0.03);
@@ -194,15 +168,7 @@ fn a_sensor_offset_is_no_part_of_the_peak() {
     }
     std::fs::write(at.join("raised.csv"), raised).unwrap();
     let tolerance = |name| {
-        let args = [
-            "select",
-            name,
-            "--families",
-            "kelvin",
-            "--tolerance",
-            "1%",
-            "--json",
-        ];
+        let args = ["select", name, "--families", "kelvin", "--tolerance", "1%", "--json"];
         let found = palpate(at, &args);
         succeeded(&found);
         json(&found)["tolerance_n"].as_f64().unwrap()
@@ -217,11 +183,7 @@ fn wrong_use_is_told_in_one_sentence() {
     let at = folder.path();
     table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
     std::fs::write(at.join("empty.csv"), "t_s,depth_mm,force_N\n").unwrap();
-    std::fs::write(
-        at.join("flat.csv"),
-        "t_s,depth_mm,force_N\n0,1,1\n1,1,2\n2,1,3\n",
-    )
-    .unwrap();
+    std::fs::write(at.join("flat.csv"), "t_s,depth_mm,force_N\n0,1,1\n1,1,2\n2,1,3\n").unwrap();
     std::fs::write(at.join("there.svg"), "").unwrap();
     let cases: [(&[&str], i32, &str); 8] = [
         (&["slow.csv", "--families", "kelvin,zener"], 2, "'zener'"),
@@ -235,17 +197,9 @@ fn wrong_use_is_told_in_one_sentence() {
     ];
     for (args, code, fact) in cases {
         let output = palpate(at, &[&["select"], args].concat());
-        assert_eq!(
-            output.status.code(),
-            Some(code),
-            "{args:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
         let said = stderr(&output);
-        assert!(
-            said.starts_with("error: ") && said.contains(fact),
-            "{args:?}: {said}"
-        );
+        assert!(said.starts_with("error: ") && said.contains(fact), "{args:?}: {said}");
         assert_eq!(said.lines().count(), 1, "{said}");
         assert_eq!(stdout(&output), "");
     }

@@ -83,16 +83,7 @@ pub fn assert_refused(output: &Output, code: i32, fact: &str) {
 }
 
 /// A run short enough for a test: about 90 s of session time, most of it finding contact.
-pub const SHORT: [&str; 8] = [
-    "run",
-    "ramp-hold",
-    "--speed",
-    "3",
-    "--depth",
-    "6",
-    "--hold",
-    "1",
-];
+pub const SHORT: [&str; 8] = ["run", "ramp-hold", "--speed", "3", "--depth", "6", "--hold", "1"];
 
 pub fn short_run(folder: &Path, out: &str, more: &[&str]) -> Output {
     let mut args = SHORT.to_vec();
@@ -106,9 +97,6 @@ pub fn log_file(session: &Path) -> PathBuf {
         .expect("a session folder")
         .flatten()
         .map(|entry| entry.path())
-        .find(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "mcap")
-        })
+        .find(|path| path.extension().is_some_and(|extension| extension == "mcap"))
         .expect("a log")
 }

@@ -37,20 +37,13 @@ fn the_log_tells_transitions_of_a_run_and_no_samples() {
     let samples = json(&run)["samples"].as_u64().unwrap();
     let text = log(at);
     assert!(text.starts_with("palpate "), "{text}");
-    for told in [
-        "session opened",
-        "folder=one",
-        "phase: ramp",
-        ":step{number=",
-        "session closed, finish",
-    ] {
+    for told in
+        ["session opened", "folder=one", "phase: ramp", ":step{number=", "session closed, finish"]
+    {
         assert!(text.contains(told), "{told}: {text}");
     }
     let lines = text.lines().count() as u64;
-    assert!(
-        samples > 10_000 && lines < 100,
-        "{lines} lines, {samples} samples"
-    );
+    assert!(samples > 10_000 && lines < 100, "{lines} lines, {samples} samples");
     // A refusal is the user's business; a failure is support's.
     let refused = palpate(at, &["info", "nowhere"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -74,19 +67,11 @@ fn what_is_logged_is_shown_when_asked_and_chosen_by_rust_log() {
     let library = at.join("library");
     let usual = run(&library, "usual", "");
     succeeded(&usual);
-    assert!(
-        stderr(&usual).contains("session opened"),
-        "{}",
-        stderr(&usual)
-    );
+    assert!(stderr(&usual).contains("session opened"), "{}", stderr(&usual));
     let before = log(at);
     let silent = run(&library, "silent", "palpate=off");
     succeeded(&silent);
-    assert!(
-        !stderr(&silent).contains("session opened"),
-        "{}",
-        stderr(&silent)
-    );
+    assert!(!stderr(&silent).contains("session opened"), "{}", stderr(&silent));
     assert_eq!(log(at), before);
 
     // A file where the library's folder for logs should be: the run goes on, and who asks for more is told once.
@@ -111,38 +96,17 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     let rig = "device = \"galil\"\naddress = \"lab:tulip@192.168.1.10:23\"\npassword = \"rose\"\n";
     fs::write(at.join("bench.toml"), rig).unwrap();
 
-    let made = palpate(
-        at,
-        &[
-            "support-bundle",
-            "help.zip",
-            "--rig",
-            "bench.toml",
-            "--json",
-        ],
-    );
+    let made = palpate(at, &["support-bundle", "help.zip", "--rig", "bench.toml", "--json"]);
     succeeded(&made);
     let made = json(&made);
     assert_eq!(made["command"], "support-bundle");
     let files = unpacked(&at.join("help.zip"));
-    let told: Vec<&str> = made["files"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|one| one["name"].as_str().unwrap())
-        .collect();
-    assert!(
-        files.keys().all(|name| told.contains(&name.as_str())),
-        "{made}"
-    );
+    let told: Vec<&str> =
+        made["files"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
+    assert!(files.keys().all(|name| told.contains(&name.as_str())), "{made}");
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
-    let expected = [
-        "findings.txt",
-        "log/palpate.log",
-        "rigs/bench.toml",
-        "versions.txt",
-        "window.json",
-    ];
+    let expected =
+        ["findings.txt", "log/palpate.log", "rigs/bench.toml", "versions.txt", "window.json"];
     assert_eq!(names, expected);
     let text = |name: &str| String::from_utf8_lossy(&files[name]).into_owned();
     assert!(
@@ -154,10 +118,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     assert!(text("log/palpate.log").contains("session closed"));
     assert_eq!(text("window.json"), "{\"is_dark\": true}\n");
     let rig = text("rigs/bench.toml");
-    assert!(
-        rig.contains("192.168.1.10:23") && rig.contains("galil"),
-        "{rig}"
-    );
+    assert!(rig.contains("192.168.1.10:23") && rig.contains("galil"), "{rig}");
     for bytes in files.values() {
         let text = String::from_utf8_lossy(bytes);
         for secret in ["tulip", "rose", "kidney 7"] {
@@ -169,13 +130,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     assert_eq!(again.status.code(), Some(2));
     assert_eq!(unpacked(&at.join("help.zip")), files);
 
-    let more = [
-        "support-bundle",
-        "more.zip",
-        "--with-manifests",
-        "--with-session",
-        session,
-    ];
+    let more = ["support-bundle", "more.zip", "--with-manifests", "--with-session", session];
     let more = palpate(at, &more);
     succeeded(&more);
     let lines = stdout(&more);
@@ -190,10 +145,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     let name = format!("sessions/one/{}", log.file_name().unwrap().display());
     assert_eq!(files[&name], fs::read(log).unwrap());
 
-    let none = palpate(
-        at,
-        &["support-bundle", "none.zip", "--with-session", "bench.toml"],
-    );
+    let none = palpate(at, &["support-bundle", "none.zip", "--with-session", "bench.toml"]);
     assert_eq!(none.status.code(), Some(2), "{}", stderr(&none));
     assert!(!at.join("none.zip").exists());
 }

@@ -34,20 +34,10 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     let rows = |table: &str| curves[table].as_array().unwrap().clone();
     // Seven integrators, two precisions, four steps.
     assert_eq!(rows("integrators").len(), 56);
-    assert_eq!(
-        (
-            rows("families").len(),
-            rows("fit").len(),
-            rows("live").len()
-        ),
-        (11, 2, 5)
-    );
+    assert_eq!((rows("families").len(), rows("fit").len(), rows("live").len()), (11, 2, 5));
     let is_unstable = |row: &&Value| row["error"].is_null();
     for row in rows("integrators").iter().filter(is_unstable) {
-        assert!(
-            row["refused"].as_str().unwrap().contains("unstable"),
-            "{row}"
-        );
+        assert!(row["refused"].as_str().unwrap().contains("unstable"), "{row}");
         assert_eq!(row["step_s"], 5.0);
     }
     assert_eq!(rows("integrators").iter().filter(is_unstable).count(), 4);
@@ -60,10 +50,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     assert!(exact.iter().all(|error| *error < 1e-13), "{exact:?}");
     let advice = &measured["recommendation"];
     for advised in [&advice["integrator"], &advice["fit"]] {
-        assert!(
-            advised["use"]["error_of_peak"].as_f64().unwrap() <= 0.02,
-            "{advice}"
-        );
+        assert!(advised["use"]["error_of_peak"].as_f64().unwrap() <= 0.02, "{advice}");
     }
     assert_eq!(advice["families"].as_array().unwrap().len(), 5);
     assert!(advice["live"]["use"]["setting"].is_string(), "{advice}");
@@ -88,13 +75,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     let text = palpate(at, &["trade", "--show", "--tolerance", "1e-9N"]);
     succeeded(&text);
     let text = stdout(&text);
-    for words in [
-        "trapezoid, f32",
-        "unstable",
-        "series-3",
-        "10 Hz, 901 samples",
-        "none: ",
-    ] {
+    for words in ["trapezoid, f32", "unstable", "series-3", "10 Hz, 901 samples", "none: "] {
         assert!(text.contains(words), "{words} is not in\n{text}");
     }
     let check = palpate(at, &["trade", "--check"]);
@@ -114,9 +95,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
 
     // Old and foreign curves are shown, with a word of warning.
     std::fs::write(&file, good).unwrap();
-    resealed(&file, |curves| {
-        curves.measured_at = "2020-01-01T00:00:00Z".into()
-    });
+    resealed(&file, |curves| curves.measured_at = "2020-01-01T00:00:00Z".into());
     let shown = palpate(at, &["trade", "--show"]);
     succeeded(&shown);
     assert_says(&shown, "stale");
@@ -136,19 +115,10 @@ fn files_that_hold_no_curves_are_refused_in_one_sentence() {
     let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/trade/curves.json");
     let good = std::fs::read_to_string(recorded).unwrap();
     let cases = [
-        (
-            good.replace("\"seeds\"", "\"sedes\""),
-            "missing field `seeds`",
-        ),
-        (
-            good.replacen("\"poke_n\": ", "\"poke_n\": NaN, \"x\": ", 1),
-            "holds no curves",
-        ),
+        (good.replace("\"seeds\"", "\"sedes\""), "missing field `seeds`"),
+        (good.replacen("\"poke_n\": ", "\"poke_n\": NaN, \"x\": ", 1), "holds no curves"),
         (good.replace("\"format\": 1", "\"format\": 2"), "format 2"),
-        (
-            good.replacen("\"quick\": true", "\"quick\": false", 1),
-            "changed",
-        ),
+        (good.replacen("\"quick\": true", "\"quick\": false", 1), "changed"),
         ("[]".into(), "holds no curves"),
         (String::new(), "holds no curves"),
     ];

@@ -27,29 +27,18 @@ fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
 fn the_main_job_works_as_the_readme_writes_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let run = answer(&typed(
-        at,
-        "run ramp-hold --time-scale max --out demo --json",
-    ));
-    assert_eq!(
-        (run["ending"].as_str(), run["command"].as_str()),
-        (Some("finish"), Some("run"))
-    );
+    let run = answer(&typed(at, "run ramp-hold --time-scale max --out demo --json"));
+    assert_eq!((run["ending"].as_str(), run["command"].as_str()), (Some("finish"), Some("run")));
 
     let fit = answer(&palpate(at, &["fit", "demo", "--json"]));
     let parameters = fit["parameters"].as_array().unwrap();
     let value = |name: &str| {
         let one = parameters.iter().find(|one| one["name"] == name);
-        one.and_then(|one| one["value"].as_f64())
-            .unwrap_or_else(|| panic!("{name} in {fit}"))
+        one.and_then(|one| one["value"].as_f64()).unwrap_or_else(|| panic!("{name} in {fit}"))
     };
     // The simulated specimen varies by some percent around the thesis body.
     for (name, thesis) in [("tau_eps", 1.023), ("mu3", 0.000_434_5), ("tau_sig", 0.06)] {
-        assert!(
-            (value(name) / thesis - 1.0).abs() < 0.25,
-            "{name} = {}",
-            value(name)
-        );
+        assert!((value(name) / thesis - 1.0).abs() < 0.25, "{name} = {}", value(name));
     }
     assert!(fit["r2"].as_f64().unwrap() > 0.999);
     assert_eq!(fit["samples"].as_u64().unwrap() / 1000, 90);
@@ -86,16 +75,8 @@ fn one_seed_gives_one_session_at_any_pace() {
     let (max, paced, other) = (open("max"), open("paced"), open("other"));
     assert_eq!(max.manifest.rig.as_ref().unwrap().settings["seed"], "7");
     // Not assert_eq: a hundred thousand rows help nobody who reads the failure.
-    assert!(
-        max.rows == paced.rows,
-        "{:?}",
-        first_difference(&max.rows, &paced.rows)
-    );
-    assert!(
-        max.entries == paced.entries,
-        "{:?}",
-        first_difference(&max.entries, &paced.entries)
-    );
+    assert!(max.rows == paced.rows, "{:?}", first_difference(&max.rows, &paced.rows));
+    assert!(max.entries == paced.entries, "{:?}", first_difference(&max.entries, &paced.entries));
     assert!(max.rows != other.rows);
     // The recorded seed rebuilds the rig: run again with what the manifest says.
     let recorded = &max.manifest.rig.as_ref().unwrap().settings;
@@ -112,18 +93,16 @@ fn one_seed_gives_one_session_at_any_pace() {
         ],
     ));
     let again = open("again").rows;
-    assert!(
-        again == max.rows,
-        "{:?}",
-        first_difference(&again, &max.rows)
-    );
+    assert!(again == max.rows, "{:?}", first_difference(&again, &max.rows));
 }
 
 fn first_difference<T: PartialEq + std::fmt::Debug>(a: &[T], b: &[T]) -> Option<String> {
     let place = a.iter().zip(b).position(|(a, b)| a != b);
-    place
-        .map(|i| format!("{i}: {:?} {:?}", a[i], b[i]))
-        .or(Some(format!("{} {}", a.len(), b.len())))
+    place.map(|i| format!("{i}: {:?} {:?}", a[i], b[i])).or(Some(format!(
+        "{} {}",
+        a.len(),
+        b.len()
+    )))
 }
 
 #[test]
@@ -133,11 +112,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
     std::fs::create_dir(at.join("full")).unwrap();
     std::fs::write(at.join("full/notes.txt"), "mine").unwrap();
     std::fs::write(at.join("noforce.csv"), "t_s,depth_mm\n0,0\n1,1\n").unwrap();
-    std::fs::write(
-        at.join("words.csv"),
-        "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n",
-    )
-    .unwrap();
+    std::fs::write(at.join("words.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n").unwrap();
     std::fs::write(at.join("nounits.csv"), "time,depth,force\n0,0,0\n1,1,1\n").unwrap();
     std::fs::write(at.join("random.mcap"), "this is no session").unwrap();
     std::fs::write(at.join("a-file"), "").unwrap();
@@ -149,24 +124,12 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
     let cases: &[(Vec<&str>, &str)] = &[
         (run(&["--depth", "200", "--out", "x"]), "beyond the travel"),
         (run(&["--depth", "-3", "--out", "x"]), "give more than 0"),
-        (
-            run(&["--depth", "nan", "--out", "x"]),
-            "not a finite number",
-        ),
-        (
-            run(&["--speed", "inf", "--out", "x"]),
-            "not a finite number",
-        ),
+        (run(&["--depth", "nan", "--out", "x"]), "not a finite number"),
+        (run(&["--speed", "inf", "--out", "x"]), "not a finite number"),
         (run(&["--speed", "500", "--out", "x"]), "rig sim"),
-        (
-            run(&["--speed", "0.76", "--out", "x"]),
-            "0.7500 and 0.7800 mm/s",
-        ),
+        (run(&["--speed", "0.76", "--out", "x"]), "0.7500 and 0.7800 mm/s"),
         (run(&["--hold", "-1", "--out", "x"]), "give 0 s or more"),
-        (
-            vec!["run", "ramp-hold", "--time-scale", "fast"],
-            "time scale",
-        ),
+        (vec!["run", "ramp-hold", "--time-scale", "fast"], "time scale"),
         (run(&["--profile", "perfect", "--out", "x"]), "perfect"),
         (run(&["--rig", "robot", "--out", "x"]), "'robot'"),
         (run(&["--depth", "45", "--out", "x"]), "calibrated"),
@@ -178,14 +141,8 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
         (vec!["fit", "words.csv"], "line 3"),
         (vec!["fit", "nounits.csv"], "unit"),
         (vec!["fit", "random.mcap"], "random.mcap"),
-        (
-            vec!["fit", "noforce.csv", "--fixed", "f_offset"],
-            "NAME=VALUE",
-        ),
-        (
-            vec!["fit", "noforce.csv", "--fixed", "gravity=9.8"],
-            "gravity",
-        ),
+        (vec!["fit", "noforce.csv", "--fixed", "f_offset"], "NAME=VALUE"),
+        (vec!["fit", "noforce.csv", "--fixed", "gravity=9.8"], "gravity"),
         (vec!["replay", "full"], "full"),
         (vec!["export", "full", "--format", "csv"], "full"),
         (vec!["info", "nowhere"], "nowhere"),
@@ -203,10 +160,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert!(
-        !at.join("x").exists(),
-        "a refused run must not leave a folder"
-    );
+    assert!(!at.join("x").exists(), "a refused run must not leave a folder");
 }
 
 #[test]
@@ -230,12 +184,7 @@ fn an_acknowledged_force_band_is_recorded() {
     assert_refused(&output, 1, "interlock");
     let info = json(&palpate(at, &["info", "deep", "--json"]));
     assert_eq!(info["ending"], "interlock");
-    assert!(
-        info["acknowledgements"][0]
-            .as_str()
-            .unwrap()
-            .contains("calibrated")
-    );
+    assert!(info["acknowledgements"][0].as_str().unwrap().contains("calibrated"));
     succeeded(&palpate(at, &["replay", "deep"]));
 }
 
@@ -264,18 +213,11 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     let mut damaged = bytes.clone();
     damaged[bytes.len() / 2] ^= 0x10;
     std::fs::write(at.join("damaged.mcap"), damaged).unwrap();
-    for command in [
-        vec!["info", "damaged.mcap"],
-        vec!["fit", "damaged.mcap"],
-        vec!["replay", "damaged.mcap"],
-    ] {
+    for command in
+        [vec!["info", "damaged.mcap"], vec!["fit", "damaged.mcap"], vec!["replay", "damaged.mcap"]]
+    {
         let output = palpate(at, &command);
-        assert_eq!(
-            output.status.code(),
-            Some(1),
-            "{command:?}: {}",
-            stderr(&output)
-        );
+        assert_eq!(output.status.code(), Some(1), "{command:?}: {}", stderr(&output));
         assert_says(&output, "damaged");
     }
 }
@@ -298,18 +240,11 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
     ] {
         let output = palpate(at, &args);
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-        assert!(
-            stderr(&output).contains(&pid),
-            "{pid} in: {}",
-            stderr(&output)
-        );
+        assert!(stderr(&output).contains(&pid), "{pid} in: {}", stderr(&output));
     }
     // Asked to end, the holder stops the slider, closes the session and reports failure.
     // The shell has its own kill; a minimal system has no other.
-    let killed = Command::new("sh")
-        .args(["-c", &format!("kill -TERM {pid}")])
-        .status()
-        .unwrap();
+    let killed = Command::new("sh").args(["-c", &format!("kill -TERM {pid}")]).status().unwrap();
     assert!(killed.success());
     assert_eq!(holder.wait().unwrap().code(), Some(1));
     let info = json(&palpate(at, &["info", "held", "--json"]));

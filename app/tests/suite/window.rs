@@ -6,10 +6,7 @@ use std::process::{Command, Stdio};
 
 #[test]
 fn the_window_runs_and_stops_on_a_virtual_display() {
-    if ["Xvfb", "xdotool", "import", "convert"]
-        .into_iter()
-        .any(skip::lacks_program)
-    {
+    if ["Xvfb", "xdotool", "import", "convert"].into_iter().any(skip::lacks_program) {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -17,13 +14,7 @@ fn the_window_runs_and_stops_on_a_virtual_display() {
     let report = folder.path().join("frames.json");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scripts/screenshot");
     let output = Command::new(script)
-        .args([
-            "--binary",
-            env!("CARGO_BIN_EXE_palpate"),
-            "--at",
-            "3",
-            "--out",
-        ])
+        .args(["--binary", env!("CARGO_BIN_EXE_palpate"), "--at", "3", "--out"])
         .arg(&picture)
         .env("PALPATE_FRAME_REPORT", &report)
         .stdin(Stdio::null())

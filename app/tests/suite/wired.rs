@@ -33,15 +33,9 @@ fn a_rig_is_found_checked_and_watched() {
     let checked = json(&checked);
     let identity = checked["rig"]["identity"].as_str().unwrap();
     assert!(identity.contains("13.3 mm"), "{identity}");
-    assert!(
-        checked["links"][0]["answers"].as_u64().unwrap() > 0,
-        "{checked}"
-    );
+    assert!(checked["links"][0]["answers"].as_u64().unwrap() > 0, "{checked}");
 
-    let watched = palpate(
-        folder.path(),
-        &["rig", "monitor", &file, "--seconds", "1", "--json"],
-    );
+    let watched = palpate(folder.path(), &["rig", "monitor", &file, "--seconds", "1", "--json"]);
     let watched = json(&watched);
     assert!(watched["samples"].as_u64().unwrap() > 100, "{watched}");
     // The free cell of the built-in bench.
@@ -69,12 +63,7 @@ fn what_is_not_as_the_file_says_is_told() {
 }
 
 /// What is said where a busy computer has ended a run, or the retract after it.
-const LATE: [&str; 4] = [
-    "sample age",
-    "stood still",
-    "samples arrived",
-    "nothing answers",
-];
+const LATE: [&str; 4] = ["sample age", "stood still", "samples arrived", "nothing answers"];
 
 fn is_late(said: &str) -> bool {
     LATE.iter().any(|words| said.contains(words))
@@ -85,9 +74,7 @@ fn is_late(said: &str) -> bool {
 ///
 /// A computer busy with other tests may make a sample late, which stops the run before: then it is made again.
 fn stopped_run(answer: Option<&str>) -> Option<([f64; 2], String)> {
-    (0..10)
-        .map(|_| stopped_once(answer))
-        .find(|(_, said)| !is_late(said))
+    (0..10).map(|_| stopped_once(answer)).find(|(_, said)| !is_late(said))
 }
 
 fn stopped_once(answer: Option<&str>) -> ([f64; 2], String) {
@@ -98,13 +85,7 @@ fn stopped_once(answer: Option<&str>) -> ([f64; 2], String) {
     let words = ["run", "check-home", "--set", "distance=60mm", "--rig", &rig];
     let mut run = Command::new(env!("CARGO_BIN_EXE_palpate"))
         .args(words)
-        .args([
-            "--acknowledge",
-            "--calibration",
-            "thesis",
-            "--out",
-            "session",
-        ])
+        .args(["--acknowledge", "--calibration", "thesis", "--out", "session"])
         .current_dir(folder.path())
         .env("PALPATE_HOME", folder.path().join("library"))
         .stdin(match answer {
@@ -132,17 +113,10 @@ fn stopped_once(answer: Option<&str>) -> ([f64; 2], String) {
     if is_late(&said) {
         return ([0.0; 2], said);
     }
-    assert!(
-        code == Some(1) && said.contains("the force is 55"),
-        "{said}"
-    );
+    assert!(code == Some(1) && said.contains("the force is 55"), "{said}");
     let session = Session::open(&folder.path().join("session")).expect("it can be read");
     let pulses: Vec<i64> = session.rows.iter().filter_map(|row| row.pulses).collect();
-    let furthest = pulses
-        .iter()
-        .max()
-        .copied()
-        .expect("the axis told where it was");
+    let furthest = pulses.iter().max().copied().expect("the axis told where it was");
     let last = pulses.last().copied().expect("the axis told where it was");
     ([furthest, last].map(|pulses| 0.015 * pulses as f64), said)
 }
@@ -156,16 +130,10 @@ fn a_stopped_probe_leaves_where_somebody_says_so_and_stays_otherwise() {
         let runs = [retracted, left, alone].map(|run| run.join().unwrap());
         let [Some(retracted), Some(left), Some(alone)] = runs else {
             let need = Need::System("a processor within 250 ms");
-            return skip(
-                need,
-                "each run was ended by samples that came late, as it must be",
-            );
+            return skip(need, "each run was ended by samples that came late, as it must be");
         };
         let ([furthest, last], said) = retracted;
-        assert!(
-            furthest > 5.0 && last < furthest - 2.0,
-            "{furthest} {last} {said}"
-        );
+        assert!(furthest > 5.0 && last < furthest - 2.0, "{furthest} {last} {said}");
         let ([furthest, last], said) = left;
         assert!(last > furthest - 0.1, "{furthest} {last} {said}");
         // Without anybody at the terminal nothing is asked.

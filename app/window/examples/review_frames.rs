@@ -30,9 +30,8 @@ type Failed = Box<dyn std::error::Error>;
 
 /// Loops of half a second down and half a second up, the force with noise and a little softer every time.
 fn row(index: u64, random: &mut u64) -> Row {
-    *random = random
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
+    *random =
+        random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let noise = (*random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
     let share = (index % 20_000) as f64 / 10_000.0;
     let depth = 10.0 * if share < 1.0 { share } else { 2.0 - share };
@@ -188,13 +187,12 @@ fn plain(ui: &mut Ui, all: &[[Vec<PlotPoint>; 3]]) {
     let height = ui.available_height() / 3.0;
     for number in 0..3 {
         let plot = Plot::new(("plain", number)).height(height);
-        plot.link_axis(Id::unique("plain"), [true, false])
-            .show(ui, |plot_ui| {
-                for (session, columns) in all.iter().enumerate() {
-                    let points = PlotPoints::Borrowed(&columns[number]);
-                    plot_ui.line(Line::new("plain", points).id((session, number)));
-                }
-            });
+        plot.link_axis(Id::unique("plain"), [true, false]).show(ui, |plot_ui| {
+            for (session, columns) in all.iter().enumerate() {
+                let points = PlotPoints::Borrowed(&columns[number]);
+                plot_ui.line(Line::new("plain", points).id((session, number)));
+            }
+        });
     }
 }
 
@@ -230,10 +228,7 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
         first.unwrap_or(f64::NAN),
         start.elapsed().as_secs_f64()
     );
-    println!(
-        "{:<28} {:>12} {:>12}",
-        "ms of CPU per frame", "median", "highest"
-    );
+    println!("{:<28} {:>12} {:>12}", "ms of CPU per frame", "median", "highest");
     let tell = |what: &str, [median, highest]: [f64; 2]| {
         println!("{what:<28} {median:>12.2} {highest:>12.2}");
     };
@@ -247,14 +242,8 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
         std::thread::sleep(Duration::from_millis(4));
         bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
     }
-    println!(
-        "loops over depth found after {:.2} s",
-        start.elapsed().as_secs_f64()
-    );
-    tell(
-        "over depth, moved",
-        bench.frames(false, |ui| draw(&mut screen, ui)),
-    );
+    println!("loops over depth found after {:.2} s", start.elapsed().as_secs_f64());
+    tell("over depth, moved", bench.frames(false, |ui| draw(&mut screen, ui)));
     drop(screen);
     // Twice as many points as fit into memory help nobody: the same samples, made again.
     let points: Vec<[Vec<PlotPoint>; 3]> = (0..sessions.len())
@@ -273,10 +262,7 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
         .collect();
     let mut bench = Bench::new();
     bench.frame(Vec::new(), |ui| plain(ui, &points));
-    tell(
-        "plain egui_plot, moved",
-        bench.frames(false, |ui| plain(ui, &points)),
-    );
+    tell("plain egui_plot, moved", bench.frames(false, |ui| plain(ui, &points)));
     Ok(())
 }
 
@@ -292,9 +278,5 @@ fn main() -> Result<(), Failed> {
     let several = (0..count as u32)
         .map(|number| record(folder.path(), 1 + number, each))
         .collect::<Result<Vec<_>, _>>()?;
-    case(
-        &format!("{count} sessions of {each} samples"),
-        &several,
-        each,
-    )
+    case(&format!("{count} sessions of {each} samples"), &several, each)
 }

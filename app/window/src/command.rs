@@ -119,23 +119,15 @@ impl Aside {
             ("distance".to_owned(), format!("{distance} mm")),
             ("speed".to_owned(), format!("{speed} mm/s")),
         ];
-        Self {
-            protocol: "free-jog",
-            values: values.into(),
-        }
+        Self { protocol: "free-jog", values: values.into() }
     }
 
     /// Find home, and touch it once more.
     #[must_use]
     pub fn home() -> Self {
-        let values = [
-            ("repeats".to_owned(), "1".to_owned()),
-            ("distance".to_owned(), "1 mm".to_owned()),
-        ];
-        Self {
-            protocol: "check-home",
-            values: values.into(),
-        }
+        let values =
+            [("repeats".to_owned(), "1".to_owned()), ("distance".to_owned(), "1 mm".to_owned())];
+        Self { protocol: "check-home", values: values.into() }
     }
 }
 
@@ -179,22 +171,12 @@ mod tests {
     #[test]
     fn a_stop_overtakes_what_was_asked_before() {
         let mut commands = Commands::default();
-        for command in [
-            Command::Start,
-            Command::ListPorts,
-            Command::Stop,
-            Command::Halt,
-        ] {
+        for command in [Command::Start, Command::ListPorts, Command::Stop, Command::Halt] {
             commands.push(command);
         }
         assert_eq!(
             commands.take(),
-            [
-                Command::Halt,
-                Command::Stop,
-                Command::Start,
-                Command::ListPorts
-            ]
+            [Command::Halt, Command::Stop, Command::Start, Command::ListPorts]
         );
         assert!(commands.take().is_empty());
     }

@@ -77,10 +77,7 @@ impl Settings {
     /// Writes them; the file is replaced as a whole.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         let unwritable = |err: &dyn std::fmt::Display| {
-            format!(
-                "the window's settings cannot be written to {} ({err})",
-                path.display()
-            )
+            format!("the window's settings cannot be written to {} ({err})", path.display())
         };
         let text = serde_json::to_string_pretty(self).map_err(|err| unwritable(&err))?;
         if let Some(folder) = path.parent() {
@@ -115,11 +112,7 @@ impl Kept {
         };
         match Settings::read(&path) {
             Ok(read) => {
-                let kept = Self {
-                    now: read.clone(),
-                    stored: read,
-                    path: Some(path),
-                };
+                let kept = Self { now: read.clone(), stored: read, path: Some(path) };
                 (kept, None)
             }
             Err(reason) => (Self::default(), Some(reason)),

@@ -54,13 +54,7 @@ impl WindowOptions {
     /// Options for a rig that somebody opened, with what the window remembers in the library.
     #[must_use]
     pub fn remembered(request: WorkbenchRequest) -> Self {
-        let WorkbenchRequest {
-            rig,
-            calibration,
-            limits,
-            to_acknowledge,
-            scale,
-        } = request;
+        let WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale } = request;
         Self {
             rig,
             calibration,

@@ -195,10 +195,7 @@ impl Workbench {
     /// Whether the loop of a screen may run now, or why not: its priority would disturb a run, or another loop.
     pub fn loop_verdict(&self, screen: &str) -> Result<(), String> {
         let mut others = self.occupation.running.iter();
-        match (
-            self.is_busy(),
-            others.find(|(running, _)| *running != screen),
-        ) {
+        match (self.is_busy(), others.find(|(running, _)| *running != screen)) {
             (true, _) => Err("a run is in progress and would be disturbed".into()),
             (false, Some((_, words))) => Err(format!("{words} and would be disturbed")),
             (false, None) => Ok(()),
@@ -312,9 +309,7 @@ impl Workbench {
             Start::Asked(answer) => match answer.try_recv() {
                 Ok(Ok(())) => {
                     self.starts += 1;
-                    self.start = Start::Granted {
-                        seen: self.snapshot.sequence,
-                    };
+                    self.start = Start::Granted { seen: self.snapshot.sequence };
                 }
                 Ok(Err(reason)) => {
                     self.refusal = Some(reason.to_string());
@@ -337,8 +332,7 @@ impl Workbench {
     /// Checks what stands in the form.
     pub fn refresh_form(&mut self) {
         let rig = &self.snapshot.rig;
-        self.form
-            .refresh(&rig.description, &self.bench, rig.is_homed);
+        self.form.refresh(&rig.description, &self.bench, rig.is_homed);
     }
 
     /// The window is to close, which stops first: whether it may close now, with the axis at rest.

@@ -59,12 +59,7 @@ impl Bench {
         axis: Box<dyn EmulatedAxis>,
         cell: Box<dyn EmulatedCell>,
     ) -> Self {
-        Self {
-            axis,
-            cell,
-            plant: Plant::new(sim, STEP_SECS),
-            now: Nanos::ZERO,
-        }
+        Self { axis, cell, plant: Plant::new(sim, STEP_SECS), now: Nanos::ZERO }
     }
 
     /// The slide, for tests.
@@ -102,20 +97,13 @@ impl Device for Bench {
                 self.plant.shift(shift);
             }
             self.plant.advance(self.axis.place_mm(), STEP_SECS);
-            let felt = Felt {
-                volts: self.plant.volts(),
-                force: self.plant.on_cell(),
-            };
+            let felt = Felt { volts: self.plant.volts(), force: self.plant.on_cell() };
             self.cell.advance(self.now, felt);
         }
     }
 
     fn transmit(&mut self, channel: usize) -> Vec<u8> {
-        if channel == 0 {
-            self.axis.transmit()
-        } else {
-            self.cell.transmit()
-        }
+        if channel == 0 { self.axis.transmit() } else { self.cell.transmit() }
     }
 
     fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {

@@ -38,9 +38,7 @@ type Program = fn(u64) -> Box<dyn EmulatedCell>;
 
 /// Emulated load cells beside an axis that are programs of their own, by their words in a rig file.
 const PROGRAMS: [(&str, Program); 2] = [
-    ("hx711", |_| {
-        Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
-    }),
+    ("hx711", |_| Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))),
     ("mark10", |seed| {
         let usual = EmulatedGaugeSettings::default();
         Box::new(EmulatedGauge::new(EmulatedGaugeSettings { seed, ..usual }))
@@ -51,9 +49,7 @@ const PROGRAMS: [(&str, Program); 2] = [
 #[must_use]
 pub fn emulated_cells() -> Vec<&'static str> {
     let words = DEVICES.iter().map(|kind| kind.word);
-    words
-        .filter(|word| emulated_cell(word, 0).is_some())
-        .collect()
+    words.filter(|word| emulated_cell(word, 0).is_some()).collect()
 }
 
 /// An emulated load cell, by its word in a rig file.

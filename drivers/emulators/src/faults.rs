@@ -114,15 +114,8 @@ impl ScheduledFault {
             _ => return Err(refused()),
         };
         let name = name.trim();
-        let (_, kind) = KINDS
-            .iter()
-            .find(|(known, _)| *known == name)
-            .ok_or_else(refused)?;
-        Ok(Self {
-            kind: *kind,
-            from,
-            until: from + duration,
-        })
+        let (_, kind) = KINDS.iter().find(|(known, _)| *known == name).ok_or_else(refused)?;
+        Ok(Self { kind: *kind, from, until: from + duration })
     }
 }
 
@@ -162,11 +155,7 @@ impl FaultPlan {
     /// These faults; which bytes they spoil follows from the seed.
     #[must_use]
     pub fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
-        Self {
-            coming: faults,
-            active: Vec::new(),
-            random: Random::new(seed, Cause::Fault),
-        }
+        Self { coming: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
     }
 
     /// One more.
@@ -176,17 +165,11 @@ impl FaultPlan {
 
     /// What begins or ends up to a time, the ends first.
     pub fn advance(&mut self, now: Nanos) -> Vec<Turn> {
-        let turn = |fault: ScheduledFault, is_on| Turn {
-            kind: fault.kind,
-            is_on,
-        };
+        let turn = |fault: ScheduledFault, is_on| Turn { kind: fault.kind, is_on };
         let mut turns = Vec::new();
         let over = self.active.extract_if(.., |fault| fault.until <= now);
         turns.extend(over.map(|fault| turn(fault, false)));
-        let begun: Vec<_> = self
-            .coming
-            .extract_if(.., |fault| fault.from <= now)
-            .collect();
+        let begun: Vec<_> = self.coming.extract_if(.., |fault| fault.from <= now).collect();
         for fault in begun {
             turns.push(turn(fault, true));
             self.active.push(fault);
@@ -207,11 +190,7 @@ impl FaultPlan {
     /// How much later what is sent now arrives.
     #[must_use]
     pub fn lateness(&self) -> Nanos {
-        if self.has(LineFault::Late) {
-            LATENESS
-        } else {
-            Nanos::ZERO
-        }
+        if self.has(LineFault::Late) { LATENESS } else { Nanos::ZERO }
     }
 
     /// What becomes of bytes on their way, to the device or from it.
@@ -219,11 +198,8 @@ impl FaultPlan {
         if self.active.is_empty() {
             return bytes;
         }
-        let is_lost = if is_to_device {
-            self.has(LineFault::Deaf)
-        } else {
-            self.has(LineFault::Mute)
-        };
+        let is_lost =
+            if is_to_device { self.has(LineFault::Deaf) } else { self.has(LineFault::Mute) };
         if is_lost {
             return Vec::new();
         }
@@ -260,31 +236,18 @@ mod tests {
     fn faults_are_read_or_refused_by_name() {
         let fault: ScheduledFault = "stuck@2.5:10".parse().unwrap();
         assert_eq!(fault.kind, FaultKind::Device(DeviceFault::Stuck));
-        assert_eq!(
-            (fault.from.0, fault.until.0),
-            (2_500_000_000, 12_500_000_000)
-        );
+        assert_eq!((fault.from.0, fault.until.0), (2_500_000_000, 12_500_000_000));
         let fault = ScheduledFault::parse("mute", Some(Nanos(7))).unwrap();
         assert_eq!((fault.from.0, fault.until.0), (7, 500_000_007));
         for (name, kind) in KINDS {
             let fault: ScheduledFault = format!("{name}@1").parse().unwrap();
             assert_eq!((fault.kind, kind.to_string().as_str()), (kind, name));
         }
-        for wrong in [
-            "",
-            "stuck",
-            "stuck@",
-            "melt@1",
-            "stuck@-1",
-            "stuck@1:x",
-            "stuck@nan",
-            "stuck@1e9",
-        ] {
+        for wrong in
+            ["", "stuck", "stuck@", "melt@1", "stuck@-1", "stuck@1:x", "stuck@nan", "stuck@1e9"]
+        {
             let err = wrong.parse::<ScheduledFault>().unwrap_err().to_string();
-            assert!(
-                err.contains(wrong) && err.contains("garbage, drop"),
-                "{err}"
-            );
+            assert!(err.contains(wrong) && err.contains("garbage, drop"), "{err}");
         }
     }
 

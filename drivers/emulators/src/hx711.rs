@@ -42,12 +42,7 @@ pub struct EmulatedHx711Settings {
 
 impl Default for EmulatedHx711Settings {
     fn default() -> Self {
-        Self {
-            board: "emulated".into(),
-            is_fast: true,
-            is_half_gain: false,
-            micros: 0,
-        }
+        Self { board: "emulated".into(), is_fast: true, is_half_gain: false, micros: 0 }
     }
 }
 
@@ -117,11 +112,7 @@ impl EmulatedHx711 {
                 (false, false) => 10,
             },
             gain: if self.settings.is_half_gain { 64 } else { 128 },
-            board: if self.is_other {
-                "another".into()
-            } else {
-                self.settings.board.clone()
-            },
+            board: if self.is_other { "another".into() } else { self.settings.board.clone() },
         }
     }
 
@@ -157,11 +148,7 @@ impl EmulatedHx711 {
             // The cast saturates.
             self.count = (count as i32).clamp(COUNT_MIN, COUNT_MAX);
         }
-        let count = if self.is_saturated {
-            COUNT_MAX
-        } else {
-            self.count
-        };
+        let count = if self.is_saturated { COUNT_MAX } else { self.count };
         self.conversions = self.conversions.saturating_add(1);
         let micros = self.micros(at);
         if self.conversions == SETTLING && !self.has_begun {
@@ -188,10 +175,7 @@ impl EmulatedHx711 {
 impl EmulatedCell for EmulatedHx711 {
     fn receive(&mut self, now: Nanos, bytes: &[u8]) {
         if self.started.is_some() && bytes.contains(&b'?') {
-            let message = Message::Header {
-                micros: self.micros(now),
-                header: self.header(),
-            };
+            let message = Message::Header { micros: self.micros(now), header: self.header() };
             self.say(&message);
         }
     }

@@ -33,10 +33,7 @@ pub enum OrderError {
 impl Order {
     /// Reads `load GRAMS`, `mount NUMBER`, `unmount`, or `KIND[:DURATION]` of a fault.
     pub fn parse(text: &str, now: Nanos) -> Result<Self, OrderError> {
-        let wrong = |right| OrderError::Number {
-            order: text.to_owned(),
-            right,
-        };
+        let wrong = |right| OrderError::Number { order: text.to_owned(), right };
         let (word, rest) = text.split_once(' ').unwrap_or((text, ""));
         let rest = rest.trim();
         match word {
@@ -49,15 +46,14 @@ impl Order {
                 Ok(Self::Hand(HandAction::LoadCell { mass_g }))
             }
             "mount" => {
-                let specimen = rest
-                    .parse()
-                    .map_err(|_| wrong("mount and the number of a specimen"))?;
+                let specimen =
+                    rest.parse().map_err(|_| wrong("mount and the number of a specimen"))?;
                 Ok(Self::Hand(HandAction::Mount { specimen }))
             }
             "unmount" if rest.is_empty() => Ok(Self::Hand(HandAction::Unmount)),
-            _ => ScheduledFault::parse(text, Some(now))
-                .map(Self::Fault)
-                .map_err(OrderError::Unknown),
+            _ => {
+                ScheduledFault::parse(text, Some(now)).map(Self::Fault).map_err(OrderError::Unknown)
+            }
         }
     }
 

@@ -35,11 +35,7 @@ impl Pty {
         let path = PathBuf::from(name.to_string_lossy().into_owned());
         fcntl_setfl(&master, OFlags::NONBLOCK)?;
         // Without this the terminal would echo what the emulator sends before a client opens it.
-        let client = open(
-            &path,
-            OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC,
-            Mode::empty(),
-        )?;
+        let client = open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
         let mut attributes = tcgetattr(&client)?;
         attributes.make_raw();
         tcsetattr(&client, OptionalActions::Now, &attributes)?;
@@ -49,12 +45,7 @@ impl Pty {
             }
             symlink(&path, link)?;
         }
-        Ok(Self {
-            master,
-            path,
-            link: link.map(Path::to_owned),
-            has_client: false,
-        })
+        Ok(Self { master, path, link: link.map(Path::to_owned), has_client: false })
     }
 
     /// What has arrived; nothing without a client.

@@ -275,15 +275,10 @@ impl<'a> Server<'a> {
     fn wait(&mut self) -> Result<(), ServeError> {
         let now = self.now();
         let due = self.lines.iter().flat_map(|line| {
-            [line.to_device.next_at(), line.from_device.next_at()]
-                .into_iter()
-                .flatten()
+            [line.to_device.next_at(), line.from_device.next_at()].into_iter().flatten()
         });
         let until = due.min().unwrap_or(now + SLEEP_MAX).min(now + SLEEP_MAX);
-        let timeout = Timespec {
-            tv_sec: 0,
-            tv_nsec: until.since(now).0 as i64,
-        };
+        let timeout = Timespec { tv_sec: 0, tv_nsec: until.since(now).0 as i64 };
         let mut watched: Vec<PollFd<'_>> = Vec::new();
         if let Some(listener) = &self.plug.listener {
             watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN));
@@ -434,9 +429,5 @@ impl<'a> Server<'a> {
 }
 
 fn flags(line: &Line) -> PollFlags {
-    if line.unsent.is_empty() {
-        PollFlags::IN
-    } else {
-        PollFlags::IN | PollFlags::OUT
-    }
+    if line.unsent.is_empty() { PollFlags::IN } else { PollFlags::IN | PollFlags::OUT }
 }

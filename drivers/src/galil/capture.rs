@@ -93,11 +93,7 @@ impl Measured {
         // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
         let every = self.apart.max(Nanos(tick.0 * 6 / 10));
         let in_flight = (self.trip.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
-        Pace {
-            every,
-            in_flight,
-            tick,
-        }
+        Pace { every, in_flight, tick }
     }
 
     /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
@@ -108,16 +104,11 @@ impl Measured {
         if left <= 0.0 {
             return None;
         }
-        let every = Nanos((FETCH_BYTES / left) as u64)
-            .max(FETCH_EVERY)
-            .max(Nanos(self.trip.0 * 5 / 4));
+        let every =
+            Nanos((FETCH_BYTES / left) as u64).max(FETCH_EVERY).max(Nanos(self.trip.0 * 5 / 4));
         let transfer = (every.0 as f64 / interval * ELEMENT_BYTES + FETCH_BYTES) / bytes_per_ns;
         let age = Nanos(every.0 + 2 * self.trip.0 + transfer as u64);
-        let pace = Pace {
-            every,
-            in_flight: 1,
-            tick,
-        };
+        let pace = Pace { every, in_flight: 1, tick };
         Some((pace, age))
     }
 }
@@ -158,22 +149,15 @@ pub fn set_up(
         return Ok(polled(""));
     }
     let fits = INTERVALS.filter_map(|n| Some((n, measured.fetching(tick, n)?)));
-    let chosen = fits
-        .clone()
-        .find(|(_, (_, age))| *age <= AGE_MAX)
-        .or_else(|| {
-            let is_forced = settings.sampling == Sampling::Record;
-            fits.clone().next().filter(|_| is_forced)
-        });
+    let chosen = fits.clone().find(|(_, (_, age))| *age <= AGE_MAX).or_else(|| {
+        let is_forced = settings.sampling == Sampling::Record;
+        fits.clone().next().filter(|_| is_forced)
+    });
     let Some((n, (pace, age))) = chosen else {
         if settings.sampling == Sampling::Record {
-            return Err(GalilOpenError::NoRecording(
-                "the link is too slow for it".into(),
-            ));
+            return Err(GalilOpenError::NoRecording("the link is too slow for it".into()));
         }
-        return Ok(polled(
-            ", because recorded samples would be old when they come over this link",
-        ));
+        return Ok(polled(", because recorded samples would be old when they come over this link"));
     };
     match start(console, settings, n, tick)? {
         Ok(plan) => Ok(Capture {
@@ -186,9 +170,7 @@ pub fn set_up(
             ),
         }),
         Err(why) if settings.sampling == Sampling::Record => Err(GalilOpenError::NoRecording(why)),
-        Err(why) => Ok(polled(&format!(
-            ", because the controller does not record ({why})"
-        ))),
+        Err(why) => Ok(polled(&format!(", because the controller does not record ({why})"))),
     }
 }
 
@@ -258,9 +240,7 @@ fn anchor(
         }
         let reply = console.ask(&question)?;
         let Some(look) = reply.numbers().as_deref().and_then(Look::read) else {
-            return Ok(Err(
-                "its answers have other numbers than were asked for".into()
-            ));
+            return Ok(Err("its answers have other numbers than were asked for".into()));
         };
         count += 1;
         if rough.is_none() && look.next == 0 {
@@ -277,13 +257,7 @@ fn anchor(
         let base = look.time - newest * interval;
         (least, most) = (least.min(base), most.max(base));
         if count >= ANCHORS.start && most - least >= interval - 1 {
-            return Ok(Ok(Plan {
-                interval,
-                ring,
-                base: least,
-                first: newest + 1,
-                tick,
-            }));
+            return Ok(Ok(Plan { interval, ring, base: least, first: newest + 1, tick }));
         }
     }
     Ok(Err("its clock and its recording do not fit".into()))

@@ -71,25 +71,15 @@ pub fn connect(
     let has_watchdog = settings.has_watchdog && start_watchdog(&mut console, settings)?;
     let tm = console.number("_TM")?;
     if !(tm > 0.0 && tm <= 1e6) {
-        return Err(GalilOpenError::SetOtherwise {
-            command: "TM".into(),
-            found: tm.to_string(),
-        });
+        return Err(GalilOpenError::SetOtherwise { command: "TM".into(), found: tm.to_string() });
     }
     let tick = Nanos((tm * NANOS_PER_TM).round() as u64);
     // From here on only the signal has decimals, and its form is said with it: short answers are fast ones.
     console.try_ask("VF 10.0")?;
     let measured = capture::measure(&mut console, settings)?;
-    let Capture {
-        pace,
-        plan,
-        words,
-        measured: how,
-    } = capture::set_up(&mut console, settings, &measured, tick)?;
-    let stats = LinkStats {
-        in_flight: pace.in_flight,
-        ..measured.stats
-    };
+    let Capture { pace, plan, words, measured: how } =
+        capture::set_up(&mut console, settings, &measured, tick)?;
+    let stats = LinkStats { in_flight: pace.in_flight, ..measured.stats };
     let worst_case_mm = if has_watchdog {
         watchdog::worst_case_mm(settings.speed_max, acceleration, tick)
     } else {
@@ -145,9 +135,8 @@ fn identify(
     if let Some(expected) = settings.serial_number
         && board.serial_number != Some(expected)
     {
-        let found = board
-            .serial_number
-            .map_or_else(|| "none that it tells".to_owned(), |n| n.to_string());
+        let found =
+            board.serial_number.map_or_else(|| "none that it tells".to_owned(), |n| n.to_string());
         return Err(GalilOpenError::OtherSerial { found, expected });
     }
     let index = (settings.axis as usize).wrapping_sub('A' as usize);
@@ -199,11 +188,7 @@ fn set_up_axis(
     let motor_type = settings.motor_type.code();
     if console.number(&format!("_MT{a}"))? != motor_type {
         console.ask(&format!("MO{a}"))?;
-        console.set(
-            &format!("MT{a}={motor_type}"),
-            &format!("_MT{a}"),
-            motor_type,
-        )?;
+        console.set(&format!("MT{a}={motor_type}"), &format!("_MT{a}"), motor_type)?;
     }
     let command = format!("KS{a}={SMOOTHING}");
     console.ask(&command)?;
@@ -232,11 +217,8 @@ fn set_up_axis(
     let travel = (settings.travel.0 / settings.mm_per_pulse).round() as i64;
     // Homing searches ten millimetres further than the travel.
     let margin = (10.0 / settings.mm_per_pulse).round() as i64;
-    let (forward, reverse) = software_limits(
-        settings,
-        here - travel - margin,
-        2.0 * (settings.travel.0 + 10.0),
-    );
+    let (forward, reverse) =
+        software_limits(settings, here - travel - margin, 2.0 * (settings.travel.0 + 10.0));
     for command in limit_commands(a, forward, reverse) {
         if let Some(list) = command.strip_prefix("MG ") {
             let found = console.numbers(list)?;
@@ -325,11 +307,8 @@ fn describe(
     tm: f64,
 ) -> RigDescription {
     let counts = 1_i32 << settings.bits.min(24);
-    let (counts_min, counts_max) = if settings.range.is_bipolar() {
-        (-counts / 2, counts / 2 - 1)
-    } else {
-        (0, counts - 1)
-    };
+    let (counts_min, counts_max) =
+        if settings.range.is_bipolar() { (-counts / 2, counts / 2 - 1) } else { (0, counts - 1) };
     let filter = settings.filter.as_deref().unwrap_or("not known");
     RigDescription {
         name: settings.name.clone(),

@@ -19,10 +19,7 @@ pub struct Console<'a> {
 impl<'a> Console<'a> {
     /// On a link.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
-        Self {
-            link: TappedLink::new(link, clock, device),
-            parser: Parser::default(),
-        }
+        Self { link: TappedLink::new(link, clock, device), parser: Parser::default() }
     }
 
     /// The host's clock.
@@ -67,9 +64,7 @@ impl<'a> Console<'a> {
     /// Asks one command and gives its answer, whether accepted or not.
     pub fn try_ask(&mut self, command: &str) -> Result<Reply, GalilOpenError> {
         self.write(&format!("{command}\r"))?;
-        self.replies(1, ANSWER_MAX)?
-            .pop()
-            .ok_or(GalilOpenError::Silent)
+        self.replies(1, ANSWER_MAX)?.pop().ok_or(GalilOpenError::Silent)
     }
 
     /// Asks one command that must be accepted.
@@ -81,10 +76,7 @@ impl<'a> Console<'a> {
         let why = self.try_ask("TC1")?;
         Err(GalilOpenError::Refused {
             command: command.to_owned(),
-            error: error_of(&why).unwrap_or(super::GalilError {
-                code: 0,
-                words: String::new(),
-            }),
+            error: error_of(&why).unwrap_or(super::GalilError { code: 0, words: String::new() }),
         })
     }
 
@@ -93,13 +85,9 @@ impl<'a> Console<'a> {
         let command = format!("MG {list}");
         let reply = self.ask(&command)?;
         let count = list.split(',').count();
-        reply
-            .numbers()
-            .filter(|numbers| numbers.len() == count)
-            .ok_or_else(|| GalilOpenError::SetOtherwise {
-                command,
-                found: format!("'{}'", reply.text()),
-            })
+        reply.numbers().filter(|numbers| numbers.len() == count).ok_or_else(|| {
+            GalilOpenError::SetOtherwise { command, found: format!("'{}'", reply.text()) }
+        })
     }
 
     /// The one number that an expression has.
@@ -119,10 +107,7 @@ impl<'a> Console<'a> {
         if found == wanted {
             return Ok(());
         }
-        Err(GalilOpenError::SetOtherwise {
-            command: command.to_owned(),
-            found: found.to_string(),
-        })
+        Err(GalilOpenError::SetOtherwise { command: command.to_owned(), found: found.to_string() })
     }
 
     fn read(&mut self) -> Result<Vec<u8>, GalilOpenError> {
@@ -131,7 +116,5 @@ impl<'a> Console<'a> {
 }
 
 fn lost(err: io::Error) -> GalilOpenError {
-    GalilOpenError::Lost {
-        detail: err.to_string(),
-    }
+    GalilOpenError::Lost { detail: err.to_string() }
 }

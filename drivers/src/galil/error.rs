@@ -59,11 +59,7 @@ impl GalilError {
 
 impl fmt::Display for GalilError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words = if self.words.is_empty() {
-            "no reason given"
-        } else {
-            &self.words
-        };
+        let words = if self.words.is_empty() { "no reason given" } else { &self.words };
         write!(f, "{words}, TC {}", self.code)?;
         if !self.remedy().is_empty() {
             write!(f, "; {}", self.remedy())?;

@@ -36,9 +36,5 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     title: "a Galil controller",
     introduction: "Galil controller, ",
     role: Role::Axis(crate::rig_file::galil),
-    recognise: |lines| {
-        first(lines, |line| {
-            line.starts_with("DMC") || line.starts_with("RIO")
-        })
-    },
+    recognise: |lines| first(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
 };

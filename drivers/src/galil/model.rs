@@ -18,24 +18,17 @@ pub struct GalilBoard {
 impl GalilBoard {
     /// Reads the answer to `^R^V`.
     pub fn parse(revision: &str) -> Result<Self, GalilOpenError> {
-        let unsupported = |why: &'static str| GalilOpenError::Unsupported {
-            revision: revision.to_owned(),
-            why,
-        };
+        let unsupported =
+            |why: &'static str| GalilOpenError::Unsupported { revision: revision.to_owned(), why };
         let Some(model) = revision.strip_prefix("DMC") else {
             return Err(if revision.starts_with("RIO") {
                 unsupported("it has inputs and outputs and drives no axis")
             } else {
-                GalilOpenError::NoGalil {
-                    got: revision.to_owned(),
-                }
+                GalilOpenError::NoGalil { got: revision.to_owned() }
             });
         };
-        let digits: Vec<usize> = model
-            .chars()
-            .map_while(|c| c.to_digit(10))
-            .map(|digit| digit as usize)
-            .collect();
+        let digits: Vec<usize> =
+            model.chars().map_while(|c| c.to_digit(10)).map(|digit| digit as usize).collect();
         let axes = match digits.as_slice() {
             [4, 1, axes, 3, ..] | [2, 1, axes, 3, ..] | [4, 0, axes, 0, ..] => *axes,
             [3, 0, 0, 1, 0] => 1,
@@ -45,19 +38,13 @@ impl GalilBoard {
                 ));
             }
             _ => {
-                return Err(unsupported(
-                    "palpate drives the series 21x3, 41x3, 40x0 and 30010",
-                ));
+                return Err(unsupported("palpate drives the series 21x3, 41x3, 40x0 and 30010"));
             }
         };
         if !(1..=8).contains(&axes) {
             return Err(unsupported("its name tells no number of axes"));
         }
-        Ok(Self {
-            revision: revision.to_owned(),
-            axes,
-            serial_number: None,
-        })
+        Ok(Self { revision: revision.to_owned(), axes, serial_number: None })
     }
 }
 
@@ -158,11 +145,7 @@ mod tests {
             ("DMC2143 Rev 1.0o", 4),
             ("DMC4183 Rev 1.3a", 8),
         ] {
-            assert_eq!(
-                GalilBoard::parse(revision).unwrap().axes,
-                axes,
-                "{revision}"
-            );
+            assert_eq!(GalilBoard::parse(revision).unwrap().axes, axes, "{revision}");
         }
     }
 

@@ -81,10 +81,8 @@ impl Order {
                 vec![format!("SH{a}"), format!("MG _MO{a}")]
             }
             RigCommand::MoveTo(wanted) => {
-                let (speed, rate) = (
-                    settings.counts(wanted.speed),
-                    settings.counts2(wanted.acceleration),
-                );
+                let (speed, rate) =
+                    (settings.counts(wanted.speed), settings.counts2(wanted.acceleration));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
                     return Next::Refused(format!(
                         "a speed of {} is beyond the {} of the rig file",
@@ -111,11 +109,7 @@ impl Order {
                     return Next::Refused(why);
                 }
                 let rate = settings.counts2(wanted.acceleration);
-                vec![
-                    format!("AC{a}={rate}"),
-                    format!("DC{a}={rate}"),
-                    format!("MG _AC{a},_DC{a}"),
-                ]
+                vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
             }
             RigCommand::Stop | RigCommand::Halt => {
                 return Next::Refused("a stop does not wait in a queue".into());
@@ -192,10 +186,8 @@ impl Order {
                         "it reads back acceleration {ac} and deceleration {dc} in counts, where {ac_asked} was asked for"
                     ));
                 }
-                let made = Oscillation {
-                    acceleration: MmPerS2(ac * settings.mm_per_pulse),
-                    ..wanted
-                };
+                let made =
+                    Oscillation { acceleration: MmPerS2(ac * settings.mm_per_pulse), ..wanted };
                 let feed = self.feed.insert(Feed::new(&made, settings, self.tick));
                 (RigCommand::Oscillate(made), feed.begin())
             }
@@ -254,10 +246,7 @@ mod tests {
         let answers = std::iter::repeat_n("", first).chain(told.iter().copied());
         let mut next = Next::Wait;
         for text in answers {
-            let reply = Reply {
-                is_accepted: true,
-                bytes: text.into(),
-            };
+            let reply = Reply { is_accepted: true, bytes: text.into() };
             next = order.take(&reply, &settings);
         }
         next
@@ -265,11 +254,8 @@ mod tests {
 
     #[test]
     fn nothing_faster_than_asked_for_is_begun() {
-        let wanted = MoveTo {
-            target_pulses: 1000,
-            speed: MmPerS(0.75),
-            acceleration: MmPerS2(61.44),
-        };
+        let wanted =
+            MoveTo { target_pulses: 1000, speed: MmPerS(0.75), acceleration: MmPerS2(61.44) };
         for (told, is_begun) in [
             (" 50 4096 4096", true),
             (" 48 3072 3072", true),

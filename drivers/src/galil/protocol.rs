@@ -48,18 +48,10 @@ impl Reply {
     pub fn begins_with_volts(&self) -> bool {
         let text = self.bytes.trim_ascii_start();
         let unsigned = text.strip_prefix(b"-").unwrap_or(text);
-        let digits = |bytes: &[u8]| {
-            bytes
-                .iter()
-                .take_while(|byte| byte.is_ascii_digit())
-                .count()
-        };
+        let digits = |bytes: &[u8]| bytes.iter().take_while(|byte| byte.is_ascii_digit()).count();
         let whole = digits(unsigned);
         let rest = unsigned.get(whole..).unwrap_or_default();
-        (1..=2).contains(&whole)
-            && rest
-                .strip_prefix(b".")
-                .is_some_and(|rest| digits(rest) == 4)
+        (1..=2).contains(&whole) && rest.strip_prefix(b".").is_some_and(|rest| digits(rest) == 4)
     }
 
     /// The numbers of its text; `None` when anything else stands there.
@@ -99,10 +91,7 @@ impl Parser {
                 while matches!(bytes.last(), Some(b'\r' | b'\n' | &UPLOAD_END)) {
                     bytes.pop();
                 }
-                Some(Incoming::Reply(Reply {
-                    is_accepted: byte == b':',
-                    bytes,
-                }))
+                Some(Incoming::Reply(Reply { is_accepted: byte == b':', bytes }))
             }
             _ if self.reply.len() >= REPLY_MAX => {
                 self.reply.clear();
@@ -120,9 +109,7 @@ impl Parser {
             b'\r' => None,
             b'\n' => {
                 let line = std::mem::take(&mut self.unasked);
-                Some(Incoming::Unasked(
-                    String::from_utf8_lossy(&line).into_owned(),
-                ))
+                Some(Incoming::Unasked(String::from_utf8_lossy(&line).into_owned()))
             }
             _ => {
                 if self.unasked.len() < UNASKED_MAX {
@@ -143,10 +130,7 @@ pub fn numbers(text: &str) -> Option<Vec<f64>> {
         let mut rest = part;
         while !rest.is_empty() {
             // `MG` puts nothing but the sign's place between numbers, so a sign begins the next.
-            let end = rest
-                .get(1..)?
-                .find(['-', '+'])
-                .map_or(rest.len(), |at| at + 1);
+            let end = rest.get(1..)?.find(['-', '+']).map_or(rest.len(), |at| at + 1);
             let number: f64 = rest.get(..end)?.parse().ok()?;
             // "inf" and "nan" are no numbers of a controller.
             all.push(Some(number).filter(|number| number.is_finite())?);
@@ -182,10 +166,7 @@ pub fn error_of(reply: &Reply) -> Option<GalilError> {
     let text = reply.text();
     let digits = text.find(|c: char| !c.is_ascii_digit());
     let (number, words) = text.split_at(digits.unwrap_or(text.len()));
-    Some(GalilError {
-        code: number.parse().ok()?,
-        words: words.trim().to_owned(),
-    })
+    Some(GalilError { code: number.parse().ok()?, words: words.trim().to_owned() })
 }
 
 #[cfg(test)]

@@ -9,10 +9,7 @@ fn all(bytes: &[u8]) -> Vec<Incoming> {
 }
 
 fn reply(text: &str, is_accepted: bool) -> Incoming {
-    Incoming::Reply(Reply {
-        is_accepted,
-        bytes: text.into(),
-    })
+    Incoming::Reply(Reply { is_accepted, bytes: text.into() })
 }
 
 /// What a controller sent, and what it means.
@@ -160,21 +157,9 @@ fn transcripts_are_understood_split_at_every_byte() {
 fn text_nobody_asked_for_is_told_apart_byte_by_byte() {
     // DMC-41x3 user manual, page 45: with CW 1 the top bit of unsolicited characters is set.
     let marked = |text: &str| text.bytes().map(|byte| byte | 0x80).collect::<Vec<u8>>();
-    let bytes = [
-        &b" 1.00"[..],
-        &marked("?55 i=v"),
-        &b"00\r"[..],
-        &marked("ar\r\n"),
-        &b"\n:"[..],
-    ]
-    .concat();
-    assert_eq!(
-        all(&bytes),
-        [
-            Incoming::Unasked("?55 i=var".into()),
-            reply(" 1.0000", true)
-        ]
-    );
+    let bytes =
+        [&b" 1.00"[..], &marked("?55 i=v"), &b"00\r"[..], &marked("ar\r\n"), &b"\n:"[..]].concat();
+    assert_eq!(all(&bytes), [Incoming::Unasked("?55 i=var".into()), reply(" 1.0000", true)]);
 }
 
 #[test]
@@ -203,10 +188,7 @@ fn lines_hold_eighty_characters() {
     let commands: Vec<String> = (0..40).map(|i| format!("SPA={i}")).collect();
     let lines = packed(&commands);
     assert!(lines.len() > 1 && lines.iter().all(|line| line.len() <= LINE_MAX));
-    let joined: Vec<&str> = lines
-        .iter()
-        .flat_map(|line| line.trim_end().split(';'))
-        .collect();
+    let joined: Vec<&str> = lines.iter().flat_map(|line| line.trim_end().split(';')).collect();
     assert_eq!(joined, commands);
     let one = packed(&["BGA".into(), "MG _BGA".into()]);
     assert_eq!(one, ["BGA;MG _BGA\r"]);
@@ -221,18 +203,9 @@ fn a_refusal_tells_what_to_do() {
     .unwrap();
     assert_eq!(err.code, 22);
     assert!(err.to_string().contains("move the other way"), "{err}");
-    let number = error_of(&Reply {
-        is_accepted: true,
-        bytes: b" 6".to_vec(),
-    });
+    let number = error_of(&Reply { is_accepted: true, bytes: b" 6".to_vec() });
     assert_eq!(number.map(|err| err.code), Some(6));
-    assert_eq!(
-        error_of(&Reply {
-            is_accepted: true,
-            bytes: b"what".to_vec()
-        }),
-        None
-    );
+    assert_eq!(error_of(&Reply { is_accepted: true, bytes: b"what".to_vec() }), None);
 }
 
 #[test]
@@ -248,10 +221,8 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
         let got: Vec<Incoming> = bytes.iter().filter_map(|b| whole.take(*b)).collect();
         // Any split gives the same.
         let cut = random.below(length);
-        let mut parts: Vec<Incoming> = bytes[..cut]
-            .iter()
-            .filter_map(|b| parser.take(*b))
-            .collect();
+        let mut parts: Vec<Incoming> =
+            bytes[..cut].iter().filter_map(|b| parser.take(*b)).collect();
         parts.extend(bytes[cut..].iter().filter_map(|b| parser.take(*b)));
         assert_eq!(got, parts);
         for incoming in got {
@@ -278,19 +249,10 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
 #[test]
 fn a_signal_with_a_digit_lost_is_none() {
     let is_whole = |text: &str| {
-        let reply = Reply {
-            is_accepted: true,
-            bytes: text.into(),
-        };
+        let reply = Reply { is_accepted: true, bytes: text.into() };
         reply.begins_with_volts()
     };
-    for whole in [
-        " 0.3050 120 120",
-        "-0.3050-120",
-        "10.0000,1",
-        " 00.3050 1",
-        "\r\n 1.2345",
-    ] {
+    for whole in [" 0.3050 120 120", "-0.3050-120", "10.0000,1", " 00.3050 1", "\r\n 1.2345"] {
         assert!(is_whole(whole), "{whole}");
     }
     for spoilt in [

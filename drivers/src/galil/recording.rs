@@ -158,10 +158,7 @@ impl Recording {
 
     /// A report that belongs behind all samples that the controller has taken so far.
     pub fn hold(&mut self, event: RigEventBody) {
-        self.waiting.push_back(Waiting {
-            time: None,
-            out: Out::Event(event),
-        });
+        self.waiting.push_back(Waiting { time: None, out: Out::Event(event) });
     }
 
     /// Everything that waits, whatever samples are missing before it.
@@ -216,11 +213,7 @@ impl Recording {
             .min(CHUNK_MAX)
             .min(self.plan.ring / CHUNKS_OF_A_RING)
             .min(self.plan.ring - first);
-        self.chunk = Some(Chunk {
-            first: self.next,
-            count,
-            columns: Vec::new(),
-        });
+        self.chunk = Some(Chunk { first: self.next, count, columns: Vec::new() });
         let last = first + count - 1;
         let fetch = |name| format!("QU {name}[],{first},{last},1");
         Some(ARRAYS.map(fetch).into())

@@ -22,11 +22,7 @@ impl GalilDevice {
     /// The controller at a place.
     #[must_use]
     pub fn new(place: Place, settings: GalilSettings) -> Self {
-        Self {
-            worst_case_mm: settings.travel.0,
-            place,
-            settings,
-        }
+        Self { worst_case_mm: settings.travel.0, place, settings }
     }
 
     /// How far the axis goes at most when palpate falls silent, in mm, as it was set up last.

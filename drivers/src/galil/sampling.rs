@@ -53,13 +53,7 @@ impl Sampler {
     /// For a rig.
     #[must_use]
     pub fn new(settings: GalilSettings) -> Self {
-        Self {
-            settings,
-            time: None,
-            offset: 0,
-            doubtful: None,
-            was_moving: false,
-        }
+        Self { settings, time: None, offset: 0, doubtful: None, was_moving: false }
     }
 
     /// The command that asks for a sample: signal, pulses given, commanded position, switches, stop code, clock. All
@@ -79,16 +73,13 @@ impl Sampler {
     /// Whether a clock that shows this has begun anew since the newest sample.
     #[must_use]
     pub fn is_reset(&self, time: i64) -> bool {
-        self.time
-            .is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
+        self.time.is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
     }
 
     /// Whether a clock that shows this has gone back for the first time, so that it may be a garbled one: a reset is
     /// believed when a second answer, no earlier than the first, says so too.
     pub fn doubts(&mut self, time: u64) -> bool {
-        let is_back = self
-            .time
-            .is_some_and(|last| time < last && !is_wrapped(last, time));
+        let is_back = self.time.is_some_and(|last| time < last && !is_wrapped(last, time));
         let is_first = is_back && self.doubtful.is_none_or(|before| time < before);
         self.doubtful = is_back.then_some(time);
         is_first
@@ -146,19 +137,14 @@ impl Sampler {
         // `_BG` falls before the smoothing filter has given its last pulses (DMC-2x00 user manual, page 117).
         let is_moving = is_high(ts::MOVING) || has_pulses_left;
         let is_early = EARLY.contains(&stop_code);
-        let (mut forward, mut reverse) = (
-            s.limits.is_closed(is_high(ts::FORWARD)),
-            s.limits.is_closed(is_high(ts::REVERSE)),
-        );
+        let (mut forward, mut reverse) =
+            (s.limits.is_closed(is_high(ts::FORWARD)), s.limits.is_closed(is_high(ts::REVERSE)));
         if s.is_reversed {
             std::mem::swap(&mut forward, &mut reverse);
         }
         let bits = [
             (is_moving, AxisStatus::MOVING),
-            (
-                is_early && (is_moving || self.was_moving),
-                AxisStatus::STOPPING,
-            ),
+            (is_early && (is_moving || self.was_moving), AxisStatus::STOPPING),
             (s.home.is_closed(is_high(ts::HOME)), AxisStatus::HOME),
             (forward, AxisStatus::FORWARD_LIMIT),
             (reverse, AxisStatus::REVERSE_LIMIT),

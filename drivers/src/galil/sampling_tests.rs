@@ -35,14 +35,8 @@ fn a_stop_is_seen_on_the_way_and_at_its_end() {
     let moving = AxisStatus::MOTOR_ON | AxisStatus::MOVING;
     let seen = [
         ([0.3, 5.0, 6.0, 143.0, 0.0, 1.0], moving),
-        (
-            [0.3, 6.0, 7.0, 143.0, 4.0, 2.0],
-            moving | AxisStatus::STOPPING,
-        ),
-        (
-            [0.3, 7.0, 7.0, 15.0, 4.0, 3.0],
-            AxisStatus::MOTOR_ON | AxisStatus::STOPPING,
-        ),
+        ([0.3, 6.0, 7.0, 143.0, 4.0, 2.0], moving | AxisStatus::STOPPING),
+        ([0.3, 7.0, 7.0, 15.0, 4.0, 3.0], AxisStatus::MOTOR_ON | AxisStatus::STOPPING),
         ([0.3, 7.0, 7.0, 15.0, 4.0, 4.0], AxisStatus::MOTOR_ON),
     ];
     for (numbers, status) in seen {
@@ -98,17 +92,11 @@ fn a_motion_just_begun_counts_as_one() {
 
 #[test]
 fn what_counts_backwards_is_turned_round() {
-    let mut sampler = Sampler::new(GalilSettings {
-        is_reversed: true,
-        ..thesis()
-    });
+    let mut sampler = Sampler::new(GalilSettings { is_reversed: true, ..thesis() });
     let turned = reading(&mut sampler, [0.3, -50.0, -50.0, 11.0, 1.0, 9.0]);
     assert_eq!(turned.pulses, 50);
     // Bit 2 is the reverse limit of the controller, bit 3 the forward one, of which 11 has it high.
-    assert_eq!(
-        turned.status,
-        AxisStatus::MOTOR_ON | AxisStatus::FORWARD_LIMIT
-    );
+    assert_eq!(turned.status, AxisStatus::MOTOR_ON | AxisStatus::FORWARD_LIMIT);
 }
 
 #[test]

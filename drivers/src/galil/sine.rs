@@ -170,11 +170,7 @@ mod tests {
                     n = interval.parse().unwrap();
                     continue;
                 }
-                place += command
-                    .strip_prefix("CDA=")
-                    .unwrap()
-                    .parse::<i64>()
-                    .unwrap();
+                place += command.strip_prefix("CDA=").unwrap().parse::<i64>().unwrap();
                 ticks += 1 << n;
                 let angle = std::f64::consts::TAU * ticks as f64 / f64::from(period);
                 let exact = 50.0 * (1.0 - angle.cos());

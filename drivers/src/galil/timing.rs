@@ -38,11 +38,7 @@ impl Span {
 impl Timing {
     /// Takes a question's times and the tick that it told, for ticks of a length.
     pub fn push(&mut self, tick: u64, length: Nanos, asked: Nanos, answered: Nanos) {
-        let span = Span {
-            tick,
-            asked,
-            answered,
-        };
+        let span = Span { tick, asked, answered };
         if let Some(at) = self.host_time(tick, length) {
             let off = (span.middle() - at.0 as f64).abs();
             self.deviation_max = self.deviation_max.max(Nanos(off.round() as u64));
@@ -67,9 +63,7 @@ impl Timing {
     #[must_use]
     pub fn uncertainty(&self, at: Nanos, length: Nanos) -> Option<Nanos> {
         let best = self.best?;
-        Some(Nanos(
-            (best.uncertainty(at) + length.0 as f64).round() as u64
-        ))
+        Some(Nanos((best.uncertainty(at) + length.0 as f64).round() as u64))
     }
 }
 
@@ -84,10 +78,7 @@ mod tests {
         timing.push(10, tick, Nanos(10_000_000), Nanos(10_400_000));
         timing.push(20, tick, Nanos(19_000_000), Nanos(22_000_000));
         assert_eq!(timing.host_time(20, tick), Some(Nanos(20_200_000)));
-        assert_eq!(
-            timing.uncertainty(Nanos(10_400_000), tick),
-            Some(Nanos(1_200_000))
-        );
+        assert_eq!(timing.uncertainty(Nanos(10_400_000), tick), Some(Nanos(1_200_000)));
         // The middle of the second one is 0.3 ms late.
         assert_eq!(timing.deviation_max, Nanos(300_000));
         // 5 s later the first one is uncertain by 0.2 and 1 ms.

@@ -24,19 +24,11 @@ pub fn open(
     clock: &HostClock,
 ) -> Result<(RigDescription, Axis), OpenError> {
     let device: Arc<str> = "grbl".into();
-    let Connected {
-        identity,
-        facts,
-        stats,
-        raw,
-        ..
-    } = connect(link.as_mut(), clock, settings, &device)?;
+    let Connected { identity, facts, stats, raw, .. } =
+        connect(link.as_mut(), clock, settings, &device)?;
     let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * facts.steps)));
     let session = Session::new(settings.clone(), facts, Arc::clone(&track), stats, clock());
-    let line_settings = LineSettings {
-        device,
-        farewell: vec![JOG_CANCEL],
-    };
+    let line_settings = LineSettings { device, farewell: vec![JOG_CANCEL] };
     let line = Line::start(link, session, clock, line_settings)?;
     let description = RigDescription {
         name: settings.name.clone(),

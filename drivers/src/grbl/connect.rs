@@ -57,9 +57,7 @@ pub fn connect(
     // Whatever is on that pin opens and closes it while the slide leaves the switch, and each change is an alarm
     // (limits.c, the pin's interrupt).
     if settings.home == HomeSwitch::Probe && status.has_pin(settings.axis) {
-        return Err(GrblOpenError::OnALimit {
-            axis: settings.axis,
-        });
+        return Err(GrblOpenError::OnALimit { axis: settings.axis });
     }
     unlock(&mut console, settings, &status)?;
     let values = read_settings(&mut console)?;
@@ -70,14 +68,9 @@ pub fn connect(
     }
     let is_shared = settings.home == HomeSwitch::Limit && !settings.is_closed_home;
     if is_shared && status.has_pin(settings.axis) {
-        return Err(GrblOpenError::OnASwitch {
-            axis: settings.axis,
-        });
+        return Err(GrblOpenError::OnASwitch { axis: settings.axis });
     }
-    let place = status
-        .machine
-        .as_ref()
-        .and_then(|place| place.get(settings.index()).copied());
+    let place = status.machine.as_ref().and_then(|place| place.get(settings.index()).copied());
     let Some(place) = place else {
         return Err(GrblOpenError::SetOtherwise {
             number: 10,
@@ -187,17 +180,15 @@ fn identify(
             own.clone_into(&mut text);
         }
     }
-    let version = version
-        .or_else(|| said.map(str::to_owned))
-        .unwrap_or_else(|| "of unknown version".into());
+    let version =
+        version.or_else(|| said.map(str::to_owned)).unwrap_or_else(|| "of unknown version".into());
     if !version.starts_with("1.1") {
         return Err(GrblOpenError::OtherVersion { version });
     }
     match &settings.build_info {
-        Some(expected) if *expected != text => Err(GrblOpenError::OtherBoard {
-            found: text,
-            expected: expected.clone(),
-        }),
+        Some(expected) if *expected != text => {
+            Err(GrblOpenError::OtherBoard { found: text, expected: expected.clone() })
+        }
         _ if text.is_empty() => Ok(version),
         _ => Ok(format!("{version} '{text}'")),
     }
@@ -242,9 +233,7 @@ fn unlock(
             } else {
                 "it wants to be homed or confirmed"
             };
-            Err(GrblOpenError::Locked {
-                reason: reason.into(),
-            })
+            Err(GrblOpenError::Locked { reason: reason.into() })
         }
         other => Err(GrblOpenError::State(format!("{other:?}"))),
     }

@@ -88,7 +88,5 @@ impl<'a> Console<'a> {
 }
 
 fn lost(err: std::io::Error) -> GrblOpenError {
-    GrblOpenError::Lost {
-        detail: err.to_string(),
-    }
+    GrblOpenError::Lost { detail: err.to_string() }
 }

@@ -37,10 +37,7 @@ pub(super) fn check(
     // Three decimals are stored and shown; 2e-4 of the way is far below what any other part of a rig is known to.
     let steps_per_mm = value(values, 100 + axis);
     if steps_per_mm > 1.0 / MM_PER_STEP_MIN {
-        return Err(GrblOpenError::TooFine {
-            number: 100 + axis,
-            found: steps_per_mm,
-        });
+        return Err(GrblOpenError::TooFine { number: 100 + axis, found: steps_per_mm });
     }
     let wanted = 1.0 / settings.mm_per_pulse;
     let fastest = settings.speed_max.0 * 60.0;
@@ -77,12 +74,7 @@ pub(super) fn check(
             "255".into(),
             Box::new(|found| found == 255.0),
         ),
-        (
-            13,
-            "reports in inches",
-            "0".into(),
-            Box::new(|found| found == 0.0),
-        ),
+        (13, "reports in inches", "0".into(), Box::new(|found| found == 0.0)),
         (
             21,
             "hard limits; on with a home switch on the probe pin, off with one on the limit pin",
@@ -106,12 +98,7 @@ pub(super) fn check(
     for (number, meaning, wanted, is_right) in checks {
         let found = value(values, number);
         if !is_right(found) {
-            return Err(GrblOpenError::SetOtherwise {
-                number,
-                meaning,
-                found,
-                wanted,
-            });
+            return Err(GrblOpenError::SetOtherwise { number, meaning, found, wanted });
         }
     }
     Ok(steps_per_mm)

@@ -73,12 +73,7 @@ impl Motion {
     /// A profile over a way in mm, from 0 on.
     #[must_use]
     pub fn profile(way: f64, wanted: &MoveTo) -> Profile {
-        Profile::to_rest(
-            Position(0.0),
-            Position(way),
-            wanted.speed,
-            wanted.acceleration,
-        )
+        Profile::to_rest(Position(0.0), Position(way), wanted.speed, wanted.acceleration)
     }
 
     /// 1 or -1 in steps of the board.
@@ -140,11 +135,7 @@ impl Motion {
         let sent = (self.sent - self.from).abs() as f64 * mm_per_pulse;
         // The first one may be as long as all that may be ahead: from rest it takes longer anyway.
         let is_first = self.sent == self.from;
-        let chunk = if is_first {
-            usual.max((window / mm_per_pulse) as i64)
-        } else {
-            usual
-        };
+        let chunk = if is_first { usual.max((window / mm_per_pulse) as i64) } else { usual };
         let is_due = is_first
             || sent - done + chunk as f64 * mm_per_pulse
                 <= window.max(2.0 * chunk as f64 * mm_per_pulse);
@@ -154,11 +145,7 @@ impl Motion {
         }
         let left = (self.to - self.sent).abs();
         // A last piece that is less than half a chunk goes with the one before it.
-        let next = if left <= chunk + usual / 2 {
-            left
-        } else {
-            chunk
-        };
+        let next = if left <= chunk + usual / 2 { left } else { chunk };
         self.sent += next * if self.to < self.from { -1 } else { 1 };
         Some(self.sent)
     }
@@ -184,23 +171,15 @@ mod tests {
 
     #[test]
     fn chunks_keep_braking_ahead_and_never_more_than_stated() {
-        let long = [
-            (0.02, 1_000),
-            (0.75, 20_000),
-            (9.0, 40_000),
-            (20.0, -40_000),
-        ];
+        let long = [(0.02, 1_000), (0.75, 20_000), (9.0, 40_000), (20.0, -40_000)];
         // And ways of one to two windows, of which the first jog may be all.
         let short = [0.02, 0.75, 9.0, 20.0].into_iter().flat_map(|speed| {
             let window = ahead_mm(MmPerS(speed), MmPerS2(60.0)) / 0.0025;
             (10..20).map(move |tenths| (speed, (window * f64::from(tenths) / 10.0) as i64))
         });
         for (speed, way) in long.into_iter().chain(short) {
-            let wanted = MoveTo {
-                target_pulses: way,
-                speed: MmPerS(speed),
-                acceleration: MmPerS2(60.0),
-            };
+            let wanted =
+                MoveTo { target_pulses: way, speed: MmPerS(speed), acceleration: MmPerS2(60.0) };
             let mut motion = Motion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
             let worst = worst_case_mm(wanted.speed, wanted.acceleration);
             let mut sent = motion.next_chunk(Nanos::ZERO, 0.0025).unwrap();

@@ -42,9 +42,10 @@ impl Pace {
         if now.since(asked) > LATE_MAX {
             return;
         }
-        let passed = self.told.replace(asked).map_or(0.0, |last| {
-            (asked.since(last).0 as f64 * 1e-9).min(APART_MAX)
-        });
+        let passed = self
+            .told
+            .replace(asked)
+            .map_or(0.0, |last| (asked.since(last).0 as f64 * 1e-9).min(APART_MAX));
         // Of coarse steps less is believed, by the share of the variance that is not theirs.
         let trust = GRAIN * GRAIN / (GRAIN * GRAIN + step * step / 12.0);
         self.ahead = trust * ahead;
@@ -88,11 +89,7 @@ mod tests {
                 }
                 assert!(ahead.abs() < 0.004, "{fast}: {ahead}");
             }
-            assert!(
-                (pace.drift - (1.0 - 1.0 / fast)).abs() < 3e-4,
-                "{fast}: {}",
-                pace.drift
-            );
+            assert!((pace.drift - (1.0 - 1.0 / fast)).abs() < 3e-4, "{fast}: {}", pace.drift);
         }
     }
 

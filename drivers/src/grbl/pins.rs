@@ -109,10 +109,7 @@ mod tests {
         let (far, home, none) = (AxisStatus::FORWARD_LIMIT, AxisStatus::HOME, AxisStatus(0));
         let (mut ends, mut known) = (Ends::default(), none);
         ends.leave(true);
-        assert_eq!(
-            seen(&mut ends, &mut known, &[(151.0, false), (152.0, true)]),
-            [none, far]
-        );
+        assert_eq!(seen(&mut ends, &mut known, &[(151.0, false), (152.0, true)]), [none, far]);
         // Back from it: open for a report, closed again, then really open.
         ends.leave(false);
         let way = [(152.0, true), (151.9, false), (151.8, true), (150.0, false)];
@@ -133,9 +130,6 @@ mod tests {
         let (mut ends, mut known) = (Ends::default(), AxisStatus(0));
         ends.leave(true);
         let way = [(151.9, false), (152.0, true)];
-        assert_eq!(
-            seen(&mut ends, &mut known, &way)[1],
-            AxisStatus::FORWARD_LIMIT
-        );
+        assert_eq!(seen(&mut ends, &mut known, &way)[1], AxisStatus::FORWARD_LIMIT);
     }
 }

@@ -180,18 +180,14 @@ impl Incoming {
         }
         if let Some(inner) = line.strip_prefix('<') {
             let inner = inner.strip_suffix('>');
-            return inner
-                .and_then(Status::parse)
-                .map_or_else(other, Self::Status);
+            return inner.and_then(Status::parse).map_or_else(other, Self::Status);
         }
         if let Some(inner) = line.strip_prefix('[') {
             let inner = inner.strip_suffix(']');
             return inner.map_or_else(other, |inner| Self::Message(inner.to_owned()));
         }
         // grblHAL says `GrblHAL 1.1f ['$' or '$HELP' for help]` (grblHAL/core, report.c).
-        let welcome = line
-            .strip_prefix("Grbl ")
-            .or_else(|| line.strip_prefix("GrblHAL "));
+        let welcome = line.strip_prefix("Grbl ").or_else(|| line.strip_prefix("GrblHAL "));
         if let Some(rest) = welcome {
             let version = rest.split(' ').next().unwrap_or_default();
             return Self::Hello(version.to_owned());

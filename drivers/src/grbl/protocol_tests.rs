@@ -79,17 +79,10 @@ fn status_reports_have_fields_in_any_order() {
     assert_eq!(full.offset, Some(vec![0.0, 1.551, 5.664]));
     assert_eq!(full.free, Some((15, 128)));
     assert!(!full.has_pin('X'));
-    assert_eq!(
-        status("<Hold:1|MPos:1,2,3,4|New>\r\n").state,
-        State::Hold(false)
-    );
-    for bad in [
-        "<Idle>",
-        "<|MPos:0,0,0>",
-        "<Idle|MPos:0,x,0>",
-        "<Idle|MPos:0,nan,0>",
-        "<Idle|MPos:0,0,0",
-    ] {
+    assert_eq!(status("<Hold:1|MPos:1,2,3,4|New>\r\n").state, State::Hold(false));
+    for bad in
+        ["<Idle>", "<|MPos:0,0,0>", "<Idle|MPos:0,x,0>", "<Idle|MPos:0,nan,0>", "<Idle|MPos:0,0,0"]
+    {
         let got = all(format!("{bad}\r\n").as_bytes());
         assert_eq!(got, [Incoming::Other(bad.into())]);
     }
@@ -126,10 +119,8 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
             .collect();
         let cut = random.below(length);
         let mut parser = Parser::default();
-        let mut parts: Vec<Incoming> = bytes[..cut]
-            .iter()
-            .filter_map(|b| parser.take(*b))
-            .collect();
+        let mut parts: Vec<Incoming> =
+            bytes[..cut].iter().filter_map(|b| parser.take(*b)).collect();
         parts.extend(bytes[cut..].iter().filter_map(|b| parser.take(*b)));
         assert!(parser.line.len() <= LINE_MAX);
         assert_eq!(parts, all(&bytes));

@@ -126,11 +126,7 @@ mod tests {
     use crate::cell::CellDialogue;
 
     fn header(board: &str) -> Header {
-        Header {
-            rate: 80,
-            gain: 128,
-            board: board.into(),
-        }
+        Header { rate: 80, gain: 128, board: board.into() }
     }
 
     fn dialogue() -> Hx711Dialogue {
@@ -159,11 +155,7 @@ mod tests {
             micros = micros.wrapping_add(12_500);
             times.push(dialogue.take_sample().unwrap().device_time.unwrap());
         }
-        assert!(
-            times
-                .windows(2)
-                .all(|w| w[1].since(w[0]) == Nanos(12_500_000))
-        );
+        assert!(times.windows(2).all(|w| w[1].since(w[0]) == Nanos(12_500_000)));
         assert_eq!(dialogue.take_trouble(), None);
     }
 
@@ -171,14 +163,7 @@ mod tests {
     fn a_restart_is_told_and_time_goes_on() {
         let mut dialogue = dialogue();
         say(&mut dialogue, ms(10), &value(900_000_000, 5));
-        say(
-            &mut dialogue,
-            ms(500),
-            &Message::Started {
-                micros: 1_000,
-                header: header("a"),
-            },
-        );
+        say(&mut dialogue, ms(500), &Message::Started { micros: 1_000, header: header("a") });
         say(&mut dialogue, ms(513), &value(13_500, 6));
         let times = [(); 2].map(|()| dialogue.take_sample().unwrap().device_time.unwrap());
         assert_eq!(times[1].since(times[0]), Nanos(490_000_000 + 12_500_000));
@@ -205,11 +190,7 @@ mod tests {
     fn beyond_the_range_and_a_missing_chip_are_told_once() {
         let mut dialogue = dialogue();
         for i in 0..3 {
-            say(
-                &mut dialogue,
-                ms(12 * i),
-                &value(12_500 * i as u32 + 1, COUNT_MAX),
-            );
+            say(&mut dialogue, ms(12 * i), &value(12_500 * i as u32 + 1, COUNT_MAX));
         }
         let sample = dialogue.take_sample().unwrap();
         assert!((sample.volts.0 - 5.0).abs() < 1e-6 && sample.counts == COUNT_MAX);
@@ -217,11 +198,7 @@ mod tests {
         assert_eq!(dialogue.take_trouble(), None);
         for i in 0..3_u32 {
             let micros = 600_000 + 500_000 * i;
-            say(
-                &mut dialogue,
-                ms(600 + 500 * u64::from(i)),
-                &Message::Missing { micros },
-            );
+            say(&mut dialogue, ms(600 + 500 * u64::from(i)), &Message::Missing { micros });
         }
         assert!(dialogue.take_trouble().unwrap().contains("DOUT"));
         assert_eq!(dialogue.take_trouble(), None);
@@ -235,17 +212,9 @@ mod tests {
     #[test]
     fn another_board_in_its_place_ends_it() {
         let mut dialogue = dialogue();
-        let other = Message::Started {
-            micros: 9,
-            header: header("b"),
-        };
+        let other = Message::Started { micros: 9, header: header("b") };
         say(&mut dialogue, ms(1), &other);
-        assert!(
-            dialogue
-                .is_dead(ms(2))
-                .unwrap()
-                .contains("another HX711 board")
-        );
+        assert!(dialogue.is_dead(ms(2)).unwrap().contains("another HX711 board"));
     }
 
     #[test]

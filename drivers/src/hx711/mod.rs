@@ -27,14 +27,9 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "hx711",
     title: "an HX711 board",
     introduction: "load cell on an HX711, ",
-    role: Role::Cell {
-        read,
-        emulation: None,
-    },
+    role: Role::Cell { read, emulation: None },
     recognise: |lines| {
-        first(lines, |line| {
-            line.contains("palpate-hx711") || protocol::parse(line).is_some()
-        })
+        first(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
     },
 };
 
@@ -76,8 +71,6 @@ fn read(fields: &mut Fields) -> Option<Arc<dyn CellDevice>> {
         full_scale: fields
             .number("cell.full_scale_v", 1e-3, 1000.0)
             .map_or(usual.full_scale, Volts),
-        noise: fields
-            .number("cell.noise_v", 1e-9, 1.0)
-            .map_or(usual.noise, Volts),
+        noise: fields.number("cell.noise_v", 1e-9, 1.0).map_or(usual.noise, Volts),
     }))
 }

@@ -53,11 +53,7 @@ impl CellDevice for Hx711Settings {
                 "HX711 board {}, {rate:.1} values a second, gain {}, {} of full scale",
                 header.board, header.gain, self.full_scale
             ),
-            adc: AdcDescription {
-                counts_min: COUNT_MIN,
-                counts_max: COUNT_MAX,
-                volts_per_count,
-            },
+            adc: AdcDescription { counts_min: COUNT_MIN, counts_max: COUNT_MAX, volts_per_count },
             noise_expected: self.noise,
             rate,
             delay: Nanos((0.5 * SETTLING / rate * 1e9) as u64),
@@ -100,10 +96,7 @@ fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
             "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
         ));
     }
-    Err(DeviceError::Other {
-        device: DEVICE,
-        found: stranger(&console.heard),
-    })
+    Err(DeviceError::Other { device: DEVICE, found: stranger(&console.heard) })
 }
 
 /// Values a second by the board's clock.
@@ -120,15 +113,12 @@ fn measure(console: &mut TextConsole<'_>) -> Result<f64, DeviceError> {
     steps.sort_unstable();
     match steps.get(steps.len() / 2) {
         Some(step) if *step > 0 && micros.len() == MEASURED => Ok(1e6 / f64::from(*step)),
-        _ => Err(unfit(
-            "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
-        )),
+        _ => {
+            Err(unfit("the chip does not answer it; check DOUT, SCK and the chip's supply".into()))
+        }
     }
 }
 
 fn unfit(detail: String) -> DeviceError {
-    DeviceError::Unfit {
-        device: DEVICE,
-        detail,
-    }
+    DeviceError::Unfit { device: DEVICE, detail }
 }

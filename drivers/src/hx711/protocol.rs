@@ -69,11 +69,7 @@ pub enum Message {
 pub fn crc(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xffff, |sum, byte| {
         (0..8).fold(sum ^ u16::from(*byte) << 8, |sum, _| {
-            if sum & 0x8000 == 0 {
-                sum << 1
-            } else {
-                sum << 1 ^ 0x1021
-            }
+            if sum & 0x8000 == 0 { sum << 1 } else { sum << 1 ^ 0x1021 }
         })
     })
 }
@@ -147,9 +143,7 @@ fn fields(header: &Header) -> String {
 
 /// Digits with at most a minus before them: `parse` alone takes a plus too.
 fn number<T: std::str::FromStr>(text: &str) -> Option<T> {
-    (!text.starts_with('+'))
-        .then(|| text.parse().ok())
-        .flatten()
+    (!text.starts_with('+')).then(|| text.parse().ok()).flatten()
 }
 
 #[cfg(test)]
@@ -165,33 +159,14 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let header = Header {
-            rate: 80,
-            gain: 128,
-            board: "bench-1".into(),
-        };
-        let started = Message::Started {
-            micros: 1204,
-            header: header.clone(),
-        };
-        assert_eq!(
-            line(&started),
-            "B,1204,palpate-hx711,1,80,128,bench-1*8C6B\r\n"
-        );
+        let header = Header { rate: 80, gain: 128, board: "bench-1".into() };
+        let started = Message::Started { micros: 1204, header: header.clone() };
+        assert_eq!(line(&started), "B,1204,palpate-hx711,1,80,128,bench-1*8C6B\r\n");
         for message in [
             started,
-            Message::Header {
-                micros: u32::MAX,
-                header,
-            },
-            Message::Value {
-                micros: 0,
-                count: COUNT_MIN,
-            },
-            Message::Value {
-                micros: 48_332_680,
-                count: COUNT_MAX,
-            },
+            Message::Header { micros: u32::MAX, header },
+            Message::Value { micros: 0, count: COUNT_MIN },
+            Message::Value { micros: 48_332_680, count: COUNT_MAX },
             Message::Missing { micros: 7 },
         ] {
             assert_eq!(parse(line(&message).trim_end()), Some(message));
@@ -200,16 +175,10 @@ mod tests {
 
     #[test]
     fn no_changed_lost_or_doubled_byte_is_a_value() {
-        let whole = line(&Message::Value {
-            micros: 48_332_680,
-            count: -152_034,
-        });
+        let whole = line(&Message::Value { micros: 48_332_680, count: -152_034 });
         let whole = whole.trim_end().as_bytes();
-        let is_value = |bytes: &[u8]| {
-            std::str::from_utf8(bytes)
-                .ok()
-                .is_some_and(|l| parse(l).is_some())
-        };
+        let is_value =
+            |bytes: &[u8]| std::str::from_utf8(bytes).ok().is_some_and(|l| parse(l).is_some());
         assert!(is_value(whole));
         for at in 0..whole.len() {
             for other in 0..=255_u8 {

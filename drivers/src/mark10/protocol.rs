@@ -255,10 +255,7 @@ mod tests {
         assert_eq!(list.firmware, "1.00");
         assert_eq!(list.unit, Ok(ForceUnit::Pound));
         assert_eq!(list.mode, "CUR");
-        assert_eq!(
-            (list.filter_displayed, list.filter_current),
-            (Some(8), Some(1))
-        );
+        assert_eq!((list.filter_displayed, list.filter_current), (Some(8), Some(1)));
         assert_eq!(list.auto_transmit, Some(0));
         assert!(list.has_units);
         assert_eq!((list.is_inverted, list.is_unsigned), (None, None));
@@ -266,10 +263,7 @@ mod tests {
             panic!("no list");
         };
         assert_eq!(list.unit, Err("LBIN".to_owned()));
-        assert_eq!(
-            (list.is_inverted, list.is_unsigned),
-            (Some(true), Some(false))
-        );
+        assert_eq!((list.is_inverted, list.is_unsigned), (Some(true), Some(false)));
         assert!(!list.has_units && list.auto_transmit == Some(125));
     }
 

@@ -42,16 +42,10 @@ impl CellClock {
     /// How far arrivals of late are from the line, at the median: half of them are nearer.
     #[must_use]
     pub fn spread(&self) -> Nanos {
-        let mut late: Vec<f64> = self
-            .prompt
-            .iter()
-            .map(|(d, a)| a - (d * (1.0 + self.rate) + self.offset))
-            .collect();
+        let mut late: Vec<f64> =
+            self.prompt.iter().map(|(d, a)| a - (d * (1.0 + self.rate) + self.offset)).collect();
         late.sort_by(f64::total_cmp);
-        Nanos(
-            late.get(late.len() / 2)
-                .map_or(0, |late| late.max(0.0) as u64),
-        )
+        Nanos(late.get(late.len() / 2).map_or(0, |late| late.max(0.0) as u64))
     }
 
     fn note(&mut self, d: f64, a: f64) {

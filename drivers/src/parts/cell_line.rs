@@ -80,9 +80,7 @@ impl CellLine {
     /// When a sample was sent that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
     /// before it a period apart, or closer where there is less time since the last one.
     fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
-        let told = self
-            .last_tick
-            .map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
+        let told = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
         // The samples that are left share what is left of the time.
         let apart = self.period.min(Nanos(at.since(told).0 / (newer + 1)));
         Nanos(at.0 - apart.0 * newer)
@@ -100,10 +98,9 @@ impl CellLine {
                     (taken, self.clock.spread())
                 }
                 // It was taken at any time of its period, and told on the grid.
-                None => (
-                    self.laid_back(sample.at, newer as u64),
-                    Nanos(self.period.0 / 2 + TICK.0),
-                ),
+                None => {
+                    (self.laid_back(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
+                }
             };
             let taken = Nanos(taken.0.saturating_sub(self.delay.0));
             let tick = (taken.since(self.start).0 + TICK.0 / 2) / TICK.0;
@@ -116,10 +113,7 @@ impl CellLine {
                 volts: sample.volts,
                 pulses: 0,
                 status: AxisStatus(0),
-                age: Some(Age {
-                    by: now.since(taken),
-                    within,
-                }),
+                age: Some(Age { by: now.since(taken), within }),
             };
             self.events.push_back((now, RigEventBody::Reading(reading)));
         }

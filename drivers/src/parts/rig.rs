@@ -62,20 +62,12 @@ impl RigDevice for Parts {
         let axis_link = axis_place.open()?;
         let mut link = cell_place.open()?;
         let (mut description, axis) = grbl::open(axis_link, settings, clock)?;
-        let OpenedCell {
-            description: cell,
-            dialogue,
-            raw,
-            farewell,
-        } = cell.open(link.as_mut(), clock, &device)?;
+        let OpenedCell { description: cell, dialogue, raw, farewell } =
+            cell.open(link.as_mut(), clock, &device)?;
         (self.track, self.start) = (axis.track, clock());
         (self.zero, self.motions_shown) = (0, 0);
-        let line = CellLine::new(
-            dialogue,
-            (cell.rate, cell.delay),
-            Arc::clone(&self.track),
-            self.start,
-        );
+        let line =
+            CellLine::new(dialogue, (cell.rate, cell.delay), Arc::clone(&self.track), self.start);
         let line_settings = LineSettings { device, farewell };
         let cell_line = Line::start(link, line, clock, line_settings)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
@@ -110,9 +102,7 @@ impl RigDevice for Parts {
                 }
                 RigEventBody::Reading(reading)
             }
-            RigEventBody::Ack(Ack {
-                command: RigCommand::DefinePosition { pulses },
-            }) => {
+            RigEventBody::Ack(Ack { command: RigCommand::DefinePosition { pulses } }) => {
                 self.zero = track.at(now).pulses.round() as i64 - pulses;
                 body
             }

@@ -113,11 +113,7 @@ impl Track {
     /// The motion under way ends earlier than was told, at the end of this profile, such as when the way behind it was
     /// never given.
     pub fn shortened(&mut self, profile: Profile) {
-        if let Some(Piece {
-            course: Some((course, _)),
-            ..
-        }) = self.pieces.back_mut()
-        {
+        if let Some(Piece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
             *course = profile;
         }
     }
@@ -163,11 +159,7 @@ impl Track {
         });
         let inputs = self.inputs.iter().rev().find(|(from, _)| *from <= time);
         let inputs = inputs.map_or(AxisStatus(0), |(_, status)| *status);
-        Placed {
-            pulses: piece.pulses + way,
-            status: piece.status | inputs,
-            motion: piece.motion,
-        }
+        Placed { pulses: piece.pulses + way, status: piece.status | inputs, motion: piece.motion }
     }
 }
 
@@ -193,10 +185,7 @@ mod tests {
         assert_eq!(track.at(ms(400)).status, AxisStatus(0));
         let moving = track.at(ms(1_500));
         // 0.1 mm while it gains speed, 0.4 s at 2 mm/s.
-        assert!(
-            (moving.pulses - (100.0 - 400.0 * 0.9)).abs() < 1e-6,
-            "{moving:?}"
-        );
+        assert!((moving.pulses - (100.0 - 400.0 * 0.9)).abs() < 1e-6, "{moving:?}");
         assert_eq!(moving.status, AxisStatus::MOVING | AxisStatus::MOTOR_ON);
         let braking = track.at(ms(2_050));
         assert!(braking.status.has(AxisStatus::STOPPING));

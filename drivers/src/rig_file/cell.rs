@@ -33,11 +33,8 @@ pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
         fields.mistake("cell.readings_per_second", &format!("gauges send {rates}"));
     }
     let filter = fields.whole("cell.filter", 0, u64::from(FILTER_MAX));
-    let is_reversed = fields.choice(
-        "cell.direction",
-        &[("compression", false), ("tension", true)],
-        Some(false),
-    );
+    let is_reversed =
+        fields.choice("cell.direction", &[("compression", false), ("tension", true)], Some(false));
     let noise = fields.number("cell.noise_n", 1e-9, 1e3).map(Newtons);
     Some(GaugeSettings {
         serial_number: fields.text("cell.serial_number"),

@@ -90,31 +90,18 @@ impl Fields {
                         });
                     }
                 }
-                value => all.push(Field {
-                    key: name,
-                    line,
-                    value: value_of(value),
-                    is_taken: false,
-                }),
+                value => {
+                    all.push(Field { key: name, line, value: value_of(value), is_taken: false })
+                }
             }
         }
-        Ok(Self {
-            all,
-            mistakes: Vec::new(),
-        })
+        Ok(Self { all, mistakes: Vec::new() })
     }
 
     /// Tells a mistake at a key, or at the file where the key is missing.
     pub fn mistake(&mut self, key: &str, message: &str) {
-        let line = self
-            .all
-            .iter()
-            .find(|field| field.key == key)
-            .map_or(0, |field| field.line);
-        self.mistakes.push(Mistake {
-            line,
-            message: format!("{key}: {message}"),
-        });
+        let line = self.all.iter().find(|field| field.key == key).map_or(0, |field| field.line);
+        self.mistakes.push(Mistake { line, message: format!("{key}: {message}") });
     }
 
     fn take(&mut self, key: &str) -> Option<Value> {
@@ -150,10 +137,7 @@ impl Fields {
         match self.take(key)? {
             Value::Number(number) if (least..=most).contains(&number) => Some(number),
             _ => {
-                self.mistake(
-                    key,
-                    &format!("give a number from {least} to {most}, without quotes"),
-                );
+                self.mistake(key, &format!("give a number from {least} to {most}, without quotes"));
                 None
             }
         }
@@ -214,10 +198,7 @@ impl Fields {
         };
         let found = words.iter().find(|(word, _)| *word == given);
         if found.is_none() {
-            let all: Vec<String> = words
-                .iter()
-                .map(|(word, _)| format!("\"{word}\""))
-                .collect();
+            let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
             self.mistake(key, &format!("give {}", all.join(" or ")));
         }
         found.map(|(_, value)| *value)

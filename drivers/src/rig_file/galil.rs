@@ -82,15 +82,11 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     ))
 }
 
-const MOTOR_TYPES: [(&str, MotorType); 2] = [
-    ("active-low", MotorType::ActiveLow),
-    ("active-high", MotorType::ActiveHigh),
-];
+const MOTOR_TYPES: [(&str, MotorType); 2] =
+    [("active-low", MotorType::ActiveLow), ("active-high", MotorType::ActiveHigh)];
 
-const LEVELS: [(&str, Levels); 2] = [
-    ("active-low", Levels::ActiveLow),
-    ("active-high", Levels::ActiveHigh),
-];
+const LEVELS: [(&str, Levels); 2] =
+    [("active-low", Levels::ActiveLow), ("active-high", Levels::ActiveHigh)];
 
 const RANGES: [(&str, AnalogRange); 4] = [
     ("-10..10 V", AnalogRange::Bipolar10),
@@ -99,8 +95,5 @@ const RANGES: [(&str, AnalogRange); 4] = [
     ("0..10 V", AnalogRange::Unipolar10),
 ];
 
-const SAMPLINGS: [(&str, Sampling); 3] = [
-    ("auto", Sampling::Auto),
-    ("poll", Sampling::Poll),
-    ("record", Sampling::Record),
-];
+const SAMPLINGS: [(&str, Sampling); 3] =
+    [("auto", Sampling::Auto), ("poll", Sampling::Poll), ("record", Sampling::Record)];

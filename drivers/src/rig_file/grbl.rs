@@ -13,10 +13,7 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (axis, cell) = (read(name, fields), super::cell::read(fields));
     let (axis, cell) = (axis?, cell?);
     if axis.0 == cell.0 {
-        fields.mistake(
-            "cell.port",
-            "the board is at this port; the load cell has another",
-        );
+        fields.mistake("cell.port", "the board is at this port; the load cell has another");
         return None;
     }
     let places = vec![axis.0.clone(), cell.0.clone()];

@@ -53,10 +53,7 @@ impl fmt::Display for RigFileError {
 impl RigFile {
     /// Reads the text of a rig file; `file` is what messages call it, and the rig where it has no name of its own.
     pub fn parse(file: &str, text: &str) -> Result<Self, RigFileError> {
-        let error = |mistakes| RigFileError {
-            file: file.to_owned(),
-            mistakes,
-        };
+        let error = |mistakes| RigFileError { file: file.to_owned(), mistakes };
         if text.len() > BYTES_MAX {
             let message = format!("more than {BYTES_MAX} bytes are no rig file");
             return Err(error(vec![Mistake { line: 0, message }]));
@@ -71,11 +68,9 @@ impl RigFile {
 
     /// A rig whose devices are at these places, that of the axis first.
     pub(crate) fn of(places: Vec<Place>, device: impl RigDevice + Clone + Sync + 'static) -> Self {
-        let open = Box::new(
-            move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
-                Ok(Box::new(DeviceRig::open(device.clone(), clock.clone())?))
-            },
-        );
+        let open = Box::new(move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
+            Ok(Box::new(DeviceRig::open(device.clone(), clock.clone())?))
+        });
         Self { places, open }
     }
 
@@ -109,10 +104,9 @@ fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
 
 /// The file's name without folders and ending.
 fn stem(file: &str) -> String {
-    std::path::Path::new(file).file_stem().map_or_else(
-        || file.to_owned(),
-        |stem| stem.to_string_lossy().into_owned(),
-    )
+    std::path::Path::new(file)
+        .file_stem()
+        .map_or_else(|| file.to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

@@ -9,11 +9,8 @@ pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
     let port = fields.text(&key("port"));
     let address = fields.text(&key("address"));
     let baud = fields.whole(&key("baud"), 300, 4_000_000);
-    let has_handshake = fields.choice(
-        &key("handshake"),
-        &[("none", false), ("rts-cts", true)],
-        Some(false),
-    );
+    let has_handshake =
+        fields.choice(&key("handshake"), &[("none", false), ("rts-cts", true)], Some(false));
     match (port, address) {
         (Some(port), None) => Some(Place::Serial {
             port,
@@ -29,18 +26,11 @@ pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
             Some(Place::Tcp(address))
         }
         (Some(_), Some(_)) => {
-            fields.mistake(
-                &key("address"),
-                "a device is at a port or at an address, not at both",
-            );
+            fields.mistake(&key("address"), "a device is at a port or at an address, not at both");
             None
         }
         (None, None) => {
-            let what = if table.is_empty() {
-                "controller"
-            } else {
-                "load cell"
-            };
+            let what = if table.is_empty() { "controller" } else { "load cell" };
             fields.mistake(
                 &key("port"),
                 &format!(

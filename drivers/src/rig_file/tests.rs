@@ -39,11 +39,7 @@ fn what_is_not_said_is_usual() {
     let (place, galil) = galil("rigs/bench 2.toml", THESIS);
     assert_eq!(
         place,
-        Place::Serial {
-            port: "/dev/ttyUSB0".into(),
-            baud: 115_200,
-            has_handshake: false
-        }
+        Place::Serial { port: "/dev/ttyUSB0".into(), baud: 115_200, has_handshake: false }
     );
     assert_eq!(galil.name, "bench 2");
     assert_eq!((galil.axis, galil.input), ('A', 1));
@@ -116,18 +112,10 @@ fn what_does_not_go_together_is_told() {
 #[test]
 fn what_is_no_rig_file_is_told() {
     assert_eq!(mistakes("device = \"galil")[0].0, 1);
-    assert!(
-        mistakes(&"#".repeat(BYTES_MAX + 1))[0]
-            .1
-            .contains("no rig file")
-    );
+    assert!(mistakes(&"#".repeat(BYTES_MAX + 1))[0].1.contains("no rig file"));
     assert_eq!(mistakes("").len(), 1);
     assert!(mistakes("device = \"galil\"").len() > 3);
-    assert!(
-        mistakes(&THESIS.replace("150", "inf"))[0]
-            .1
-            .contains("travel_mm")
-    );
+    assert!(mistakes(&THESIS.replace("150", "inf"))[0].1.contains("travel_mm"));
 }
 
 const PARTS: &str = r#"device = "grbl"
@@ -147,15 +135,9 @@ port = "/dev/ttyACM1"
 fn a_rig_of_parts_has_two_places() {
     let file = RigFile::parse("bench.toml", PARTS).unwrap();
     let ports: Vec<String> = file.places().iter().map(ToString::to_string).collect();
-    assert_eq!(
-        ports,
-        ["/dev/ttyACM0 at 115200 baud", "/dev/ttyACM1 at 115200 baud"]
-    );
+    assert_eq!(ports, ["/dev/ttyACM0 at 115200 baud", "/dev/ttyACM1 at 115200 baud"]);
     let gauge = PARTS.replace("hx711", "mark10") + "capacity_n = 25\nfilter = 4\n";
-    assert_eq!(
-        RigFile::parse("bench.toml", &gauge).unwrap().places().len(),
-        2
-    );
+    assert_eq!(RigFile::parse("bench.toml", &gauge).unwrap().places().len(), 2);
     let (_, settings) = grbl_settings(&gauge);
     assert!(!settings.is_unlocking && settings.axis == 'X');
     let gauge = super::gauge(&mut Fields::read(&gauge).unwrap()).unwrap();
@@ -164,9 +146,7 @@ fn a_rig_of_parts_has_two_places() {
 
 #[test]
 fn mistakes_of_both_parts_are_told() {
-    let text = PARTS
-        .replace("\"probe\"", "\"none\"")
-        .replace("\"hx711\"", "\"mark10\"")
+    let text = PARTS.replace("\"probe\"", "\"none\"").replace("\"hx711\"", "\"mark10\"")
         + "board = \"A\"\nreadings_per_second = 60\n";
     let told = mistakes(&text);
     let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
@@ -207,17 +187,11 @@ fn fractions_of_what_is_whole_are_refused_with_their_line() {
 fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
     let fine = PARTS.replace("0.0025", "0.000625");
     let told = mistakes(&fine);
-    assert!(
-        told[0].0 == 3 && told[0].1.contains("thousandths"),
-        "{told:?}"
-    );
+    assert!(told[0].0 == 3 && told[0].1.contains("thousandths"), "{told:?}");
     let probe = PARTS.replace("\"probe\"\n", "\"probe\"\nclosed_is_home = true\n");
     assert_eq!(mistakes(&probe)[0].0, 8);
     let limit = probe.replace("\"probe\"", "\"limit\"");
-    assert_eq!(
-        RigFile::parse("bench.toml", &limit).unwrap().places().len(),
-        2
-    );
+    assert_eq!(RigFile::parse("bench.toml", &limit).unwrap().places().len(), 2);
     assert!(grbl_settings(&limit).1.is_closed_home);
 }
 

@@ -28,9 +28,8 @@ pub enum SerialError {
 
 /// The serial ports of this computer in order of their names; empty when there are none.
 pub fn list_ports() -> Result<Vec<PortInfo>, SerialError> {
-    let ports = serialport::available_ports().map_err(|err| SerialError::Listing {
-        detail: err.to_string(),
-    })?;
+    let ports = serialport::available_ports()
+        .map_err(|err| SerialError::Listing { detail: err.to_string() })?;
     let mut ports: Vec<PortInfo> = ports.into_iter().map(described).collect();
     ports.sort();
     Ok(ports)
@@ -48,10 +47,7 @@ fn described(port: SerialPortInfo) -> PortInfo {
         SerialPortType::PciPort => "built in".to_owned(),
         SerialPortType::Unknown => "unknown kind".to_owned(),
     };
-    PortInfo {
-        name: port.port_name,
-        description,
-    }
+    PortInfo { name: port.port_name, description }
 }
 
 #[cfg(test)]

@@ -105,13 +105,10 @@ impl FromStr for SimRate {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let rate: Option<u32> = text.parse().ok();
         let kilohertz = KILOHERTZ.into_iter().find(|one| rate == Some(1000 * one));
-        kilohertz
-            .map(|kilohertz| Self { kilohertz })
-            .ok_or_else(|| {
-                let choices =
-                    "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)";
-                SimSettingError::new("rate", text, choices)
-            })
+        kilohertz.map(|kilohertz| Self { kilohertz }).ok_or_else(|| {
+            let choices = "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)";
+            SimSettingError::new("rate", text, choices)
+        })
     }
 }
 

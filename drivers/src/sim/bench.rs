@@ -90,17 +90,9 @@ impl Bench {
     /// The axis has moved straight to a true position in a time step.
     pub fn advance(&mut self, axis: Position, dt: Seconds) -> Felt {
         let compliance = self.settings.compliance.mm_per_newton();
-        self.probe = if compliance > 0.0 {
-            self.balanced(axis, dt, compliance)
-        } else {
-            axis
-        };
+        self.probe = if compliance > 0.0 { self.balanced(axis, dt, compliance) } else { axis };
         let on_probe = self.push(self.probe, dt);
-        Felt {
-            probe: self.probe,
-            on_probe,
-            on_cell: on_probe + self.weights,
-        }
+        Felt { probe: self.probe, on_probe, on_cell: on_probe + self.weights }
     }
 
     /// Where the force that bends the rig is the force that tissue and base have there:
@@ -129,11 +121,7 @@ impl Bench {
             }
             // An end kept twice counts half, so that the bracket shrinks from both sides.
             let keep_high = here <= 0.0;
-            let share = if is_high_kept == Some(keep_high) {
-                0.5
-            } else {
-                1.0
-            };
+            let share = if is_high_kept == Some(keep_high) { 0.5 } else { 1.0 };
             if keep_high {
                 (low, low_miss, high_miss) = (between, here, share * high_miss);
             } else {

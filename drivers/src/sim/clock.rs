@@ -23,11 +23,7 @@ pub struct TickClock {
 impl TickClock {
     /// A clock whose first tick is at time zero and carries the number `count`.
     pub fn new(count: u64, tick_nanos: u64) -> Self {
-        Self {
-            count,
-            at: Nanos::ZERO,
-            tick: Nanos(tick_nanos),
-        }
+        Self { count, at: Nanos::ZERO, tick: Nanos(tick_nanos) }
     }
 
     /// True time of the next tick.
@@ -54,10 +50,7 @@ pub struct ReportLink {
 impl ReportLink {
     /// The link of a rig with this seed.
     pub fn new(seed: u64) -> Self {
-        Self {
-            random: Random::new(seed, Cause::Link),
-            newest: None,
-        }
+        Self { random: Random::new(seed, Cause::Link), newest: None }
     }
 
     /// Arrival at the host of a report sent at `sent`, later than every arrival before it.

@@ -22,11 +22,8 @@ const IDEAL_VOLTS_PER_NEWTON: f64 = 0.15;
 const IDEAL_NEWTONS_MAX: Newtons = Newtons(10.0);
 
 /// The lab cell's converter: 16 bits over +-10 V, 0.305 mV per count.
-const LAB_ADC: AdcDescription = AdcDescription {
-    counts_min: -32_768,
-    counts_max: 32_767,
-    volts_per_count: 20.0 / 65_536.0,
-};
+const LAB_ADC: AdcDescription =
+    AdcDescription { counts_min: -32_768, counts_max: 32_767, volts_per_count: 20.0 / 65_536.0 };
 
 /// What the laboratory's calibration of this profile's cell says.
 pub fn calibration(profile: SimProfile) -> Calibration {
@@ -67,16 +64,8 @@ pub struct LoadCell {
 
 #[derive(Clone, Debug)]
 enum CellError {
-    Lab {
-        drift: Random,
-        drift_per_tick: f64,
-        wander_step: f64,
-        wander: f64,
-        ticks: u64,
-    },
-    Ideal {
-        noise: Newtons,
-    },
+    Lab { drift: Random, drift_per_tick: f64, wander_step: f64, wander: f64, ticks: u64 },
+    Ideal { noise: Newtons },
 }
 
 impl LoadCell {
@@ -98,15 +87,9 @@ impl LoadCell {
                     ticks: 0,
                 }
             }
-            SimProfile::Ideal => CellError::Ideal {
-                noise: settings.noise.newtons(),
-            },
+            SimProfile::Ideal => CellError::Ideal { noise: settings.noise.newtons() },
         };
-        Self {
-            curve,
-            noise: Random::new(settings.seed, Cause::Noise),
-            error,
-        }
+        Self { curve, noise: Random::new(settings.seed, Cause::Noise), error }
     }
 
     /// The signal under a force at the next tick, as counts where there is a converter.
@@ -129,13 +112,7 @@ impl LoadCell {
                 let felt = Newtons(force.0 + rms.0 * noise);
                 self.curve.volts_from_newtons(felt)
             }
-            CellError::Lab {
-                drift,
-                drift_per_tick,
-                wander_step,
-                wander,
-                ticks,
-            } => {
+            CellError::Lab { drift, drift_per_tick, wander_step, wander, ticks } => {
                 *ticks += 1;
                 if ticks.is_multiple_of(WANDER_TICKS) {
                     *wander += *wander_step * drift.normal();
@@ -165,11 +142,7 @@ mod tests {
     use super::*;
 
     fn cell(profile: SimProfile, seed: u64) -> LoadCell {
-        let settings = SimSettings {
-            profile,
-            seed,
-            ..SimSettings::default()
-        };
+        let settings = SimSettings { profile, seed, ..SimSettings::default() };
         LoadCell::new(&settings, Seconds(0.001))
     }
 

@@ -204,14 +204,8 @@ impl SimRig {
             force: felt.on_probe,
             ..self.truth
         };
-        let reading = Reading {
-            tick,
-            counts,
-            volts,
-            pulses: axis.pulses,
-            status: axis.status,
-            age: None,
-        };
+        let reading =
+            Reading { tick, counts, volts, pulses: axis.pulses, status: axis.status, age: None };
         self.report(at, RigEventBody::Reading(reading));
     }
 
@@ -230,8 +224,7 @@ impl Rig for SimRig {
         if self.commands.len() >= COMMANDS_MAX {
             self.is_overrun = true;
         } else {
-            self.commands
-                .push_back((self.now + COMMAND_LATENCY, command));
+            self.commands.push_back((self.now + COMMAND_LATENCY, command));
         }
     }
 

@@ -46,12 +46,7 @@ pub(super) struct Set {
 impl Set {
     /// Nothing has pressed the specimen yet.
     pub fn new(preconditioning: SimPreconditioning) -> Self {
-        Self {
-            share: preconditioning.share(),
-            depth_max: 0.0,
-            depth: 0.0,
-            set: 0.0,
-        }
+        Self { share: preconditioning.share(), depth_max: 0.0, depth: 0.0, set: 0.0 }
     }
 
     /// How far the surface has receded, in mm.
@@ -139,11 +134,7 @@ mod tests {
                 }
                 before = here;
             }
-            Cycle {
-                peak,
-                at_one_newton,
-                work,
-            }
+            Cycle { peak, at_one_newton, work }
         }
 
         fn rest(&mut self, seconds: f64) {
@@ -172,10 +163,7 @@ mod tests {
             assert!(cycles.windows(2).all(|pair| pair[1].peak < pair[0].peak));
             // A tick's way, by which a depth is known, is 5 um at most.
             assert!(shifts.iter().all(|shift| *shift > -1e-9), "{shifts:?}");
-            assert!(
-                shifts[..5].is_sorted_by(|one, next| one > next),
-                "{shifts:?}"
-            );
+            assert!(shifts[..5].is_sorted_by(|one, next| one > next), "{shifts:?}");
             // What the thesis saw: repeats 1 and 9 differ clearly, 5 and 9 barely.
             let change = |a: usize, b: usize| 1.0 - cycles[b - 1].peak / cycles[a - 1].peak;
             assert!(change(1, 9) > 0.08 && change(5, 9) < 0.01, "{cycles:?}");
@@ -220,10 +208,7 @@ mod tests {
             });
             let law = terms.sum::<f64>() * depth.powf(-q);
             // The force is above zero from the surface on: what differs is the way of a tick, up to 0.02 mm.
-            assert!(
-                (set / law - 1.0).abs() < 3e-3,
-                "{depth} {speed}: {set} {law}"
-            );
+            assert!((set / law - 1.0).abs() < 3e-3, "{depth} {speed}: {set} {law}");
         }
     }
 
@@ -240,14 +225,9 @@ mod tests {
         for (depth, speed) in [(20.0, 0.5), (30.0, 5.0), (10.0, 5.0), (30.0, 20.0)] {
             let [hard, soft] = [0, 30].map(|percent| {
                 let mut press = Press::new(percent);
-                (0..4)
-                    .map(|_| press.cycle(depth, speed).work)
-                    .collect::<Vec<f64>>()
+                (0..4).map(|_| press.cycle(depth, speed).work).collect::<Vec<f64>>()
             });
-            assert!(
-                hard.iter().chain(&soft).all(|work| *work > 0.0),
-                "{hard:?} {soft:?}"
-            );
+            assert!(hard.iter().chain(&soft).all(|work| *work > 0.0), "{hard:?} {soft:?}");
             // The first loop pays for what is rearranged in it.
             assert!(soft[0] > soft[3], "{soft:?}");
         }
@@ -277,10 +257,7 @@ mod tests {
     fn none_is_none_to_the_last_bit() {
         let mut with = Press::new(0);
         let plain = Tissue::new(&mut Random::new(4, Cause::Tissue), &SimSettings::default());
-        let mut without = Press {
-            surface: plain.surface(),
-            tissue: plain,
-        };
+        let mut without = Press { surface: plain.surface(), tissue: plain };
         for i in 0..20_000 {
             let x = 15.0 - 16.0 * (f64::from(i) * 1e-3).cos();
             assert_eq!(with.to(x), without.to(x));

@@ -33,10 +33,7 @@ impl Random {
         let cause = cause as u64;
         let high = scrambled(seed ^ scrambled(cause));
         let low = scrambled(high);
-        Self(Pcg64::new(
-            (u128::from(high) << 64) | u128::from(low),
-            u128::from(cause),
-        ))
+        Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), u128::from(cause)))
     }
 
     /// The generator that draws the specimen with a number; number 0 is the rig's own.
@@ -98,11 +95,7 @@ mod tests {
         };
         let base = draw(7, Cause::Noise);
         assert_eq!(base, draw(7, Cause::Noise));
-        for other in [
-            draw(8, Cause::Noise),
-            draw(7, Cause::Drift),
-            draw(7, Cause::Link),
-        ] {
+        for other in [draw(8, Cause::Noise), draw(7, Cause::Drift), draw(7, Cause::Link)] {
             let correlation: f64 =
                 base.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / base.len() as f64;
             // Five standard errors of 1 / sqrt(4000).

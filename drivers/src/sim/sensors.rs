@@ -28,11 +28,7 @@ pub struct Sensors {
 impl Sensors {
     /// The sensors that settings ask for.
     pub fn new(settings: &SimSettings) -> Self {
-        Self {
-            bath: settings.bath,
-            input: settings.input,
-            told: Vec::new(),
-        }
+        Self { bath: settings.bath, input: settings.input, told: Vec::new() }
     }
 
     /// Which there are.

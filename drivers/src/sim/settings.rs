@@ -83,11 +83,7 @@ pub struct SimSettingError {
 
 impl SimSettingError {
     pub(super) fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
-        Self {
-            setting,
-            value: value.to_owned(),
-            choices,
-        }
+        Self { setting, value: value.to_owned(), choices }
     }
 }
 
@@ -156,20 +152,8 @@ macro_rules! words {
     };
 }
 
-words!(
-    SimProfile,
-    "profile",
-    "'lab' or 'ideal'",
-    Lab = "lab",
-    Ideal = "ideal"
-);
-words!(
-    SimClock,
-    "clock",
-    "'nominal' or 'galil'",
-    Nominal = "nominal",
-    Galil = "galil"
-);
+words!(SimProfile, "profile", "'lab' or 'ideal'", Lab = "lab", Ideal = "ideal");
+words!(SimClock, "clock", "'nominal' or 'galil'", Nominal = "nominal", Galil = "galil");
 
 #[cfg(test)]
 mod tests {
@@ -179,14 +163,9 @@ mod tests {
     #[test]
     fn map_has_every_setting_that_is_not_usual() {
         let usual = SimSettings::default().to_map();
-        let usual: Vec<_> = usual
-            .iter()
-            .map(|(key, value)| (key.as_str(), value.as_str()))
-            .collect();
-        assert_eq!(
-            usual,
-            [("clock", "nominal"), ("profile", "lab"), ("seed", "0")]
-        );
+        let usual: Vec<_> =
+            usual.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
+        assert_eq!(usual, [("clock", "nominal"), ("profile", "lab"), ("seed", "0")]);
         let settings = SimSettings {
             profile: "ideal".parse().unwrap(),
             seed: u64::MAX - 3,
@@ -202,10 +181,7 @@ mod tests {
             input: "30".parse().unwrap(),
         };
         let map = settings.to_map();
-        let map: Vec<_> = map
-            .iter()
-            .map(|(key, value)| (key.as_str(), value.as_str()))
-            .collect();
+        let map: Vec<_> = map.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
         let all = [
             ("bath", "37"),
             ("clock", "galil"),

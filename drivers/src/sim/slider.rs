@@ -138,10 +138,7 @@ impl Slider {
     /// Ends a tick: moves the probe, looks at the switches and reports.
     pub fn end_tick(&mut self, tick: u64) -> AxisSample {
         if let Some(motion) = self.motion {
-            self.motion = Some(Motion {
-                is_reported: true,
-                ..motion
-            });
+            self.motion = Some(Motion { is_reported: true, ..motion });
             let since = self.since(motion, tick);
             self.position = motion.course.position(since);
             let speed = motion.course.velocity(since).0;
@@ -161,9 +158,7 @@ impl Slider {
     /// Whether a motion may begin, or why it may not.
     fn check_begin(&self) -> Result<(), Fault> {
         if !self.is_motor_on {
-            return Err(refused(
-                "begin not valid with the motor off, enable it first",
-            ));
+            return Err(refused("begin not valid with the motor off, enable it first"));
         }
         if self.motion.is_some() || self.is_just_ended {
             return Err(refused(
@@ -203,11 +198,7 @@ impl Slider {
         let speed = MmPerS(speed);
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
         self.check_direction(target.distance_from(self.position))?;
-        let made = MoveTo {
-            target_pulses: wanted.target_pulses,
-            speed,
-            acceleration,
-        };
+        let made = MoveTo { target_pulses: wanted.target_pulses, speed, acceleration };
         self.motion = Some(Motion {
             course: Course::Move(Profile::to_rest(self.position, target, speed, acceleration)),
             start_tick: tick,
@@ -219,10 +210,7 @@ impl Slider {
 
     fn start_oscillation(&mut self, tick: u64, wanted: Oscillation) -> Result<Oscillation, Fault> {
         self.check_begin()?;
-        let made = Oscillation {
-            acceleration: acceleration_made(wanted.acceleration)?,
-            ..wanted
-        };
+        let made = Oscillation { acceleration: acceleration_made(wanted.acceleration)?, ..wanted };
         let start = self.pulses_at(self.position);
         let far = made.amplitude_pulses.saturating_mul(2);
         if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
@@ -232,8 +220,7 @@ impl Slider {
             )));
         }
         let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
-        sine.check(MmPerS(self.speed_max), made.acceleration)
-            .map_err(|why| refused(&why))?;
+        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(|why| refused(&why))?;
         self.check_direction(made.amplitude_pulses as f64)?;
         self.motion = Some(Motion {
             course: Course::Sine(sine),
@@ -275,9 +262,7 @@ impl Slider {
 
     fn define(&mut self, pulses: i64) -> Result<(), Fault> {
         if self.motion.is_some() {
-            return Err(refused(
-                "position cannot be defined while the axis moves, stop it first",
-            ));
+            return Err(refused("position cannot be defined while the axis moves, stop it first"));
         }
         if pulses.unsigned_abs() > PULSES_MAX {
             return Err(refused(&format!(
@@ -352,7 +337,5 @@ fn rounded_down(wanted: f64, quantum: f64) -> f64 {
 }
 
 fn refused(detail: &str) -> Fault {
-    Fault::CommandRefused {
-        detail: detail.to_owned(),
-    }
+    Fault::CommandRefused { detail: detail.to_owned() }
 }

@@ -83,10 +83,8 @@ impl Tissue {
     pub fn new(random: &mut Random, settings: &SimSettings) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
         let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.share();
-        let (relaxation, viscosity) = (
-            random.around_one(TIME_SPREAD),
-            random.around_one(TIME_SPREAD),
-        );
+        let (relaxation, viscosity) =
+            (random.around_one(TIME_SPREAD), random.around_one(TIME_SPREAD));
         let thesis = ModifiedKelvin::THESIS;
         Self {
             surface: Position(surface),
@@ -175,9 +173,7 @@ mod tests {
     /// Energy in N*mm put into the tissue along forces over depth.
     fn work(forces: &[(f64, f64)]) -> f64 {
         let pairs = forces.windows(2);
-        pairs
-            .map(|pair| 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0))
-            .sum()
+        pairs.map(|pair| 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0)).sum()
     }
 
     #[test]
@@ -189,12 +185,7 @@ mod tests {
         let turn = 125_000;
         assert_eq!(one[..turn], other[..turn]);
         // After it the softened tissue is nowhere stiffer.
-        assert!(
-            one[turn..]
-                .iter()
-                .zip(&other[turn..])
-                .all(|(a, b)| b.1 <= a.1)
-        );
+        assert!(one[turn..].iter().zip(&other[turn..]).all(|(a, b)| b.1 <= a.1));
         assert!(other[turn + 25_000].1 < 0.8 * one[turn + 25_000].1);
     }
 

@@ -47,9 +47,7 @@ impl<'a> TextConsole<'a> {
 
     /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), DeviceError> {
-        self.link
-            .write(text.as_bytes())
-            .map_err(|err| DeviceError::lost(self.device, &err))
+        self.link.write(text.as_bytes()).map_err(|err| DeviceError::lost(self.device, &err))
     }
 
     /// The next whole line with its arrival; `None` when none comes within a time. Garbled ones are passed over.
@@ -94,14 +92,10 @@ impl<'a> TextConsole<'a> {
     }
 
     fn read(&mut self) -> Result<usize, DeviceError> {
-        let bytes = self
-            .link
-            .read()
-            .map_err(|err| DeviceError::lost(self.device, &err))?;
+        let bytes = self.link.read().map_err(|err| DeviceError::lost(self.device, &err))?;
         let at = self.now();
         self.heard.extend_from_slice(&bytes);
-        self.heard
-            .drain(..self.heard.len().saturating_sub(HEARD_MAX));
+        self.heard.drain(..self.heard.len().saturating_sub(HEARD_MAX));
         for byte in &bytes {
             if let Some(Taken::Line(line)) = self.lines.take(*byte) {
                 self.ready.push_back((at, line));

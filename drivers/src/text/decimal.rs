@@ -31,10 +31,7 @@ impl Decimal {
         if !is_number {
             return None;
         }
-        Some(Self {
-            digits: sign * joined.parse::<i32>().ok()?,
-            decimals: part.len() as u8,
-        })
+        Some(Self { digits: sign * joined.parse::<i32>().ok()?, decimals: part.len() as u8 })
     }
 
     /// What its last digit is worth.

@@ -58,10 +58,7 @@ pub enum DeviceError {
 impl DeviceError {
     /// The link is gone.
     pub(crate) fn lost(device: &'static str, err: &io::Error) -> Self {
-        Self::Lost {
-            device,
-            detail: err.to_string(),
-        }
+        Self::Lost { device, detail: err.to_string() }
     }
 }
 

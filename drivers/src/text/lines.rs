@@ -78,10 +78,7 @@ mod tests {
     fn a_spoiled_line_is_one_garbled_line_and_the_next_is_whole() {
         let long = [vec![b'x'; 3 * LINE_MAX], b"\r\nok\r\n".to_vec()].concat();
         assert_eq!(all(&long), [Taken::Garbled, Taken::Line("ok".into())]);
-        assert_eq!(
-            all(b"1\xff2\r\n3\r\n"),
-            [Taken::Garbled, Taken::Line("3".into())]
-        );
+        assert_eq!(all(b"1\xff2\r\n3\r\n"), [Taken::Garbled, Taken::Line("3".into())]);
         assert!(all(b"half").is_empty());
     }
 }

@@ -33,10 +33,7 @@ impl Answers {
     /// It is not done.
     pub fn refuse(&mut self, number: u64, detail: impl Into<String>) {
         let detail = detail.into();
-        self.answer(
-            number,
-            RigEventBody::Fault(Fault::CommandRefused { detail }),
-        );
+        self.answer(number, RigEventBody::Fault(Fault::CommandRefused { detail }));
     }
 
     /// The next answer, when all before it were given.

@@ -19,11 +19,7 @@ impl CallerTime {
     /// Nobody has asked yet.
     #[must_use]
     pub const fn new(clock: HostClock) -> Self {
-        Self {
-            clock,
-            origin: None,
-            newest: Nanos::ZERO,
-        }
+        Self { clock, origin: None, newest: Nanos::ZERO }
     }
 
     /// The caller asks for what comes until a time of its own: the host's time now, and of that end.

@@ -32,11 +32,8 @@ impl LinkStats {
     /// Takes one measured round trip.
     pub fn push(&mut self, round_trip: Nanos) {
         let sum = self.round_trip_mean.0 as f64 * self.answers as f64 + round_trip.0 as f64;
-        self.round_trip_min = if self.answers == 0 {
-            round_trip
-        } else {
-            self.round_trip_min.min(round_trip)
-        };
+        self.round_trip_min =
+            if self.answers == 0 { round_trip } else { self.round_trip_min.min(round_trip) };
         self.round_trip_max = self.round_trip_max.max(round_trip);
         self.answers += 1;
         self.round_trip_mean = Nanos((sum / self.answers as f64).round() as u64);

@@ -35,11 +35,7 @@ impl HaltHandle {
         standing: Arc<Standing>,
         owner: ThreadId,
     ) -> Self {
-        Self {
-            stops,
-            standing,
-            owner,
-        }
+        Self { stops, standing, owner }
     }
 
     /// How many stops are on the wire.

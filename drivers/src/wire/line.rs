@@ -130,15 +130,7 @@ impl Line {
                 owner.run(&closing);
             })
             .map_err(|err| OpenError::thread(&err))?;
-        Ok(Self {
-            device,
-            stops,
-            commands,
-            standing,
-            reports,
-            is_closing,
-            thread: Some(thread),
-        })
+        Ok(Self { device, stops, commands, standing, reports, is_closing, thread: Some(thread) })
     }
 
     /// What the device is called in the log of raw bytes.
@@ -165,11 +157,7 @@ impl Line {
     #[must_use]
     pub fn halt_handle(&self) -> Option<HaltHandle> {
         let thread = self.thread.as_ref()?.thread().id();
-        Some(HaltHandle::new(
-            self.stops.clone(),
-            Arc::clone(&self.standing),
-            thread,
-        ))
+        Some(HaltHandle::new(self.stops.clone(), Arc::clone(&self.standing), thread))
     }
 
     /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
@@ -282,9 +270,7 @@ fn in_words(err: &io::Error) -> String {
 }
 
 fn lost(detail: impl Into<String>) -> RigEventBody {
-    RigEventBody::Fault(Fault::LinkLost {
-        detail: detail.into(),
-    })
+    RigEventBody::Fault(Fault::LinkLost { detail: detail.into() })
 }
 
 impl<D: Dialogue> Owner<D> {
@@ -305,8 +291,7 @@ impl<D: Dialogue> Owner<D> {
             }
         };
         tracing::warn!("link lost: {ending}");
-        self.events
-            .push(RigEvent::new((self.clock)(), lost(ending)));
+        self.events.push(RigEvent::new((self.clock)(), lost(ending)));
     }
 
     /// Commands, lines, bytes: once.
@@ -325,15 +310,11 @@ impl<D: Dialogue> Owner<D> {
             };
             self.write(line)?;
         }
-        self.standing
-            .written
-            .store(self.stops_taken, Ordering::Release);
+        self.standing.written.store(self.stops_taken, Ordering::Release);
         let now = (self.clock)();
         let wait = self.dialogue.next_at(now).since(now).min(READ_MAX);
         let mut buffer = [0_u8; CHUNK];
-        let count = self
-            .link
-            .read(&mut buffer, Duration::from_nanos(wait.0.max(1)))?;
+        let count = self.link.read(&mut buffer, Duration::from_nanos(wait.0.max(1)))?;
         let now = (self.clock)();
         if count > 0 {
             self.tap(now, false, buffer[..count].to_vec());
@@ -379,12 +360,7 @@ impl<D: Dialogue> Owner<D> {
     }
 
     fn tap(&mut self, at: Nanos, is_sent: bool, bytes: Vec<u8>) {
-        self.raw.push(RawBytes {
-            at,
-            device: Arc::clone(&self.settings.device),
-            is_sent,
-            bytes,
-        });
+        self.raw.push(RawBytes { at, device: Arc::clone(&self.settings.device), is_sent, bytes });
     }
 
     /// Hands over what there is, unless somebody reads at this moment: who is to write a stop waits for no reader.
@@ -395,10 +371,7 @@ impl<D: Dialogue> Owner<D> {
             Err(TryLockError::Poisoned(err)) => err.into_inner(),
             Err(TryLockError::WouldBlock) => return,
         };
-        reports.stats = LinkStats {
-            is_real_time: self.is_real_time,
-            ..self.dialogue.stats()
-        };
+        reports.stats = LinkStats { is_real_time: self.is_real_time, ..self.dialogue.stats() };
         if std::mem::take(&mut reports.is_attended) {
             self.dialogue.attended((self.clock)());
         }

@@ -48,9 +48,7 @@ impl Dialogue for Notes {
                 (self.fails)();
                 panic!("a driver that fails");
             }
-            let ack = palpate_model::rig::Ack {
-                command: RigCommand::Stop,
-            };
+            let ack = palpate_model::rig::Ack { command: RigCommand::Stop };
             self.events.push_back((now, RigEventBody::Ack(ack)));
         }
     }
@@ -102,10 +100,7 @@ fn clock() -> HostClock {
 }
 
 fn settings() -> LineSettings {
-    LineSettings {
-        device: "controller".into(),
-        farewell: b"bye".to_vec(),
-    }
+    LineSettings { device: "controller".into(), farewell: b"bye".to_vec() }
 }
 
 /// Generous: a computer with much else to do.
@@ -129,11 +124,7 @@ fn stops_overtake_what_waits() {
     let (waits, waiting) = sync_channel(1);
     let notes = Notes::default();
     let heard = Arc::clone(&notes.heard);
-    let gate = Gate {
-        inner: here,
-        waits,
-        go_on,
-    };
+    let gate = Gate { inner: here, waits, go_on };
     let mut line = Line::start(Box::new(gate), notes, &clock(), settings()).unwrap();
     waiting.recv().unwrap();
     let define = RigCommand::DefinePosition { pulses: 3 };
@@ -143,23 +134,13 @@ fn stops_overtake_what_waits() {
     drop(release);
     assert_eq!(read(&mut there, 17), b"Halt\rEnableMotor\r");
     let heard = heard.lock().unwrap().clone();
-    assert_eq!(
-        heard,
-        [
-            "overtaken DefinePosition { pulses: 3 }",
-            "Halt",
-            "EnableMotor"
-        ]
-    );
+    assert_eq!(heard, ["overtaken DefinePosition { pulses: 3 }", "Halt", "EnableMotor"]);
     let mut raw = line.take_raw();
     while raw.is_empty() {
         std::thread::yield_now();
         raw = line.take_raw();
     }
-    assert!(
-        raw.iter()
-            .all(|piece| piece.is_sent && &*piece.device == "controller")
-    );
+    assert!(raw.iter().all(|piece| piece.is_sent && &*piece.device == "controller"));
     drop(line);
     assert_eq!(read(&mut there, 3), b"bye");
 }
@@ -193,10 +174,7 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
     }
     drop(there);
     let last = line.next_event(late, WAIT).unwrap();
-    assert!(
-        matches!(&last.body, RigEventBody::Fault(Fault::LinkLost { .. })),
-        "{last:?}"
-    );
+    assert!(matches!(&last.body, RigEventBody::Fault(Fault::LinkLost { .. })), "{last:?}");
     // Nobody waits for what will not come.
     assert_eq!(line.next_event(late, Duration::from_secs(600)), None);
 }
@@ -204,17 +182,11 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
 #[test]
 fn a_driver_that_fails_is_a_lost_link() {
     let (here, mut there) = super::super::pair();
-    let notes = Notes {
-        fails_at: Some(b'!'),
-        ..Notes::default()
-    };
+    let notes = Notes { fails_at: Some(b'!'), ..Notes::default() };
     let line = Line::start(Box::new(here), notes, &clock(), settings()).unwrap();
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
-    assert!(matches!(
-        last.body,
-        RigEventBody::Fault(Fault::LinkLost { .. })
-    ));
+    assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
     // Nobody else has the link: its farewell stops what moves.
     assert_eq!(read(&mut there, 3), b"bye");
 }

@@ -27,14 +27,8 @@ pub struct MemoryLink {
 #[must_use]
 pub fn pair() -> (MemoryLink, MemoryLink) {
     let (one, other) = (Shared::default(), Shared::default());
-    let first = MemoryLink {
-        incoming: Arc::clone(&one),
-        outgoing: Arc::clone(&other),
-    };
-    let second = MemoryLink {
-        incoming: other,
-        outgoing: one,
-    };
+    let first = MemoryLink { incoming: Arc::clone(&one), outgoing: Arc::clone(&other) };
+    let second = MemoryLink { incoming: other, outgoing: one };
     (first, second)
 }
 

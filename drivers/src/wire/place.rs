@@ -95,16 +95,8 @@ impl Place {
     /// Opens it. Two programs cannot have one serial port.
     pub fn open(&self) -> Result<Box<dyn Link>, WireError> {
         match self {
-            Self::Serial {
-                port,
-                baud,
-                has_handshake,
-            } => {
-                let flow = if *has_handshake {
-                    FlowControl::Hardware
-                } else {
-                    FlowControl::None
-                };
+            Self::Serial { port, baud, has_handshake } => {
+                let flow = if *has_handshake { FlowControl::Hardware } else { FlowControl::None };
                 let opened: Box<dyn SerialPort> = serialport::new(port, *baud)
                     .flow_control(flow)
                     .timeout(Duration::from_millis(1))
@@ -113,10 +105,8 @@ impl Place {
                 Ok(Box::new(SerialLink::new(opened)))
             }
             Self::Tcp(address) => {
-                let wrong = |detail: String| WireError::Address {
-                    address: address.clone(),
-                    detail,
-                };
+                let wrong =
+                    |detail: String| WireError::Address { address: address.clone(), detail };
                 let resolved = address
                     .to_socket_addrs()
                     .map_err(|err| wrong(err.to_string()))?
@@ -138,23 +128,16 @@ fn port_error(port: &str, err: &serialport::Error) -> WireError {
     use serialport::ErrorKind as Kind;
     let port = port.to_owned();
     match err.kind() {
-        Kind::Io(ErrorKind::NotFound) => WireError::Missing {
-            port,
-            present: present(),
-        },
+        Kind::Io(ErrorKind::NotFound) => WireError::Missing { port, present: present() },
         Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
         Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
         // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
         // port"; on Windows a missing port has it too, with other words.
         Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
-        Kind::NoDevice if !std::path::Path::new(&port).exists() => WireError::Missing {
-            port,
-            present: present(),
-        },
-        _ => WireError::Port {
-            port,
-            detail: err.to_string(),
-        },
+        Kind::NoDevice if !std::path::Path::new(&port).exists() => {
+            WireError::Missing { port, present: present() }
+        }
+        _ => WireError::Port { port, detail: err.to_string() },
     }
 }
 
@@ -175,11 +158,7 @@ mod tests {
     use super::*;
 
     fn serial(port: &str) -> WireError {
-        let place = Place::Serial {
-            port: port.into(),
-            baud: 115_200,
-            has_handshake: false,
-        };
+        let place = Place::Serial { port: port.into(), baud: 115_200, has_handshake: false };
         let Err(err) = place.open() else {
             panic!("{port} was opened");
         };

@@ -22,12 +22,7 @@ pub struct TappedLink<'a> {
 impl<'a> TappedLink<'a> {
     /// Notes what goes over a link; `device` is what the log calls who is behind it.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
-        Self {
-            link,
-            clock,
-            device: Arc::clone(device),
-            raw: Vec::new(),
-        }
+        Self { link, clock, device: Arc::clone(device), raw: Vec::new() }
     }
 
     /// The host's clock.

@@ -2,11 +2,7 @@
 //!
 //! The system goes in and out again and again; in every round it is held beside the same system started afresh. Ends with
 //! exit code 1 where anything differs or is no number.
-#![allow(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "an example speaks to its user"
-)]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example speaks to its user")]
 
 use palpate_haptics::{
     Flags, Input, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, Snapshot,
@@ -51,10 +47,8 @@ fn fresh(settings: &MasterSlaveSettings) -> Result<Snapshot, MasterSlaveError> {
 }
 
 fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
-    let settings = MasterSlaveSettings::of(LawSettings::of::<3>(
-        ModifiedKelvin::THESIS,
-        Period::MILLISECOND,
-    ));
+    let settings =
+        MasterSlaveSettings::of(LawSettings::of::<3>(ModifiedKelvin::THESIS, Period::MILLISECOND));
     let wanted = fresh(&settings)?;
     let mut system = MasterSlave::new(&settings)?;
     let mut worst = 0.0f64;
@@ -62,9 +56,7 @@ fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
     for i in 0..ticks {
         let one = tick(&mut system, i % ROUND);
         is_right &= one.force.is_finite() && one.energy.is_finite() && one.bias.is_finite();
-        is_right &= !one
-            .flags
-            .has_any(Flags::NO_FORCE | Flags::DEPTH_NAN | Flags::PULSE_RATE);
+        is_right &= !one.flags.has_any(Flags::NO_FORCE | Flags::DEPTH_NAN | Flags::PULSE_RATE);
         if i % ROUND == MOVING / 2 && i > ROUND {
             let off = (one.model.0 / wanted.model.0 - 1.0).abs();
             worst = worst.max(off);
@@ -86,10 +78,7 @@ fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
 }
 
 fn main() -> ExitCode {
-    let ticks = std::env::args()
-        .nth(1)
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(100_000_000);
+    let ticks = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(100_000_000);
     match soak(ticks) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {

@@ -54,20 +54,14 @@ impl Case {
     fn tool(self, n: usize, tick: usize) -> (Node, f64) {
         let middle = (n / 2) as f64;
         let depth = SHEAR * middle;
-        let node = |column: f64, row: f64| Node {
-            column: column as u16,
-            row: row as u16,
-        };
+        let node = |column: f64, row: f64| Node { column: column as u16, row: row as u16 };
         match self {
             Self::Lasting => (node(middle, middle), -depth),
             Self::Whole => (node(middle, middle), -2.0 * depth),
             Self::Moving => {
                 let (sin, cos) = (TAU * tick as f64 * TICK * 2.0).sin_cos();
                 let radius = 0.5 * middle;
-                (
-                    node(middle + radius * cos, middle + radius * sin),
-                    -0.1 * depth,
-                )
+                (node(middle + radius * cos, middle + radius * sin), -0.1 * depth)
             }
         }
     }
@@ -177,11 +171,7 @@ fn main() {
             }
             let naive = measure_naive(n, case, (few / NAIVE_SHARE).max(5));
             for method in Method::ALL {
-                let ticks = if method == Method::Envelope {
-                    ticks
-                } else {
-                    few
-                };
+                let ticks = if method == Method::Envelope { ticks } else { few };
                 let rate = measure(n, case, method, ticks.max(10));
                 println!("    {:.0} times naive", rate / naive);
             }

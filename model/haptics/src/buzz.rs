@@ -18,10 +18,7 @@ impl BuzzSettings {
     /// tell: the energy does.
     #[must_use]
     pub fn of(count_mm: f64) -> Self {
-        Self {
-            frequency_hz: 8.0,
-            swing_mm: 2.0 * count_mm,
-        }
+        Self { frequency_hz: 8.0, swing_mm: 2.0 * count_mm }
     }
 }
 
@@ -81,11 +78,7 @@ impl BuzzDetector {
         if !at.is_finite() {
             return self.buzz();
         }
-        let way = if self.inward {
-            at - self.extreme.0
-        } else {
-            self.extreme.0 - at
-        };
+        let way = if self.inward { at - self.extreme.0 } else { self.extreme.0 - at };
         if way > 0.0 {
             self.extreme = (at, self.tick, energy);
         } else if -way >= self.swing {

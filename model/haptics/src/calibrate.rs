@@ -121,21 +121,13 @@ impl Sums {
         let (low, high) = (&self.sums[from], &self.sums[to]);
         let part: [f64; 5] = std::array::from_fn(|k| high[k] - low[k]);
         let (u, f) = (part[0] / n, part[1] / n);
-        let central = [
-            part[2] - n * u * u,
-            part[3] - n * u * f,
-            part[4] - n * f * f,
-        ];
+        let central = [part[2] - n * u * u, part[3] - n * u * f, part[4] - n * f * f];
         (n, [u, f], central)
     }
 
     /// Sum of squares about the mean.
     fn flat(&self, from: usize, to: usize) -> f64 {
-        if to > from {
-            self.stretch(from, to).2[2].max(0.0)
-        } else {
-            0.0
-        }
+        if to > from { self.stretch(from, to).2[2].max(0.0) } else { 0.0 }
     }
 
     /// Sum of squares about the line.
@@ -184,13 +176,8 @@ impl Branch {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Sums of squares of centred numbers keep their digits.
         let n = points.len().max(1) as f64;
-        let middle = points
-            .iter()
-            .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-        let centred: Vec<_> = points
-            .iter()
-            .map(|p| (p.0 - middle.0, p.1 - middle.1))
-            .collect();
+        let middle = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+        let centred: Vec<_> = points.iter().map(|p| (p.0 - middle.0, p.1 - middle.1)).collect();
         // Places to cut are looked for among so many means at most: their pairs are what takes time.
         let each = centred.len().div_ceil(PLACES).max(1);
         let means: Vec<_> = centred.chunks(each).map(mean).collect();
@@ -221,9 +208,7 @@ impl Branch {
 
 fn mean(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len() as f64;
-    let sum = points
-        .iter()
-        .fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    let sum = points.iter().fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
     (sum.0 / n, sum.1 / n)
 }
 
@@ -252,17 +237,10 @@ impl BiasCalibration {
         }
         let slope = if uu > 0.0 { uf / uu } else { 0.0 };
         let residual = ((ff - slope * uf).max(0.0) / free).sqrt();
-        let slope_error = if uu > 0.0 {
-            residual / uu.sqrt()
-        } else {
-            f64::INFINITY
-        };
+        let slope_error = if uu > 0.0 { residual / uu.sqrt() } else { f64::INFINITY };
         // Four standard errors: by chance once in 30 000 calibrations.
         if slope <= 4.0 * slope_error {
-            return Err(BiasError::Flat {
-                slope,
-                error: slope_error,
-            });
+            return Err(BiasError::Flat { slope, error: slope_error });
         }
         Ok(Self {
             slope,
@@ -277,8 +255,7 @@ impl BiasCalibration {
     /// By how much the way down is above the way up, in N: twice the friction.
     #[must_use]
     pub fn hysteresis(&self) -> Option<Newtons> {
-        self.falling
-            .map(|one| Newtons(one.offset - self.rising.offset))
+        self.falling.map(|one| Newtons(one.offset - self.rising.offset))
     }
 
     /// Bias voltage at which force begins on the way up: the end of the dead band.
@@ -290,10 +267,8 @@ impl BiasCalibration {
 
     /// The bias voltage for a force on the way up, between the ends of the line.
     pub fn bias_for(&self, force: Newtons) -> Result<Volts, BiasError> {
-        let [from, to] = self
-            .rising
-            .line
-            .map(|bias| Newtons(self.rising.offset + self.slope * bias.0));
+        let [from, to] =
+            self.rising.line.map(|bias| Newtons(self.rising.offset + self.slope * bias.0));
         // Written so that NaN is beyond.
         if !(force >= from && force <= to) {
             return Err(BiasError::Beyond { force, from, to });

@@ -98,12 +98,7 @@ impl CheckSettings {
             ("depth", self.depth.0, "mm"),
             ("samples", self.samples_hz, "Hz"),
         ];
-        let refusal = |name, value, unit, should| CheckError::Setting {
-            name,
-            value,
-            unit,
-            should,
-        };
+        let refusal = |name, value, unit, should| CheckError::Setting { name, value, unit, should };
         for (name, value, unit) in above {
             if !(value > 0.0 && value.is_finite()) {
                 let should = "it is a finite number above zero";
@@ -140,12 +135,7 @@ pub struct CheckSample {
 
 /// A slider as a hand: so stiff that 10 N give way by 0.1 mm, damped to a tenth over the mass it is and moves.
 fn slider(path: HandPath) -> Hand {
-    Hand {
-        mass_kg: 0.5,
-        stiffness: 100.0,
-        damping: 0.2,
-        path,
-    }
+    Hand { mass_kg: 0.5, stiffness: 100.0, damping: 0.2, path }
 }
 
 /// Runs a check on the simulated master and gives each sample to `seen`, in order; `progress` hears the share done.
@@ -155,11 +145,7 @@ pub fn check(
     mut progress: impl FnMut(f64),
 ) -> Result<(), CheckError> {
     let seconds = settings.seconds()?;
-    let path = HandPath::RampHold {
-        from: 0.0,
-        to: settings.depth.0,
-        speed: settings.speed.0,
-    };
+    let path = HandPath::RampHold { from: 0.0, to: settings.depth.0, speed: settings.speed.0 };
     let mut all = SimulationSettings::of(settings.body, settings.period, slider(path));
     all.system.torque = settings.torque();
     let mut simulation = Simulation::new(&all)?;
@@ -192,10 +178,5 @@ pub fn check(
 #[must_use]
 pub fn calibration_points(samples: &[CheckSample], until: Seconds) -> Vec<BiasPoint> {
     let ramp = samples.iter().filter(|one| one.t <= until);
-    ramp.map(|one| BiasPoint {
-        bias: one.bias,
-        force: one.measured,
-        is_rising: true,
-    })
-    .collect()
+    ramp.map(|one| BiasPoint { bias: one.bias, force: one.measured, is_rising: true }).collect()
 }

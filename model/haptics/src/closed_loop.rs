@@ -119,11 +119,7 @@ impl Plant {
     pub fn lead(&mut self, to: f64, speed: MmPerS) {
         let from = self.settings.hand.path.at(self.path_time());
         self.begun = self.tick;
-        self.settings.hand.path = HandPath::RampHold {
-            from,
-            to,
-            speed: speed.0,
-        };
+        self.settings.hand.path = HandPath::RampHold { from, to, speed: speed.0 };
     }
 
     /// How long the hand has been on its path at the begin of a tick, in s.
@@ -216,10 +212,7 @@ impl Plant {
                     -motor.torque(self.motor.amps) / pinion.radius_mm()
                 }
             };
-            let forces = RackForces {
-                motor,
-                hand: [0.5 * (early + late), (late - early) / dt],
-            };
+            let forces = RackForces { motor, hand: [0.5 * (early + late), (late - early) / dt] };
             self.hand_force = self.rack.step(&forces, &settings.hand, dt);
             self.motor_force = motor;
         }

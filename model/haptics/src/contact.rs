@@ -33,10 +33,7 @@ impl ContactSettings {
     /// more than the noise is wide.
     #[must_use]
     pub fn above_noise(sigma: Newtons) -> Self {
-        Self {
-            on: Newtons(12.0 * sigma.0),
-            off: Newtons(4.0 * sigma.0),
-        }
+        Self { on: Newtons(12.0 * sigma.0), off: Newtons(4.0 * sigma.0) }
     }
 
     /// Itself if contact can end.
@@ -62,11 +59,7 @@ impl ContactDetector {
     /// Not touching.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        Self {
-            settings,
-            is_touching: false,
-            changes: 0,
-        }
+        Self { settings, is_touching: false, changes: 0 }
     }
 
     /// Whether it touches.

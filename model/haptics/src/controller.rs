@@ -80,11 +80,7 @@ impl PassivityController {
         let clamped = inertia(settings.mass_kg) / tick_s * 2.0 * turn.sin();
         Self {
             observer: PassivityObserver::late(settings.delay_ticks),
-            damping_max: if settings.is_clamped {
-                clamped.max(0.0)
-            } else {
-                f64::MAX
-            },
+            damping_max: if settings.is_clamped { clamped.max(0.0) } else { f64::MAX },
             force_max: settings.force_max.0.max(0.0),
             kept: (-tick_s / settings.leak.0.max(tick_s)).exp(),
             tick_s,
@@ -151,12 +147,7 @@ impl PassivityController {
         let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
         let total = wanted + added;
         self.observer.hold(total);
-        ControllerTick {
-            force: Newtons(total),
-            damping,
-            energy,
-            flags,
-        }
+        ControllerTick { force: Newtons(total), damping, energy, flags }
     }
 
     /// The force that reaches the device after all, where a later bound changed it.
@@ -170,10 +161,7 @@ mod tests {
     use super::*;
 
     fn controller(is_clamped: bool) -> PassivityController {
-        let settings = ControllerSettings {
-            is_clamped,
-            ..ControllerSettings::of(0.115)
-        };
+        let settings = ControllerSettings { is_clamped, ..ControllerSettings::of(0.115) };
         PassivityController::new(&settings, Period::MILLISECOND)
     }
 

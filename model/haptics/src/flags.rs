@@ -112,9 +112,7 @@ mod tests {
 
     #[test]
     fn every_fact_has_its_own_bit_and_words() {
-        let all = Flags::ALL
-            .iter()
-            .fold(Flags::NONE, |all, (flag, _)| all | *flag);
+        let all = Flags::ALL.iter().fold(Flags::NONE, |all, (flag, _)| all | *flag);
         assert_eq!(all.bits().count_ones() as usize, Flags::ALL.len());
         assert_eq!(all.sentences().count(), Flags::ALL.len());
         let some = Flags::PULL | Flags::SLEW;

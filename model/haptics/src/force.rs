@@ -137,10 +137,7 @@ enum Schemes<R> {
 
 impl<R: Real> Schemes<R> {
     fn new(scheme: Scheme, body: &SeriesBody<N>, dt: f64, depth: f64) -> Self {
-        let start = Start {
-            depth: R::of(depth),
-            force: None,
-        };
+        let start = Start { depth: R::of(depth), force: None };
         match scheme {
             Scheme::ExplicitEuler => Self::ExplicitEuler(Stepped::at_any_step(body, dt, start)),
             Scheme::ImplicitEuler => Self::ImplicitEuler(Stepped::at_any_step(body, dt, start)),
@@ -221,12 +218,9 @@ impl ForceLaw {
         let model = match &mut self.stepper {
             Stepper::F64(schemes) => schemes.step(to),
             Stepper::F32(schemes) => schemes.step(to),
-            Stepper::Instant { speed_per_move } => Ok(instant(
-                &self.settings.body,
-                *speed_per_move,
-                self.depth,
-                to,
-            )),
+            Stepper::Instant { speed_per_move } => {
+                Ok(instant(&self.settings.body, *speed_per_move, self.depth, to))
+            }
         };
         let model = match model {
             Ok(force) if force.is_finite() => {
@@ -274,10 +268,7 @@ fn stepper(settings: &LawSettings, depth: f64) -> Result<Stepper, LawError> {
     let dt = settings.period.seconds().0;
     // So short a memory is over before any number of ticks can tell.
     if body.tau_eps >= 0.0 && (dt / body.tau_eps).is_infinite() {
-        let checked = SeriesBody {
-            tau_eps: 1.0,
-            ..*body
-        };
+        let checked = SeriesBody { tau_eps: 1.0, ..*body };
         checked.checked().map_err(IntegratorError::from)?;
         let speed_per_move = 1.0 / dt;
         return Ok(Stepper::Instant { speed_per_move });

@@ -90,10 +90,7 @@ impl Ramp {
     /// The gain of the next tick, and whether it still rises.
     fn tick(&mut self) -> (f64, bool) {
         self.done = (self.done + 1).min(self.length);
-        (
-            self.done as f64 / self.length as f64,
-            self.done < self.length,
-        )
+        (self.done as f64 / self.length as f64, self.done < self.length)
     }
 }
 
@@ -159,11 +156,7 @@ impl ForceGuard {
             | Flags::CONTACT_RAMP.when(contacts && is_touching)
             | Flags::NO_CONTACT.when(!is_touching)
             | Flags::NO_FORCE.when(force.0.is_nan());
-        let wanted = if is_touching && !force.0.is_nan() {
-            force.0
-        } else {
-            0.0
-        };
+        let wanted = if is_touching && !force.0.is_nan() { force.0 } else { 0.0 };
         let bounded = wanted.clamp(-self.force_max, self.force_max);
         flags |= Flags::FORCE_MAX.when(bounded != wanted);
         let risen = bounded * start.min(contact);
@@ -173,10 +166,7 @@ impl ForceGuard {
         let reached = target.clamp(self.last - self.change_max, self.last + self.change_max);
         flags |= Flags::SLEW.when(reached != target);
         self.last = reached;
-        GuardTick {
-            force: Newtons(reached),
-            flags,
-        }
+        GuardTick { force: Newtons(reached), flags }
     }
 }
 
@@ -194,11 +184,8 @@ mod tests {
         let wild = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -0.0];
         let mut last = 0.0;
         for i in 0..200_000 {
-            let force = if i % 11 == 0 {
-                wild[random.below(wild.len())]
-            } else {
-                20.0 * random.normal()
-            };
+            let force =
+                if i % 11 == 0 { wild[random.below(wild.len())] } else { 20.0 * random.normal() };
             let elapsed = [0, 1, 1, 1, 1, 1, 1, 30, u64::MAX][random.below(9)];
             let one = guard.tick(Newtons(force), random.below(3) > 0, elapsed);
             // The product of the limit and a tick, to rounding of 10 N.

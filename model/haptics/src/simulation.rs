@@ -36,11 +36,7 @@ impl SimulationSettings {
             hand,
             ..PlantSettings::bare(period)
         };
-        Self {
-            system,
-            plant,
-            specimen: body,
-        }
+        Self { system, plant, specimen: body }
     }
 
     /// The thesis body as it buzzes, or not: pressed to 25 mm by a firm grip that wants to 30, on a current drive without
@@ -49,16 +45,9 @@ impl SimulationSettings {
     /// voltage drive, which brings 17.6 N s/m and 0.8 N of friction, it is calm at that depth by itself.
     #[must_use]
     pub fn buzz(is_guarded: bool) -> Self {
-        let path = HandPath::RampHold {
-            from: 0.0,
-            to: 30.0,
-            speed: 50.0,
-        };
+        let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
         // Less damping than a firm grip has when it is asked to calm something.
-        let hand = Hand {
-            damping: 0.002,
-            ..Hand::firm(path)
-        };
+        let hand = Hand { damping: 0.002, ..Hand::firm(path) };
         let mut all = Self::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
         let (delay, damping) = (2, 0.5e-3);
         all.plant.friction = [0.0; 2];
@@ -185,13 +174,7 @@ impl Simulation {
     /// One tick with a slave elsewhere, whose cell felt this last, and with force only if it is wanted.
     pub fn tick_with(&mut self, cell: Newtons, is_on: bool) -> SimulationTick {
         let Sensed { counts, .. } = self.plant.sense();
-        let input = Input {
-            counts,
-            elapsed: self.away + 1,
-            cell,
-            slave_pulses: None,
-            is_on,
-        };
+        let input = Input { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
         self.away = 0;
         self.last = self.system.tick(&input);
         self.command = Command::Drive(self.torque.drive(self.last.bias));

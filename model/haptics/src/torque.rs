@@ -55,10 +55,7 @@ impl Default for TorqueSettings {
             pinion: Pinion::default(),
             motor: Motor::SOURCE,
             drive: DriveKind::Voltage { gain: 1.0 },
-            converter: Converter {
-                volts_max: 10.0,
-                bits: Some(12),
-            },
+            converter: Converter { volts_max: 10.0, bits: Some(12) },
             friction_share: 0.0,
         }
     }
@@ -89,25 +86,15 @@ impl TorqueSettings {
             ("gain", gain),
             ("largest bias voltage", self.converter.volts_max),
         ];
-        let wrong = numbers
-            .into_iter()
-            .find(|(_, value)| !(*value > 0.0 && value.is_finite()));
+        let wrong = numbers.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()));
         if let Some((name, value)) = wrong {
-            return Err(TorqueError {
-                name,
-                value,
-                should: above,
-            });
+            return Err(TorqueError { name, value, should: above });
         }
         let bits = self.converter.bits.unwrap_or(12);
         if !(1..=32).contains(&bits) {
             let value = f64::from(bits);
             let should = "it is from 1 to 32";
-            return Err(TorqueError {
-                name: "bits",
-                value,
-                should,
-            });
+            return Err(TorqueError { name: "bits", value, should });
         }
         if !(0.0..=1.0).contains(&self.friction_share) {
             return Err(TorqueError {
@@ -190,11 +177,7 @@ impl TorqueSettings {
         };
         let flags = Flags::SATURATED.when(within != volts)
             | Flags::CONTINUOUS.when(torque.abs() > self.motor.continuous);
-        TorqueTick {
-            torque,
-            bias: Volts(bias),
-            flags,
-        }
+        TorqueTick { torque, bias: Volts(bias), flags }
     }
 }
 
@@ -226,10 +209,8 @@ mod tests {
         assert_eq!(tick.flags, Flags::CONTINUOUS);
         let tick = voltage.tick(Newtons(60.0), MmPerS(0.0));
         assert!(tick.flags.has(Flags::SATURATED) && tick.bias.0 == 10.0);
-        let current = TorqueSettings {
-            drive: DriveKind::Current { amps_per_volt: 1.0 },
-            ..voltage
-        };
+        let current =
+            TorqueSettings { drive: DriveKind::Current { amps_per_volt: 1.0 }, ..voltage };
         assert_eq!(current.damping(), 0.0);
         assert_eq!(current.drive(Volts(2.0)), Drive::Current(2.0));
     }
@@ -248,36 +229,20 @@ mod tests {
 
     #[test]
     fn compensation_helps_the_motion_either_way_and_not_at_rest() {
-        let settings = TorqueSettings {
-            friction_share: 0.5,
-            ..TorqueSettings::default()
-        };
+        let settings = TorqueSettings { friction_share: 0.5, ..TorqueSettings::default() };
         let torque = |speed: f64| settings.tick(Newtons(2.0), MmPerS(speed)).torque;
         assert!((torque(1.0) - (20.0 - 4.05)).abs() < 1e-12);
         assert!((torque(-1.0) - (20.0 + 4.05)).abs() < 1e-12);
         assert_eq!((torque(0.0), torque(f64::NAN)), (20.0, 20.0));
-        assert_eq!(
-            settings.tick(Newtons(f64::NAN), MmPerS(0.0)).bias,
-            Volts(0.0)
-        );
+        assert_eq!(settings.tick(Newtons(f64::NAN), MmPerS(0.0)).bias, Volts(0.0));
     }
 
     #[test]
     fn what_cannot_drive_is_refused() {
-        let bad = TorqueSettings {
-            friction_share: 1.1,
-            ..TorqueSettings::default()
-        };
-        assert!(
-            bad.checked()
-                .unwrap_err()
-                .to_string()
-                .contains("from 0 to 1")
-        );
-        let bad = TorqueSettings {
-            drive: DriveKind::Voltage { gain: 0.0 },
-            ..TorqueSettings::default()
-        };
+        let bad = TorqueSettings { friction_share: 1.1, ..TorqueSettings::default() };
+        assert!(bad.checked().unwrap_err().to_string().contains("from 0 to 1"));
+        let bad =
+            TorqueSettings { drive: DriveKind::Voltage { gain: 0.0 }, ..TorqueSettings::default() };
         assert!(bad.checked().unwrap_err().to_string().contains("gain = 0"));
     }
 }

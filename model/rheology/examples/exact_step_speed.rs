@@ -22,9 +22,7 @@ const DT: f64 = 1e-3;
 
 /// The thesis protocol at 1 kHz, over and over.
 fn depths<R: Real>(count: usize) -> Vec<R> {
-    (0..count)
-        .map(|i| R::of((0.75 * DT * (i % 90_001) as f64).min(30.0)))
-        .collect()
+    (0..count).map(|i| R::of((0.75 * DT * (i % 90_001) as f64).min(30.0))).collect()
 }
 
 /// Seconds of the fastest of some rounds, over `per`.
@@ -70,10 +68,7 @@ fn main() {
     });
     println!("{ns:>8.2}  any step, the thesis body");
     let model = families::by_key("series-3").map(|family| {
-        family.model(
-            &[body.tau_eps],
-            &[body.mu[0], body.mu[1], body.mu[2], body.tau_sig],
-        )
+        family.model(&[body.tau_eps], &[body.mu[0], body.mu[1], body.mu[2], body.tau_sig])
     });
     if let Ok(Ok(model)) = model
         && let Ok(start) = model.at_rest_from(Depth(0.0))
@@ -94,8 +89,5 @@ fn main() {
         }
         black_box(&mut forces);
     });
-    println!(
-        "{ns:>8.2}  memory alone: 16 bytes a sample at {:.1} GB/s",
-        16.0 / ns
-    );
+    println!("{ns:>8.2}  memory alone: 16 bytes a sample at {:.1} GB/s", 16.0 / ns);
 }

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
         return Err(
-            "give the curve and the picture to write: master_curve CURVE.csv OUT.svg".into(),
+            "give the curve and the picture to write: master_curve CURVE.csv OUT.svg".into()
         );
     };
     let curve = read(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
@@ -46,11 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (tau, modulus) in taus.iter().zip(&fixed.linear[1..]) {
         println!("  {tau:.0e} s  {:.6e}", modulus / sum);
     }
-    println!(
-        "{:3} terms laid down: rms {:.3} MPa",
-        taus.len(),
-        rms(&fixed, &samples)?
-    );
+    println!("{:3} terms laid down: rms {:.3} MPa", taus.len(), rms(&fixed, &samples)?);
     let mut ladder = Vec::new();
     let mut best = fixed.clone();
     for terms in FREE {
@@ -97,13 +93,8 @@ fn relaxation(curve: &[(f64, f64)]) -> Vec<FitSample> {
         force: Newtons(force),
         sigma: Newtons(sigma),
     };
-    let step = [
-        sample(0.0, 0.0, 0.0, f64::INFINITY),
-        sample(STEP, 1.0, 0.0, f64::INFINITY),
-    ];
-    let held = curve
-        .iter()
-        .map(|&(t, modulus)| sample(t, 1.0, modulus, 1.0));
+    let step = [sample(0.0, 0.0, 0.0, f64::INFINITY), sample(STEP, 1.0, 0.0, f64::INFINITY)];
+    let held = curve.iter().map(|&(t, modulus)| sample(t, 1.0, modulus, 1.0));
     step.into_iter().chain(held).collect()
 }
 
@@ -130,34 +121,14 @@ fn picture(
          font-family=\"sans-serif\" font-size=\"13\">\n\
          <rect width=\"930\" height=\"380\" fill=\"white\"/>\n",
     );
-    let axes = Axes {
-        panel: LEFT_PANEL,
-        x: (-3.0, 29.0),
-        y: (0.0, 1800.0),
-    };
+    let axes = Axes { panel: LEFT_PANEL, x: (-3.0, 29.0), y: (0.0, 1800.0) };
     axes.draw(
         &mut svg,
-        [
-            "Master curve (dots) and both series",
-            "log10 of time in s",
-            "MPa",
-        ],
-        [
-            &[0.0, 5.0, 10.0, 15.0, 20.0, 25.0],
-            &[0.0, 500.0, 1000.0, 1500.0],
-        ],
+        ["Master curve (dots) and both series", "log10 of time in s", "MPa"],
+        [&[0.0, 5.0, 10.0, 15.0, 20.0, 25.0], &[0.0, 500.0, 1000.0, 1500.0]],
     )?;
-    for sample in samples
-        .iter()
-        .filter(|sample| sample.is_measured())
-        .step_by(4)
-    {
-        axes.dot(
-            &mut svg,
-            (sample.t.0.log10(), sample.force.0),
-            "#999999",
-            2.5,
-        )?;
+    for sample in samples.iter().filter(|sample| sample.is_measured()).step_by(4) {
+        axes.dot(&mut svg, (sample.t.0.log10(), sample.force.0), "#999999", 2.5)?;
     }
     for (model, colour, style) in [(best, BLUE, ""), (fixed, RED, "stroke-dasharray=\"4 5\"")] {
         let forces = model.along(samples.iter().map(|sample| (sample.t, sample.depth)))?;
@@ -170,23 +141,9 @@ fn picture(
         axes.line(&mut svg, &line, colour, style)?;
     }
     let (terms, laid) = (best.outer.len(), fixed.outer.len());
-    axes.text(
-        &mut svg,
-        (-1.0, 420.0),
-        BLUE,
-        &format!("{terms} terms, times fitted"),
-    )?;
-    axes.text(
-        &mut svg,
-        (-1.0, 280.0),
-        RED,
-        &format!("{laid} terms, one to a decade"),
-    )?;
-    let axes = Axes {
-        panel: RIGHT_PANEL,
-        x: (0.0, 32.0),
-        y: (-0.5, 2.5),
-    };
+    axes.text(&mut svg, (-1.0, 420.0), BLUE, &format!("{terms} terms, times fitted"))?;
+    axes.text(&mut svg, (-1.0, 280.0), RED, &format!("{laid} terms, one to a decade"))?;
+    let axes = Axes { panel: RIGHT_PANEL, x: (0.0, 32.0), y: (-0.5, 2.5) };
     axes.draw(
         &mut svg,
         ["What each term buys", "terms", "rms in MPa"],
@@ -199,12 +156,7 @@ fn picture(
     for &(terms, rms) in ladder {
         axes.dot(&mut svg, (terms, rms.log10()), BLUE, 4.0)?;
     }
-    axes.dot(
-        &mut svg,
-        (laid as f64, rms(fixed, samples)?.log10()),
-        RED,
-        5.0,
-    )?;
+    axes.dot(&mut svg, (laid as f64, rms(fixed, samples)?.log10()), RED, 5.0)?;
     axes.text(&mut svg, (16.0, 1.6), BLUE, "relaxation times fitted")?;
     axes.text(&mut svg, (20.0, 0.45), RED, "as published")?;
     writeln!(svg, "</svg>")?;

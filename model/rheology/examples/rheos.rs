@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
         return Err(
-            "give the recording and the picture to write: rheos RECORDING.csv OUT.svg".into(),
+            "give the recording and the picture to write: rheos RECORDING.csv OUT.svg".into()
         );
     };
     let samples = read(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
@@ -34,11 +34,7 @@ fn read(path: &str) -> Result<Vec<StrainSample>, Box<dyn Error>> {
         let fields: Result<Vec<f64>, _> =
             line.split(',').map(|field| field.trim().parse()).collect();
         match fields.as_deref() {
-            Ok(&[t, strain, stress]) => Ok(StrainSample {
-                t: Seconds(t),
-                strain,
-                stress,
-            }),
+            Ok(&[t, strain, stress]) => Ok(StrainSample { t: Seconds(t), strain, stress }),
             _ => Err(format!("row {} is not three numbers", row + 1).into()),
         }
     };
@@ -65,11 +61,7 @@ fn recording(
     samples: &[StrainSample],
     [exact, backward]: [&MaxwellFit; 2],
 ) -> Result<(), Box<dyn Error>> {
-    let axes = Axes {
-        panel: LEFT_PANEL,
-        x: (0.0, 10.0),
-        y: (0.0, 3.0),
-    };
+    let axes = Axes { panel: LEFT_PANEL, x: (0.0, 10.0), y: (0.0, 3.0) };
     axes.draw(
         svg,
         ["Recording (dots) and both fits", "time in s", "stress"],
@@ -82,10 +74,7 @@ fn recording(
     axes.line(svg, &stress, BLUE, "")?;
     let stress = curve(samples, backward.body, Integrator::BackwardDifference);
     axes.line(svg, &stress, RED, DASHED)?;
-    let rows = [
-        (BLUE, "exact", exact.body),
-        (RED, "backward difference", backward.body),
-    ];
+    let rows = [(BLUE, "exact", exact.body), (RED, "backward difference", backward.body)];
     for (row, (colour, name, Maxwell { eta, k })) in rows.into_iter().enumerate() {
         let y = 2.75 - 0.5 * row as f64;
         axes.text(svg, (4.6, y), colour, name)?;
@@ -97,11 +86,7 @@ fn recording(
 
 /// Right: fitted over true stiffness of simulated records, against the sampling interval.
 fn bias(svg: &mut String, body: Maxwell) -> Result<(), Box<dyn Error>> {
-    let axes = Axes {
-        panel: RIGHT_PANEL,
-        x: (0.0, 0.52),
-        y: (0.75, 1.05),
-    };
+    let axes = Axes { panel: RIGHT_PANEL, x: (0.0, 0.52), y: (0.75, 1.05) };
     axes.draw(
         svg,
         [
@@ -109,15 +94,10 @@ fn bias(svg: &mut String, body: Maxwell) -> Result<(), Box<dyn Error>> {
             "r = sampling interval / relaxation time",
             "",
         ],
-        [
-            &[0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
-            &[0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05],
-        ],
+        [&[0.0, 0.1, 0.2, 0.3, 0.4, 0.5], &[0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05]],
     )?;
-    let law: Vec<(f64, f64)> = (1..=52)
-        .map(|i| f64::from(i) * 0.01)
-        .map(|r: f64| (r, -(-r).exp_m1() / r))
-        .collect();
+    let law: Vec<(f64, f64)> =
+        (1..=52).map(|i| f64::from(i) * 0.01).map(|r: f64| (r, -(-r).exp_m1() / r)).collect();
     axes.line(svg, &law, RED, DASHED)?;
     axes.line(svg, &[(0.0, 1.0), (0.52, 1.0)], BLUE, "")?;
     for intervals in [2, 3, 4, 5, 7, 10, 20, 50] {
@@ -138,11 +118,7 @@ fn simulated(body: Maxwell, ramp_intervals: u32) -> Result<(f64, [f64; 2]), Box<
     let dt = 2.0 / f64::from(ramp_intervals);
     let t = |i: u32| f64::from(i) * dt;
     let path: Vec<StrainSample> = (0..=5 * ramp_intervals)
-        .map(|i| StrainSample {
-            t: Seconds(t(i)),
-            strain: t(i.min(ramp_intervals)),
-            stress: 0.0,
-        })
+        .map(|i| StrainSample { t: Seconds(t(i)), strain: t(i.min(ramp_intervals)), stress: 0.0 })
         .collect();
     let stress = curve(&path, body, Integrator::Exact);
     let record: Vec<StrainSample> = path
@@ -152,13 +128,7 @@ fn simulated(body: Maxwell, ramp_intervals: u32) -> Result<(f64, [f64; 2]), Box<
         .collect();
     let ratio =
         |integrator| Ok::<_, Box<dyn Error>>(fit_maxwell(&record, integrator)?.body.k / body.k);
-    Ok((
-        dt / body.tau().0,
-        [
-            ratio(Integrator::Exact)?,
-            ratio(Integrator::BackwardDifference)?,
-        ],
-    ))
+    Ok((dt / body.tau().0, [ratio(Integrator::Exact)?, ratio(Integrator::BackwardDifference)?]))
 }
 
 /// Time and the stress a body gives along the strain of some samples.

@@ -53,9 +53,7 @@ impl FromStr for Tolerance {
     type Err = BadTolerance;
 
     fn from_str(text: &str) -> Result<Self, BadTolerance> {
-        let bad = || BadTolerance {
-            text: text.to_owned(),
-        };
+        let bad = || BadTolerance { text: text.to_owned() };
         let compact: String = text.split_whitespace().collect();
         let kinds: [Kind; 3] = [
             ("%jnd", Self::PercentOfThreshold),
@@ -67,11 +65,7 @@ impl FromStr for Tolerance {
             .find_map(|(ending, kind)| Some((compact.strip_suffix(ending)?, kind)))
             .ok_or_else(bad)?;
         let value: f64 = number.parse().map_err(|_| bad())?;
-        if value > 0.0 && value.is_finite() {
-            Ok(kind(value))
-        } else {
-            Err(bad())
-        }
+        if value > 0.0 && value.is_finite() { Ok(kind(value)) } else { Err(bad()) }
     }
 }
 

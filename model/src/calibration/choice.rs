@@ -116,12 +116,8 @@ fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candid
     };
     let zeroed = Zeroed::of(&curve, points);
     for point in points {
-        candidate
-            .residuals_n
-            .push(zeroed.force(point.volts).0 - point.newtons.0);
-        candidate
-            .residuals_v
-            .push(zeroed.signal(point.newtons).0 - point.volts.0);
+        candidate.residuals_n.push(zeroed.force(point.volts).0 - point.newtons.0);
+        candidate.residuals_v.push(zeroed.signal(point.newtons).0 - point.volts.0);
     }
     match left_out(recipe, points) {
         Ok(errors) => {

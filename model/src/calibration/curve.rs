@@ -32,13 +32,7 @@ struct Piece {
 impl Piece {
     /// From a cubic's three coefficients.
     fn cubic(newtons: f64, width: f64, volts: f64, rise: f64, [c1, c2, c3]: [f64; 3]) -> Self {
-        Self {
-            newtons,
-            width,
-            volts,
-            rise,
-            c: [c1, c2, c3, 0.0, 0.0],
-        }
+        Self { newtons, width, volts, rise, c: [c1, c2, c3, 0.0, 0.0] }
     }
 
     fn rise_at(&self, s: f64) -> f64 {
@@ -67,11 +61,7 @@ impl Piece {
                 low = s;
             }
             let newton = s - miss / self.slope_at(s);
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             let is_settled = (next - s).abs() <= f64::EPSILON * s;
             s = next;
             if is_settled {
@@ -253,9 +243,7 @@ impl Curve {
     }
 
     fn piece_at(&self, newtons: f64) -> &Piece {
-        let after = self
-            .pieces
-            .partition_point(|piece| piece.newtons <= newtons);
+        let after = self.pieces.partition_point(|piece| piece.newtons <= newtons);
         &self.pieces[after.max(1) - 1]
     }
 }
@@ -298,10 +286,7 @@ mod tests {
             let volts = curve.volts_from_newtons(step.newtons()).0;
             assert!((volts - step.volts.0).abs() < 1e-14, "{step:?} {volts}");
             let newtons = curve.newtons_from_volts(step.volts).0;
-            assert!(
-                (newtons - step.newtons().0).abs() < 1e-12,
-                "{step:?} {newtons}"
-            );
+            assert!((newtons - step.newtons().0).abs() < 1e-12, "{step:?} {newtons}");
         }
     }
 
@@ -332,10 +317,7 @@ mod tests {
                 - curve.volts_from_newtons(Newtons(newtons - step)).0)
                 / (2.0 * step);
             let exact = curve.sensitivity_at(Newtons(newtons));
-            assert!(
-                (numerical - exact).abs() < 1e-6,
-                "{newtons}: {numerical} {exact}"
-            );
+            assert!((numerical - exact).abs() < 1e-6, "{newtons}: {numerical} {exact}");
         }
     }
 
@@ -377,9 +359,8 @@ mod tests {
         assert!((curve.newtons_from_volts(Volts(2.3)).0 - 3.5).abs() < 1e-14);
         assert!((curve.sensitivity_at(Newtons(5.0)) - 1.4).abs() < 1e-15);
         let quintic = |f: f64| 1.0 + 0.3 * f + 0.02 * f * f + 1e-4 * f.powi(5);
-        let points: Vec<(f64, f64)> = (0..9)
-            .map(|i| (f64::from(i), quintic(f64::from(i))))
-            .collect();
+        let points: Vec<(f64, f64)> =
+            (0..9).map(|i| (f64::from(i), quintic(f64::from(i)))).collect();
         let curve = Curve::polynomial(&points, 5).unwrap();
         for newtons in [0.0, 0.7, 3.3, 7.9] {
             let volts = curve.volts_from_newtons(Newtons(newtons));

@@ -171,12 +171,7 @@ impl Point {
     #[must_use]
     pub fn mean(&self, direction: Direction) -> Option<Volts> {
         let volts = |reading: &&Reading| reading.direction == direction;
-        let own: Vec<f64> = self
-            .readings
-            .iter()
-            .filter(volts)
-            .map(|r| r.volts.0)
-            .collect();
+        let own: Vec<f64> = self.readings.iter().filter(volts).map(|r| r.volts.0).collect();
         (!own.is_empty()).then(|| Volts(own.iter().sum::<f64>() / own.len() as f64))
     }
 
@@ -187,12 +182,8 @@ impl Point {
     }
 
     fn averaged(mass_g: f64, readings: Vec<Reading>) -> Self {
-        let mut point = Self {
-            mass_g,
-            newtons: newtons_of(mass_g),
-            volts: Volts(f64::NAN),
-            readings,
-        };
+        let mut point =
+            Self { mass_g, newtons: newtons_of(mass_g), volts: Volts(f64::NAN), readings };
         let means = [Direction::Loading, Direction::Unloading].map(|way| point.mean(way));
         let known: Vec<f64> = means.into_iter().flatten().map(|volts| volts.0).collect();
         point.volts = Volts(known.iter().sum::<f64>() / known.len() as f64);
@@ -219,10 +210,7 @@ impl Calibration {
             (940.0, 2.69),
             (1040.0, 2.84),
         ];
-        let step = |&(mass_g, volts): &(f64, f64)| WeightStep {
-            mass_g,
-            volts: Volts(volts),
-        };
+        let step = |&(mass_g, volts): &(f64, f64)| WeightStep { mass_g, volts: Volts(volts) };
         Self {
             name: "Thesis load cell".to_owned(),
             steps: GRAMS_VOLTS.iter().map(step).collect(),
@@ -247,10 +235,7 @@ impl Calibration {
             mass_g: newtons_max.0 / STANDARD_GRAVITY * 1e3,
             volts: Volts(volts_at_zero.0 + volts_per_newton * newtons_max.0),
         };
-        let empty = WeightStep {
-            mass_g: 0.0,
-            volts: volts_at_zero,
-        };
+        let empty = WeightStep { mass_g: 0.0, volts: volts_at_zero };
         Self {
             name: name.to_owned(),
             steps: vec![empty, full],
@@ -269,20 +254,13 @@ impl Calibration {
     /// All readings by mass, in order of increasing mass; at least two masses, all numbers finite.
     pub fn points(&self) -> Result<Vec<Point>, CalibrationError> {
         if self.format > CALIBRATION_FORMAT {
-            return Err(CalibrationError::NewerFormat {
-                format: self.format,
-            });
+            return Err(CalibrationError::NewerFormat { format: self.format });
         }
         self.check_facts()?;
-        let points = if self.series.is_empty() {
-            self.points_of_steps()?
-        } else {
-            self.points_of_series()?
-        };
+        let points =
+            if self.series.is_empty() { self.points_of_steps()? } else { self.points_of_series()? };
         match points.len() {
-            0 | 1 => Err(CalibrationError::TooFewSteps {
-                count: points.len(),
-            }),
+            0 | 1 => Err(CalibrationError::TooFewSteps { count: points.len() }),
             _ => Ok(points),
         }
     }
@@ -303,14 +281,9 @@ impl Calibration {
                 ("tolerance of a weight", weight.tolerance_g, 0.0),
             ]
         });
-        let noises = self
-            .series_steps()
-            .map(|(_, step)| ("noise", step.noise.map(Volts::get), 0.0));
-        let mut facts = signed
-            .into_iter()
-            .chain([resolution])
-            .chain(weights)
-            .chain(noises);
+        let noises =
+            self.series_steps().map(|(_, step)| ("noise", step.noise.map(Volts::get), 0.0));
+        let mut facts = signed.into_iter().chain([resolution]).chain(weights).chain(noises);
         let wrong = facts.find_map(|(what, value, least)| {
             let value = value.filter(|value| !(value.is_finite() && *value >= least))?;
             Some(CalibrationError::Fact { what, value })
@@ -329,11 +302,8 @@ impl Calibration {
                     before_g: before.mass_g,
                 });
             }
-            let reading = Reading {
-                direction: Direction::Loading,
-                volts: here.volts,
-                noise_of_mean: None,
-            };
+            let reading =
+                Reading { direction: Direction::Loading, volts: here.volts, noise_of_mean: None };
             points.push(Point::averaged(here.mass_g, vec![reading]));
         }
         Ok(points)
@@ -356,10 +326,7 @@ impl Calibration {
         readings.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let groups = readings.chunk_by(|(a, _), (b, _)| b - a <= SAME_MASS);
         let point = |group: &[(f64, Reading)]| {
-            Point::averaged(
-                group[0].0,
-                group.iter().map(|(_, reading)| *reading).collect(),
-            )
+            Point::averaged(group[0].0, group.iter().map(|(_, reading)| *reading).collect())
         };
         Ok(groups.map(point).collect())
     }
@@ -376,18 +343,11 @@ impl Calibration {
         for name in &here.weights {
             let weight = self.weights.iter().find(|weight| weight.name == *name);
             sum_g += weight
-                .ok_or_else(|| CalibrationError::UnknownWeight {
-                    step,
-                    name: name.clone(),
-                })?
+                .ok_or_else(|| CalibrationError::UnknownWeight { step, name: name.clone() })?
                 .mass_g;
         }
         if !here.weights.is_empty() && (sum_g - here.mass_g).abs() > SAME_MASS * (1.0 + sum_g) {
-            return Err(CalibrationError::WeightsDisagree {
-                step,
-                mass_g: here.mass_g,
-                sum_g,
-            });
+            return Err(CalibrationError::WeightsDisagree { step, mass_g: here.mass_g, sum_g });
         }
         Ok(())
     }
@@ -410,9 +370,7 @@ impl Calibration {
         };
         self.weights = masses.windows(2).map(weight).collect();
         for step in self.series.iter_mut().flat_map(|one| &mut one.steps) {
-            let on = masses
-                .windows(2)
-                .filter(|pair| pair[1] <= step.mass_g + SAME_MASS);
+            let on = masses.windows(2).filter(|pair| pair[1] <= step.mass_g + SAME_MASS);
             step.weights = on.map(name).collect();
         }
         Ok(self)
@@ -430,8 +388,7 @@ impl Calibration {
     #[must_use]
     pub fn reading_resolution(&self) -> Option<Volts> {
         let is_thesis = || self.steps == Self::thesis().steps;
-        self.resolution
-            .or_else(|| is_thesis().then_some(THESIS_RESOLUTION))
+        self.resolution.or_else(|| is_thesis().then_some(THESIS_RESOLUTION))
     }
 
     /// How far the empty cell's signal moved from the beginning to the end: from the zeros taken for
@@ -466,9 +423,5 @@ fn check_numbers(step: usize, mass_g: f64, volts: Volts) -> Result<(), Calibrati
     if mass_g.is_finite() && volts.is_finite() && mass_g >= 0.0 {
         return Ok(());
     }
-    Err(CalibrationError::NotANumber {
-        step,
-        mass_g,
-        volts: volts.0,
-    })
+    Err(CalibrationError::NotANumber { step, mass_g, volts: volts.0 })
 }

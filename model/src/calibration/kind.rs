@@ -56,9 +56,7 @@ impl CurveKind {
     /// The curve of this kind for points in order of increasing mass.
     pub fn through(&self, points: &[Point]) -> Result<Curve, CalibrationError> {
         let pairs = |points: &mut dyn Iterator<Item = &Point>| -> Vec<(f64, f64)> {
-            points
-                .map(|point| (point.newtons.0, point.volts.0))
-                .collect()
+            points.map(|point| (point.newtons.0, point.volts.0)).collect()
         };
         match self {
             Self::Monotone => {
@@ -67,20 +65,13 @@ impl CurveKind {
             }
             Self::Segments { through_g } => {
                 let breaks = break_indices(points, through_g).ok_or_else(|| {
-                    CalibrationError::NoSuchBreak {
-                        through_g: through_g.clone(),
-                    }
+                    CalibrationError::NoSuchBreak { through_g: through_g.clone() }
                 })?;
                 check_rise(breaks.iter().map(|&i| (i, &points[i])))?;
-                Ok(Curve::straight(&pairs(
-                    &mut breaks.iter().map(|&i| &points[i]),
-                )))
+                Ok(Curve::straight(&pairs(&mut breaks.iter().map(|&i| &points[i]))))
             }
             &Self::Polynomial { degree } => Curve::polynomial(&pairs(&mut points.iter()), degree)
-                .ok_or(CalibrationError::NotRising {
-                    degree,
-                    points: points.len(),
-                }),
+                .ok_or(CalibrationError::NotRising { degree, points: points.len() }),
         }
     }
 
@@ -116,9 +107,7 @@ impl CurveKind {
         }
         through.push(0);
         let masses = through.iter().rev().map(|&i| points[i].mass_g);
-        Some(Self::Segments {
-            through_g: masses.collect(),
-        })
+        Some(Self::Segments { through_g: masses.collect() })
     }
 }
 
@@ -132,9 +121,7 @@ fn miss(points: &[Point], i: usize, j: usize) -> f64 {
     }
     let line = |point: &Point| a.volts.0 + slope * (point.newtons.0 - a.newtons.0);
     let between = points[i + 1..j].iter();
-    between
-        .map(|point| (point.volts.0 - line(point)).powi(2))
-        .sum()
+    between.map(|point| (point.volts.0 - line(point)).powi(2)).sum()
 }
 
 /// Which points have these masses: in order, from the first to the last.

@@ -21,9 +21,8 @@ impl<'a> Zeroed<'a> {
     /// Tared on the empty cell if it is among the points, else not at all.
     pub fn of(curve: &'a Curve, points: &[Point]) -> Self {
         let empty = points.first().filter(|point| point.newtons.0 == 0.0);
-        let shift = empty.map_or(0.0, |point| {
-            point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0
-        });
+        let shift =
+            empty.map_or(0.0, |point| point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0);
         Self { curve, shift }
     }
 
@@ -160,9 +159,7 @@ impl Calibration {
 }
 
 fn hysteresis(points: &[PointQuality]) -> Option<Hysteresis> {
-    let pairs = points
-        .iter()
-        .filter_map(|p| Some([p.hysteresis_v?, p.hysteresis_n?]));
+    let pairs = points.iter().filter_map(|p| Some([p.hysteresis_v?, p.hysteresis_n?]));
     let pairs: Vec<[f64; 2]> = pairs.collect();
     let [volts, newtons] = [0, 1].map(|k| pairs.iter().map(move |pair| pair[k]));
     let max = |values: &mut dyn Iterator<Item = f64>| {
@@ -184,10 +181,7 @@ pub(super) fn repeatability(points: &[Point]) -> Option<Volts> {
             let Some(mean) = point.mean(direction) else {
                 continue;
             };
-            let own = point
-                .readings
-                .iter()
-                .filter(|one| one.direction == direction);
+            let own = point.readings.iter().filter(|one| one.direction == direction);
             let misses: Vec<f64> = own.map(|one| one.volts.0 - mean.0).collect();
             square += misses.iter().map(|miss| miss * miss).sum::<f64>();
             freedom += misses.len() - 1;
@@ -213,22 +207,15 @@ fn flat(points: &[Point], curve: &Curve, uncertainty: &ForceUncertainty) -> Opti
     steps.sort_by(f64::total_cmp);
     let limit = FLAT_SHARE * steps[steps.len() / 2];
     let begin = (0..last).find(|&i| chord(i, i + 1) < limit)?;
-    let end = (begin + 1..=last)
-        .take_while(|&j| chord(begin, j) < limit)
-        .last()?;
+    let end = (begin + 1..=last).take_while(|&j| chord(begin, j) < limit).last()?;
     let (from, to) = (&points[begin], &points[end]);
     let (rise, width) = (to.volts.0 - from.volts.0, to.newtons.0 - from.newtons.0);
-    let all = [
-        points[last].volts.0 - points[0].volts.0,
-        points[last].newtons.0 - points[0].newtons.0,
-    ];
+    let all =
+        [points[last].volts.0 - points[0].volts.0, points[last].newtons.0 - points[0].newtons.0];
     let elsewhere = (all[0] - rise) / (all[1] - width);
     // Hundredths of the stretch: curve and uncertainty are smooth between weights.
     let places = (0..=100).map(|i| Newtons(from.newtons.0 + width * f64::from(i) / 100.0));
-    let least = places
-        .clone()
-        .map(|at| curve.sensitivity_at(at))
-        .fold(f64::INFINITY, f64::min);
+    let least = places.clone().map(|at| curve.sensitivity_at(at)).fold(f64::INFINITY, f64::min);
     let sigmas = places.filter_map(|at| uncertainty.sigma(at));
     Some(FlatStretch {
         from_g: from.mass_g,
@@ -272,11 +259,7 @@ fn findings(quality: &Quality, uncertainty: &ForceUncertainty) -> Vec<String> {
             quality.force_max_n, last.mass_g
         ));
     }
-    let missing: Vec<&str> = uncertainty
-        .not_stated()
-        .iter()
-        .map(|term| term.word())
-        .collect();
+    let missing: Vec<&str> = uncertainty.not_stated().iter().map(|term| term.word()).collect();
     if !missing.is_empty() {
         findings.push(format!(
             "the uncertainty leaves out what the calibration does not state: {}",

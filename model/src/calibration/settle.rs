@@ -238,10 +238,8 @@ impl Settling {
         let (per_block, block_ticks) = (samples as f64 / count, ticks as f64 / count);
         let mean = self.blocks.iter().map(|block| block.mean).sum::<f64>() / count;
         let places = (0..BLOCKS).map(|i| i as f64 - 0.5 * (count - 1.0));
-        let along: f64 = places
-            .zip(&self.blocks)
-            .map(|(place, block)| place * (block.mean - mean))
-            .sum();
+        let along: f64 =
+            places.zip(&self.blocks).map(|(place, block)| place * (block.mean - mean)).sum();
         // Sum of the squared places of `count` blocks a block apart.
         let square = count * (count * count - 1.0) / 12.0;
         let block_time = block_ticks * self.rule.interval.0;

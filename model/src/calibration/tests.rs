@@ -37,10 +37,7 @@ pub(super) fn document(series: &[Taken<'_>]) -> Calibration {
 #[test]
 fn errors_name_the_step() {
     let err = with_step(4, |step| step.volts = Volts(1.78));
-    assert!(
-        err.to_string().contains("weight step 5 reads 1.78 V"),
-        "{err}"
-    );
+    assert!(err.to_string().contains("weight step 5 reads 1.78 V"), "{err}");
     let err = with_step(4, |step| step.mass_g = 340.0);
     assert!(err.to_string().contains("weight step 5 has 340 g"), "{err}");
     let err = with_step(0, |step| step.volts = Volts(f64::NAN));
@@ -53,10 +50,7 @@ fn errors_name_the_step() {
 fn one_step_is_not_a_calibration() {
     let mut calibration = Calibration::thesis();
     calibration.steps.truncate(1);
-    assert_eq!(
-        calibration.curve(),
-        Err(CalibrationError::TooFewSteps { count: 1 })
-    );
+    assert_eq!(calibration.curve(), Err(CalibrationError::TooFewSteps { count: 1 }));
 }
 
 #[test]
@@ -68,10 +62,7 @@ fn a_line_is_a_line_and_a_falling_line_is_refused() {
         assert!((volts - (0.5 + 0.1 * newtons)).abs() < 1e-13, "{newtons}");
     }
     let falling = Calibration::linear("cell", Volts(0.5), -0.1, Newtons(50.0));
-    assert!(matches!(
-        falling.curve(),
-        Err(CalibrationError::VoltsNotIncreasing { step: 2, .. })
-    ));
+    assert!(matches!(falling.curve(), Err(CalibrationError::VoltsNotIncreasing { step: 2, .. })));
 }
 
 #[test]
@@ -89,10 +80,7 @@ fn a_signal_that_falls_by_more_than_it_repeats_is_refused() {
     assert_eq!(falls(&[(Loading, 1, wired)]), Some(fall));
     // One line through all of them rises and would hide it.
     let line = CurveKind::Polynomial { degree: 1 };
-    assert!(
-        line.through(&document(&[(Loading, 1, wired)]).points().unwrap())
-            .is_ok()
-    );
+    assert!(line.through(&document(&[(Loading, 1, wired)]).points().unwrap()).is_ok());
     // Hysteresis, and masses of one direction only, are no fall.
     let up: &[_] = &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3), (300.0, 1.31)];
     let down: &[_] = &[(200.0, 1.35), (0.0, 1.01)];
@@ -118,14 +106,8 @@ fn a_signal_that_falls_by_more_than_it_repeats_is_refused() {
 fn old_and_new_documents_survive_json() {
     let up: &[(f64, f64)] = &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)];
     let mut whole = document(&[(Direction::Loading, 1, up)]);
-    whole.curve = CurveKind::Segments {
-        through_g: vec![0.0, 200.0],
-    };
-    whole.weights.push(NamedWeight {
-        name: "A".into(),
-        mass_g: 100.0,
-        tolerance_g: Some(0.05),
-    });
+    whole.curve = CurveKind::Segments { through_g: vec![0.0, 200.0] };
+    whole.weights.push(NamedWeight { name: "A".into(), mass_g: 100.0, tolerance_g: Some(0.05) });
     for calibration in [Calibration::thesis(), whole] {
         let text = serde_json::to_string(&calibration).unwrap();
         let back: Calibration = serde_json::from_str(&text).unwrap();
@@ -158,27 +140,9 @@ fn facts_that_cannot_be_are_refused() {
     let thesis = Calibration::thesis;
     let nan = Some(Volts(f64::NAN));
     for (wrong, fact) in [
-        (
-            Calibration {
-                excitation: nan,
-                ..thesis()
-            },
-            "excitation",
-        ),
-        (
-            Calibration {
-                zero_after: nan,
-                ..thesis()
-            },
-            "zero after",
-        ),
-        (
-            Calibration {
-                resolution: Some(Volts(-0.1)),
-                ..thesis()
-            },
-            "resolution",
-        ),
+        (Calibration { excitation: nan, ..thesis() }, "excitation"),
+        (Calibration { zero_after: nan, ..thesis() }, "zero after"),
+        (Calibration { resolution: Some(Volts(-0.1)), ..thesis() }, "resolution"),
     ] {
         let refusal = wrong.curve().unwrap_err();
         assert!(
@@ -188,10 +152,7 @@ fn facts_that_cannot_be_are_refused() {
     }
     let mut noisy = document(&[(Direction::Loading, 1, &[(0.0, 1.0), (100.0, 1.2)])]);
     noisy.series[0].steps[1].noise = nan;
-    assert!(matches!(
-        noisy.curve(),
-        Err(CalibrationError::Fact { what: "noise", .. })
-    ));
+    assert!(matches!(noisy.curve(), Err(CalibrationError::Fact { what: "noise", .. })));
 }
 
 #[test]
@@ -199,10 +160,7 @@ fn a_newer_form_is_refused() {
     let mut calibration = Calibration::thesis();
     let format = CALIBRATION_FORMAT + 1;
     calibration.format = format;
-    assert_eq!(
-        calibration.curve(),
-        Err(CalibrationError::NewerFormat { format })
-    );
+    assert_eq!(calibration.curve(), Err(CalibrationError::NewerFormat { format }));
 }
 
 #[test]
@@ -219,13 +177,7 @@ fn series_are_averaged_by_direction() {
     let volts: Vec<f64> = points.iter().map(|point| point.volts.0).collect();
     // (1.21 + 1.25) / 2: three readings, two directions.
     let expected = [1.005, 1.23, 1.3];
-    assert!(
-        volts
-            .iter()
-            .zip(expected)
-            .all(|(a, b)| (a - b).abs() < 1e-12),
-        "{volts:?}"
-    );
+    assert!(volts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{volts:?}");
     let hysteresis = points[1].hysteresis().unwrap().0;
     assert!((hysteresis + 0.04).abs() < 1e-12, "{hysteresis}");
     assert!((calibration.zero_shift().unwrap().0 - 0.01).abs() < 1e-12);
@@ -239,21 +191,10 @@ fn weights_must_be_known_and_add_up() {
     let mut calibration = document(&[(Direction::Loading, 1, up)]);
     calibration.series[0].steps[1].weights = vec!["A".into()];
     let name = "A".to_owned();
-    assert_eq!(
-        calibration.curve(),
-        Err(CalibrationError::UnknownWeight { step: 2, name })
-    );
-    let weight = |mass_g| NamedWeight {
-        name: "A".into(),
-        mass_g,
-        tolerance_g: None,
-    };
+    assert_eq!(calibration.curve(), Err(CalibrationError::UnknownWeight { step: 2, name }));
+    let weight = |mass_g| NamedWeight { name: "A".into(), mass_g, tolerance_g: None };
     calibration.weights = vec![weight(50.0)];
-    let disagree = CalibrationError::WeightsDisagree {
-        step: 2,
-        mass_g: 100.0,
-        sum_g: 50.0,
-    };
+    let disagree = CalibrationError::WeightsDisagree { step: 2, mass_g: 100.0, sum_g: 50.0 };
     assert_eq!(calibration.curve(), Err(disagree));
     calibration.weights = vec![weight(100.0)];
     assert!(calibration.curve().is_ok());
@@ -262,12 +203,8 @@ fn weights_must_be_known_and_add_up() {
 #[test]
 fn segments_go_where_they_are_told_or_nearest() {
     let points = Calibration::thesis().points().unwrap();
-    let through = |masses: &[f64]| CurveKind::Segments {
-        through_g: masses.to_vec(),
-    };
-    let curve = through(&[0.0, 340.0, 640.0, 1040.0])
-        .through(&points)
-        .unwrap();
+    let through = |masses: &[f64]| CurveKind::Segments { through_g: masses.to_vec() };
+    let curve = through(&[0.0, 340.0, 640.0, 1040.0]).through(&points).unwrap();
     let middle = curve.volts_from_newtons(newtons_of(490.0)).0;
     assert!((middle - 0.5 * (1.78 + 1.87)).abs() < 1e-12, "{middle}");
     for wrong in [
@@ -300,21 +237,14 @@ fn segments_go_where_they_are_told_or_nearest() {
     let best = CurveKind::best_segments(&points, 4).unwrap();
     assert!((sum(&best) - least).abs() < 1e-15, "{best:?}");
     assert_eq!(CurveKind::best_segments(&points, 11), None);
-    assert!(
-        CurveKind::best_segments(&points, 10)
-            .unwrap()
-            .meets_all(&points)
-    );
+    assert!(CurveKind::best_segments(&points, 10).unwrap().meets_all(&points));
 }
 
 #[test]
 fn a_polynomial_through_the_flat_stretch_is_refused() {
     let points = Calibration::thesis().points().unwrap();
     let refusal = CurveKind::Polynomial { degree: 6 }.through(&points);
-    assert!(matches!(
-        refusal,
-        Err(CalibrationError::NotRising { degree: 6, .. })
-    ));
+    assert!(matches!(refusal, Err(CalibrationError::NotRising { degree: 6, .. })));
     assert!(CurveKind::Polynomial { degree: 1 }.through(&points).is_ok());
 }
 
@@ -325,10 +255,7 @@ fn the_flat_stretch_of_the_thesis_is_called_out() {
     assert_eq!((flat.from_g, flat.to_g), (340.0, 640.0));
     assert!((flat.rise_v - 0.09).abs() < 1e-12);
     // 1.47 V over 740 g elsewhere, 0.09 V over 300 g here.
-    assert!(
-        (flat.ratio - (1.47 / 740.0) / (0.09 / 300.0)).abs() < 1e-9,
-        "{flat:?}"
-    );
+    assert!((flat.ratio - (1.47 / 740.0) / (0.09 / 300.0)).abs() < 1e-9, "{flat:?}");
     let sentence = &quality.findings[0];
     for fact in ["340 g", "640 g", "3.33", "6.28 N", "0.09 V", "300 g"] {
         assert!(sentence.contains(fact), "{fact}: {sentence}");
@@ -336,15 +263,8 @@ fn the_flat_stretch_of_the_thesis_is_called_out() {
     // 0.01 V for 100 g is 0.098 N per mV; between the weights the curve is flatter yet.
     assert!((0.098..0.14).contains(&flat.worst_n_per_mv), "{flat:?}");
     let extrapolated = &quality.findings[1];
-    assert!(
-        extrapolated.contains("10.20 N") && extrapolated.contains("1040 g"),
-        "{extrapolated}"
-    );
-    assert!(
-        quality.findings[2].contains("hysteresis"),
-        "{:?}",
-        quality.findings
-    );
+    assert!(extrapolated.contains("10.20 N") && extrapolated.contains("1040 g"), "{extrapolated}");
+    assert!(quality.findings[2].contains("hysteresis"), "{:?}", quality.findings);
     let straight = Calibration::linear("line", Volts(0.5), 0.1, Newtons(50.0));
     assert!(straight.quality().unwrap().flat.is_empty());
 }
@@ -369,31 +289,16 @@ fn the_curve_that_foretells_best_is_chosen() {
         .collect();
     let calibration = document(&borrowed);
     let found = candidates(&calibration.points().unwrap());
-    assert!(
-        matches!(found[0].curve, CurveKind::Polynomial { degree: 2.. }),
-        "{}",
-        found[0].name
-    );
+    assert!(matches!(found[0].curve, CurveKind::Polynomial { degree: 2.. }), "{}", found[0].name);
     // 1 + 7 + 5 kinds, all judged.
     assert_eq!(found.len(), 13);
     // One straight line is off by the square: an eighth of 0.01 * 8.8^2 V at most, over 0.29 V/N.
-    let line = found
-        .iter()
-        .find(|one| one.name == "1 straight segment")
-        .unwrap();
+    let line = found.iter().find(|one| one.name == "1 straight segment").unwrap();
     assert!(line.left_out_rms_n.unwrap() > 20.0 * found[0].left_out_rms_n.unwrap());
     let score = |one: &Candidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
-    assert!(
-        found
-            .windows(2)
-            .all(|pair| score(&pair[0]) <= score(&pair[1]))
-    );
+    assert!(found.windows(2).all(|pair| score(&pair[0]) <= score(&pair[1])));
     // With three weights there is nothing to compare.
-    let few = document(&[(
-        Direction::Loading,
-        1,
-        &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)],
-    )]);
+    let few = document(&[(Direction::Loading, 1, &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)])]);
     assert_eq!(candidates(&few.points().unwrap()).len(), 1);
 }
 
@@ -408,26 +313,15 @@ fn every_curve_of_the_thesis_table_is_shown() {
         // Tared: the empty cell reads nothing.
         assert!(one.residuals_n[0].abs() < 1e-9, "{}", one.name);
     }
-    let monotone = found
-        .iter()
-        .find(|one| one.curve == CurveKind::Monotone)
-        .unwrap();
-    assert!(
-        monotone
-            .residuals_n
-            .iter()
-            .all(|residual| residual.abs() < 1e-11)
-    );
+    let monotone = found.iter().find(|one| one.curve == CurveKind::Monotone).unwrap();
+    assert!(monotone.residuals_n.iter().all(|residual| residual.abs() < 1e-11));
 }
 
 #[test]
 fn hysteresis_and_repeatability_are_what_was_put_in() {
     let line = |g: f64| 1.0 + 2e-3 * g;
     let up = |error: f64| -> Vec<(f64, f64)> {
-        (0..6)
-            .map(|i| 100.0 * f64::from(i))
-            .map(|g| (g, line(g) + error * (g / 500.0)))
-            .collect()
+        (0..6).map(|i| 100.0 * f64::from(i)).map(|g| (g, line(g) + error * (g / 500.0))).collect()
     };
     // 4 mV apart at the top, repeats 1 mV up and down.
     let down: Vec<(f64, f64)> = up(0.004).into_iter().rev().collect();
@@ -440,10 +334,7 @@ fn hysteresis_and_repeatability_are_what_was_put_in() {
     let quality = calibration.quality().unwrap();
     let hysteresis = quality.hysteresis.unwrap();
     assert!((hysteresis.max_v - 0.004).abs() < 1e-12, "{hysteresis:?}");
-    assert!(
-        (hysteresis.max_n - 0.004 / (2e-3 / 9.806_65e-3)).abs() < 2e-4,
-        "{hysteresis:?}"
-    );
+    assert!((hysteresis.max_n - 0.004 / (2e-3 / 9.806_65e-3)).abs() < 2e-4, "{hysteresis:?}");
     // Shares 0, .2, .4, .6, .8, 1 of the top: mean square 2.2/6.
     assert!((hysteresis.rms_v - 0.004 * (2.2f64 / 6.0).sqrt()).abs() < 1e-12);
     // Pairs 2 mV apart times those shares: variance 2 mV^2 over one degree of freedom each.
@@ -472,22 +363,11 @@ fn age_and_rig_raise_doubts() {
         (None, Some("when it was taken")),
     ] {
         let doubts = calibration.doubts(&bench(age));
-        assert_eq!(
-            doubts.len(),
-            usize::from(words.is_some()),
-            "{age:?}: {doubts:?}"
-        );
-        assert!(
-            words.is_none_or(|words| doubts[0].contains(words)),
-            "{doubts:?}"
-        );
+        assert_eq!(doubts.len(), usize::from(words.is_some()), "{age:?}: {doubts:?}");
+        assert!(words.is_none_or(|words| doubts[0].contains(words)), "{doubts:?}");
     }
-    let other = Bench {
-        rig: "sim",
-        cell: Some("9"),
-        excitation: Some(Volts(5.0)),
-        age_days: Some(1),
-    };
+    let other =
+        Bench { rig: "sim", cell: Some("9"), excitation: Some(Volts(5.0)), age_days: Some(1) };
     assert_eq!(calibration.doubts(&other).len(), 3);
 }
 
@@ -503,33 +383,16 @@ fn a_known_weight_passes_within_one_percent() {
         limit_percent: None,
     };
     let result = calibration.check(&weight).unwrap();
-    assert!(
-        result.is_passed && (result.error_percent - 0.9).abs() < 1e-9,
-        "{result:?}"
-    );
-    assert!(
-        result.sentence.contains("+0.90 %") && result.sentence.contains("1 %"),
-        "{result:?}"
-    );
-    let strict = KnownWeight {
-        limit_percent: Some(0.5),
-        ..weight
-    };
+    assert!(result.is_passed && (result.error_percent - 0.9).abs() < 1e-9, "{result:?}");
+    assert!(result.sentence.contains("+0.90 %") && result.sentence.contains("1 %"), "{result:?}");
+    let strict = KnownWeight { limit_percent: Some(0.5), ..weight };
     let result = calibration.check(&strict).unwrap();
     assert!(!result.is_passed && result.sentence.contains("0.5 %"));
-    let none = KnownWeight {
-        mass_g: 0.0,
-        ..weight
-    };
+    let none = KnownWeight { mass_g: 0.0, ..weight };
     assert!(calibration.check(&none).is_err());
     // In the flat stretch one percent is less than the calibration knows.
     let thesis = Calibration::thesis();
-    let flat = KnownWeight {
-        mass_g: 440.0,
-        volts: Volts(1.79),
-        tare: Volts(1.28),
-        ..weight
-    };
+    let flat = KnownWeight { mass_g: 440.0, volts: Volts(1.79), tare: Volts(1.28), ..weight };
     let result = thesis.check(&flat).unwrap();
     assert!(result.is_passed && result.doubts.len() == 1, "{result:?}");
 }
@@ -539,10 +402,7 @@ fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     let thesis = Calibration::thesis();
     for mass_g in [200.0, 500.0] {
         let told = thesis.check_refusal(mass_g).unwrap().unwrap();
-        assert!(
-            told.contains(&format!("{mass_g} g")) && told.contains("950 g"),
-            "{told}"
-        );
+        assert!(told.contains(&format!("{mass_g} g")) && told.contains("950 g"), "{told}");
     }
     for mass_g in [800.0, 950.0] {
         assert_eq!(thesis.check_refusal(mass_g), Ok(None));

@@ -103,12 +103,7 @@ impl ForceUncertainty {
         if !components.iter().all(is_finite) {
             return Err(CalibrationError::TooFlat);
         }
-        let square = |i: usize| {
-            components
-                .iter()
-                .map(|one| one.shifts[i].powi(2))
-                .sum::<f64>()
-        };
+        let square = |i: usize| components.iter().map(|one| one.shifts[i].powi(2)).sum::<f64>();
         Ok(Self {
             sigma: (0..maker.nodes.len()).map(|i| square(i).sqrt()).collect(),
             range: maker.curve.force_range(),
@@ -121,8 +116,7 @@ impl ForceUncertainty {
     /// Standard uncertainty of a force; `None` where the calibration states nothing of its errors.
     #[must_use]
     pub fn sigma(&self, force: Newtons) -> Option<Newtons> {
-        self.is_stated()
-            .then(|| Newtons(self.between(&self.sigma, force.0)))
+        self.is_stated().then(|| Newtons(self.between(&self.sigma, force.0)))
     }
 
     /// The part of one term.
@@ -133,9 +127,7 @@ impl ForceUncertainty {
         }
         let own = self.components.iter().filter(|one| one.term == term);
         // A term without errors is 0; an empty sum would be -0.
-        let square = own.fold(0.0, |sum, one| {
-            sum + self.between(&one.shifts, force.0).powi(2)
-        });
+        let square = own.fold(0.0, |sum, one| sum + self.between(&one.shifts, force.0).powi(2));
         Some(Newtons(square.sqrt()))
     }
 
@@ -206,12 +198,7 @@ impl<'a> Maker<'a> {
         }
         let last = points[points.len() - 1].newtons.0;
         nodes.extend([last, last + (last - points[points.len() - 2].newtons.0)]);
-        Ok(Self {
-            calibration,
-            points,
-            curve,
-            nodes,
-        })
+        Ok(Self { calibration, points, curve, nodes })
     }
 
     /// The errors of a term; `None` where the calibration says nothing of it.
@@ -274,11 +261,8 @@ impl<'a> Maker<'a> {
             let sigma_g = weight.tolerance_g? / 3f64.sqrt();
             let sigma = super::newtons_of(sigma_g).0;
             // How many of the readings under each mass had it on the cell.
-            let shares: Vec<f64> = self
-                .points
-                .iter()
-                .map(|p| self.share(&weight.name, p))
-                .collect();
+            let shares: Vec<f64> =
+                self.points.iter().map(|p| self.share(&weight.name, p)).collect();
             let moved =
                 |share: f64| self.moved(|i, point| point.newtons.0 += share * sigma * shares[i]);
             components.push(self.component(Term::Weights, moved));
@@ -288,12 +272,8 @@ impl<'a> Maker<'a> {
 
     fn share(&self, name: &str, point: &Point) -> f64 {
         let steps = self.calibration.series_steps().map(|(_, step)| step);
-        let own: Vec<_> = steps
-            .filter(|step| (step.mass_g - point.mass_g).abs() <= 1e-6)
-            .collect();
-        let with = own
-            .iter()
-            .filter(|step| step.weights.iter().any(|one| one == name));
+        let own: Vec<_> = steps.filter(|step| (step.mass_g - point.mass_g).abs() <= 1e-6).collect();
+        let with = own.iter().filter(|step| step.weights.iter().any(|one| one == name));
         with.count() as f64 / own.len().max(1) as f64
     }
 
@@ -331,16 +311,9 @@ impl<'a> Maker<'a> {
     /// The curve through points that were moved.
     fn moved(&self, change: impl Fn(usize, &mut Point)) -> Option<Curve> {
         let mut points = self.points.clone();
-        points
-            .iter_mut()
-            .enumerate()
-            .for_each(|(i, point)| change(i, point));
-        let is_ordered = points
-            .windows(2)
-            .all(|pair| pair[0].newtons.0 < pair[1].newtons.0);
-        is_ordered
-            .then(|| self.calibration.curve.through(&points).ok())
-            .flatten()
+        points.iter_mut().enumerate().for_each(|(i, point)| change(i, point));
+        let is_ordered = points.windows(2).all(|pair| pair[0].newtons.0 < pair[1].newtons.0);
+        is_ordered.then(|| self.calibration.curve.through(&points).ok()).flatten()
     }
 
     /// Half the difference of the forces read with the error up and down.
@@ -367,9 +340,7 @@ impl<'a> Maker<'a> {
         let zero = Newtons(0.0);
         let above_zero =
             self.curve.volts_from_newtons(Newtons(force)) - self.curve.volts_from_newtons(zero);
-        other
-            .newtons_from_volts(above_zero + other.volts_from_newtons(zero))
-            .0
+        other.newtons_from_volts(above_zero + other.volts_from_newtons(zero)).0
     }
 
     /// Between weights, an arch of the size of the neighbours' errors when left out. A curve that meets its
@@ -409,11 +380,7 @@ impl<'a> Maker<'a> {
                     continue;
                 }
                 let hat = |&force: &f64| {
-                    let side = if force < newtons(i) {
-                        i.checked_sub(1)
-                    } else {
-                        Some(i + 1)
-                    };
+                    let side = if force < newtons(i) { i.checked_sub(1) } else { Some(i + 1) };
                     let next = side.filter(|next| *next <= last).map(newtons);
                     let height = match next {
                         Some(next) => (1.0 - (force - newtons(i)) / (next - newtons(i))).max(0.0),
@@ -436,10 +403,7 @@ fn mean_sigma(point: &Point, sigma: impl Fn(&super::Reading) -> Option<Volts>) -
     let mut square = 0.0;
     let mut ways = 0;
     for direction in [Direction::Loading, Direction::Unloading] {
-        let own = point
-            .readings
-            .iter()
-            .filter(|one| one.direction == direction);
+        let own = point.readings.iter().filter(|one| one.direction == direction);
         let sigmas: Vec<f64> = own.map(|one| Some(sigma(one)?.0)).collect::<Option<_>>()?;
         if !sigmas.is_empty() {
             let sum = sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>();

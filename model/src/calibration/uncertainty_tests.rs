@@ -9,9 +9,7 @@ use crate::units::{Newtons, Volts};
 fn read(curve: &Curve, other: &Curve, force: f64) -> f64 {
     let zero = Newtons(0.0);
     let above = curve.volts_from_newtons(Newtons(force)) - curve.volts_from_newtons(zero);
-    other
-        .newtons_from_volts(above + other.volts_from_newtons(zero))
-        .0
+    other.newtons_from_volts(above + other.volts_from_newtons(zero)).0
 }
 
 /// Standard deviation of the force over draws of whole calibrations.
@@ -69,10 +67,7 @@ fn each_term_is_what_draws_of_it_scatter() {
         }
         for series in &mut drawn.series {
             for step in &mut series.steps {
-                let on = drawn
-                    .weights
-                    .iter()
-                    .filter(|one| step.weights.contains(&one.name));
+                let on = drawn.weights.iter().filter(|one| step.weights.contains(&one.name));
                 step.mass_g = on.map(|one| one.mass_g).sum();
             }
         }
@@ -90,10 +85,7 @@ fn each_term_is_what_draws_of_it_scatter() {
     };
     // Loading only and unloading only are the two ends of the rectangle.
     let points = calibration.points().unwrap();
-    let halves: Vec<f64> = points
-        .iter()
-        .map(|p| 0.5 * p.hysteresis().unwrap().0)
-        .collect();
+    let halves: Vec<f64> = points.iter().map(|p| 0.5 * p.hysteresis().unwrap().0).collect();
     let hysteresis = |random: &mut SplitMix| {
         let share = random.normal() / 3f64.sqrt();
         let mut drawn = calibration.clone();
@@ -125,21 +117,11 @@ fn each_term_is_what_draws_of_it_scatter() {
     };
     for force in [0.4, 1.3, 2.45, 3.9, 4.8] {
         close(Term::Weights, force, scatter(&calibration, force, weights));
-        close(
-            Term::Repeatability,
-            force,
-            scatter(&calibration, force, readings),
-        );
-        close(
-            Term::Hysteresis,
-            force,
-            scatter(&calibration, force, hysteresis),
-        );
+        close(Term::Repeatability, force, scatter(&calibration, force, readings));
+        close(Term::Hysteresis, force, scatter(&calibration, force, hysteresis));
         close(Term::ZeroDrift, force, scatter(&calibration, force, drift));
         // All together, in quadrature.
-        let sum = Term::ALL
-            .iter()
-            .filter_map(|&term| uncertainty.term_sigma(term, Newtons(force)));
+        let sum = Term::ALL.iter().filter_map(|&term| uncertainty.term_sigma(term, Newtons(force)));
         let sum = sum.map(|sigma| sigma.0 * sigma.0).sum::<f64>().sqrt();
         let whole = uncertainty.sigma(Newtons(force)).unwrap().0;
         assert!((whole / sum - 1.0).abs() < 0.02, "{whole} against {sum}");
@@ -165,24 +147,15 @@ fn the_digits_of_the_thesis_are_what_draws_of_them_scatter() {
         drawn
     };
     for force in [0.7, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 11.0] {
-        let told = uncertainty
-            .term_sigma(Term::Resolution, Newtons(force))
-            .unwrap()
-            .0;
+        let told = uncertainty.term_sigma(Term::Resolution, Newtons(force)).unwrap().0;
         let drawn = 10.0 * scatter(&thesis, force, draw);
         // The curve bends within a whole digit where it is flat, so the two part a little.
-        assert!(
-            (told / drawn - 1.0).abs() < 0.2,
-            "{force} N: {told} against {drawn}"
-        );
+        assert!((told / drawn - 1.0).abs() < 0.2, "{force} N: {told} against {drawn}");
     }
     let sigma = |force: f64| uncertainty.sigma(Newtons(force)).unwrap().0;
     // The flat stretch is an order of magnitude worse than where the cell moves.
     assert!(sigma(4.3) > 10.0 * sigma(1.0) && sigma(4.3) > 6.0 * sigma(8.0));
-    assert!(
-        sigma(0.0) < 1e-12,
-        "tared forces of the empty cell are exact"
-    );
+    assert!(sigma(0.0) < 1e-12, "tared forces of the empty cell are exact");
     assert!(
         uncertainty.is_extrapolated(Newtons(10.3)) && !uncertainty.is_extrapolated(Newtons(10.1))
     );
@@ -197,10 +170,7 @@ fn what_is_not_stated_has_no_number() {
     assert_eq!(uncertainty.errors().count(), 0);
     let mut too_flat = Calibration::thesis();
     too_flat.steps[4].volts = Volts(too_flat.steps[3].volts.0 + 1e-15);
-    assert_eq!(
-        ForceUncertainty::of(&too_flat),
-        Err(CalibrationError::TooFlat)
-    );
+    assert_eq!(ForceUncertainty::of(&too_flat), Err(CalibrationError::TooFlat));
 }
 
 #[test]
@@ -214,10 +184,7 @@ fn interpolation_is_bounded_by_the_weights_around() {
             let (from, to) = (pair[0].newtons.0, pair[1].newtons.0);
             let middle = uncertainty.term_sigma(Term::Interpolation, Newtons(0.5 * (from + to)));
             let middle = middle.unwrap().0;
-            let end = uncertainty
-                .term_sigma(Term::Interpolation, Newtons(to))
-                .unwrap()
-                .0;
+            let end = uncertainty.term_sigma(Term::Interpolation, Newtons(to)).unwrap().0;
             match kind {
                 // It meets its points, and between them it cannot leave the interval.
                 CurveKind::Monotone => {
@@ -246,8 +213,6 @@ fn a_term_without_errors_is_zero_and_not_minus_zero() {
     }];
     sampled.resolution = None;
     let uncertainty = ForceUncertainty::of(&sampled).unwrap();
-    let digits = uncertainty
-        .term_sigma(Term::Resolution, Newtons(1.0))
-        .unwrap();
+    let digits = uncertainty.term_sigma(Term::Resolution, Newtons(1.0)).unwrap();
     assert!(digits.0.to_bits() == 0, "{digits:?}");
 }

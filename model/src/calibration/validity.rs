@@ -92,43 +92,19 @@ impl KnownWeight {
         let limit_percent = self.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         for (what, value, is_right, advice) in [
-            (
-                "mass",
-                self.mass_g,
-                is_positive(self.mass_g),
-                "give grams above 0",
-            ),
-            (
-                "limit",
-                limit_percent,
-                is_positive(limit_percent),
-                "give percent above 0",
-            ),
-            (
-                "signal",
-                self.volts.0,
-                self.volts.is_finite(),
-                "read it again",
-            ),
+            ("mass", self.mass_g, is_positive(self.mass_g), "give grams above 0"),
+            ("limit", limit_percent, is_positive(limit_percent), "give percent above 0"),
+            ("signal", self.volts.0, self.volts.is_finite(), "read it again"),
             (
                 "tolerance",
                 self.tolerance_g.unwrap_or(0.0),
                 self.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
                 "give grams, 0 or more",
             ),
-            (
-                "tare",
-                self.tare.0,
-                self.tare.is_finite(),
-                "read the empty cell again",
-            ),
+            ("tare", self.tare.0, self.tare.is_finite(), "read the empty cell again"),
         ] {
             if !is_right {
-                return Err(CheckError::Number {
-                    what,
-                    value,
-                    advice,
-                });
+                return Err(CheckError::Number { what, value, advice });
             }
         }
         Ok(limit_percent)
@@ -168,10 +144,7 @@ impl Calibration {
                 self.name, self.rig, bench.rig
             ));
         }
-        if let Some(cell) = bench
-            .cell
-            .filter(|cell| !self.cell.is_empty() && *cell != self.cell)
-        {
+        if let Some(cell) = bench.cell.filter(|cell| !self.cell.is_empty() && *cell != self.cell) {
             doubts.push(format!(
                 "the calibration \"{}\" is of cell {}, and cell {cell} is mounted; take one of this cell",
                 self.name, self.cell
@@ -199,9 +172,7 @@ impl Calibration {
         for direction in [Direction::Loading, Direction::Unloading] {
             let mean = |point: &super::Point| Some((point.mass_g, point.mean(direction)?.0));
             let taken: Vec<(f64, f64)> = points.iter().filter_map(mean).collect();
-            let fall = taken
-                .windows(2)
-                .find(|pair| pair[0].1 - pair[1].1 > allowed);
+            let fall = taken.windows(2).find(|pair| pair[0].1 - pair[1].1 > allowed);
             if let Some(&[(before_g, before_volts), (mass_g, volts)]) = fall {
                 return Err(CalibrationError::SignalFalls {
                     mass_g,
@@ -281,11 +252,7 @@ impl Calibration {
             force.0,
             true_force.0,
             if is_passed { "within" } else { "beyond" },
-            if is_passed {
-                ""
-            } else {
-                "; take a new calibration before the next run"
-            },
+            if is_passed { "" } else { "; take a new calibration before the next run" },
         );
         Ok(CheckResult {
             is_passed,

@@ -71,10 +71,8 @@ impl RigCommand {
             }
             (Self::Oscillate(asked), Self::Oscillate(set)) => {
                 let acceleration = set.acceleration;
-                *set == Oscillation {
-                    acceleration,
-                    ..*asked
-                } && is_near(asked.acceleration.0, acceleration.0)
+                *set == Oscillation { acceleration, ..*asked }
+                    && is_near(asked.acceleration.0, acceleration.0)
             }
             _ => self == set,
         }

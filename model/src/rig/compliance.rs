@@ -147,9 +147,7 @@ impl Line {
             used.iter().map(|one| one.weight * of(one)).sum::<f64>() / weights
         };
         let (middle, force_mean) = (mean(&|s| s.position), mean(&|s| s.force));
-        let half = used
-            .iter()
-            .fold(0.0f64, |max, s| max.max((s.position - middle).abs()));
+        let half = used.iter().fold(0.0f64, |max, s| max.max((s.position - middle).abs()));
         // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
         let u = |s: &Weighed| (s.position - middle) / half;
         let (square, cube) = (mean(&|s| u(s).powi(2)), mean(&|s| u(s).powi(3)));
@@ -182,10 +180,7 @@ impl Line {
     fn check_straight(&self) -> Result<(), ComplianceError> {
         let share = self.bend.abs() / (2.0 * self.slope);
         if share > BEND_MAX && self.bend.abs() > BEND_SIGMAS * self.bend_error {
-            return Err(ComplianceError::Curved {
-                bend: 100.0 * share,
-                limit: 100.0 * BEND_MAX,
-            });
+            return Err(ComplianceError::Curved { bend: 100.0 * share, limit: 100.0 * BEND_MAX });
         }
         Ok(())
     }
@@ -254,10 +249,7 @@ mod tests {
     #[test]
     fn a_straight_run_gives_compliance_and_surface() {
         let exact = fit_compliance(&run(0.0, 1, |x| x / 0.02), Newtons(0.5)).unwrap();
-        assert!(
-            (exact.mm_per_newton / 0.02 - 1.0).abs() < 1e-10,
-            "{exact:?}"
-        );
+        assert!((exact.mm_per_newton / 0.02 - 1.0).abs() < 1e-10, "{exact:?}");
         assert!((exact.surface.0 - 52.3).abs() < 1e-10);
         let (mut slope, mut surface) = (0.0, 0.0);
         for seed in 0..40 {
@@ -315,11 +307,7 @@ mod tests {
     fn seating_below_the_force_is_left_out() {
         // The first 10 um are ten times as soft.
         let seated = |x: f64| {
-            if x < 0.01 {
-                5.0 * x
-            } else {
-                0.05 + (x - 0.01) / 0.02
-            }
+            if x < 0.01 { 5.0 * x } else { 0.05 + (x - 0.01) / 0.02 }
         };
         let found = fit_compliance(&run(0.005, 3, seated), Newtons(0.3)).unwrap();
         assert!((found.mm_per_newton - 0.02).abs() < 4.0 * found.std_error);
@@ -329,26 +317,17 @@ mod tests {
     fn what_curves_or_is_soft_or_short_is_refused() {
         // Hertz: a ball on a plate, F ~ x^1.5.
         let hertz = fit_compliance(&run(0.01, 1, |x| 150.0 * x.powf(1.5)), Newtons(0.3));
-        assert!(
-            matches!(hertz, Err(ComplianceError::Curved { .. })),
-            "{hertz:?}"
-        );
+        assert!(matches!(hertz, Err(ComplianceError::Curved { .. })), "{hertz:?}");
         let none = fit_compliance(&run(0.02, 1, |_| 1.0), Newtons(0.5));
         assert_eq!(none, Err(ComplianceError::NotRising));
         let short = fit_compliance(&run(0.0, 1, |x| x / 0.02), Newtons(4.99));
         assert!(matches!(short, Err(ComplianceError::TooShort { .. })));
-        let still = vec![
-            StiffSample {
-                position: Position(1.0),
-                force: Newtons(1.0),
-                sigma: Newtons(1.0),
-            };
-            100
-        ];
-        assert_eq!(
-            fit_compliance(&still, Newtons(0.5)),
-            Err(ComplianceError::NotRising)
-        );
+        let still =
+            vec![
+                StiffSample { position: Position(1.0), force: Newtons(1.0), sigma: Newtons(1.0) };
+                100
+            ];
+        assert_eq!(fit_compliance(&still, Newtons(0.5)), Err(ComplianceError::NotRising));
     }
 
     #[test]

@@ -168,12 +168,7 @@ mod tests {
         // By hand: standard deviation 0.0002, of the mean of three 0.0002 / sqrt(3).
         let wanted = 2e-4 / 3f64.sqrt();
         assert!((found.std_error_mm_per_n / wanted - 1.0).abs() < 1e-6);
-        assert!(
-            found
-                .presses
-                .iter()
-                .all(|one| one.std_error_mm_per_n < 1e-9)
-        );
+        assert!(found.presses.iter().all(|one| one.std_error_mm_per_n < 1e-9));
         let sum: usize = found.presses.iter().map(|one| one.samples).sum();
         assert!(found.samples.abs_diff(sum) < 10, "{found:?}");
         found.check().unwrap();
@@ -186,10 +181,7 @@ mod tests {
     fn one_bad_press_refuses_all_and_an_impossible_document_is_refused() {
         let tissue: Vec<StiffSample> = press(0.02)
             .iter()
-            .map(|one| StiffSample {
-                force: Newtons(one.force.0.powi(2) / 5.0),
-                ..*one
-            })
+            .map(|one| StiffSample { force: Newtons(one.force.0.powi(2) / 5.0), ..*one })
             .collect();
         let refused = RigCompliance::of_presses(&[(1, tissue)], Newtons(1.0));
         assert!(matches!(refused, Err(ComplianceError::Curved { .. })));
@@ -197,10 +189,7 @@ mod tests {
         assert!(matches!(none, Err(ComplianceError::TooShort { .. })));
         let good = RigCompliance::of_presses(&[(1, press(0.02))], Newtons(1.0)).unwrap();
         for bad in [0.0, -0.02, f64::NAN, f64::INFINITY] {
-            let bad = RigCompliance {
-                mm_per_n: bad,
-                ..good.clone()
-            };
+            let bad = RigCompliance { mm_per_n: bad, ..good.clone() };
             assert!(bad.check().is_err(), "{bad:?}");
         }
         let newer = RigCompliance { format: 2, ..good };

@@ -122,8 +122,7 @@ impl RigDescription {
     /// white noise leaves two samples equal two times in five; a hundred in a row never happen.
     #[must_use]
     pub fn shows_noise(&self) -> bool {
-        self.adc
-            .is_none_or(|adc| self.noise_expected.0 >= 0.5 * adc.volts_per_count)
+        self.adc.is_none_or(|adc| self.noise_expected.0 >= 0.5 * adc.volts_per_count)
     }
 
     /// Checks that the rig can follow an oscillation, and explains a refusal.

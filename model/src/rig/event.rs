@@ -57,19 +57,15 @@ impl fmt::Display for Fault {
             Self::CommandRefused { detail } => write!(f, "the rig refused a command ({detail})"),
             Self::ControllerReset => write!(f, "the controller restarted; home the axis again"),
             Self::SignalInvalid { .. } => {
-                write!(
-                    f,
-                    "the load cell's signal is not a number; check its wiring"
-                )
+                write!(f, "the load cell's signal is not a number; check its wiring")
             }
             Self::LogFailed { detail } => write!(f, "the session log cannot be written ({detail})"),
             Self::LogAtRisk { detail } => {
                 write!(f, "the run ends before the disks take no more ({detail})")
             }
-            Self::HostPaused { missed } => write!(
-                f,
-                "the computer stood still for {missed:.1} and nobody watched the rig"
-            ),
+            Self::HostPaused { missed } => {
+                write!(f, "the computer stood still for {missed:.1} and nobody watched the rig")
+            }
         }
     }
 }

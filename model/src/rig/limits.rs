@@ -38,11 +38,7 @@ impl Limits {
     /// as those of a slow load cell, has that time beside the 20 ms: its newest sample is as old by itself.
     #[must_use]
     pub fn sample_age_max(speed: MmPerS, unseen: Position, apart: Seconds) -> Seconds {
-        let span = if speed.0.abs() > 0.0 {
-            unseen.0 / speed.0.abs()
-        } else {
-            f64::INFINITY
-        };
+        let span = if speed.0.abs() > 0.0 { unseen.0 / speed.0.abs() } else { f64::INFINITY };
         // Apart by more than 230 ms there is no room for a computer's slices: nothing moves on such a rig.
         Seconds(span.clamp((0.020 + apart.0.max(0.0)).min(0.250), 0.250))
     }

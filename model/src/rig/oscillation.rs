@@ -174,10 +174,7 @@ mod tests {
             assert!(err.contains(fact), "{fact}: {err}");
         }
         let err = path.check(MmPerS(speed), MmPerS2(0.9 * accel)).unwrap_err();
-        assert!(
-            err.contains("7.40 mm/s2") && err.contains("6.66 mm/s2"),
-            "{err}"
-        );
+        assert!(err.contains("7.40 mm/s2") && err.contains("6.66 mm/s2"), "{err}");
         for (amplitude, period, cycles) in [(0, 2000, 1), (50, 0, 1), (50, 2000, 0), (0, 0, 0)] {
             let command = Oscillation {
                 amplitude_pulses: amplitude,

@@ -28,11 +28,7 @@ pub struct PathError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
     Rest,
-    Moving {
-        course: Course,
-        start_tick: u64,
-        is_stopping: bool,
-    },
+    Moving { course: Course, start_tick: u64, is_stopping: bool },
 }
 
 /// A motion that was sent and has not begun.
@@ -139,11 +135,7 @@ impl PathTracker {
         let position = match &mut self.motion {
             Motion::Rest if is_over && self.pending.take().is_some() => reported,
             Motion::Rest => at_rest,
-            Motion::Moving {
-                course,
-                start_tick,
-                is_stopping,
-            } => {
+            Motion::Moving { course, start_tick, is_stopping } => {
                 let mut since =
                     Seconds(reading.tick.saturating_sub(*start_tick) as f64 * self.tick.0);
                 if reading.status.has(AxisStatus::STOPPING) && !*is_stopping {
@@ -159,11 +151,7 @@ impl PathTracker {
                     let way = course.position(Seconds(other)).distance_from(here);
                     lag_mm = lag_mm.max(way.abs());
                 }
-                if is_moving {
-                    here
-                } else {
-                    self.rest_at(here, since, reading)
-                }
+                if is_moving { here } else { self.rest_at(here, since, reading) }
             }
         };
         if !is_moving && matches!(self.motion, Motion::Rest) {
@@ -175,10 +163,7 @@ impl PathTracker {
         let lag_pulses = lag_mm / self.mm_per_pulse;
         // One pulse, plus rounding of a position of up to 1e5 pulses in double precision.
         if (expected_pulses - reading.pulses as f64).abs() > 1.0 + lag_pulses + 1e-6 {
-            return Err(PathError {
-                expected_pulses,
-                reported_pulses: reading.pulses,
-            });
+            return Err(PathError { expected_pulses, reported_pulses: reading.pulses });
         }
         Ok(position)
     }
@@ -198,12 +183,7 @@ impl PathTracker {
 
     /// The axis no longer moves: the course's end, or the whole pulse where it was cut short.
     fn rest_at(&mut self, here: Position, since: Seconds, reading: &Reading) -> Position {
-        let Motion::Moving {
-            course,
-            is_stopping,
-            ..
-        } = self.motion
-        else {
+        let Motion::Moving { course, is_stopping, .. } = self.motion else {
             return here;
         };
         self.motion = Motion::Rest;

@@ -140,10 +140,7 @@ mod tests {
                 (ramp.position(Seconds(t + h)).0 - ramp.position(Seconds(t - h)).0) / (2.0 * h);
             // Central difference of a piecewise quadratic: exact but at the corners, where it
             // is off by at most accel * h, plus cancellation of 71 mm at 1e-16 over 2e-6 s.
-            assert!(
-                (slope - ramp.velocity(Seconds(t)).0).abs() < 1e-4,
-                "t = {t}"
-            );
+            assert!((slope - ramp.velocity(Seconds(t)).0).abs() < 1e-4, "t = {t}");
         }
     }
 

@@ -108,10 +108,7 @@ mod tests {
         assert_eq!(signal.range_v, Some([-32.768, 32.767]));
         // 20 x 50 Hz is the sampling rate itself; 17 x 60 Hz = 1020 Hz is seen at 20 Hz, which is no slow one.
         let text = &signal.aliasing;
-        assert!(
-            text.contains("above 500 Hz") && text.contains("7.50 mm/s"),
-            "{text}"
-        );
+        assert!(text.contains("above 500 Hz") && text.contains("7.50 mm/s"), "{text}");
         assert!(
             text.contains("1000 Hz") && text.contains("50 Hz") && text.contains("0.0 Hz"),
             "{text}"
@@ -131,9 +128,7 @@ mod tests {
 
     #[test]
     fn a_millisecond_has_as_many_samples_as_the_clock_means() {
-        let ticks = [
-            1_000_000, 976_000, 976_562, 2_000_000, 500_000, 50_000, 48_800,
-        ];
+        let ticks = [1_000_000, 976_000, 976_562, 2_000_000, 500_000, 50_000, 48_800];
         let samples = ticks.map(|tick| rig(tick).samples_per_ms());
         assert_eq!(samples, [1, 1, 1, 1, 2, 20, 20]);
     }

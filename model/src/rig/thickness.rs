@@ -42,17 +42,10 @@ pub fn thickness(tissue: Touched, base: Touched) -> Result<Thickness, ThicknessE
     let is_known = mm.is_finite() && std_error_mm.is_finite();
     // Less than three standard errors may be nothing at all.
     if !(is_known && mm > 3.0 * std_error_mm) {
-        return Err(ThicknessError {
-            base: base.position,
-            tissue: tissue.position,
-        });
+        return Err(ThicknessError { base: base.position, tissue: tissue.position });
     }
     let half = 1.96 * std_error_mm;
-    Ok(Thickness {
-        mm,
-        std_error_mm,
-        ci95_mm: [mm - half, mm + half],
-    })
+    Ok(Thickness { mm, std_error_mm, ci95_mm: [mm - half, mm + half] })
 }
 
 #[cfg(test)]
@@ -60,10 +53,7 @@ mod tests {
     use super::*;
 
     fn touched(position: f64, std_error_mm: f64) -> Touched {
-        Touched {
-            position: Position(position),
-            std_error_mm,
-        }
+        Touched { position: Position(position), std_error_mm }
     }
 
     #[test]

@@ -66,9 +66,7 @@ type Rows = Triangle<6>;
 /// Estimates the contact position from a slow pass at constant speed.
 pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactError> {
     if points.len() < POINTS_MIN {
-        return Err(ContactError::TooShort {
-            points: points.len(),
-        });
+        return Err(ContactError::TooShort { points: points.len() });
     }
     let pass = Pass::new(points)?;
     let (mut at, mut cost) = pass.scan().ok_or(ContactError::NoOnset)?;
@@ -128,12 +126,7 @@ impl<'a> Pass<'a> {
         if !(is_straight && speed > 0.0) {
             return Err(ContactError::NotOneSpeed);
         }
-        Ok(Self {
-            points,
-            speed,
-            first: begin.position.0,
-            last: end.position.0,
-        })
+        Ok(Self { points, speed, first: begin.position.0, last: end.position.0 })
     }
 
     /// The three linear columns and the two derivatives of the fitted force at a point.
@@ -233,10 +226,7 @@ impl<'a> Pass<'a> {
     fn cost_without_contact(&self) -> f64 {
         let count = self.points.len() as f64;
         let mean = self.points.iter().map(|point| point.force.0).sum::<f64>() / count;
-        self.points
-            .iter()
-            .map(|point| (point.force.0 - mean).powi(2))
-            .sum()
+        self.points.iter().map(|point| (point.force.0 - mean).powi(2)).sum()
     }
 }
 
@@ -252,11 +242,7 @@ mod tests {
         let (tau, speed) = (1.023, 0.15);
         let elastic = |x: f64| (0.053_33 + (-0.0086 + 0.000_434_5 * x) * x) * x;
         let forcing = |x: f64| {
-            if x > 0.0 {
-                elastic(x) + 0.06 * x * speed
-            } else {
-                0.0
-            }
+            if x > 0.0 { elastic(x) + 0.06 * x * speed } else { 0.0 }
         };
         let mut noise = Noise(seed);
         let (mut force, mut points) = (0.0, Vec::new());
@@ -312,9 +298,8 @@ mod tests {
 
     #[test]
     fn scatter_is_what_the_standard_error_says() {
-        let estimates: Vec<_> = (0..40)
-            .map(|seed| fit_contact(&pass(0.02, seed)).unwrap())
-            .collect();
+        let estimates: Vec<_> =
+            (0..40).map(|seed| fit_contact(&pass(0.02, seed)).unwrap()).collect();
         let squares: f64 = estimates
             .iter()
             .map(|one| ((one.position.0 - CONTACT) / one.std_error_mm).powi(2))
@@ -337,9 +322,6 @@ mod tests {
             })
             .collect();
         assert_eq!(fit_contact(&flat), Err(ContactError::NoOnset));
-        assert!(matches!(
-            fit_contact(&flat[..10]),
-            Err(ContactError::TooShort { points: 10 })
-        ));
+        assert!(matches!(fit_contact(&flat[..10]), Err(ContactError::TooShort { points: 10 })));
     }
 }

@@ -14,12 +14,7 @@ impl MovingMean {
     #[must_use]
     pub fn new(length: usize) -> Self {
         let length = length.max(1);
-        Self {
-            ring: Vec::with_capacity(length),
-            length,
-            next: 0,
-            sum: 0.0,
-        }
+        Self { ring: Vec::with_capacity(length), length, next: 0, sum: 0.0 }
     }
 
     /// Whether the mean is over all the values it is meant for: before, it hides less noise.
@@ -68,12 +63,7 @@ mod tests {
     fn starts_with_what_there_is() {
         let mut mean = MovingMean::new(3);
         assert_eq!(
-            [
-                mean.push(1.0),
-                mean.push(2.0),
-                mean.push(3.0),
-                mean.push(4.0)
-            ],
+            [mean.push(1.0), mean.push(2.0), mean.push(3.0), mean.push(4.0)],
             [1.0, 1.5, 2.0, 3.0]
         );
         assert!(mean.is_full() && !MovingMean::new(2).is_full());

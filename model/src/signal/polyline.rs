@@ -91,9 +91,7 @@ impl Reducer {
         let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
         Some(Coverage {
             size,
-            pixels: pixels
-                .map(|(x, y)| (crossed(x, y) * 255 / side).min(255) as u8)
-                .collect(),
+            pixels: pixels.map(|(x, y)| (crossed(x, y) * 255 / side).min(255) as u8).collect(),
         })
     }
 
@@ -252,13 +250,7 @@ fn walk([from, to]: [[f64; 2]; 2], mut visit: impl FnMut([usize; 2]) -> bool) {
             way => (edge - from[axis]) / way,
         }
     });
-    let between = way.map(|way| {
-        if way == 0.0 {
-            f64::INFINITY
-        } else {
-            CELL / way.abs()
-        }
-    });
+    let between = way.map(|way| if way == 0.0 { f64::INFINITY } else { CELL / way.abs() });
     // As many steps as there are edges: rounding cannot make it go on.
     let steps = (last[0] - cell[0]).abs() + (last[1] - cell[1]).abs();
     for left in (0..=steps).rev() {
@@ -299,8 +291,7 @@ fn straighten(points: &[[f64; 2]], error: f64) -> Vec<[f64; 2]> {
         }
     }
     let kept = points.iter().zip(is_kept);
-    kept.filter_map(|(point, is_kept)| is_kept.then_some(*point))
-        .collect()
+    kept.filter_map(|(point, is_kept)| is_kept.then_some(*point)).collect()
 }
 
 /// Distance of a point from the line between two others.
@@ -334,12 +325,7 @@ mod tests {
             .filter(|pair| pair.iter().all(is_known))
             .collect();
         // A point alone is a line without length.
-        lines.extend(
-            points
-                .iter()
-                .filter(|one| is_known(one))
-                .map(|one| [*one; 2]),
-        );
+        lines.extend(points.iter().filter(|one| is_known(one)).map(|one| [*one; 2]));
         lines
     }
 
@@ -421,18 +407,8 @@ mod tests {
     #[test]
     fn points_alone_gaps_and_what_is_outside() {
         let nan = f64::NAN;
-        let points = [
-            [1.0, 1.0],
-            [nan, 0.0],
-            [5.0, 5.0],
-            [nan, nan],
-            [1.1, 1.1],
-            [nan, 0.0],
-        ];
-        assert_eq!(
-            reduced(&points, [10.0, 10.0]),
-            [vec![[1.0, 1.0]], vec![[5.0, 5.0]]]
-        );
+        let points = [[1.0, 1.0], [nan, 0.0], [5.0, 5.0], [nan, nan], [1.1, 1.1], [nan, 0.0]];
+        assert_eq!(reduced(&points, [10.0, 10.0]), [vec![[1.0, 1.0]], vec![[5.0, 5.0]]]);
         assert!(reduced(&[[-3.0, 1.0], [-1.0, 40.0], [30.0, 40.0]], [10.0, 10.0]).is_empty());
         // Across the picture from outside to outside.
         let across = [[-5.0, 5.0], [15.0, 5.0]];
@@ -480,9 +456,6 @@ mod tests {
         reducer.lift();
         let coverage = reducer.coverage().expect("two points");
         let row = |y: usize| &coverage.pixels[10 * y..10 * (y + 1)];
-        assert_eq!(
-            (row(0), row(1), row(2)),
-            (&[0; 10][..], &[255; 10][..], &[0; 10][..])
-        );
+        assert_eq!((row(0), row(1), row(2)), (&[0; 10][..], &[255; 10][..], &[0; 10][..]));
     }
 }

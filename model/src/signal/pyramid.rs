@@ -61,11 +61,7 @@ impl Fold {
     }
 
     fn take(&mut self, index: u32, value: f32) {
-        let place = Place {
-            index,
-            value,
-            gaps: self.gaps,
-        };
+        let place = Place { index, value, gaps: self.gaps };
         if self.low.is_none_or(|low| value < low.value) {
             self.low = Some(place);
         }
@@ -87,18 +83,14 @@ impl Fold {
     fn bucket(&self) -> Bucket {
         let mark = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
         let Some((first, second)) = self.pair() else {
-            return Bucket {
-                first: NONE | mark(self.gaps > 0, BEFORE),
-                second: NONE,
-            };
+            return Bucket { first: NONE | mark(self.gaps > 0, BEFORE), second: NONE };
         };
         let last = second.unwrap_or(first);
         let marks = mark(first.gaps > 0, BEFORE) | mark(self.gaps > last.gaps, AFTER);
         Bucket {
             first: first.index | marks,
-            second: second.map_or(NONE, |second| {
-                second.index | mark(second.gaps > first.gaps, BETWEEN)
-            }),
+            second: second
+                .map_or(NONE, |second| second.index | mark(second.gaps > first.gaps, BETWEEN)),
         }
     }
 
@@ -134,10 +126,7 @@ impl Pyramid {
     /// A pyramid with room for so many samples.
     #[must_use]
     pub fn with_capacity(samples: usize) -> Self {
-        Self {
-            values: Vec::with_capacity(samples),
-            levels: Vec::new(),
-        }
+        Self { values: Vec::with_capacity(samples), levels: Vec::new() }
     }
 
     /// How many samples there are.
@@ -256,11 +245,7 @@ impl Pyramid {
         }
         if column == 1 {
             for (value, index) in self.values[from..to].iter().zip(from..) {
-                draw(if value.is_finite() {
-                    Mark::Point(index, *value)
-                } else {
-                    Mark::Gap
-                });
+                draw(if value.is_finite() { Mark::Point(index, *value) } else { Mark::Gap });
             }
             return;
         }

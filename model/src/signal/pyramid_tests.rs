@@ -98,9 +98,7 @@ fn extremes_of_any_range_are_those_of_its_samples() {
     for _ in 0..2000 {
         let from = random.below(raw.len());
         let to = from + random.below(raw.len() - from + 3);
-        let own = raw[from..to.min(raw.len())]
-            .iter()
-            .filter(|one| one.is_finite());
+        let own = raw[from..to.min(raw.len())].iter().filter(|one| one.is_finite());
         let low = own.clone().copied().reduce(f32::min);
         let high = own.copied().reduce(f32::max);
         let found = pyramid.extremes(from, to);
@@ -127,11 +125,7 @@ fn nothing_one_sample_and_ranges_beyond_the_end_are_drawn() {
         pyramid.extend([f32::NAN; 100]);
         pyramid
     };
-    assert!(
-        drawn(&nothing, 0, 100, 64)
-            .iter()
-            .all(|mark| *mark == Mark::Gap)
-    );
+    assert!(drawn(&nothing, 0, 100, 64).iter().all(|mark| *mark == Mark::Gap));
     assert_eq!(nothing.extremes(0, 100), None);
 }
 
@@ -142,19 +136,11 @@ fn there_are_at_most_two_points_a_pixel_and_the_memory_is_as_stated() {
     let pyramid = pyramid(&mut random, &raw);
     let per_sample = pyramid.bytes() as f64 / raw.len() as f64;
     assert!((4.6..4.7).contains(&per_sample), "{per_sample}");
-    for (samples, pixels) in [
-        (1000, 800.0),
-        (1601, 800.0),
-        (40_000, 333.0),
-        (1 << 20, 1600.0),
-    ] {
+    for (samples, pixels) in [(1000, 800.0), (1601, 800.0), (40_000, 333.0), (1 << 20, 1600.0)] {
         let column = column_for(samples, pixels);
         let points = drawn(&pyramid, 0, samples, column).len();
         assert!(points as f64 <= 2.0 * pixels + 2.0, "{points}");
         // And not many fewer than there is room for.
-        assert!(
-            points as f64 >= 0.45 * pixels.min(samples as f64),
-            "{points}"
-        );
+        assert!(points as f64 >= 0.45 * pixels.min(samples as f64), "{points}");
     }
 }

@@ -93,9 +93,7 @@ pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
             _ => search.has_speed_term = false,
         }
     }
-    search
-        .estimate(&found, &starts)
-        .ok_or(ContactError::NoOnset)
+    search.estimate(&found, &starts).ok_or(ContactError::NoOnset)
 }
 
 /// A trial contact position in mm, the logarithm of a relaxation time in s, and how much deeper in mm the second
@@ -143,9 +141,7 @@ impl Search {
             point.t.is_finite() && point.position.is_finite() && force.is_finite()
         });
         let mut deep = f64::NEG_INFINITY;
-        points
-            .iter()
-            .for_each(|point| deep = deep.max(point.position.0));
+        points.iter().for_each(|point| deep = deep.max(point.position.0));
         let (begin, end) = (points[0], points[points.len() - 1]);
         if !(is_forward && is_finite && deep > begin.position.0) {
             return Err(ContactError::NotOneSpeed);
@@ -163,11 +159,7 @@ impl Search {
 
     /// Coefficients that are linear: offset, drift, and those of the body.
     fn linear(&self) -> usize {
-        if self.has_speed_term {
-            2 + BODY
-        } else {
-            1 + BODY
-        }
+        if self.has_speed_term { 2 + BODY } else { 1 + BODY }
     }
 
     /// Parameters that are not: contact, ln tau and perhaps the distance.
@@ -207,10 +199,8 @@ impl Search {
             let mean = |of: &dyn Fn(&TouchPoint) -> f64| {
                 points.iter().map(of).sum::<f64>() / points.len() as f64
             };
-            let forces: Option<Vec<f64>> = points
-                .iter()
-                .map(|point| point.force.map(|force| force.0))
-                .collect();
+            let forces: Option<Vec<f64>> =
+                points.iter().map(|point| point.force.map(|force| force.0)).collect();
             TouchPoint {
                 t: Seconds(mean(&|point| point.t.0)),
                 position: Position(mean(&|point| point.position.0)),
@@ -218,20 +208,12 @@ impl Search {
             }
         };
         let points: Vec<_> = self.points.chunks(group).map(mean_of).collect();
-        Self {
-            between: points.iter().rposition(|point| point.force.is_none()),
-            points,
-            ..*self
-        }
+        Self { between: points.iter().rposition(|point| point.force.is_none()), points, ..*self }
     }
 
     /// Follows the path; hands out the body's columns at every force, zero where nothing is touched.
     fn follow(&self, trial: Trial, mut at: impl FnMut(usize, &TouchPoint, f64, [f64; BODY])) {
-        let body = ModifiedKelvin {
-            tau_eps: trial.log_tau.exp(),
-            mu: [0.0; 3],
-            tau_sig: 0.0,
-        };
+        let body = ModifiedKelvin { tau_eps: trial.log_tau.exp(), mu: [0.0; 3], tau_sig: 0.0 };
         let depth = |index: usize, point: &TouchPoint| {
             let is_second = self.between.is_some_and(|between| index > between);
             let apart = if is_second { trial.apart } else { 0.0 };
@@ -253,11 +235,7 @@ impl Search {
                 if depth.0 > 0.0 {
                     let [f1, f2, f3, g] = state.columns();
                     // tau times the filtered speed, by parts.
-                    let speed = if self.has_speed_term {
-                        depth.0 - f1
-                    } else {
-                        0.0
-                    };
+                    let speed = if self.has_speed_term { depth.0 - f1 } else { 0.0 };
                     columns = [f1, f2, f3, g, speed];
                     columns.iter_mut().zip(scales).for_each(|(c, s)| *c *= s);
                 }
@@ -294,11 +272,7 @@ impl Search {
             let trials = (1..CONTACT_COUNT).filter_map(|i| {
                 let share = f64::from(i) / f64::from(CONTACT_COUNT);
                 let contact = self.shallow + share * (self.deep - self.shallow);
-                let trial = Trial {
-                    contact,
-                    log_tau,
-                    apart: 0.0,
-                };
+                let trial = Trial { contact, log_tau, apart: 0.0 };
                 Some((trial, self.solve(trial)?.1))
             });
             let best = trials.min_by(|one, other| one.1.total_cmp(&other.1))?;
@@ -397,9 +371,7 @@ impl Search {
     fn estimate(&self, bottom: &Bottom, starts: &[Trial]) -> Option<TouchEstimate> {
         let by_noise = self.std_error(bottom, 0)?;
         let apart_mm = self.apart(starts);
-        let std_error_mm = by_noise
-            .hypot(apart_mm.unwrap_or(0.0) / 2.0)
-            .hypot(bottom.by_choice_mm);
+        let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0).hypot(bottom.by_choice_mm);
         // Against offset and drift alone the fit must gain what noise cannot: chi-square with six degrees,
         // for which 100 has a chance of 1e-18 a trial.
         let gain = (self.cost_without_contact()? - bottom.cost) / bottom.variance;
@@ -415,11 +387,7 @@ impl Search {
     /// found anew with the distance free.
     fn apart(&self, starts: &[Trial]) -> Option<f64> {
         self.between?;
-        let free = Self {
-            may_be_apart: true,
-            points: self.points.clone(),
-            ..*self
-        };
+        let free = Self { may_be_apart: true, points: self.points.clone(), ..*self };
         let moved = free.best(starts)?;
         let error = free.std_error(&moved, 2)?;
         (moved.trial.apart.abs() > APART_SIGMAS * error).then_some(moved.trial.apart)
@@ -459,11 +427,7 @@ impl Search {
         let ratio = squares / blocks / variance;
         // A variance from so many blocks scatters by the root of two over their number; three times that is
         // no accident. A ratio that is no number comes of too few blocks or of no noise at all.
-        if ratio > 1.0 + 3.0 * (2.0f64 / blocks).sqrt() {
-            ratio
-        } else {
-            1.0
-        }
+        if ratio > 1.0 + 3.0 * (2.0f64 / blocks).sqrt() { ratio } else { 1.0 }
     }
 
     /// Sum of squares about offset and drift.

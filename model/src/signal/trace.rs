@@ -23,11 +23,7 @@ struct Bucket {
 
 impl Bucket {
     fn of(point: TracePoint) -> Self {
-        Self {
-            low: point,
-            high: point,
-            has_gap: !point.force.is_finite(),
-        }
+        Self { low: point, high: point, has_gap: !point.force.is_finite() }
     }
 
     fn join(self, other: Self) -> Self {
@@ -60,21 +56,12 @@ impl LiveTrace {
     /// A history of at most `capacity` buckets, at least two.
     #[must_use]
     pub fn new(capacity: usize) -> Self {
-        Self {
-            capacity: capacity.max(2),
-            per_bucket: 1,
-            buckets: Vec::new(),
-            open: None,
-        }
+        Self { capacity: capacity.max(2), per_bucket: 1, buckets: Vec::new(), open: None }
     }
 
     /// Takes a sample.
     pub fn push(&mut self, t: Seconds, depth: Depth, force: Newtons) {
-        let point = Bucket::of(TracePoint {
-            t: t.0,
-            depth: depth.0,
-            force: force.0,
-        });
+        let point = Bucket::of(TracePoint { t: t.0, depth: depth.0, force: force.0 });
         let (bucket, count) = match self.open.take() {
             Some((bucket, count)) => (bucket.join(point), count + 1),
             None => (point, 1),
@@ -104,11 +91,7 @@ impl LiveTrace {
     #[must_use]
     pub fn points(&self) -> Vec<TracePoint> {
         let mut points = Vec::with_capacity(2 * self.buckets.len() + 2);
-        for bucket in self
-            .buckets
-            .iter()
-            .chain(self.open.iter().map(|(bucket, _)| bucket))
-        {
+        for bucket in self.buckets.iter().chain(self.open.iter().map(|(bucket, _)| bucket)) {
             let (first, second) = if bucket.low.t <= bucket.high.t {
                 (bucket.low, bucket.high)
             } else {
@@ -119,10 +102,7 @@ impl LiveTrace {
                 points.push(second);
             }
             if bucket.has_gap && second.force.is_finite() {
-                points.push(TracePoint {
-                    force: f64::NAN,
-                    ..second
-                });
+                points.push(TracePoint { force: f64::NAN, ..second });
             }
         }
         points
@@ -144,11 +124,7 @@ mod tests {
     #[test]
     fn keeps_every_extreme_in_constant_memory() {
         let spike = |i: i32| {
-            if i == 54_321 {
-                9.0
-            } else {
-                f64::from(i % 100) * 1e-3
-            }
+            if i == 54_321 { 9.0 } else { f64::from(i % 100) * 1e-3 }
         };
         let trace = trace_of((0..100_000).map(spike), 256);
         let points = trace.points();

@@ -139,12 +139,7 @@ impl Track {
         let segment = after.saturating_sub(1);
         let times = &self.segments.get(segment)?.times;
         let within = times.partition_point(|one| *one <= t).saturating_sub(1);
-        Some(Place {
-            index: self.before[segment] + within,
-            t: times[within],
-            segment,
-            within,
-        })
+        Some(Place { index: self.before[segment] + within, t: times[within], segment, within })
     }
 
     /// A quantity at a place; `None` in a gap.
@@ -197,11 +192,7 @@ impl Track {
         mut draw: impl FnMut(Option<[f64; 2]>),
     ) -> Drawn {
         let per_second = pixels / (to - from);
-        let mut pen = Pen {
-            draw: &mut draw,
-            newest: None,
-            drawn: Drawn::default(),
-        };
+        let mut pen = Pen { draw: &mut draw, newest: None, drawn: Drawn::default() };
         if self.segments.is_empty() || !(per_second.is_finite() && per_second > 0.0) {
             return pen.drawn;
         }

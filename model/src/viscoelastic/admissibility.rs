@@ -54,10 +54,7 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
             unstable(body),
             "the elastic force falls with depth {bands}: there this body is unstable if held by force",
         ),
-        (
-            active_cycles(body),
-            "around depths {bands} a small slow cycle returns energy",
-        ),
+        (active_cycles(body), "around depths {bands} a small slow cycle returns energy"),
         (
             active_pokes(body),
             "a step from the surface to depths {bands} does not relax, and a slow poke returns energy",
@@ -66,10 +63,8 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
     cases
         .into_iter()
         .filter_map(|(bands, text)| {
-            let inside: Vec<String> = bands
-                .iter()
-                .filter_map(|band| words(band, deepest))
-                .collect();
+            let inside: Vec<String> =
+                bands.iter().filter_map(|band| words(band, deepest)).collect();
             (!inside.is_empty()).then(|| text.replace("{bands}", &inside.join(" and ")))
         })
         .collect()
@@ -95,28 +90,18 @@ fn negative([c0, c1, c2]: [f64; 3]) -> Vec<Band> {
     let value = |x: f64| c0 + x * (c1 + x * c2);
     ends.windows(2)
         .filter(|pair| {
-            let middle = if pair[1].is_finite() {
-                0.5 * (pair[0] + pair[1])
-            } else {
-                2.0 * pair[0] + 1.0
-            };
+            let middle =
+                if pair[1].is_finite() { 0.5 * (pair[0] + pair[1]) } else { 2.0 * pair[0] + 1.0 };
             value(middle) < 0.0
         })
-        .map(|pair| Band {
-            from: pair[0],
-            to: pair[1],
-        })
+        .map(|pair| Band { from: pair[0], to: pair[1] })
         .collect()
 }
 
 /// Real roots in rising order, without cancellation.
 fn roots([c0, c1, c2]: [f64; 3]) -> Vec<f64> {
     if c2 == 0.0 {
-        return if c1 == 0.0 {
-            Vec::new()
-        } else {
-            vec![-c0 / c1]
-        };
+        return if c1 == 0.0 { Vec::new() } else { vec![-c0 / c1] };
     }
     let discriminant = c1 * c1 - 4.0 * c2 * c0;
     if discriminant <= 0.0 {
@@ -155,10 +140,7 @@ mod tests {
         let bands = active_pokes(&THESIS);
         close(bands[0].to, 1.430, 5e-4);
         let said = sentences(&THESIS, 30.0).join("; ");
-        assert!(
-            said.contains("between 4.98") && said.contains("below 0.71"),
-            "{said}"
-        );
+        assert!(said.contains("between 4.98") && said.contains("below 0.71"), "{said}");
         assert!(!said.contains("57.5"), "deeper than recorded: {said}");
     }
 
@@ -192,11 +174,7 @@ mod tests {
 
     #[test]
     fn a_body_without_faults_says_nothing() {
-        let body = ModifiedKelvin {
-            tau_eps: 0.1,
-            mu: [0.0, 0.01, 0.0],
-            tau_sig: 0.06,
-        };
+        let body = ModifiedKelvin { tau_eps: 0.1, mu: [0.0, 0.01, 0.0], tau_sig: 0.06 };
         assert_eq!(sentences(&body, 30.0), Vec::<String>::new());
     }
 }

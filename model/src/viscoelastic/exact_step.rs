@@ -69,11 +69,7 @@ impl StepWeights {
     /// Weights of a step of `dt > 0` seconds at `tau >= 0` seconds.
     pub fn new(dt: f64, tau: f64) -> Self {
         let r = dt / tau;
-        Self {
-            dt,
-            r,
-            psi: psi_all(r),
-        }
+        Self { dt, r, psi: psi_all(r) }
     }
 }
 

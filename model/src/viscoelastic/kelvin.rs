@@ -35,26 +35,15 @@ pub struct BodyError {
 
 impl ModifiedKelvin {
     /// Pig stomach, equation 3.5 of the thesis.
-    pub const THESIS: Self = Self {
-        tau_eps: 1.023,
-        mu: [0.05333, -0.0086, 0.0004345],
-        tau_sig: 0.06,
-    };
+    pub const THESIS: Self =
+        Self { tau_eps: 1.023, mu: [0.05333, -0.0086, 0.0004345], tau_sig: 0.06 };
 
     /// The body itself if its numbers describe one.
     pub fn checked(self) -> Result<Self, BodyError> {
         let [mu1, mu2, mu3] = self.mu;
-        let named = [
-            ("mu1", mu1),
-            ("mu2", mu2),
-            ("mu3", mu3),
-            ("tau_sig", self.tau_sig),
-        ];
+        let named = [("mu1", mu1), ("mu2", mu2), ("mu3", mu3), ("tau_sig", self.tau_sig)];
         if !(self.tau_eps > 0.0 && self.tau_eps.is_finite()) {
-            return Err(BodyError {
-                name: "tau_eps",
-                value: self.tau_eps,
-            });
+            return Err(BodyError { name: "tau_eps", value: self.tau_eps });
         }
         match named.into_iter().find(|(_, value)| !value.is_finite()) {
             Some((name, value)) => Err(BodyError { name, value }),
@@ -207,10 +196,7 @@ mod tests {
     }
 
     fn check(value: f64, exact: f64, relative: f64) {
-        assert!(
-            (value - exact).abs() <= relative * exact.abs(),
-            "{value:.17} is not {exact:.17}"
-        );
+        assert!((value - exact).abs() <= relative * exact.abs(), "{value:.17} is not {exact:.17}");
     }
 
     #[test]
@@ -238,10 +224,7 @@ mod tests {
             (1e6, 7.311_230_684_586_716e-5, 3.526_716_621_883_997_7e-4),
         ];
         for (tau_eps, peak_exact, end_exact) in cases {
-            let body = ModifiedKelvin {
-                tau_eps,
-                ..ModifiedKelvin::THESIS
-            };
+            let body = ModifiedKelvin { tau_eps, ..ModifiedKelvin::THESIS };
             for steps in [1, 1000] {
                 let (peak, end) = ramp_hold(&body, 0.75, steps);
                 check(peak, peak_exact, 2e-13);
@@ -259,24 +242,13 @@ mod tests {
         check(jump, 0.06 * 100.0 / 2.046, 1e-15);
         let force = state.step(&body, Depth(10.0), Seconds(2.0)).0;
         let settled = body.elastic(Depth(10.0)).0;
-        check(
-            force,
-            settled + (jump - settled) * (-2.0f64 / 1.023).exp(),
-            1e-14,
-        );
+        check(force, settled + (jump - settled) * (-2.0f64 / 1.023).exp(), 1e-14);
     }
 
     #[test]
     fn splitting_steps_changes_nothing_even_across_the_surface() {
         let body = ModifiedKelvin::THESIS;
-        let path = [
-            (-1.3, 0.0),
-            (4.0, 2.0),
-            (4.0, 1.0),
-            (-2.0, 0.7),
-            (3.0, 5.0),
-            (9.0, 0.1),
-        ];
+        let path = [(-1.3, 0.0), (4.0, 2.0), (4.0, 1.0), (-2.0, 0.7), (3.0, 5.0), (9.0, 0.1)];
         let mut whole = KelvinState::at_rest_from(Depth(path[0].0));
         let mut split = whole.clone();
         for pair in path.windows(2) {
@@ -285,9 +257,7 @@ mod tests {
             let mut at_last = f64::NAN;
             for share in [0.0, 0.3, 0.31, 0.7, 1.0].windows(2) {
                 let depth = Depth(from + (to - from) * share[1]);
-                at_last = split
-                    .step(&body, depth, Seconds(span * (share[1] - share[0])))
-                    .0;
+                at_last = split.step(&body, depth, Seconds(span * (share[1] - share[0]))).0;
             }
             check(at_last, at_once, 1e-13);
         }
@@ -311,16 +281,10 @@ mod tests {
     #[test]
     fn bodies_are_checked_in_words() {
         assert_eq!(ModifiedKelvin::THESIS.checked(), Ok(ModifiedKelvin::THESIS));
-        let body = ModifiedKelvin {
-            tau_eps: 0.0,
-            ..ModifiedKelvin::THESIS
-        };
+        let body = ModifiedKelvin { tau_eps: 0.0, ..ModifiedKelvin::THESIS };
         let text = body.checked().unwrap_err().to_string();
         assert!(text.contains("tau_eps = 0"), "{text}");
-        let body = ModifiedKelvin {
-            mu: [0.1, f64::NAN, 0.0],
-            ..ModifiedKelvin::THESIS
-        };
+        let body = ModifiedKelvin { mu: [0.1, f64::NAN, 0.0], ..ModifiedKelvin::THESIS };
         assert_eq!(body.checked().unwrap_err().name, "mu2");
     }
 }

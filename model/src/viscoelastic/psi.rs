@@ -126,11 +126,7 @@ mod tests {
             .map(|line| {
                 let mut fields = line.split(' ');
                 let mut next = || fields.next().unwrap();
-                (
-                    next().parse().unwrap(),
-                    next().parse().unwrap(),
-                    next().parse().unwrap(),
-                )
+                (next().parse().unwrap(), next().parse().unwrap(), next().parse().unwrap())
             })
             .collect()
     }
@@ -139,11 +135,8 @@ mod tests {
     fn agrees_with_fifty_digits() {
         let rows = reference();
         // Every 0.02 in 0.5..8 for each j, besides the decades.
-        let dense = |j| {
-            rows.iter()
-                .filter(|row| row.0 == j && (0.5..8.01).contains(&row.1))
-                .count()
-        };
+        let dense =
+            |j| rows.iter().filter(|row| row.0 == j && (0.5..8.01).contains(&row.1)).count();
         assert!((0..=5).all(|j| dense(j) >= 376));
         let mut worst: f64 = 0.0;
         for (j, r, exact) in rows {

@@ -22,47 +22,23 @@ struct Body {
 }
 
 /// A standard linear solid of springs 0.12 and 0.08 N/mm, `F + tau F' = k1 (x + tau_sig x')`.
-const LINEAR: Body = Body {
-    tau: 4.0,
-    mu: [0.12, 0.0],
-    by_speed: 0.2 * 4.0,
-    by_both: 0.0,
-};
+const LINEAR: Body = Body { tau: 4.0, mu: [0.12, 0.0], by_speed: 0.2 * 4.0, by_both: 0.0 };
 /// The body of the thesis, equation 3.5.
-const THESIS: Body = Body {
-    tau: 1.023,
-    mu: [0.05333, -0.0086],
-    by_speed: 0.0,
-    by_both: 0.06,
-};
+const THESIS: Body = Body { tau: 1.023, mu: [0.05333, -0.0086], by_speed: 0.0, by_both: 0.06 };
 /// Quasi-linear (Fung 1981): an elastic response `0.1 x + 0.04 x^2`, 40 % of which relax.
-const QUASI_LINEAR: Body = Body {
-    tau: 2.0,
-    mu: [0.06, 0.024],
-    by_speed: 0.1 * 2.0,
-    by_both: 2.0 * 0.04 * 2.0,
-};
+const QUASI_LINEAR: Body =
+    Body { tau: 2.0, mu: [0.06, 0.024], by_speed: 0.1 * 2.0, by_both: 2.0 * 0.04 * 2.0 };
 
 /// Out to a press, a dwell, back, a rest and a slow pass with another dwell: way in mm and speed in mm/s, or a time.
-const WAY: [(f64, f64); 6] = [
-    (16.4, 1.5),
-    (5.0, 0.0),
-    (11.7, 1.5),
-    (10.0, 0.0),
-    (14.9, 0.18),
-    (5.0, 0.0),
-];
+const WAY: [(f64, f64); 6] =
+    [(16.4, 1.5), (5.0, 0.0), (11.7, 1.5), (10.0, 0.0), (14.9, 0.18), (5.0, 0.0)];
 
 /// What the two touches feel if the surface is elsewhere by `apart` mm at the second.
 fn touched(body: &Body, apart: f64, seed: u64) -> Vec<TouchPoint> {
     let mut noise = Noise::seeded(seed);
     let (mut t, mut place, mut force, mut points) = (0.0, 4.0f64, 0.0, Vec::new());
     for (number, (amount, speed)) in WAY.into_iter().enumerate() {
-        let seconds = if speed > 0.0 {
-            (amount - place).abs() / speed
-        } else {
-            amount
-        };
+        let seconds = if speed > 0.0 { (amount - place).abs() / speed } else { amount };
         let velocity = (amount - place).signum() * speed;
         for _ in 0..(seconds / POINT_S) as usize {
             let (mut sum, mut at) = (0.0, 0.0);
@@ -96,11 +72,7 @@ fn found(body: &Body, apart: f64, seed: u64) -> TouchEstimate {
 
 #[test]
 fn bodies_of_every_kind_are_met_where_they_are() {
-    for (name, body) in [
-        ("linear", LINEAR),
-        ("thesis", THESIS),
-        ("quasi-linear", QUASI_LINEAR),
-    ] {
+    for (name, body) in [("linear", LINEAR), ("thesis", THESIS), ("quasi-linear", QUASI_LINEAR)] {
         for seed in 0..8 {
             let TouchEstimate { contact, apart_mm } = found(&body, 0.0, seed);
             let off = contact.position.0 - SURFACE;
@@ -112,21 +84,14 @@ fn bodies_of_every_kind_are_met_where_they_are() {
             );
             assert!(contact.rmse_n < 1.2 * NOISE, "{name}: {}", contact.rmse_n);
             // Noise is taken for a distance once in three hundred; never for one that matters.
-            assert!(
-                apart_mm.is_none_or(|apart| apart.abs() < 0.02),
-                "{name}: {apart_mm:?}"
-            );
+            assert!(apart_mm.is_none_or(|apart| apart.abs() < 0.02), "{name}: {apart_mm:?}");
         }
     }
 }
 
 #[test]
 fn a_surface_that_moved_between_the_touches_is_told() {
-    for (name, body) in [
-        ("linear", LINEAR),
-        ("thesis", THESIS),
-        ("quasi-linear", QUASI_LINEAR),
-    ] {
+    for (name, body) in [("linear", LINEAR), ("thesis", THESIS), ("quasi-linear", QUASI_LINEAR)] {
         for apart in [-0.3, 0.2] {
             let found = found(&body, apart, 1).apart_mm.unwrap_or(0.0);
             assert!((found - apart).abs() < 0.02, "{name}: {found} for {apart}");

@@ -42,26 +42,17 @@ fn rig() -> RigDescription {
 
 fn plan(hours: u64) -> Plan {
     let mut steps = vec![
-        Step::SelfTest(SelfTest {
-            duration: Seconds(0.5),
-        }),
-        Step::Tare(Tare {
-            duration: Seconds(1.0),
-        }),
+        Step::SelfTest(SelfTest { duration: Seconds(0.5) }),
+        Step::Tare(Tare { duration: Seconds(1.0) }),
     ];
     for _ in 0..hours * 20 {
         // Three minutes: a hold that looks at its slope, and a rest.
         steps.push(Step::Hold(Hold {
             duration: Seconds(90.0),
             until: None,
-            rate: Some(HoldRate {
-                below_n_per_s: 1e-12,
-                over: Seconds(10.0),
-            }),
+            rate: Some(HoldRate { below_n_per_s: 1e-12, over: Seconds(10.0) }),
         }));
-        steps.push(Step::Rest(Rest {
-            duration: Seconds(90.0),
-        }));
+        steps.push(Step::Rest(Rest { duration: Seconds(90.0) }));
     }
     Plan::of("overhead", 1, steps)
 }
@@ -84,20 +75,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let ten_cycles = ten_cycles.map_err(|_| "preconditioning has mistakes")?;
     let ten_cycles = ten_cycles.plan(&BTreeMap::new()).map_err(|_| "no plan")?;
     let watch = Stopwatch::start();
-    let expected = (0..PREVIEWS).map(|_| {
-        preview(&ten_cycles, &rig(), &limits, &curve, true)
-            .expected
-            .0
-    });
+    let expected =
+        (0..PREVIEWS).map(|_| preview(&ten_cycles, &rig(), &limits, &curve, true).expected.0);
     let expected = expected.fold(0.0, f64::max);
     let preview_us = watch.seconds() / f64::from(PREVIEWS) * 1e6;
-    let config = Config {
-        rig: rig(),
-        limits,
-        curve,
-        plan: plan(hours),
-        is_homed: true,
-    };
+    let config = Config { rig: rig(), limits, curve, plan: plan(hours), is_homed: true };
     let mut state = State::new(Arc::new(config));
     let choice = Operator::Start;
     state = step(state, Nanos::ZERO, Input::Operator { choice }).0;

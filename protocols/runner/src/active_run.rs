@@ -159,9 +159,7 @@ impl ActiveRun {
         if is_urgent {
             commands.iter().copied().for_each(&mut *send);
         }
-        effects
-            .iter()
-            .for_each(|effect| self.fidelity.effect(effect));
+        effects.iter().for_each(|effect| self.fidelity.effect(effect));
         if let Some(input) = &told {
             self.run_log.input(input);
         }
@@ -212,10 +210,7 @@ impl ActiveRun {
             let fault = Input::Fault(fault.clone());
             self.feed(now, fault, send);
         }
-        let is_holding = self
-            .engine
-            .as_ref()
-            .is_some_and(|state| state.holding().is_some());
+        let is_holding = self.engine.as_ref().is_some_and(|state| state.holding().is_some());
         if is_holding && self.after_stop == AfterStop::Close {
             let choice = Operator::Close;
             self.feed(now, Input::Operator { choice }, send);
@@ -224,10 +219,7 @@ impl ActiveRun {
             let choice = Operator::Leave;
             self.feed(now, Input::Operator { choice }, send);
         }
-        let is_asked = self
-            .engine
-            .as_ref()
-            .is_some_and(|state| state.prompt().is_some());
+        let is_asked = self.engine.as_ref().is_some_and(|state| state.prompt().is_some());
         if is_asked && self.answers == Answers::Confirm {
             let choice = Operator::Confirm;
             self.feed(now, Input::Operator { choice }, send);
@@ -321,26 +313,15 @@ impl ActiveRun {
             cycle,
         };
         self.fidelity.row(&row);
-        let result = self
-            .writer
-            .as_mut()
-            .map_or(Ok(()), |writer| writer.push_row(row));
+        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_row(row));
         self.note_log(result);
     }
 
     fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
-        let entry = Entry {
-            kind,
-            order: self.order,
-            after_sample: self.board.samples(),
-            now,
-            body,
-        };
+        let entry =
+            Entry { kind, order: self.order, after_sample: self.board.samples(), now, body };
         self.order += 1;
-        let result = self
-            .writer
-            .as_mut()
-            .map_or(Ok(()), |writer| writer.push_entry(entry));
+        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_entry(entry));
         self.note_log(result);
     }
 
@@ -439,11 +420,7 @@ fn to_rig(effect: &Effect) -> Option<ToRig> {
 }
 
 fn kind_of(input: &Input) -> EntryKind {
-    if matches!(input, Input::LiveFit(_)) {
-        EntryKind::Fit
-    } else {
-        EntryKind::Input
-    }
+    if matches!(input, Input::LiveFit(_)) { EntryKind::Fit } else { EntryKind::Input }
 }
 
 /// The on-disk form of an input or effect. The types have no map keys but strings and reject

@@ -23,11 +23,7 @@ impl FoundBase {
     #[must_use]
     pub fn of(record: &Record) -> Option<Self> {
         let Record::BaseFound {
-            position,
-            std_error_mm,
-            thickness_mm,
-            thickness_std_error_mm,
-            ..
+            position, std_error_mm, thickness_mm, thickness_std_error_mm, ..
         } = record
         else {
             return None;

@@ -134,33 +134,16 @@ impl Board {
                 self.touches = Arc::default();
             }
         }
-        if let Record::ContactTriggered {
-            pass,
-            position,
-            force,
-            ..
-        } = record
-        {
+        if let Record::ContactTriggered { pass, position, force, .. } = record {
             let (pass, position, force) = (*pass, *position, *force);
-            Arc::make_mut(&mut self.touches).push(Touch {
-                pass,
-                position,
-                force,
-            });
+            Arc::make_mut(&mut self.touches).push(Touch { pass, position, force });
         }
         self.readings.record(record);
         if self.readings.all() != self.weighed.as_slice() {
             self.weighed = Arc::new(self.readings.all().to_vec());
         }
-        if let Record::ContactFound {
-            position,
-            std_error_mm,
-        } = record
-        {
-            self.tissue = Some(Contact {
-                position: *position,
-                std_error_mm: *std_error_mm,
-            });
+        if let Record::ContactFound { position, std_error_mm } = record {
+            self.tissue = Some(Contact { position: *position, std_error_mm: *std_error_mm });
         }
         if let Some(base) = FoundBase::of(record) {
             // Without a thickness no tissue is known in front of it.
@@ -257,19 +240,19 @@ impl Board {
             return (Seconds(0.0), 1.0);
         }
         let spent = self.now.since(step_started).seconds().0;
-        let left: f64 = self
-            .steps
-            .iter()
-            .enumerate()
-            .skip(step_index)
-            .map(|(i, step)| {
-                if i == step_index {
-                    (step.expected.0 - spent).max(0.0)
-                } else {
-                    step.expected.0
-                }
-            })
-            .sum();
+        let left: f64 =
+            self.steps
+                .iter()
+                .enumerate()
+                .skip(step_index)
+                .map(|(i, step)| {
+                    if i == step_index {
+                        (step.expected.0 - spent).max(0.0)
+                    } else {
+                        step.expected.0
+                    }
+                })
+                .sum();
         let done = self.now.seconds().0;
         (Seconds(left), done / (done + left).max(1e-9))
     }

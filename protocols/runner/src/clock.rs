@@ -133,10 +133,7 @@ pub(super) struct Throttle {
 
 impl Throttle {
     pub fn new(interval: Duration) -> Self {
-        Self {
-            interval,
-            last: None,
-        }
+        Self { interval, last: None }
     }
 
     pub fn is_due(&mut self) -> bool {
@@ -174,11 +171,7 @@ pub(super) fn host_times() -> HostTimes {
     let all = ClockId::Boottime;
     #[cfg(not(target_os = "linux"))]
     let all = ClockId::Monotonic;
-    HostTimes {
-        wall: SystemTime::now(),
-        awake: read(ClockId::Monotonic),
-        all: read(all),
-    }
+    HostTimes { wall: SystemTime::now(), awake: read(ClockId::Monotonic), all: read(all) }
 }
 
 /// The wall clock, to date what is recorded.

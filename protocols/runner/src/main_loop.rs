@@ -82,21 +82,15 @@ impl Runner {
         let shared = Arc::clone(&snapshot);
         let to_stop = requests.clone();
         let (registered, is_registered) = sync_channel(1);
-        let thread = std::thread::Builder::new()
-            .name("runner".into())
-            .spawn(move || {
-                let link = main_loop.rig.halt_handle();
-                main_loop.registered = Some(Registered::new(to_stop, link));
-                let _ = registered.send(());
-                main_loop.run(first, &receiver, &shared, &wake);
-            })?;
+        let thread = std::thread::Builder::new().name("runner".into()).spawn(move || {
+            let link = main_loop.rig.halt_handle();
+            main_loop.registered = Some(Registered::new(to_stop, link));
+            let _ = registered.send(());
+            main_loop.run(first, &receiver, &shared, &wake);
+        })?;
         // A panic anywhere from here on stops this rig, however late the thread gets its first turn.
         let _ = is_registered.recv();
-        Ok(Self {
-            requests,
-            snapshot,
-            thread: Some(thread),
-        })
+        Ok(Self { requests, snapshot, thread: Some(thread) })
     }
 
     /// Asks for something. Fails only when the runner has ended or is swamped.
@@ -120,9 +114,7 @@ impl Runner {
     /// Whether the thread still runs.
     #[must_use]
     pub fn is_alive(&self) -> bool {
-        self.thread
-            .as_ref()
-            .is_some_and(|thread| !thread.is_finished())
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     #[cfg(test)]
@@ -220,11 +212,7 @@ impl MainLoop {
                 }
                 Wake::Request(request, at) => {
                     // At full pace a request is served between strides, without moving time.
-                    self.advance(if self.pace() == TimeScale::Max {
-                        self.now
-                    } else {
-                        at
-                    });
+                    self.advance(if self.pace() == TimeScale::Max { self.now } else { at });
                     self.serve(request)
                 }
                 Wake::Disconnected => true,
@@ -271,11 +259,7 @@ impl MainLoop {
 
     /// Time between runs passes as on the wall, at any pace.
     fn pace(&self) -> TimeScale {
-        if self.is_running() {
-            self.scale
-        } else {
-            TimeScale::Factor(1.0)
-        }
+        if self.is_running() { self.scale } else { TimeScale::Factor(1.0) }
     }
 
     fn stride(&self) -> Nanos {
@@ -428,9 +412,7 @@ impl MainLoop {
 
     pub(super) fn start_run(&mut self, request: &RunRequest) -> Result<(), StartError> {
         if self.is_running() {
-            return Err(StartError::Refused(
-                "a run is in progress; stop it first".into(),
-            ));
+            return Err(StartError::Refused("a run is in progress; stop it first".into()));
         }
         let bench = Bench {
             rig: &self.description,
@@ -442,18 +424,14 @@ impl MainLoop {
         self.run = Some(start(request, bench)?);
         // What was exchanged before belongs to no run.
         drop(self.rig.take_raw());
-        self.feed(Input::Operator {
-            choice: Operator::Start,
-        });
+        self.feed(Input::Operator { choice: Operator::Start });
         Ok(())
     }
 
     /// Stops whatever moves, waits until it rests and closes the session.
     fn shut_down(&mut self) {
         if self.is_running() {
-            self.feed(Input::Operator {
-                choice: Operator::Stop,
-            });
+            self.feed(Input::Operator { choice: Operator::Stop });
             // Braking has two seconds, the halt after it two more.
             let give_up = self.now + Nanos::from_millis(6_000);
             while self.is_running() && self.now < give_up {
@@ -464,15 +442,10 @@ impl MainLoop {
                     .and_then(ActiveRun::engine)
                     .is_some_and(|state| state.holding().is_some());
                 if is_holding {
-                    self.feed(Input::Operator {
-                        choice: Operator::Close,
-                    });
+                    self.feed(Input::Operator { choice: Operator::Close });
                 }
             }
-        } else if self
-            .reading
-            .is_some_and(|reading| reading.status.has(AxisStatus::MOVING))
-        {
+        } else if self.reading.is_some_and(|reading| reading.status.has(AxisStatus::MOVING)) {
             self.rig.send(RigCommand::Stop);
         }
     }

@@ -32,11 +32,7 @@ pub(super) struct Registered(Arc<OpenRig>);
 
 impl Registered {
     pub fn new(requests: SyncSender<Request>, link: Option<HaltHandle>) -> Self {
-        let rig = Arc::new(OpenRig {
-            runner: std::thread::current().id(),
-            requests,
-            link,
-        });
+        let rig = Arc::new(OpenRig { runner: std::thread::current().id(), requests, link });
         OPEN.rcu(|open| [open.as_slice(), &[Arc::clone(&rig)]].concat());
         Self(rig)
     }

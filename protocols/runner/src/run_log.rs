@@ -38,11 +38,7 @@ impl RunLog {
         Self {
             step: run.clone(),
             run,
-            kinds: plan
-                .steps
-                .iter()
-                .map(|planned| planned.step.word())
-                .collect(),
+            kinds: plan.steps.iter().map(|planned| planned.step.word()).collect(),
             step_index: None,
             faults: FaultLog::default(),
         }
@@ -62,10 +58,7 @@ impl RunLog {
                 self.begin_step(*step_index);
                 info!(parent: &self.step, "phase: {record}");
             }
-            Record::EndingStarted {
-                ending: EndingKind::Finish | EndingKind::Stop,
-                ..
-            }
+            Record::EndingStarted { ending: EndingKind::Finish | EndingKind::Stop, .. }
             | Record::FinishedEarly
             | Record::PausePending { .. }
             | Record::Paused { .. }

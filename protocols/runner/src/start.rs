@@ -91,25 +91,13 @@ pub(super) struct Bench<'a> {
 /// Checks a request and opens its session.
 pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
-    let curve = request
-        .calibration
-        .curve()
-        .map_err(|err| refused(err.to_string()))?;
-    let preview = preview(
-        &request.plan,
-        bench.rig,
-        &request.limits,
-        &curve,
-        bench.is_homed,
-    );
+    let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
+    let preview = preview(&request.plan, bench.rig, &request.limits, &curve, bench.is_homed);
     preview.verdict(request.is_acknowledged).map_err(refused)?;
     if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
         return Err(refused(format!("{first}; acknowledge this to go on")));
     }
-    request
-        .labels
-        .check()
-        .map_err(|err| refused(err.to_string()))?;
+    request.labels.check().map_err(|err| refused(err.to_string()))?;
 
     let started_at = wall_now();
     let session_id = new_session_id(started_at.into());
@@ -124,11 +112,7 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
 
     let manifest = manifest(request, &bench, &preview, session_id.clone(), started_at)?;
-    let pace = if bench.is_virtual {
-        Pace::Virtual
-    } else {
-        Pace::Real
-    };
+    let pace = if bench.is_virtual { Pace::Virtual } else { Pace::Real };
     let writer = SessionWriter::start(folder, spare_folder().as_deref(), &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {

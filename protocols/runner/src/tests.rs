@@ -57,11 +57,7 @@ type Clock = Box<dyn Fn() -> HostTimes + Send + Sync>;
 /// The computer's clocks, read at one moment: a busy computer may do something else between two of them.
 fn alike(start: HostTimes) -> HostTimes {
     let passed = host_times().awake - start.awake;
-    HostTimes {
-        wall: start.wall + passed,
-        awake: start.awake + passed,
-        all: start.all + passed,
-    }
+    HostTimes { wall: start.wall + passed, awake: start.awake + passed, all: start.all + passed }
 }
 
 /// Lets the loop turn until its run is over.
@@ -73,10 +69,7 @@ fn run(main_loop: MainLoop) {
     let seen = Arc::clone(&shared);
     let wake = move || {
         let snapshot: Arc<Snapshot> = seen.load_full();
-        let is_over = snapshot
-            .run
-            .as_ref()
-            .is_some_and(|run| run.outcome.is_some());
+        let is_over = snapshot.run.as_ref().is_some_and(|run| run.outcome.is_some());
         if is_over {
             sender.lock().unwrap().take();
         }
@@ -131,10 +124,7 @@ fn a_wall_clock_that_jumps_changes_no_sample_and_is_told() {
             .collect();
         assert_eq!(anchors.first().unwrap().0, Why::Start);
         assert_eq!(anchors.last().unwrap().0, Why::End);
-        let jumps: Vec<f64> = anchors[1..anchors.len() - 1]
-            .iter()
-            .map(|one| one.1)
-            .collect();
+        let jumps: Vec<f64> = anchors[1..anchors.len() - 1].iter().map(|one| one.1).collect();
         match name {
             "calm" => assert_eq!(jumps, Vec::<f64>::new()),
             _ => {
@@ -166,20 +156,11 @@ fn a_computer_that_was_suspended_ends_the_run() {
         }
         times
     });
-    run(started(
-        Box::new(sim()),
-        TimeScale::Factor(20.0),
-        suspended,
-        &out,
-    ));
+    run(started(Box::new(sim()), TimeScale::Factor(20.0), suspended, &out));
     let session = Session::open(&out).unwrap();
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "abort");
-    assert!(
-        end.reason.contains("stood still for 20.0 s"),
-        "{}",
-        end.reason
-    );
+    assert!(end.reason.contains("stood still for 20.0 s"), "{}", end.reason);
     assert_eq!(session.beside.health.clock_jumps, 1);
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }
@@ -220,10 +201,7 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
     let events = &panicking.beside.health.events;
     assert_eq!(events.len(), 1, "{events:?}");
     let text = &events[0].1;
-    assert!(
-        text.contains("as if a matrix had no inverse") && text.contains("is off"),
-        "{text}"
-    );
+    assert!(text.contains("as if a matrix had no inverse") && text.contains("is off"), "{text}");
     // At full pace nothing else is told: what is in the log does not depend on the computer.
     assert_eq!(panicking.beside.health.messages, 1);
     assert_eq!(sound.beside.health.messages, 0);

@@ -104,8 +104,5 @@ impl HostWatch {
 
 fn anchor(now: Nanos, why: Why, wall: SystemTime, shift_s: f64) -> Health {
     let wall = wall.into();
-    Health {
-        now,
-        told: Told::Anchor { why, wall, shift_s },
-    }
+    Health { now, told: Told::Anchor { why, wall, shift_s } }
 }

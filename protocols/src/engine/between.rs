@@ -20,10 +20,8 @@ pub(super) fn come_to_rest(cx: &mut Context<'_>, then: Then) {
         cx.stop_move();
     }
     cx.state.in_flight = None;
-    cx.state.activity = Activity::Between {
-        then,
-        deadline: cx.now + Nanos::from_seconds(REST_MAX),
-    };
+    cx.state.activity =
+        Activity::Between { then, deadline: cx.now + Nanos::from_seconds(REST_MAX) };
 }
 
 /// A sample came on the way to rest.
@@ -55,10 +53,7 @@ pub(super) fn on_reading(cx: &mut Context<'_>, then: Then, deadline: Nanos) {
         }
         Then::Return(index) => match cx.move_to_pulses(cx.state.step_from, RETURN_SPEED) {
             Ok(()) if cx.state.in_flight.is_some() => {
-                cx.state.activity = Activity::Between {
-                    then: Then::Begin(index),
-                    deadline,
-                };
+                cx.state.activity = Activity::Between { then: Then::Begin(index), deadline };
             }
             Ok(()) => step::begin(cx, index),
             Err(reason) => stop::begin(cx, EndingKind::Abort, reason),

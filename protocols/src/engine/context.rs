@@ -30,10 +30,7 @@ const MOVE_GRACE: Seconds = Seconds(1.0);
 
 /// Why a move does not begin that would end beyond the travel.
 pub(crate) fn outside_travel(what: &str, end: Position, travel: Position) -> String {
-    format!(
-        "a {what} to {:.3} mm is outside the travel of 0 to {:.1} mm",
-        end.0, travel.0
-    )
+    format!("a {what} to {:.3} mm is outside the travel of 0 to {:.1} mm", end.0, travel.0)
 }
 
 impl Context<'_> {
@@ -219,21 +216,13 @@ impl Context<'_> {
         if target_pulses == self.state.pulses && self.state.path.is_at_rest() {
             return Ok(());
         }
-        let command = MoveTo {
-            target_pulses,
-            speed,
-            acceleration: rig.acceleration,
-        };
+        let command = MoveTo { target_pulses, speed, acceleration: rig.acceleration };
         let from = self.state.derived.position;
         let to = position_from_pulses(target_pulses, rig.mm_per_pulse);
         let duration = Profile::to_rest(from, to, speed, rig.acceleration).duration();
         let deadline = self.now + Nanos::from_seconds(duration + MOVE_GRACE);
         let is_forward = target_pulses > self.state.pulses;
-        self.state.in_flight = Some(MoveInFlight {
-            deadline,
-            speed,
-            is_forward,
-        });
+        self.state.in_flight = Some(MoveInFlight { deadline, speed, is_forward });
         self.state.path.on_move(command);
         self.command(RigCommand::MoveTo(command));
         Ok(())
@@ -255,11 +244,7 @@ impl Context<'_> {
         }
         let deadline = self.now + Nanos::from_seconds(sine.duration() + MOVE_GRACE);
         let speed = sine.speed_max();
-        self.state.in_flight = Some(MoveInFlight {
-            deadline,
-            speed,
-            is_forward: true,
-        });
+        self.state.in_flight = Some(MoveInFlight { deadline, speed, is_forward: true });
         self.state.path.on_oscillate(command);
         self.command(RigCommand::Oscillate(command));
         Ok(())
@@ -277,9 +262,10 @@ impl Context<'_> {
             return Ok(true);
         }
         match self.state.in_flight {
-            Some(flight) if self.now > flight.deadline => Err(
-                "the axis did not finish its move in time; check the motor and its supply".into(),
-            ),
+            Some(flight) if self.now > flight.deadline => {
+                Err("the axis did not finish its move in time; check the motor and its supply"
+                    .into())
+            }
             _ => Ok(false),
         }
     }

@@ -112,11 +112,7 @@ impl Watch {
             retract_ceiling: None,
             newest: (Newtons(0.0), Volts(0.0)),
             same_count: 0,
-            stuck: if rig.shows_noise() {
-                STUCK_MS * rig.samples_per_ms()
-            } else {
-                u32::MAX
-            },
+            stuck: if rig.shows_noise() { STUCK_MS * rig.samples_per_ms() } else { u32::MAX },
         }
     }
 
@@ -148,11 +144,7 @@ impl Watch {
 
     /// Whether the signal stands still; takes the newest.
     fn is_stuck(&mut self, volts: Volts) -> bool {
-        self.same_count = if volts == self.newest.1 {
-            self.same_count + 1
-        } else {
-            0
-        };
+        self.same_count = if volts == self.newest.1 { self.same_count + 1 } else { 0 };
         self.same_count >= self.stuck
     }
 
@@ -170,11 +162,7 @@ impl Watch {
         let (older, newer) = self.recent.split_at(RATE_MS);
         let difference = newer.iter().sum::<f64>() - older.iter().sum::<f64>();
         let (older, newer) = self.recent_ticks.split_at(RATE_MS);
-        let sum = |ticks: &[u64]| {
-            ticks
-                .iter()
-                .fold(0, |sum: u64, tick| sum.saturating_add(*tick))
-        };
+        let sum = |ticks: &[u64]| ticks.iter().fold(0, |sum: u64, tick| sum.saturating_add(*tick));
         // A clock that went back is another interlock's business.
         let ticks = sum(newer).saturating_sub(sum(older));
         if ticks == 0 {
@@ -216,14 +204,11 @@ pub(super) fn judge(
     let derived = state.derived.force;
     let force = derived.unwrap_or_else(|| state.force_from_volts(reading.volts));
     state.watch.newest = (force, reading.volts);
-    let rate = state
-        .watch
-        .push_rate(reading.tick, force.0, &state.config.rig);
+    let rate = state.watch.push_rate(reading.tick, force.0, &state.config.rig);
     let (force_max, volts_max) = match state.watch.retract_ceiling {
-        Some((force, volts)) => (
-            Newtons(limits.force_max.0.max(force.0)),
-            Volts(limits.volts_max.0.max(volts.0)),
-        ),
+        Some((force, volts)) => {
+            (Newtons(limits.force_max.0.max(force.0)), Volts(limits.volts_max.0.max(volts.0)))
+        }
         None => (limits.force_max, limits.volts_max),
     };
     if state.is_unpowered() {
@@ -236,10 +221,7 @@ pub(super) fn judge(
         .or_else(|| {
             (reading.volts > volts_max).then(|| Trip {
                 interlock: Interlock::Volts,
-                reason: format!(
-                    "the raw signal is {:.3}, above {volts_max:.2}",
-                    reading.volts
-                ),
+                reason: format!("the raw signal is {:.3}, above {volts_max:.2}", reading.volts),
             })
         })
         .or_else(|| rate_trip(rate, limits.force_rate_max, state.current_step()))
@@ -268,18 +250,12 @@ fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip
     let position = state.derived.position;
     let is_parked = state.in_flight.is_none()
         && (state.phase == Phase::SelfTest && !state.is_homed || state.phase == Phase::Retract);
-    for (bit, which, is_forward) in [
-        (AxisStatus::FORWARD_LIMIT, "far", true),
-        (AxisStatus::REVERSE_LIMIT, "rear", false),
-    ] {
-        let is_leaving = state
-            .in_flight
-            .is_some_and(|flight| flight.is_forward != is_forward);
+    for (bit, which, is_forward) in
+        [(AxisStatus::FORWARD_LIMIT, "far", true), (AxisStatus::REVERSE_LIMIT, "rear", false)]
+    {
+        let is_leaving = state.in_flight.is_some_and(|flight| flight.is_forward != is_forward);
         if reading.status.has(bit) && !is_leaving && !is_parked {
-            return trip(
-                Interlock::Travel,
-                format!("the {which} limit switch closed"),
-            );
+            return trip(Interlock::Travel, format!("the {which} limit switch closed"));
         }
     }
     let is_returning = state.in_flight.is_some_and(|flight| !flight.is_forward);
@@ -287,10 +263,7 @@ fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip
         let Position(end) = limits.travel_max;
         return trip(
             Interlock::Travel,
-            format!(
-                "the probe is at {:.3} mm, past its travel of {end:.1} mm",
-                position.0
-            ),
+            format!("the probe is at {:.3} mm, past its travel of {end:.1} mm", position.0),
         );
     }
     None
@@ -302,18 +275,12 @@ fn motor_trip(state: &mut State, reading: &Reading) -> Option<Trip> {
         return None;
     }
     state.is_homed = false;
-    trip(
-        Interlock::Motor,
-        "the motor lost its current; check its supply, then home".into(),
-    )
+    trip(Interlock::Motor, "the motor lost its current; check its supply, then home".into())
 }
 
 fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
     if force > force_max {
-        return trip(
-            Interlock::Force,
-            format!("the force is {force:.2}, above {force_max:.2}"),
-        );
+        return trip(Interlock::Force, format!("the force is {force:.2}, above {force_max:.2}"));
     }
     if force < force_min {
         return trip(

@@ -17,12 +17,7 @@ pub(crate) struct Millisecond {
 impl Millisecond {
     /// For the samples of a rig.
     pub fn of(rig: &RigDescription) -> Self {
-        Self {
-            samples: rig.samples_per_ms(),
-            count: 0,
-            position: 0.0,
-            force: 0.0,
-        }
+        Self { samples: rig.samples_per_ms(), count: 0, position: 0.0, force: 0.0 }
     }
 
     /// Takes a sample's position in mm and force in N; their means, once the millisecond is complete.

@@ -61,11 +61,7 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     }
     condition.pauses.1 += u32::from(action == Action::Pause);
     let is_endless = condition.pauses.1 > PAUSES_MAX;
-    cx.record(Record::MonitorTripped {
-        index,
-        value,
-        message: message.clone(),
-    });
+    cx.record(Record::MonitorTripped { index, value, message: message.clone() });
     match action {
         Action::Note => {}
         Action::Pause if is_endless => {

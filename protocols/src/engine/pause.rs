@@ -25,10 +25,7 @@ pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
     let step_index = cx.state.step_index;
     let pausing = match &cx.state.activity {
         Activity::Step(_) => pausing(cx),
-        Activity::Between {
-            then: Then::Begin(index) | Then::Return(index),
-            ..
-        } => {
+        Activity::Between { then: Then::Begin(index) | Then::Return(index), .. } => {
             let next = Ok(*index);
             return halt_motion(cx, next, reason);
         }
@@ -40,10 +37,7 @@ pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
     match pausing {
         Some(Pausing::Wait | Pausing::Control) => {
             cx.state.pause = Some(Pause::Extended);
-            cx.record(Record::Paused {
-                reason,
-                no_resume: None,
-            });
+            cx.record(Record::Paused { reason, no_resume: None });
         }
         Some(Pausing::Complete) | None => await_end_of(cx, step_index),
         Some(Pausing::Repeat | Pausing::RepeatFromStart) => {
@@ -79,10 +73,7 @@ fn await_end_of(cx: &mut Context<'_>, step_index: usize) {
 }
 
 fn halt_motion(cx: &mut Context<'_>, next: Result<usize, &'static str>, reason: String) {
-    cx.record(Record::Paused {
-        reason,
-        no_resume: next.err().map(str::to_owned),
-    });
+    cx.record(Record::Paused { reason, no_resume: next.err().map(str::to_owned) });
     cx.state.pause = None;
     cx.enter_phase(Phase::Paused);
     between::come_to_rest(cx, Then::Pause(next));
@@ -94,14 +85,9 @@ pub(super) fn at_checkpoint(cx: &mut Context<'_>, done_index: usize) {
     let name = planned.and_then(|planned| planned.checkpoint.clone());
     let reason = name.unwrap_or_else(|| format!("behind step {}", done_index + 1));
     cx.state.pause = None;
-    cx.record(Record::Paused {
-        reason,
-        no_resume: None,
-    });
+    cx.record(Record::Paused { reason, no_resume: None });
     cx.enter_phase(Phase::Paused);
-    cx.state.activity = Activity::Paused {
-        next: Ok(done_index + 1),
-    };
+    cx.state.activity = Activity::Paused { next: Ok(done_index + 1) };
 }
 
 /// The operator goes on.

@@ -285,35 +285,19 @@ impl fmt::Display for Record {
         match self {
             Self::PhaseStarted { phase, .. } => write!(f, "{phase}"),
             Self::Homed { edge_pulses } => {
-                write!(
-                    f,
-                    "home found at counter {edge_pulses}; position zero set there"
-                )
+                write!(f, "home found at counter {edge_pulses}; position zero set there")
             }
-            Self::Tared {
-                volts,
-                noise,
-                drift,
-                ..
-            } => {
+            Self::Tared { volts, noise, drift, .. } => {
                 write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)?;
                 // A minute is how long people wait for a cell to settle.
                 drift.map_or(Ok(()), |drift| {
                     write!(f, ", drift {:+.2} mV a minute", drift.volts_per_s * 6e4)
                 })
             }
-            Self::ContactTriggered {
-                pass,
-                position,
-                force,
-                ..
-            } => {
+            Self::ContactTriggered { pass, position, force, .. } => {
                 write!(f, "pass {pass} felt {force:.3} at {position:.3}")
             }
-            Self::ContactFound {
-                position,
-                std_error_mm,
-            } => {
+            Self::ContactFound { position, std_error_mm } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
             }
             Self::BaseFound {
@@ -331,12 +315,7 @@ impl fmt::Display for Record {
                     _ => Ok(()),
                 }
             }
-            Self::HoldEndedEarly {
-                parameter,
-                relative,
-                wanted,
-                held,
-            } => write!(
+            Self::HoldEndedEarly { parameter, relative, wanted, held } => write!(
                 f,
                 "hold ended after {held:.1}: {} is known to {} %, {} % was wanted",
                 parameter.name(),
@@ -347,19 +326,14 @@ impl fmt::Display for Record {
                 f,
                 "nothing has led the slave for {silent:.1}; it stops, and the step ends unless a lead comes"
             ),
-            Self::HoldSteady {
-                slope_n_per_s,
-                held,
-            } => write!(
+            Self::HoldSteady { slope_n_per_s, held } => write!(
                 f,
                 "hold ended after {held:.1}: the force changes by {:.4} N/min",
                 60.0 * slope_n_per_s
             ),
-            Self::ForceReached {
-                target,
-                force,
-                depth,
-            } => write!(f, "{force:.3} at {depth:.3}; {target:.3} was wanted"),
+            Self::ForceReached { target, force, depth } => {
+                write!(f, "{force:.3} at {depth:.3}; {target:.3} was wanted")
+            }
             Self::Prompted { message, timeout } => {
                 write!(f, "{message} (waits {:.0})", *timeout)
             }
@@ -386,13 +360,7 @@ impl fmt::Display for Record {
             Self::MonitorPast { index, value } => {
                 write!(f, "monitor {} is past ({value:.4})", index + 1)
             }
-            Self::Weighed {
-                mass_g,
-                is_loading,
-                repeat,
-                volts,
-                ..
-            } => {
+            Self::Weighed { mass_g, is_loading, repeat, volts, .. } => {
                 let way = if *is_loading { "loading" } else { "unloading" };
                 write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
             }

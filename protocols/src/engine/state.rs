@@ -258,15 +258,9 @@ impl State {
     pub fn pause(&self) -> PauseView {
         match (&self.activity, self.pause) {
             (Activity::Paused { next }, _)
-            | (
-                Activity::Between {
-                    then: Then::Pause(next),
-                    ..
-                },
-                _,
-            ) => PauseView::Paused {
-                no_resume: next.err(),
-            },
+            | (Activity::Between { then: Then::Pause(next), .. }, _) => {
+                PauseView::Paused { no_resume: next.err() }
+            }
             (_, Some(Pause::Extended)) => PauseView::Paused { no_resume: None },
             (_, Some(Pause::After(step_index))) => PauseView::Pending { step_index },
             (_, None) => PauseView::None,

@@ -21,11 +21,7 @@ const ACK_MAX: Seconds = Seconds(1.0);
 #[must_use]
 pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) {
     let mut effects = Vec::new();
-    let mut cx = Context {
-        state: &mut state,
-        now,
-        effects: &mut effects,
-    };
+    let mut cx = Context { state: &mut state, now, effects: &mut effects };
     match input {
         Input::Reading(reading) => on_reading(&mut cx, &reading),
         Input::Tick => on_tick(&mut cx),
@@ -78,10 +74,9 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
     state.status = reading.status;
     let (position, path_error) = match state.path.on_reading(reading) {
         Ok(position) => (position, None),
-        Err(err) => (
-            Position(reading.pulses as f64 * state.config.rig.mm_per_pulse),
-            Some(err.to_string()),
-        ),
+        Err(err) => {
+            (Position(reading.pulses as f64 * state.config.rig.mm_per_pulse), Some(err.to_string()))
+        }
     };
     let tare = state.tare.filter(|_| reading.volts.is_finite());
     let force = tare.map(|_| state.force_from_volts(reading.volts));
@@ -92,9 +87,7 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
         force_sigma: force
             .zip(tare)
             .map(|(force, tare)| state.config.curve.force_sigma(force, tare.noise)),
-        depth: state
-            .contact
-            .map(|contact| position.depth_from(contact.position)),
+        depth: state.contact.map(|contact| position.depth_from(contact.position)),
     };
     path_error
 }
@@ -103,10 +96,7 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
     match active.in_progress().on_reading(cx, reading) {
         Ok(progress) => keep_or_end(cx, active, progress),
         Err(reason) => {
-            let label = cx
-                .state
-                .current_step()
-                .map_or("", |step| step.kind().facts().label);
+            let label = cx.state.current_step().map_or("", |step| step.kind().facts().label);
             let reason = match label {
                 "" => reason,
                 label => format!("{label}: {reason}"),
@@ -150,25 +140,14 @@ pub(super) fn next(cx: &mut Context<'_>) {
 /// Begins a step of the plan, skipping what is already done, or finishes the run.
 pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
     let config = std::sync::Arc::clone(&cx.state.config);
-    let Some(step) = config
-        .plan
-        .steps
-        .get(step_index)
-        .map(|planned| &planned.step)
-    else {
+    let Some(step) = config.plan.steps.get(step_index).map(|planned| &planned.step) else {
         cx.state.power = Power::Stopped;
         let reason = if cx.state.is_finished_early {
             "finished early by the operator"
         } else {
             PLAN_COMPLETE
         };
-        return stop::end(
-            cx,
-            Outcome {
-                ending: EndingKind::Finish,
-                reason: reason.into(),
-            },
-        );
+        return stop::end(cx, Outcome { ending: EndingKind::Finish, reason: reason.into() });
     };
     if step_index != cx.state.step_index || cx.state.phase == Phase::Idle {
         cx.state.retries = 0;
@@ -205,18 +184,11 @@ fn on_tick(cx: &mut Context<'_>) {
 }
 
 fn on_ack(cx: &mut Context<'_>, ack: Ack) {
-    let expected = cx
-        .state
-        .unacknowledged
-        .pop_front()
-        .map(|(_, command)| command);
+    let expected = cx.state.unacknowledged.pop_front().map(|(_, command)| command);
     if !expected.is_some_and(|asked| asked.is_answered_by(&ack.command)) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
-            None => format!(
-                "the rig acknowledged {:?}, which was not asked",
-                ack.command
-            ),
+            None => format!("the rig acknowledged {:?}, which was not asked", ack.command),
         };
         return stop::begin(cx, EndingKind::Abort, reason);
     }
@@ -244,21 +216,9 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
             cx.state.is_homed = false;
             // What the tracker knew of the path ended with the link.
             cx.state.path = PathTracker::new(&cx.state.config.rig);
-            on_trip(
-                cx,
-                Trip {
-                    interlock: Interlock::Link,
-                    reason,
-                },
-            );
+            on_trip(cx, Trip { interlock: Interlock::Link, reason });
         }
-        Fault::SignalInvalid { .. } => on_trip(
-            cx,
-            Trip {
-                interlock: Interlock::Signal,
-                reason,
-            },
-        ),
+        Fault::SignalInvalid { .. } => on_trip(cx, Trip { interlock: Interlock::Signal, reason }),
         Fault::CommandRefused { .. } => {
             // A stop that the plan itself sent came first: the axis rests, as it should.
             let mut waiting = cx.state.unacknowledged.iter().map(|(_, command)| command);
@@ -297,15 +257,8 @@ fn on_trip(cx: &mut Context<'_>, trip: Trip) {
     // At rest after a stop there is nothing left to stop; the samples keep showing why.
     if cx.state.is_motion_possible() && !stop::is_braking(cx.state) {
         let Trip { interlock, reason } = trip;
-        cx.record(Record::InterlockTripped {
-            interlock,
-            reason: reason.clone(),
-        });
-        stop::begin(
-            cx,
-            EndingKind::Interlock,
-            format!("{interlock} interlock: {reason}"),
-        );
+        cx.record(Record::InterlockTripped { interlock, reason: reason.clone() });
+        stop::begin(cx, EndingKind::Interlock, format!("{interlock} interlock: {reason}"));
     } else {
         stop::on_time(cx);
     }
@@ -331,11 +284,9 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         Operator::Abort => {
             stop::begin(cx, EndingKind::Abort, "the operator aborted the run".into())
         }
-        Operator::Halt => stop::begin(
-            cx,
-            EndingKind::Halt,
-            "the operator halted the motion".into(),
-        ),
+        Operator::Halt => {
+            stop::begin(cx, EndingKind::Halt, "the operator halted the motion".into())
+        }
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
         Operator::Pause => pause::now(cx, pause::By::Operator, "the operator asked for it".into()),

@@ -34,10 +34,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         | Activity::Step(_)
         | Activity::Between { .. }
         | Activity::Paused { .. } => {
-            cx.record(Record::EndingStarted {
-                ending,
-                reason: reason.clone(),
-            });
+            cx.record(Record::EndingStarted { ending, reason: reason.clone() });
             Outcome { ending, reason }
         }
     };
@@ -55,10 +52,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         Activity::Braking { deadline, .. } => deadline,
         _ => cx.now + Nanos::from_seconds(BRAKE_MAX),
     };
-    cx.state.activity = Activity::Braking {
-        ending: outcome,
-        deadline,
-    };
+    cx.state.activity = Activity::Braking { ending: outcome, deadline };
 }
 
 /// The axis moves although the run has stopped: cut it and say so.

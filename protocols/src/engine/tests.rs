@@ -63,13 +63,7 @@ impl Bench {
             is_homed: true,
         };
         let state = Some(State::new(Arc::new(config)));
-        Self {
-            state,
-            now: Nanos::ZERO,
-            tick: 0,
-            pulses: 0,
-            status: AxisStatus::MOTOR_ON,
-        }
+        Self { state, now: Nanos::ZERO, tick: 0, pulses: 0, status: AxisStatus::MOTOR_ON }
     }
 
     /// Self-tested, tared and inside a hold of `hold` seconds.
@@ -85,17 +79,9 @@ impl Bench {
     /// The same on another rig.
     fn holding_on(rig: RigDescription, hold: f64, until: Option<HoldUntil>) -> Self {
         let steps = vec![
-            Step::SelfTest(SelfTest {
-                duration: Seconds(0.1),
-            }),
-            Step::Tare(Tare {
-                duration: Seconds(0.1),
-            }),
-            Step::Hold(Hold {
-                duration: Seconds(hold),
-                until,
-                rate: None,
-            }),
+            Step::SelfTest(SelfTest { duration: Seconds(0.1) }),
+            Step::Tare(Tare { duration: Seconds(0.1) }),
+            Step::Hold(Hold { duration: Seconds(hold), until, rate: None }),
         ];
         let mut bench = Self::on(rig, steps);
         bench.start();
@@ -120,9 +106,7 @@ impl Bench {
 
     /// Starts the plan and acknowledges what the self-test sends.
     fn start(&mut self) {
-        self.give(Input::Operator {
-            choice: Operator::Start,
-        });
+        self.give(Input::Operator { choice: Operator::Start });
         self.sample(volts(0.0));
         for command in [RigCommand::EnableMotor, RigCommand::Stop] {
             self.give(Input::Ack(Ack { command }));
@@ -137,11 +121,7 @@ impl Bench {
     fn sample_after(&mut self, ticks: u64, volts: f64) -> Vec<Effect> {
         self.tick += ticks;
         self.now = self.now + Nanos::from_millis(ticks);
-        let noise = if self.tick.is_multiple_of(2) {
-            1e-4
-        } else {
-            -1e-4
-        };
+        let noise = if self.tick.is_multiple_of(2) { 1e-4 } else { -1e-4 };
         self.give(Input::Reading(Reading {
             tick: self.tick,
             counts: None,
@@ -155,9 +135,7 @@ impl Bench {
     /// Acknowledges stops until the run holds or has ended.
     fn settle(&mut self) {
         for _ in 0..100 {
-            self.give(Input::Ack(Ack {
-                command: RigCommand::Stop,
-            }));
+            self.give(Input::Ack(Ack { command: RigCommand::Stop }));
             self.sample(volts(0.0));
             if self.state().holding().is_some() {
                 return;
@@ -204,16 +182,9 @@ fn interlocks_come_before_the_plan() {
     let effects = bench.sample(volts(9.5));
     assert_eq!(tripped(&effects), Some(Interlock::Force));
     assert_eq!(commands(&effects), [RigCommand::Stop]);
-    assert_eq!(
-        bench.state().outcome(),
-        None,
-        "the plan must not have seen the sample"
-    );
+    assert_eq!(bench.state().outcome(), None, "the plan must not have seen the sample");
     bench.settle();
-    assert_eq!(
-        bench.state().holding().unwrap().ending,
-        EndingKind::Interlock
-    );
+    assert_eq!(bench.state().holding().unwrap().ending, EndingKind::Interlock);
 }
 
 #[test]
@@ -222,11 +193,7 @@ fn the_first_interlock_in_order_is_the_reason() {
         let mut bench = Bench::holding(10.0);
         bench.status = AxisStatus::MOTOR_ON | status;
         bench.now = bench.now + Nanos::from_millis(late_ms);
-        assert_eq!(
-            tripped(&bench.sample(volts)),
-            Some(expected),
-            "{volts} {status:?} {late_ms}"
-        );
+        assert_eq!(tripped(&bench.sample(volts)), Some(expected), "{volts} {status:?} {late_ms}");
     };
     let limit = AxisStatus::FORWARD_LIMIT;
     // Everything at once, then one fault less each time.
@@ -300,10 +267,7 @@ fn a_cell_whose_counts_hide_its_noise_is_not_dead() {
         })
     };
     assert_eq!(stuck(slow()), None);
-    let noisy = RigDescription {
-        noise_expected: Volts(0.001),
-        ..slow()
-    };
+    let noisy = RigDescription { noise_expected: Volts(0.001), ..slow() };
     assert_eq!(stuck(noisy), Some(Interlock::Signal));
 }
 
@@ -313,18 +277,12 @@ fn silence_trips_by_the_speed() {
     bench.now = bench.now + Nanos::from_millis(250);
     assert_eq!(tripped(&bench.give(Input::Tick)), None);
     bench.now = bench.now + Nanos::from_millis(1);
-    assert_eq!(
-        tripped(&bench.give(Input::Tick)),
-        Some(Interlock::SampleAge)
-    );
+    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
     assert_eq!(
         Limits::sample_age_max(MmPerS(0.75), Position(0.1), Seconds(0.0)),
         Seconds(0.1 / 0.75)
     );
-    assert_eq!(
-        Limits::sample_age_max(MmPerS(20.0), Position(0.1), Seconds(0.0)),
-        Seconds(0.020)
-    );
+    assert_eq!(Limits::sample_age_max(MmPerS(20.0), Position(0.1), Seconds(0.0)), Seconds(0.020));
     // A rig whose file lets it go further unseen.
     assert_eq!(
         Limits::sample_age_max(MmPerS(1.5), Position(0.3), Seconds(0.0)),
@@ -341,10 +299,7 @@ fn silence_trips_by_the_speed() {
 fn the_filter_of_a_cell_is_no_lateness() {
     let filter = Nanos::from_millis(200);
     for (cell_delay, is_tripped) in [(filter, false), (Nanos::ZERO, true)] {
-        let rig = RigDescription {
-            cell_delay: cell_delay.seconds(),
-            ..rig()
-        };
+        let rig = RigDescription { cell_delay: cell_delay.seconds(), ..rig() };
         let mut bench = Bench::holding_on(rig, 10.0, None);
         bench.tick += 1;
         bench.now = bench.now + Nanos::from_millis(1);
@@ -354,10 +309,7 @@ fn the_filter_of_a_cell_is_no_lateness() {
             volts: Volts(volts(0.0)),
             pulses: bench.pulses,
             status: bench.status,
-            age: Some(Age {
-                by: filter,
-                within: Nanos::ZERO,
-            }),
+            age: Some(Age { by: filter, within: Nanos::ZERO }),
         }));
         // A quarter of a second is what a silence may last at rest.
         bench.now = bench.now + Nanos::from_millis(100);
@@ -379,14 +331,8 @@ fn every_ending_stops_the_axis_and_says_why() {
         bench.give(Input::Ack(Ack { command }));
         bench.sample(volts(0.0));
         assert_eq!(bench.state().holding().unwrap().ending, ending);
-        assert_eq!(
-            bench.state().is_homed(),
-            choice != Operator::Halt,
-            "a halt may lose steps"
-        );
-        let effects = bench.give(Input::Operator {
-            choice: Operator::Close,
-        });
+        assert_eq!(bench.state().is_homed(), choice != Operator::Halt, "a halt may lose steps");
+        let effects = bench.give(Input::Operator { choice: Operator::Close });
         assert!(
             matches!(&effects[..], [.., Effect::Finished(outcome)] if outcome.ending == ending)
         );
@@ -396,35 +342,11 @@ fn every_ending_stops_the_axis_and_says_why() {
 #[test]
 fn faults_end_the_run_and_unhome_where_position_is_lost() {
     for (fault, ending, is_homed) in [
-        (
-            Fault::LinkLost {
-                detail: "gone".into(),
-            },
-            EndingKind::Interlock,
-            false,
-        ),
+        (Fault::LinkLost { detail: "gone".into() }, EndingKind::Interlock, false),
         (Fault::ControllerReset, EndingKind::Interlock, false),
-        (
-            Fault::CommandRefused {
-                detail: "no".into(),
-            },
-            EndingKind::Abort,
-            true,
-        ),
-        (
-            Fault::LogFailed {
-                detail: "full".into(),
-            },
-            EndingKind::Abort,
-            true,
-        ),
-        (
-            Fault::LogAtRisk {
-                detail: "slow".into(),
-            },
-            EndingKind::Abort,
-            true,
-        ),
+        (Fault::CommandRefused { detail: "no".into() }, EndingKind::Abort, true),
+        (Fault::LogFailed { detail: "full".into() }, EndingKind::Abort, true),
+        (Fault::LogAtRisk { detail: "slow".into() }, EndingKind::Abort, true),
     ] {
         let mut bench = Bench::holding(10.0);
         let effects = bench.give(Input::Fault(fault.clone()));
@@ -446,12 +368,8 @@ fn a_clock_that_runs_back_is_a_reset_controller() {
 
 #[test]
 fn a_command_without_acknowledgement_is_a_lost_link() {
-    let mut bench = Bench::new(vec![Step::SelfTest(SelfTest {
-        duration: Seconds(0.1),
-    })]);
-    bench.give(Input::Operator {
-        choice: Operator::Start,
-    });
+    let mut bench = Bench::new(vec![Step::SelfTest(SelfTest { duration: Seconds(0.1) })]);
+    bench.give(Input::Operator { choice: Operator::Start });
     let trip = (0..1100).find_map(|_| tripped(&bench.sample(volts(0.0))));
     assert_eq!(trip, Some(Interlock::Link));
 }
@@ -459,30 +377,17 @@ fn a_command_without_acknowledgement_is_a_lost_link() {
 #[test]
 fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
     let unhomed = |step: Step| {
-        let mut bench = Bench::new(vec![
-            Step::SelfTest(SelfTest {
-                duration: Seconds(0.1),
-            }),
-            step,
-        ]);
+        let mut bench = Bench::new(vec![Step::SelfTest(SelfTest { duration: Seconds(0.1) }), step]);
         let mut config = bench.state().config().clone();
         config.is_homed = false;
         bench.state = Some(State::new(Arc::new(config)));
         bench.start();
-        let sent: Vec<_> = (0..150)
-            .flat_map(|_| commands(&bench.sample(volts(0.0))))
-            .collect();
+        let sent: Vec<_> = (0..150).flat_map(|_| commands(&bench.sample(volts(0.0)))).collect();
         sent
     };
-    let ramp = Step::Ramp(Ramp {
-        speed: MmPerS(0.75),
-        depth: palpate_model::Depth(1.0),
-    });
+    let ramp = Step::Ramp(Ramp { speed: MmPerS(0.75), depth: palpate_model::Depth(1.0) });
     assert_eq!(unhomed(ramp), [RigCommand::Stop]);
-    let jog = Step::Jog(Jog {
-        distance_mm: 1.5,
-        speed: MmPerS(0.75),
-    });
+    let jog = Step::Jog(Jog { distance_mm: 1.5, speed: MmPerS(0.75) });
     assert!(
         matches!(unhomed(jog)[..], [RigCommand::MoveTo(command)] if command.target_pulses == 100)
     );
@@ -491,23 +396,14 @@ fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
 #[test]
 fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
     let reason = |signal: fn(u64) -> f64| {
-        let mut bench = Bench::new(vec![Step::SelfTest(SelfTest {
-            duration: Seconds(0.1),
-        })]);
+        let mut bench = Bench::new(vec![Step::SelfTest(SelfTest { duration: Seconds(0.1) })]);
         bench.start();
         for _ in 0..120 {
             bench.tick += 1;
             bench.now = bench.now + Nanos::from_millis(1);
             let (tick, volts) = (bench.tick, Volts(signal(bench.tick)));
             let status = AxisStatus::MOTOR_ON;
-            let reading = Reading {
-                tick,
-                counts: None,
-                volts,
-                pulses: 0,
-                status,
-                age: None,
-            };
+            let reading = Reading { tick, counts: None, volts, pulses: 0, status, age: None };
             let effects = bench.give(Input::Reading(reading));
             if let Some(Effect::Record(Record::EndingStarted { reason, .. })) = effects.first() {
                 return reason.clone();
@@ -545,13 +441,8 @@ fn steps_are_pure() {
 /// Self-tested and jogging 15 mm at 9 mm/s; the command was sent with the last sample.
 fn jogging() -> Bench {
     let mut bench = Bench::new(vec![
-        Step::SelfTest(SelfTest {
-            duration: Seconds(0.1),
-        }),
-        Step::Jog(Jog {
-            distance_mm: 15.0,
-            speed: MmPerS(9.0),
-        }),
+        Step::SelfTest(SelfTest { duration: Seconds(0.1) }),
+        Step::Jog(Jog { distance_mm: 15.0, speed: MmPerS(9.0) }),
     ]);
     bench.start();
     for _ in 0..200 {
@@ -570,10 +461,7 @@ fn silence_counts_at_the_commanded_speed_before_any_sample_shows_it() {
     assert_eq!(bench.state().derived().velocity, MmPerS(0.0));
     // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms.
     bench.now = bench.now + Nanos::from_millis(21);
-    assert_eq!(
-        tripped(&bench.give(Input::Tick)),
-        Some(Interlock::SampleAge)
-    );
+    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
 }
 
 #[test]
@@ -589,10 +477,7 @@ fn a_lost_stop_is_followed_by_a_halt() {
     assert_eq!(bench.state().holding(), None);
     bench.now = bench.now + Nanos::from_millis(2_001);
     bench.give(Input::Tick);
-    assert_eq!(
-        bench.state().holding().unwrap().ending,
-        EndingKind::Interlock
-    );
+    assert_eq!(bench.state().holding().unwrap().ending, EndingKind::Interlock);
 }
 
 #[test]
@@ -611,19 +496,8 @@ fn an_axis_that_moves_after_a_stop_is_cut() {
 /// Loading to 1 N, which the first sample of the load has already: the move and the stop behind it are sent. With a brake
 /// the approach begins fast and goes on slower.
 fn reached_at_once(brake: Option<Newtons>) -> Bench {
-    let hold = |secs: f64| {
-        Step::Hold(Hold {
-            duration: Seconds(secs),
-            until: None,
-            rate: None,
-        })
-    };
-    let load = LoadTo {
-        force: Newtons(1.0),
-        speed: MmPerS(0.75),
-        depth_max: Depth(35.0),
-        brake,
-    };
+    let hold = |secs: f64| Step::Hold(Hold { duration: Seconds(secs), until: None, rate: None });
+    let load = LoadTo { force: Newtons(1.0), speed: MmPerS(0.75), depth_max: Depth(35.0), brake };
     let (check, tare) = (Seconds(0.1), Seconds(0.1));
     let mut bench = Bench::new(vec![
         Step::SelfTest(SelfTest { duration: check }),
@@ -636,10 +510,8 @@ fn reached_at_once(brake: Option<Newtons>) -> Bench {
     let (mut sent, mut force) = (Vec::new(), 0.0_f64);
     for _ in 0..1000 {
         if bench.state().phase() == Phase::Hold {
-            bench.state.as_mut().unwrap().contact = Some(Contact {
-                position: Position(0.0),
-                std_error_mm: 0.01,
-            });
+            bench.state.as_mut().unwrap().contact =
+                Some(Contact { position: Position(0.0), std_error_mm: 0.01 });
             // 20 N/s, as no interlock minds.
             force = (force + 0.02).min(1.1);
         }
@@ -655,9 +527,7 @@ fn reached_at_once(brake: Option<Newtons>) -> Bench {
 #[test]
 fn a_stop_of_the_plan_may_come_before_the_move_that_it_ends() {
     // A driver drops the move, which waits in its queue, and says so; or the move is over between two samples.
-    let dropped = Input::Fault(Fault::CommandRefused {
-        detail: "a stop came first".into(),
-    });
+    let dropped = Input::Fault(Fault::CommandRefused { detail: "a stop came first".into() });
     let (_, command) = reached_at_once(None).state().unacknowledged[0];
     for answer in [dropped, Input::Ack(Ack { command })] {
         let mut bench = reached_at_once(None);
@@ -713,17 +583,12 @@ fn a_probe_on_the_far_switch_may_leave_it_but_not_press_on() {
 
     let mut bench = Bench::holding(10.0);
     let state = bench.state.as_mut().unwrap();
-    state.contact = Some(Contact {
-        position: Position(0.0),
-        std_error_mm: 0.01,
-    });
+    state.contact = Some(Contact { position: Position(0.0), std_error_mm: 0.01 });
     bench.pulses = 8000;
     bench.status = AxisStatus::MOTOR_ON | AxisStatus::FORWARD_LIMIT;
     bench.state.as_mut().unwrap().path.on_define(8000);
     assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Travel));
-    bench.give(Input::Ack(Ack {
-        command: RigCommand::Stop,
-    }));
+    bench.give(Input::Ack(Ack { command: RigCommand::Stop }));
     bench.sample(volts(0.0));
     let choice = Operator::Retract;
     bench.give(Input::Operator { choice });
@@ -736,9 +601,7 @@ fn a_probe_on_the_far_switch_may_leave_it_but_not_press_on() {
 
 #[test]
 fn a_pause_of_the_computer_is_no_silence_of_the_rig() {
-    let late = |ms| Input::HostLate {
-        late: Nanos::from_millis(ms),
-    };
+    let late = |ms| Input::HostLate { late: Nanos::from_millis(ms) };
     let wait = |bench: &mut Bench, ms| bench.now = bench.now + Nanos::from_millis(ms);
     // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms. Sixty of 75 were the computer's.
     let mut bench = jogging();
@@ -747,16 +610,10 @@ fn a_pause_of_the_computer_is_no_silence_of_the_rig() {
     assert_eq!(tripped(&bench.give(Input::Tick)), None);
     // What is silent then is silent.
     wait(&mut bench, 6);
-    assert_eq!(
-        tripped(&bench.give(Input::Tick)),
-        Some(Interlock::SampleAge)
-    );
+    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
     // A computer that stood still for longer than a rig may keep silent at rest has no excuse.
     let mut bench = jogging();
     bench.give(late(251));
     wait(&mut bench, 21);
-    assert_eq!(
-        tripped(&bench.give(Input::Tick)),
-        Some(Interlock::SampleAge)
-    );
+    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
 }

@@ -41,20 +41,14 @@ impl Args {
                 continue;
             }
             let Some(key) = all().find(|key| key.name == entry.key) else {
-                let known: Vec<&str> = besides
-                    .iter()
-                    .copied()
-                    .chain(all().map(|key| key.name))
-                    .collect();
+                let known: Vec<&str> =
+                    besides.iter().copied().chain(all().map(|key| key.name)).collect();
                 meant.extend(nearest(&entry.key, known.iter().copied()));
                 let hint = match entry.key.as_str() {
                     "steps" => STEPS_HINT.into(),
                     key => suggestion(key, &known),
                 };
-                problems.error(
-                    entry.line,
-                    format!("{what} has no key '{}'; {hint}", entry.key),
-                );
+                problems.error(entry.line, format!("{what} has no key '{}'; {hint}", entry.key));
                 continue;
             };
             let value = scope
@@ -115,8 +109,7 @@ impl Args {
     }
 
     pub fn number(&self, key: &str) -> Result<f64, String> {
-        self.maybe(key)
-            .ok_or_else(|| format!("'{key}' has no value"))
+        self.maybe(key).ok_or_else(|| format!("'{key}' has no value"))
     }
 
     pub fn speed(&self, key: &str) -> Result<MmPerS, String> {
@@ -137,19 +130,16 @@ impl Args {
     }
 
     pub fn text(&self, key: &str) -> Result<&str, String> {
-        self.maybe_text(key)
-            .ok_or_else(|| format!("'{key}' has no value"))
+        self.maybe_text(key).ok_or_else(|| format!("'{key}' has no value"))
     }
 
     pub fn is_true(&self, key: &str) -> bool {
-        self.get(key)
-            .is_some_and(|given| given.what == What::Flag(true))
+        self.get(key).is_some_and(|given| given.what == What::Flag(true))
     }
 
     /// Whether the key is there and says no.
     pub fn is_no(&self, key: &str) -> bool {
-        self.get(key)
-            .is_some_and(|given| matches!(given.what, What::Flag(false) | What::None))
+        self.get(key).is_some_and(|given| matches!(given.what, What::Flag(false) | What::None))
     }
 }
 
@@ -164,11 +154,9 @@ fn checked(key: &Key, given: Given) -> Result<Given, String> {
             _ => Err(given.is_not(Kind::Flag)),
         },
         Kind::Text => match key.range {
-            Range::OneOf(words) if !words.contains(&given.text.as_str()) => Err(format!(
-                "'{}' is not possible; {}",
-                given.text,
-                suggestion(&given.text, words)
-            )),
+            Range::OneOf(words) if !words.contains(&given.text.as_str()) => {
+                Err(format!("'{}' is not possible; {}", given.text, suggestion(&given.text, words)))
+            }
             _ if given.text.trim().is_empty() => Err("it says nothing; write a text".into()),
             _ => Ok(given),
         },
@@ -206,8 +194,5 @@ pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), S
 
 fn missing(what: &str, key: &Key) -> String {
     let (name, example) = (key.name, key.kind.example());
-    format!(
-        "{what} needs '{name}': {}; write {name} = {example}",
-        key.about
-    )
+    format!("{what} needs '{name}': {}; write {name} = {example}", key.about)
 }

@@ -33,18 +33,12 @@ pub fn check(
     limits: &Limits,
     curve: &Curve,
 ) -> Checked {
-    let written = Protocol::read(text).and_then(|protocol| {
-        protocol
-            .write_out(values)
-            .map(|written| (protocol, written))
-    });
+    let written = Protocol::read(text)
+        .and_then(|protocol| protocol.write_out(values).map(|written| (protocol, written)));
     let (protocol, written) = match written {
         Ok(pair) => pair,
         Err(problems) => {
-            return Checked {
-                plan: None,
-                problems,
-            };
+            return Checked { plan: None, problems };
         }
     };
     let preview = preview(&written.plan, rig, limits, curve, false);
@@ -62,8 +56,5 @@ pub fn check(
         problems.push(Problem::warning(protocol.limits_line(), reason));
     }
     problems.sort_by_key(|problem| problem.line);
-    Checked {
-        plan: Some((protocol, written, preview)),
-        problems,
-    }
+    Checked { plan: Some((protocol, written, preview)), problems }
 }

@@ -31,25 +31,17 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
         }
     };
     check_language(&root, problems)?;
-    for entry in root
-        .entries
-        .iter()
-        .filter(|entry| !KEYS.contains(&entry.key.as_str()))
-    {
+    for entry in root.entries.iter().filter(|entry| !KEYS.contains(&entry.key.as_str())) {
         let hint = match entry.key.as_str() {
             "steps" | "step" => STEPS_HINT.into(),
             key => suggestion(key, &KEYS),
         };
-        problems.error(
-            entry.line,
-            format!("a protocol has no key '{}'; {hint}", entry.key),
-        );
+        problems.error(entry.line, format!("a protocol has no key '{}'; {hint}", entry.key));
     }
     let mut text_of = |key: &str, example: &str| match root.get(key) {
-        Some(Node {
-            value: Value::Text(text),
-            ..
-        }) if !text.trim().is_empty() => text.trim().to_owned(),
+        Some(Node { value: Value::Text(text), .. }) if !text.trim().is_empty() => {
+            text.trim().to_owned()
+        }
         Some(node) => {
             problems.error(
                 node.line,
@@ -90,10 +82,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
 
 fn check_language(root: &Table, problems: &mut Problems) -> Option<()> {
     let (line, found) = match root.get("palpate") {
-        Some(Node {
-            line,
-            value: Value::Number(number),
-        }) => (*line, number.as_str()),
+        Some(Node { line, value: Value::Number(number) }) => (*line, number.as_str()),
         Some(node) => (node.line, node.kind()),
         None => {
             let first = format!("palpate = {LANGUAGE}");
@@ -145,16 +134,11 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         return Vec::new();
     };
     let Value::List(items) = &node.value else {
-        problems.error(
-            node.line,
-            "'ask' must be a list, such as ask = [\"operator\", \"specimen\"]",
-        );
+        problems
+            .error(node.line, "'ask' must be a list, such as ask = [\"operator\", \"specimen\"]");
         return Vec::new();
     };
-    let known: Vec<&str> = palpate_model::about::KEYS
-        .iter()
-        .map(|key| key.name)
-        .collect();
+    let known: Vec<&str> = palpate_model::about::KEYS.iter().map(|key| key.name).collect();
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {
@@ -171,10 +155,7 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
             }
             _ => problems.error(
                 item.line,
-                format!(
-                    "{} cannot be asked for; write a text in quotes",
-                    item.kind()
-                ),
+                format!("{} cannot be asked for; write a text in quotes", item.kind()),
             ),
         }
     }
@@ -182,16 +163,11 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
 }
 
 fn procedure(root: &Table, problems: &mut Problems) -> Node {
-    let nothing = Node {
-        line: 1,
-        value: Value::List(Vec::new()),
-    };
+    let nothing = Node { line: 1, value: Value::List(Vec::new()) };
     let has_steps =
         |node: &Node| matches!(&node.value, Value::Table(table) if table.get("steps").is_some());
-    let is_misplaced = root
-        .entries
-        .iter()
-        .any(|entry| entry.key == "steps" || has_steps(&entry.node));
+    let is_misplaced =
+        root.entries.iter().any(|entry| entry.key == "steps" || has_steps(&entry.node));
     let Some(node) = root.get("procedure") else {
         // Steps that stand elsewhere are told there.
         if is_misplaced {
@@ -213,19 +189,11 @@ fn procedure(root: &Table, problems: &mut Problems) -> Node {
         _ => None,
     };
     match steps {
-        Some(Node {
-            line,
-            value: Value::List(items),
-        }) if items.is_empty() => {
+        Some(Node { line, value: Value::List(items) }) if items.is_empty() => {
             problems.error(*line, "the protocol has no steps; write { do = \"self-test\" } and so on between the brackets");
             nothing
         }
-        Some(
-            steps @ Node {
-                value: Value::List(_),
-                ..
-            },
-        ) => steps.clone(),
+        Some(steps @ Node { value: Value::List(_), .. }) => steps.clone(),
         _ => {
             problems.error(node.line, "[procedure] has no list of steps; write steps = [ { do = \"self-test\" }, ... ] below it");
             nothing
@@ -236,11 +204,7 @@ fn procedure(root: &Table, problems: &mut Problems) -> Node {
 /// A parameter that nothing uses promises something that will not happen.
 fn check_used(protocol: &Protocol, problems: &mut Problems) {
     let mut used = BTreeSet::new();
-    let parts = [
-        Some(&protocol.procedure),
-        protocol.limits.as_ref(),
-        protocol.monitors.as_ref(),
-    ];
+    let parts = [Some(&protocol.procedure), protocol.limits.as_ref(), protocol.monitors.as_ref()];
     for part in parts.into_iter().flatten() {
         part.each_text(&mut |text| {
             names_in(text, &mut |name| {
@@ -248,10 +212,7 @@ fn check_used(protocol: &Protocol, problems: &mut Problems) {
             })
         });
     }
-    for parameter in protocol
-        .parameters
-        .iter()
-        .filter(|parameter| !used.contains(&parameter.name))
+    for parameter in protocol.parameters.iter().filter(|parameter| !used.contains(&parameter.name))
     {
         let name = &parameter.name;
         problems.error(

@@ -101,11 +101,7 @@ impl Protocol {
             return Err(problems.into_list());
         }
         let warnings = problems.into_list();
-        Ok(Written {
-            plan,
-            lines,
-            warnings,
-        })
+        Ok(Written { plan, lines, warnings })
     }
 
     fn written_out(
@@ -113,17 +109,11 @@ impl Protocol {
         values: &BTreeMap<String, String>,
         problems: &mut Problems,
     ) -> (Plan, Vec<u32>) {
-        let known: Vec<&str> = self
-            .parameters
-            .iter()
-            .map(|parameter| parameter.name.as_str())
-            .collect();
+        let known: Vec<&str> =
+            self.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         for name in values.keys().filter(|name| !known.contains(&name.as_str())) {
             let hint = suggestion(name, &known);
-            problems.error(
-                0,
-                format!("protocol {} has no parameter '{name}'; {hint}", self.name),
-            );
+            problems.error(0, format!("protocol {} has no parameter '{name}'; {hint}", self.name));
         }
         let mut scope = Scope::default();
         let mut chosen = BTreeMap::new();
@@ -133,9 +123,7 @@ impl Protocol {
                 .map_or(Ok(parameter.default.clone()), |text| parameter.read(text));
             let given = given.map_err(|why| format!("parameter '{}': {why}", parameter.name));
             // After a wrong value the usual one stands in, so that the rest is checked too.
-            let given = problems
-                .take(0, given)
-                .unwrap_or_else(|| parameter.default.clone());
+            let given = problems.take(0, given).unwrap_or_else(|| parameter.default.clone());
             chosen.insert(parameter.name.clone(), given.text.clone());
             scope.push(&parameter.name, given);
         }
@@ -150,25 +138,16 @@ impl Protocol {
         // Nothing at all in the file was told by its reader.
         let is_nothing = matches!(&self.procedure.value, Value::List(items) if items.is_empty());
         if steps.is_empty() && !is_nothing && problems.count() == before {
-            problems.error(
-                self.procedure.line,
-                "with these values no step is left; choose others",
-            );
+            problems.error(self.procedure.line, "with these values no step is left; choose others");
         }
-        let (steps, lines) = steps
-            .into_iter()
-            .map(|placed| (placed.planned, placed.line))
-            .unzip();
+        let (steps, lines) = steps.into_iter().map(|placed| (placed.planned, placed.line)).unzip();
         let plan = Plan {
             name: self.name.clone(),
             version: self.version,
             steps,
             monitors,
             limits,
-            source: Some(PlanSource {
-                crc32: self.crc32.clone(),
-                values: chosen,
-            }),
+            source: Some(PlanSource { crc32: self.crc32.clone(), values: chosen }),
         };
         (plan, lines)
     }
@@ -190,17 +169,11 @@ impl Protocol {
     /// Whether everything it asks for was told; else what to tell.
     pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
         let open = self.open_questions(labels);
-        let open: Vec<String> = open
-            .iter()
-            .map(|key| format!("{} ({})", key.name, key.meaning))
-            .collect();
+        let open: Vec<String> =
+            open.iter().map(|key| format!("{} ({})", key.name, key.meaning)).collect();
         if open.is_empty() {
             return Ok(());
         }
-        Err(format!(
-            "protocol {} asks before it starts for: {}",
-            self.name,
-            open.join(", ")
-        ))
+        Err(format!("protocol {} asks before it starts for: {}", self.name, open.join(", ")))
     }
 }

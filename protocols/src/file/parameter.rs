@@ -62,16 +62,12 @@ impl Parameter {
                 // A count has no unit.
                 let amount = |bound: f64| format!("{bound} {}", kind.unit()).trim_end().to_owned();
                 match (self.min, self.max) {
-                    (Some(min), _) if number < min => Err(format!(
-                        "{} is too small; give {} or more",
-                        given.text,
-                        amount(min)
-                    )),
-                    (_, Some(max)) if number > max => Err(format!(
-                        "{} is too large; give {} or less",
-                        given.text,
-                        amount(max)
-                    )),
+                    (Some(min), _) if number < min => {
+                        Err(format!("{} is too small; give {} or more", given.text, amount(min)))
+                    }
+                    (_, Some(max)) if number > max => {
+                        Err(format!("{} is too large; give {} or less", given.text, amount(max)))
+                    }
                     _ => Ok(()),
                 }
             }
@@ -95,10 +91,8 @@ pub(super) fn all(root: &Table, problems: &mut Problems) -> Vec<Parameter> {
         let Value::Table(keys) = &entry.node.value else {
             let name = &entry.key;
             if name == "steps" {
-                problems.error(
-                    entry.line,
-                    format!("[parameters] has no key 'steps'; {STEPS_HINT}"),
-                );
+                problems
+                    .error(entry.line, format!("[parameters] has no key 'steps'; {STEPS_HINT}"));
                 return None;
             }
             problems.error(
@@ -158,10 +152,7 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
     let mut bound = |key: &str| {
         let node = keys.get(key)?;
         let number = Given::of_node(node).and_then(|given| given.number(kind));
-        problems.take(
-            node.line,
-            number.map_err(|why| format!("'{key}' of '{name}': {why}")),
-        )
+        problems.take(node.line, number.map_err(|why| format!("'{key}' of '{name}': {why}")))
     };
     let parameter = Parameter {
         name: name.to_owned(),
@@ -175,10 +166,7 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
         line,
     };
     if let Err(why) = parameter.check(&parameter.default) {
-        problems.error(
-            line,
-            format!("the default of '{name}' does not pass its own check: {why}"),
-        );
+        problems.error(line, format!("the default of '{name}' does not pass its own check: {why}"));
     }
     Some(parameter)
 }
@@ -192,10 +180,9 @@ fn kind_of(name: &str, default: &Given, unit: &str) -> Result<Kind, String> {
         )),
         (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
             Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
-            Some(kind) => Err(format!(
-                "the default of '{name}' is wrong: {}",
-                default.is_not(kind)
-            )),
+            Some(kind) => {
+                Err(format!("the default of '{name}' is wrong: {}", default.is_not(kind)))
+            }
             None => Err(format!(
                 "'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
             )),

@@ -31,20 +31,13 @@ impl Problem {
     /// Something that keeps the protocol from running.
     #[must_use]
     pub fn error(line: u32, message: impl Into<String>) -> Self {
-        Self {
-            line,
-            severity: Severity::Error,
-            message: message.into(),
-        }
+        Self { line, severity: Severity::Error, message: message.into() }
     }
 
     /// Something to look at.
     #[must_use]
     pub fn warning(line: u32, message: impl Into<String>) -> Self {
-        Self {
-            severity: Severity::Warning,
-            ..Self::error(line, message)
-        }
+        Self { severity: Severity::Warning, ..Self::error(line, message) }
     }
 
     /// Whether it keeps the protocol from running.
@@ -125,9 +118,7 @@ impl Problems {
 
 /// The known word nearest to one that is not known, if it is near.
 pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let near = known
-        .into_iter()
-        .map(|candidate| (distance(word, candidate), candidate));
+    let near = known.into_iter().map(|candidate| (distance(word, candidate), candidate));
     let best = near.min_by_key(|(distance, _)| *distance)?;
     // Half of a short word may be wrong, never more than three letters.
     (best.0 <= (best.1.chars().count() / 2).clamp(1, 3)).then_some(best.1)
@@ -194,11 +185,6 @@ mod tests {
         assert!(problems.is_full());
         let list = problems.into_list();
         assert_eq!(list.len(), PROBLEMS_MAX + 1);
-        assert_eq!(
-            list.iter()
-                .filter(|problem| problem.message == "twice")
-                .count(),
-            1
-        );
+        assert_eq!(list.iter().filter(|problem| problem.message == "twice").count(), 1);
     }
 }

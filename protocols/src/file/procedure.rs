@@ -22,11 +22,7 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
         Kind::Text,
         "name for the number of the pass, from 1: `$name` in values, `{name}` in texts",
     ),
-    Key::optional(
-        "reverse",
-        Kind::Flag,
-        "`true` runs through the values backwards",
-    ),
+    Key::optional("reverse", Kind::Flag, "`true` runs through the values backwards"),
     Key::optional(
         "cycle",
         Kind::Flag,
@@ -37,11 +33,7 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
         Kind::Text,
         "name of a place behind each pass where the run may pause",
     ),
-    Key::optional(
-        "only_if",
-        Kind::Flag,
-        "leaves the loop out where this is `false` or `\"none\"`",
-    ),
+    Key::optional("only_if", Kind::Flag, "leaves the loop out where this is `false` or `\"none\"`"),
 ];
 
 /// A step with the line it came from.
@@ -56,14 +48,8 @@ pub(super) fn write_out(
     scope: &mut Scope,
     problems: &mut Problems,
 ) -> Vec<Placed> {
-    let mut writer = Writer {
-        scope,
-        problems,
-        steps: Vec::new(),
-        passes: 0,
-        cycles: 0,
-        is_too_long: false,
-    };
+    let mut writer =
+        Writer { scope, problems, steps: Vec::new(), passes: 0, cycles: 0, is_too_long: false };
     writer.steps(procedure, 0, 0);
     writer.steps
 }
@@ -93,10 +79,7 @@ impl Writer<'_> {
             let Value::Table(table) = &item.value else {
                 self.problems.error(
                     item.line,
-                    format!(
-                        "{} is no step; write {{ do = \"ramp\", ... }} in braces",
-                        item.kind()
-                    ),
+                    format!("{} is no step; write {{ do = \"ramp\", ... }} in braces", item.kind()),
                 );
                 continue;
             };
@@ -104,10 +87,8 @@ impl Writer<'_> {
             let is_step = table.get("do").is_some();
             match is_loop {
                 [false, false] if !is_step && table.get("steps").is_some() => {
-                    self.problems.error(
-                        item.line,
-                        "a loop needs 'repeat' or 'for_each'; write repeat = 10",
-                    );
+                    self.problems
+                        .error(item.line, "a loop needs 'repeat' or 'for_each'; write repeat = 10");
                 }
                 [false, false] => self.step(table, cycle),
                 [true, true] => self.problems.error(
@@ -141,19 +122,12 @@ impl Writer<'_> {
         };
         let before = self.problems.count();
         let what = format!("'{name}'");
-        let args = Args::read(
-            table,
-            &what,
-            &[kind.keys, &COMMON],
-            &["do"],
-            self.scope,
-            self.problems,
-        );
+        let args =
+            Args::read(table, &what, &[kind.keys, &COMMON], &["do"], self.scope, self.problems);
         let on_failure = args.text("on_failure").and_then(on_failure);
-        let on_failure = self.problems.take(
-            table.line,
-            on_failure.map_err(|why| format!("'on_failure' of {what}: {why}")),
-        );
+        let on_failure = self
+            .problems
+            .take(table.line, on_failure.map_err(|why| format!("'on_failure' of {what}: {why}")));
         if args.is_no("only_if") || self.problems.count() > before {
             return;
         }
@@ -171,10 +145,7 @@ impl Writer<'_> {
             checkpoint: args.maybe_text("checkpoint").map(str::to_owned),
             on_failure,
         };
-        self.steps.push(Placed {
-            planned,
-            line: table.line,
-        });
+        self.steps.push(Placed { planned, line: table.line });
     }
 
     fn run_loop(&mut self, table: &Table, cycle: u32, depth: usize) {
@@ -185,10 +156,9 @@ impl Writer<'_> {
             return self.problems.error(table.line, message);
         }
         let Some(steps) = table.get("steps") else {
-            return self.problems.error(
-                table.line,
-                "a loop needs steps; write steps = [ { do = \"ramp\", ... } ]",
-            );
+            return self
+                .problems
+                .error(table.line, "a loop needs steps; write steps = [ { do = \"ramp\", ... } ]");
         };
         let besides = ["repeat", "for_each", "steps"];
         // The name of a checkpoint may use the loop's own names, so it is read in each pass.
@@ -201,14 +171,8 @@ impl Writer<'_> {
                 .cloned()
                 .collect(),
         };
-        let args = Args::read(
-            &without_name,
-            "a loop",
-            &[&LOOP_KEYS],
-            &besides,
-            self.scope,
-            self.problems,
-        );
+        let args =
+            Args::read(&without_name, "a loop", &[&LOOP_KEYS], &besides, self.scope, self.problems);
         let Some((name, mut values)) = self.values(table) else {
             return;
         };
@@ -220,10 +184,7 @@ impl Writer<'_> {
         }
         let number = args.maybe_text("as").unwrap_or_default();
         let outside = self.scope.len();
-        for name in [name.as_str(), number]
-            .into_iter()
-            .filter(|name| !name.is_empty())
-        {
+        for name in [name.as_str(), number].into_iter().filter(|name| !name.is_empty()) {
             if self.scope.has(name) {
                 let message = format!("the name '{name}' is taken already; give the loop another");
                 return self.problems.error(table.line, message);
@@ -276,10 +237,8 @@ impl Writer<'_> {
     /// What a loop runs through: the name of its values and the values; numbers have no name but `as`.
     fn values(&mut self, table: &Table) -> Option<(String, Vec<Given>)> {
         if let Some(node) = table.get("repeat") {
-            let count = self
-                .scope
-                .value(node, Kind::Count)
-                .and_then(|given| given.number(Kind::Count));
+            let count =
+                self.scope.value(node, Kind::Count).and_then(|given| given.number(Kind::Count));
             let count = count.map_err(|why| format!("'repeat' of a loop: {why}"));
             let count = self.problems.take(node.line, count)?;
             if !(1.0..=COUNT_MAX).contains(&count) {
@@ -289,10 +248,7 @@ impl Writer<'_> {
                 self.problems.error(node.line, message);
                 return None;
             }
-            return Some((
-                String::new(),
-                (0..count as u32).map(|_| Given::count(0)).collect(),
-            ));
+            return Some((String::new(), (0..count as u32).map(|_| Given::count(0)).collect()));
         }
         let node = table.get("for_each")?;
         let entry = match &node.value {
@@ -308,9 +264,8 @@ impl Writer<'_> {
             .list(&entry.node)
             .map_err(|why| format!("the values of '{}': {why}", entry.key));
         let values = self.problems.take(entry.line, values)?;
-        if let Some(odd) = values
-            .iter()
-            .find(|value| matches!(value.what, What::List(_) | What::None))
+        if let Some(odd) =
+            values.iter().find(|value| matches!(value.what, What::List(_) | What::None))
         {
             let message = format!(
                 "the values of '{}': '{}' is no single value; write each by itself",

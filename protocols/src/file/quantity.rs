@@ -131,19 +131,13 @@ pub enum What {
 
 impl Given {
     fn new(text: &str, what: What) -> Self {
-        Self {
-            text: text.to_owned(),
-            what,
-        }
+        Self { text: text.to_owned(), what }
     }
 
     /// A count, such as the pass of a loop.
     #[must_use]
     pub fn count(count: u32) -> Self {
-        Self::new(
-            &count.to_string(),
-            What::Number(Kind::Count, f64::from(count)),
-        )
+        Self::new(&count.to_string(), What::Number(Kind::Count, f64::from(count)))
     }
 
     /// What its words say by themselves: a number with a unit, a whole number, true, false, none, else words.
@@ -200,10 +194,7 @@ impl Given {
             What::None => None,
             What::List(items) => {
                 let first = items.first()?.kind()?;
-                items
-                    .iter()
-                    .all(|item| item.kind() == Some(first))
-                    .then_some(first)
+                items.iter().all(|item| item.kind() == Some(first)).then_some(first)
             }
         }
     }
@@ -244,10 +235,7 @@ impl Given {
                 }
                 Some((_, unit)) if !kind.units().is_empty() => {
                     let known = suggestion(unit, &kind.units());
-                    format!(
-                        "'{unit}' in \"{text}\" is no unit of {}; {known}",
-                        kind.name()
-                    )
+                    format!("'{unit}' in \"{text}\" is no unit of {}; {known}", kind.name())
                 }
                 _ => format!("\"{text}\" is not {}; {write}", kind.name()),
             },
@@ -258,9 +246,8 @@ impl Given {
 /// Whether a text begins with digits that make no finite number.
 fn is_overflow(text: &str) -> bool {
     let number = text.split_whitespace().next().unwrap_or_default();
-    let has_digits = number
-        .trim_start_matches(['+', '-'])
-        .starts_with(|c: char| c.is_ascii_digit());
+    let has_digits =
+        number.trim_start_matches(['+', '-']).starts_with(|c: char| c.is_ascii_digit());
     has_digits && number.parse().is_ok_and(f64::is_infinite)
 }
 

@@ -13,22 +13,12 @@ use std::fmt::Write;
 pub fn reference() -> String {
     let mut text = String::new();
     for kind in KINDS.iter().filter(|kind| kind.build.is_some()) {
-        section(
-            &mut text,
-            &format!("`{}`", kind.word),
-            kind.about,
-            kind.keys,
-        );
+        section(&mut text, &format!("`{}`", kind.word), kind.about, kind.keys);
         if let Some(note) = kind.note {
             text.push_str(&note());
         }
     }
-    section(
-        &mut text,
-        "Every step",
-        "These keys go with any step.",
-        &COMMON,
-    );
+    section(&mut text, "Every step", "These keys go with any step.", &COMMON);
     let about = "`repeat = 10` or `for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }`, and `steps = [ ... ]`.";
     section(&mut text, "Loops", about, &LOOP_KEYS);
     let about = "`above` or `below` is the threshold and `resume` the value at which it is past, in the unit of what is watched.";
@@ -46,11 +36,7 @@ pub fn reference() -> String {
         Kind::Temperature,
     ] {
         let units = kind.units().join(", ");
-        let _ = writeln!(
-            text,
-            "| {} | {units} |",
-            kind.name().trim_start_matches("a ")
-        );
+        let _ = writeln!(text, "| {} | {units} |", kind.name().trim_start_matches("a "));
     }
     text.push_str("\n### What `ask` knows\n\n| key | meaning |\n|---|---|\n");
     for key in KEYS {
@@ -73,11 +59,7 @@ fn section(text: &mut String, title: &str, about: &str, keys: &[Key]) {
         };
         let kind = key.kind.name();
         let kind = kind.strip_prefix("a ").unwrap_or(kind);
-        let _ = writeln!(
-            text,
-            "| `{}` | {kind} | {without} | {} |",
-            key.name, key.about
-        );
+        let _ = writeln!(text, "| `{}` | {kind} | {without} | {} |", key.name, key.about);
     }
     text.push('\n');
 }

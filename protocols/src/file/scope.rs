@@ -53,14 +53,7 @@ impl Scope {
                 }
                 None if kind == Kind::Text => {
                     let text = self.filled_in(text)?;
-                    Ok(Given {
-                        what: if text == "none" {
-                            What::None
-                        } else {
-                            What::Text
-                        },
-                        text,
-                    })
+                    Ok(Given { what: if text == "none" { What::None } else { What::Text }, text })
                 }
                 None => Ok(Given::of_text(text)),
             },

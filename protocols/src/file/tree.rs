@@ -109,11 +109,8 @@ impl Lines {
             .iter()
             .map(|(key, value)| {
                 let line = self.at(&key.span());
-                let entry = Entry {
-                    key: key.get_ref().to_string(),
-                    line,
-                    node: self.node(value, line),
-                };
+                let entry =
+                    Entry { key: key.get_ref().to_string(), line, node: self.node(value, line) };
                 (key.span().start, entry)
             })
             .collect();
@@ -150,11 +147,8 @@ mod tests {
     fn every_word_knows_its_line_and_order() {
         let text = "b = 1\na = 'x'\n\n[t]\nz = [\n  { k = 'v' },\n  2.5,\n]\n[[m]]\nq = true\n[[m]]\nq = 2\n";
         let tree = read(text).unwrap();
-        let keys: Vec<(&str, u32)> = tree
-            .entries
-            .iter()
-            .map(|entry| (entry.key.as_str(), entry.line))
-            .collect();
+        let keys: Vec<(&str, u32)> =
+            tree.entries.iter().map(|entry| (entry.key.as_str(), entry.line)).collect();
         assert_eq!(keys, [("b", 1), ("a", 2), ("t", 4), ("m", 9)]);
         let Value::Table(t) = &tree.get("t").unwrap().value else {
             panic!("t is a table");

@@ -26,10 +26,7 @@ const LIMIT_KEYS: [Key; 2] = [
 pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems) -> PlanLimits {
     match node {
         None => PlanLimits::default(),
-        Some(Node {
-            value: Value::Table(table),
-            ..
-        }) => {
+        Some(Node { value: Value::Table(table), .. }) => {
             let args = Args::read(table, "[limits]", &[&LIMIT_KEYS], &[], scope, problems);
             PlanLimits {
                 force_max: args.maybe("force_max").map(Newtons),
@@ -37,10 +34,8 @@ pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems
             }
         }
         Some(node) => {
-            problems.error(
-                node.line,
-                "'limits' must be a table; write [limits] on a line of its own",
-            );
+            problems
+                .error(node.line, "'limits' must be a table; write [limits] on a line of its own");
             PlanLimits::default()
         }
     }
@@ -64,25 +59,12 @@ const ACTIONS: [(&str, Action); 5] = [
 
 /// Keys of a monitor beside the values, whose unit depends on what is watched.
 pub(super) const MONITOR_KEYS: [Key; 4] = [
-    Key::needed(
-        "watch",
-        Kind::Text,
-        "`force`, `depth`, `signal` or `position`",
-    )
-    .one_of(&["force", "depth", "signal", "position"]),
-    Key::usual(
-        "settle",
-        Kind::Time,
-        "1 s",
-        "how long it must be past before a paused run goes on",
-    )
-    .zero_allowed(),
-    Key::needed(
-        "action",
-        Kind::Text,
-        "`note`, `pause`, `stop`, `retract` or `halt`",
-    )
-    .one_of(&["note", "pause", "stop", "retract", "halt"]),
+    Key::needed("watch", Kind::Text, "`force`, `depth`, `signal` or `position`")
+        .one_of(&["force", "depth", "signal", "position"]),
+    Key::usual("settle", Kind::Time, "1 s", "how long it must be past before a paused run goes on")
+        .zero_allowed(),
+    Key::needed("action", Kind::Text, "`note`, `pause`, `stop`, `retract` or `halt`")
+        .one_of(&["note", "pause", "stop", "retract", "halt"]),
     Key::needed("message", Kind::Text, "what the operator reads"),
 ];
 
@@ -96,31 +78,19 @@ pub(super) fn monitors(
         return Vec::new();
     };
     let Value::List(items) = &node.value else {
-        problems.error(
-            node.line,
-            "write [[monitor]] in double brackets, once for each monitor",
-        );
+        problems.error(node.line, "write [[monitor]] in double brackets, once for each monitor");
         return Vec::new();
     };
     let tables = items.iter().filter_map(|item| match &item.value {
         Value::Table(table) => Some(table),
         _ => None,
     });
-    tables
-        .filter_map(|table| monitor(table, scope, problems))
-        .collect()
+    tables.filter_map(|table| monitor(table, scope, problems)).collect()
 }
 
 fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
     let besides = ["above", "below", "resume"];
-    let args = Args::read(
-        table,
-        "a monitor",
-        &[&MONITOR_KEYS],
-        &besides,
-        scope,
-        problems,
-    );
+    let args = Args::read(table, "a monitor", &[&MONITOR_KEYS], &besides, scope, problems);
     let watch = args.text("watch").ok()?;
     let (_, source, kind) = *SOURCES.iter().find(|(name, ..)| *name == watch)?;
     let mut value = |key: &str| {
@@ -129,10 +99,7 @@ fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Moni
             let number = given.number(kind)?;
             check_range(kind, Range::Any, number).map(|()| number)
         });
-        problems.take(
-            node.line,
-            number.map_err(|why| format!("'{key}' of a monitor: {why}")),
-        )
+        problems.take(node.line, number.map_err(|why| format!("'{key}' of a monitor: {why}")))
     };
     let (above, below, resume) = (value("above"), value("below"), value("resume"));
     let (side, threshold) = match (table.get("above").is_some(), table.get("below").is_some()) {
@@ -151,16 +118,9 @@ fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Moni
         side,
         threshold,
         // Without a value of its own it is past as soon as it no longer trips.
-        resume: if table.get("resume").is_some() {
-            resume?
-        } else {
-            threshold
-        },
+        resume: if table.get("resume").is_some() { resume? } else { threshold },
         settle: Seconds(args.number("settle").ok()?),
-        action: ACTIONS
-            .iter()
-            .find(|(name, _)| args.text("action") == Ok(name))?
-            .1,
+        action: ACTIONS.iter().find(|(name, _)| args.text("action") == Ok(name))?.1,
         message: args.text("message").ok()?.to_owned(),
     };
     if let Err(why) = monitor.check() {

@@ -34,13 +34,7 @@ pub(crate) enum KeyNeed {
 
 impl Key {
     const fn new(name: &'static str, kind: Kind, need: KeyNeed, about: &'static str) -> Self {
-        Self {
-            name,
-            kind,
-            range: Range::Above0,
-            need,
-            about,
-        }
+        Self { name, kind, range: Range::Above0, need, about }
     }
 
     /// A key that must be there.
@@ -95,9 +89,5 @@ pub(super) const COMMON: [Key; 3] = [
         "abort",
         "`abort`, `skip`, or `retry 2`: what follows if the step cannot be done",
     ),
-    Key::optional(
-        "only_if",
-        Kind::Flag,
-        "leaves the step out where this is `false` or `\"none\"`",
-    ),
+    Key::optional("only_if", Kind::Flag, "leaves the step out where this is `false` or `\"none\"`"),
 ];

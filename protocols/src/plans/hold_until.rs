@@ -53,11 +53,7 @@ impl HoldUntil {
     /// A rule with the usual shortest hold of 5 s, five relaxation times of pig stomach.
     #[must_use]
     pub const fn new(parameter: BodyParameter, relative: f64) -> Self {
-        Self {
-            parameter,
-            relative,
-            at_least: Seconds(5.0),
-        }
+        Self { parameter, relative, at_least: Seconds(5.0) }
     }
 
     /// What is wrong with it, in words.
@@ -81,9 +77,7 @@ impl HoldUntil {
     pub fn parse(text: &str) -> Result<Self, String> {
         let form = "write it like tau=1% or tau_eps=0.01";
         let Some((name, share)) = text.split_once('=') else {
-            return Err(format!(
-                "'{text}' does not say how well to know what; {form}"
-            ));
+            return Err(format!("'{text}' does not say how well to know what; {form}"));
         };
         let name = match name.trim() {
             "tau" => "tau_eps",
@@ -91,9 +85,7 @@ impl HoldUntil {
         };
         let Some(parameter) = BodyParameter::ALL.into_iter().find(|p| p.name() == name) else {
             let known = BodyParameter::ALL.map(BodyParameter::name).join(", ");
-            return Err(format!(
-                "the body has no parameter '{name}'; it has {known}"
-            ));
+            return Err(format!("the body has no parameter '{name}'; it has {known}"));
         };
         let share = share.trim();
         let (number, unit) = match share.strip_suffix('%') {
@@ -111,12 +103,7 @@ impl HoldUntil {
 
 impl fmt::Display for HoldUntil {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} is known to {} %",
-            self.parameter.name(),
-            percent(self.relative)
-        )
+        write!(f, "{} is known to {} %", self.parameter.name(), percent(self.relative))
     }
 }
 

@@ -138,12 +138,7 @@ fn is_zero(cycle: &u32) -> bool {
 
 impl From<Step> for PlannedStep {
     fn from(step: Step) -> Self {
-        Self {
-            step,
-            cycle: 0,
-            checkpoint: None,
-            on_failure: OnFailure::default(),
-        }
+        Self { step, cycle: 0, checkpoint: None, on_failure: OnFailure::default() }
     }
 }
 

@@ -12,10 +12,7 @@ use serde::{Deserialize, Serialize};
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
 /// The way out of the tissue behind a measurement.
-pub const LEAVE: Step = Step::Retract(Retract {
-    speed: MmPerS(6.0),
-    clearance_mm: 10.0,
-});
+pub const LEAVE: Step = Step::Retract(Retract { speed: MmPerS(6.0), clearance_mm: 10.0 });
 
 /// Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
 pub(super) const TARE: Seconds = Seconds(4.0);
@@ -24,15 +21,8 @@ pub(super) const TARE: Seconds = Seconds(4.0);
 #[must_use]
 pub fn approach(tare: Seconds, contact: FindContact) -> Vec<Step> {
     vec![
-        SelfTest {
-            duration: Seconds(0.5),
-        }
-        .into(),
-        Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.3),
-        }
-        .into(),
+        SelfTest { duration: Seconds(0.5) }.into(),
+        Home { speed: MmPerS(9.0), touch_speed: MmPerS(0.3) }.into(),
         Tare { duration: tare }.into(),
         contact.into(),
     ]
@@ -74,23 +64,13 @@ impl RampHold {
     pub fn plan(&self) -> Plan {
         let mut steps = approach(TARE, FindContact::default());
         steps.extend([
-            Ramp {
-                speed: self.speed,
-                depth: self.depth,
-            }
-            .into(),
-            Hold {
-                until: self.until,
-                ..Hold::of(self.hold)
-            }
-            .into(),
+            Ramp { speed: self.speed, depth: self.depth }.into(),
+            Hold { until: self.until, ..Hold::of(self.hold) }.into(),
         ]);
-        steps.extend(self.unload.map(|speed| {
-            Step::Unload(Unload {
-                speed,
-                clearance_mm: UNLOAD_CLEARANCE_MM,
-            })
-        }));
+        steps.extend(
+            self.unload
+                .map(|speed| Step::Unload(Unload { speed, clearance_mm: UNLOAD_CLEARANCE_MM })),
+        );
         steps.push(LEAVE);
         Plan::of("ramp-hold", 1, steps)
     }

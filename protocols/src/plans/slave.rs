@@ -21,11 +21,7 @@ impl Follow {
         let quantum = rig.speed_quantum.0;
         let most = (rig.speed_max.0 / quantum + 1e-6).floor();
         let steps = (FASTER * hand.0 / quantum).round();
-        Self {
-            duration,
-            speed: MmPerS(steps.clamp(1.0, most.max(1.0)) * quantum),
-            depth_max,
-        }
+        Self { duration, speed: MmPerS(steps.clamp(1.0, most.max(1.0)) * quantum), depth_max }
     }
 
     /// The plan, from self-test to retract.

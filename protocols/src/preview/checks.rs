@@ -14,19 +14,14 @@ impl Walk<'_> {
     pub fn check_travel(&mut self, what: &str, further_mm: f64) {
         let (travel, end) = (self.limits.travel_max, self.reach.low + further_mm);
         if self.known.contact && end > travel.0 {
-            self.refusals
-                .push(outside_travel(what, Position(end), travel));
+            self.refusals.push(outside_travel(what, Position(end), travel));
         }
     }
 
     /// Distances and forces of a plan are finite and no larger than any rig.
     pub fn check_sizes(&mut self, sizes: &[f64]) {
-        if let Some(size) = sizes
-            .iter()
-            .find(|size| size.is_nan() || size.abs() > 1000.0)
-        {
-            self.refusals
-                .push(format!("{size} is not possible; give a size up to 1000"));
+        if let Some(size) = sizes.iter().find(|size| size.is_nan() || size.abs() > 1000.0) {
+            self.refusals.push(format!("{size} is not possible; give a size up to 1000"));
         }
     }
 
@@ -46,18 +41,15 @@ impl Walk<'_> {
     pub fn check_span(&mut self, span: Seconds) {
         // A day is longer than any specimen lasts and keeps every tick count small.
         if !(span.0 >= 0.0 && span.0 <= 86_400.0) {
-            self.refusals.push(format!(
-                "a duration of {span} is not possible; give 0 to 86400 s"
-            ));
+            self.refusals.push(format!("a duration of {span} is not possible; give 0 to 86400 s"));
         }
     }
 
     pub fn check_depth(&mut self, depth: Depth) {
         let travel = self.limits.travel_max;
         if depth.0.is_nan() || depth.0 <= 0.0 {
-            self.refusals.push(format!(
-                "a depth of {depth} is not possible; give a depth above 0 mm"
-            ));
+            self.refusals
+                .push(format!("a depth of {depth} is not possible; give a depth above 0 mm"));
         } else if depth.0 > travel.0 {
             self.refusals.push(format!(
                 "a depth of {depth} is beyond the travel of rig {}; it ends at {travel}",

@@ -126,11 +126,7 @@ impl Expected {
         let from = self.depth;
         for i in 1..=MOVE_POINTS {
             let share = f64::from(i) / f64::from(MOVE_POINTS);
-            self.advance(
-                phase,
-                from + share * (depth - from),
-                secs / f64::from(MOVE_POINTS),
-            );
+            self.advance(phase, from + share * (depth - from), secs / f64::from(MOVE_POINTS));
             self.peak_of_depth = self.peak_of_depth.max(self.force);
         }
     }

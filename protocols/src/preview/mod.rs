@@ -110,19 +110,12 @@ fn walk(
         refusals: Vec::new(),
         notes: Vec::new(),
         expected: Expected::new(has_outline),
-        known: Known {
-            home: is_homed,
-            ..Known::default()
-        },
+        known: Known { home: is_homed, ..Known::default() },
         phase: Phase::Idle,
         reach: Reach::at(0.0),
     };
-    let steps: Vec<StepPreview> = plan
-        .steps
-        .iter()
-        .enumerate()
-        .map(|(index, planned)| walk.step(index, planned))
-        .collect();
+    let steps: Vec<StepPreview> =
+        plan.steps.iter().enumerate().map(|(index, planned)| walk.step(index, planned)).collect();
     for monitor in &plan.monitors {
         walk.refusals.extend(monitor.check().err());
     }
@@ -133,11 +126,8 @@ fn walk(
     let total =
         |of: fn(&StepPreview) -> Seconds| Seconds(steps.iter().map(|step| of(step).0).sum());
     let (expected, longest) = (total(|step| step.expected), total(|step| step.longest));
-    let force_band = if refusals.is_empty() {
-        walk.expected.force_band()
-    } else {
-        [Newtons(0.0); 2]
-    };
+    let force_band =
+        if refusals.is_empty() { walk.expected.force_band() } else { [Newtons(0.0); 2] };
     let (_, calibrated_max) = curve.force_range();
     let mut acknowledgements = Vec::new();
     if force_band[1] > calibrated_max {

@@ -21,10 +21,7 @@ pub(crate) struct Reach {
 
 impl Reach {
     pub fn at(depth: f64) -> Self {
-        Self {
-            low: depth,
-            high: depth,
-        }
+        Self { low: depth, high: depth }
     }
 
     pub fn is_known(self) -> bool {
@@ -38,18 +35,12 @@ impl Reach {
         if (pulses - pulses.round()).abs() < WHOLE {
             Self::at(pulses.round() * pulse)
         } else {
-            Self {
-                low: pulses.floor() * pulse,
-                high: pulses.ceil() * pulse,
-            }
+            Self { low: pulses.floor() * pulse, high: pulses.ceil() * pulse }
         }
     }
 
     pub fn moved_by(self, distance: f64) -> Self {
-        Self {
-            low: self.low + distance,
-            high: self.high + distance,
-        }
+        Self { low: self.low + distance, high: self.high + distance }
     }
 }
 
@@ -63,10 +54,7 @@ impl Walk<'_> {
     /// A way out, which never leads further in.
     pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> Span {
         let to = Reach::to(-clearance_mm, self.rig.mm_per_pulse);
-        let end = Reach {
-            low: to.low.min(self.reach.low),
-            high: to.high.min(self.reach.high),
-        };
+        let end = Reach { low: to.low.min(self.reach.low), high: to.high.min(self.reach.high) };
         let depth = (-clearance_mm).min(self.expected.depth());
         self.go_within(depth, end, speed)
     }
@@ -75,10 +63,8 @@ impl Walk<'_> {
         if self.is_refused() {
             return Span(0.0, 0.0, true);
         }
-        let (from, is_exact) = (
-            self.reach,
-            self.reach.is_known() && end.is_known() && self.is_answer_exact(),
-        );
+        let (from, is_exact) =
+            (self.reach, self.reach.is_known() && end.is_known() && self.is_answer_exact());
         let expected = self.secs(self.move_ticks(depth_mm - self.expected.depth(), speed));
         let furthest = (end.high - from.low).abs().max((end.low - from.high).abs());
         let longest = self.secs(self.move_ticks(furthest, speed));
@@ -133,13 +119,8 @@ impl Walk<'_> {
         // The axis ends on whole pulses.
         let pulse = self.rig.mm_per_pulse;
         let distance_mm = (distance_mm / pulse).round() * pulse;
-        Profile::to_rest(
-            Position(0.0),
-            Position(distance_mm),
-            speed,
-            self.rig.acceleration,
-        )
-        .duration()
-        .0
+        Profile::to_rest(Position(0.0), Position(distance_mm), speed, self.rig.acceleration)
+            .duration()
+            .0
     }
 }

@@ -39,8 +39,7 @@ impl Walk<'_> {
         self.phase = phase;
         let refused_before = self.refusals.len();
         let missed = step.needs().iter().filter(|need| !self.known.has(**need));
-        self.refusals
-            .extend(missed.filter_map(|need| need.refusal()).map(str::to_owned));
+        self.refusals.extend(missed.filter_map(|need| need.refusal()).map(str::to_owned));
         let Span(expected, longest, is_exact) = step.expect(self);
         step.pass(&mut self.known);
         if matches!(planned.on_failure, OnFailure::Retry(_)) && step.facts().is_measuring {

@@ -32,10 +32,7 @@ pub(super) const FACTS: Facts = Facts {
 
 impl CheckHome {
     fn search(&self) -> Home {
-        Home {
-            speed: self.speed,
-            touch_speed: self.touch_speed,
-        }
+        Home { speed: self.speed, touch_speed: self.touch_speed }
     }
 }
 
@@ -49,10 +46,7 @@ impl StepKind for CheckHome {
         self.search().check_speeds(walk);
         // At home, which is somewhere in front of the tissue.
         walk.expected.place(-CONTACT_EXPECTED_SHARE * travel);
-        walk.reach = Reach {
-            low: -travel,
-            high: 0.0,
-        };
+        walk.reach = Reach { low: -travel, high: 0.0 };
         self.search().expect_from(walk, CONTACT_EXPECTED_SHARE)
     }
 }

@@ -40,24 +40,9 @@ pub(super) const FACTS: Facts = Facts {
             "0.05 N",
             "force at which the first touch has felt the base",
         ),
-        Key::usual(
-            "retreat",
-            Kind::Length,
-            "0.3 mm",
-            "way back before the second touch",
-        ),
-        Key::usual(
-            "pass_speed",
-            Kind::Speed,
-            "0.03 mm/s",
-            "of the second touch",
-        ),
-        Key::usual(
-            "pass_force",
-            Kind::Force,
-            "0.4 N",
-            "force that ends the second touch",
-        ),
+        Key::usual("retreat", Kind::Length, "0.3 mm", "way back before the second touch"),
+        Key::usual("pass_speed", Kind::Speed, "0.03 mm/s", "of the second touch"),
+        Key::usual("pass_force", Kind::Force, "0.4 N", "force that ends the second touch"),
     ],
     build: Some(|args| {
         Ok(FindBase {
@@ -84,10 +69,7 @@ impl FindBase {
 
     fn check_speeds(&self) -> Result<(), String> {
         if self.approach_speed.0.max(self.pass_speed.0) > Self::SPEED_MAX.0 {
-            return Err(format!(
-                "a base is stiff; touch it at {} at most",
-                Self::SPEED_MAX
-            ));
+            return Err(format!("a base is stiff; touch it at {} at most", Self::SPEED_MAX));
         }
         Ok(())
     }
@@ -213,10 +195,7 @@ impl InProgress for BaseSearch {
                 self.stage = Stage::Braking;
             }
             Stage::Approach if at_rest => {
-                return Err(format!(
-                    "nothing stiff before {:.1} mm; check the base",
-                    position.0
-                ));
+                return Err(format!("nothing stiff before {:.1} mm; check the base", position.0));
             }
             Stage::Braking if at_rest => {
                 let back = self.first.moved_by(-self.plan.retreat_mm);
@@ -231,11 +210,7 @@ impl InProgress for BaseSearch {
             Stage::SlowPass => {
                 // Forces this small are all worth the same.
                 let sigma = Newtons(1.0);
-                self.samples.push(StiffSample {
-                    position: Position(felt_at),
-                    force,
-                    sigma,
-                });
+                self.samples.push(StiffSample { position: Position(felt_at), force, sigma });
                 if filtered >= self.plan.pass_force {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
@@ -260,10 +235,7 @@ impl BaseSearch {
     fn found(&self, cx: &mut Context<'_>) -> Result<Contact, String> {
         let seated = Newtons(FindBase::SEATED_SHARE * self.plan.pass_force.0);
         let line = fit_compliance(&self.samples, seated).map_err(|err| err.to_string())?;
-        let found = Contact {
-            position: line.surface,
-            std_error_mm: line.surface_std_error_mm,
-        };
+        let found = Contact { position: line.surface, std_error_mm: line.surface_std_error_mm };
         let touched = |contact: Contact| Touched {
             position: contact.position,
             std_error_mm: contact.std_error_mm,

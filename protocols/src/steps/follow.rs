@@ -49,10 +49,7 @@ impl StepKind for Follow {
         let there = walk.move_secs(way - walk.expected.depth(), self.speed);
         walk.expected.go(walk.phase, way, there.min(duration));
         walk.expected.stay(walk.phase, (duration - there).max(0.0));
-        walk.reach = Reach {
-            low: -walk.limits.travel_max.0,
-            high: way,
-        };
+        walk.reach = Reach { low: -walk.limits.travel_max.0, high: way };
         walk.note(format!(
             "the slave goes where it is led, at {} at most and no deeper than {}",
             self.speed, self.depth_max

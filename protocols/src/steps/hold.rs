@@ -34,16 +34,8 @@ pub(super) const FACTS: Facts = Facts {
             Kind::Text,
             "end it once a parameter is known so well, as `\"tau=1%\"`",
         ),
-        Key::optional(
-            "slope",
-            Kind::ForceRate,
-            "end it once the force changes by less",
-        ),
-        Key::optional(
-            "over",
-            Kind::Time,
-            "time over which the slope is judged; goes with `slope`",
-        ),
+        Key::optional("slope", Kind::ForceRate, "end it once the force changes by less"),
+        Key::optional("over", Kind::Time, "time over which the slope is judged; goes with `slope`"),
     ],
     build: Some(read),
     may_touch: false,
@@ -52,37 +44,26 @@ pub(super) const FACTS: Facts = Facts {
 
 fn read(args: &Args) -> Result<Step, String> {
     let until = args.maybe_text("until").map(HoldUntil::parse).transpose()?;
-    let rate =
-        match (args.maybe("slope"), args.maybe("over")) {
-            (Some(below_n_per_s), Some(over)) => Some(HoldRate {
-                below_n_per_s,
-                over: Seconds(over),
-            }),
-            (None, None) => None,
-            _ => return Err(
+    let rate = match (args.maybe("slope"), args.maybe("over")) {
+        (Some(below_n_per_s), Some(over)) => Some(HoldRate { below_n_per_s, over: Seconds(over) }),
+        (None, None) => None,
+        _ => {
+            return Err(
                 "'slope' and 'over' go together: how little the force changes, and over how long"
                     .into(),
-            ),
-        };
+            );
+        }
+    };
     rate.map_or(Ok(()), |rule| rule.check())?;
     let duration = args.seconds("for")?;
-    Ok(Hold {
-        duration,
-        until,
-        rate,
-    }
-    .into())
+    Ok(Hold { duration, until, rate }.into())
 }
 
 impl Hold {
     /// A hold that lasts as long as it says.
     #[must_use]
     pub const fn of(duration: Seconds) -> Self {
-        Self {
-            duration,
-            until: None,
-            rate: None,
-        }
+        Self { duration, until: None, rate: None }
     }
 
     fn check_rule(&self, rule: &HoldUntil, walk: &mut Walk<'_>) {
@@ -204,10 +185,7 @@ impl InProgress for Holding {
         {
             self.until_tick = reading.tick;
             let held = Seconds((reading.tick - self.begun_tick) as f64 * tick.0);
-            cx.record(Record::HoldSteady {
-                slope_n_per_s: now,
-                held,
-            });
+            cx.record(Record::HoldSteady { slope_n_per_s: now, held });
         }
         Ok(match reading.tick >= self.until_tick {
             true => Progress::Done,

@@ -29,11 +29,7 @@ pub(super) const FACTS: Facts = Facts {
         Key::needed("force", Kind::Force, "above tare"),
         Key::needed("for", Kind::Time, "how long").zero_allowed(),
         Key::usual("speed", Kind::Speed, "0.75 mm/s", "of the corrections"),
-        Key::needed(
-            "deepest",
-            Kind::Length,
-            "depth at which the step is given up",
-        ),
+        Key::needed("deepest", Kind::Length, "depth at which the step is given up"),
     ],
     build: Some(|args| {
         Ok(HoldForce {
@@ -61,10 +57,8 @@ impl StepKind for HoldForce {
         walk.check_force(self.force);
         walk.check_span(self.duration);
         let secs = walk.secs(walk.ticks(self.duration.0));
-        walk.reach = Reach {
-            low: walk.reach.low.min(0.0),
-            high: walk.reach.high.max(self.depth_max.0),
-        };
+        walk.reach =
+            Reach { low: walk.reach.low.min(0.0), high: walk.reach.high.max(self.depth_max.0) };
         walk.expected.keep(walk.phase, secs);
         Span(secs, secs + SETTLE_SECS, false)
     }

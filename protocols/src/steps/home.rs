@@ -39,10 +39,7 @@ pub(super) const FACTS: Facts = Facts {
 
 impl Home {
     pub(super) fn read(args: &Args) -> Result<Self, String> {
-        Ok(Self {
-            speed: args.speed("speed")?,
-            touch_speed: args.speed("touch_speed")?,
-        })
+        Ok(Self { speed: args.speed("speed")?, touch_speed: args.speed("touch_speed")? })
     }
 
     /// Times of a search that begins at these shares of the travel from the switch.
@@ -133,12 +130,7 @@ pub(crate) struct Homing {
 impl Homing {
     pub fn begin(cx: &mut Context<'_>, plan: Home, purpose: Purpose) -> Result<Self, String> {
         cx.set_homed(false);
-        let mut homing = Self {
-            plan,
-            back_off_mm: BACK_OFF_MM,
-            stage: Stage::Searching,
-            purpose,
-        };
+        let mut homing = Self { plan, back_off_mm: BACK_OFF_MM, stage: Stage::Searching, purpose };
         if cx.status().has(AxisStatus::HOME) {
             // Parked on the switch, perhaps on the limit behind it: leave it first.
             homing.back_off_mm = LEAVE_MM;
@@ -178,23 +170,17 @@ impl InProgress for Homing {
             }
             Stage::Touching if is_at_switch => {
                 cx.stop_move();
-                self.stage = Stage::TouchBraking {
-                    edge_pulses: reading.pulses,
-                };
+                self.stage = Stage::TouchBraking { edge_pulses: reading.pulses };
             }
             Stage::Searching | Stage::Touching if at_rest => {
                 return Err("the home switch was not found; check it and its cable".into());
             }
             Stage::TouchBraking { edge_pulses } if at_rest && self.purpose == Purpose::Check => {
-                cx.record(Record::HomeChecked {
-                    missed_pulses: edge_pulses,
-                });
+                cx.record(Record::HomeChecked { missed_pulses: edge_pulses });
                 return Ok(Progress::Done);
             }
             Stage::TouchBraking { edge_pulses } if at_rest => {
-                cx.command(RigCommand::DefinePosition {
-                    pulses: reading.pulses - edge_pulses,
-                });
+                cx.command(RigCommand::DefinePosition { pulses: reading.pulses - edge_pulses });
                 cx.record(Record::Homed { edge_pulses });
                 self.stage = Stage::Defining;
             }

@@ -24,11 +24,7 @@ pub(super) const FACTS: Facts = Facts {
         Key::needed("speed", Kind::Speed, "of the move"),
     ],
     build: Some(|args| {
-        Ok(Jog {
-            distance_mm: args.number("distance")?,
-            speed: args.speed("speed")?,
-        }
-        .into())
+        Ok(Jog { distance_mm: args.number("distance")?, speed: args.speed("speed")? }.into())
     }),
     needs: &[Need::Motor],
     ..Facts::of("jog", Phase::Jog, Pausing::RepeatFromStart)

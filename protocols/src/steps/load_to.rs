@@ -32,11 +32,7 @@ pub(super) const FACTS: Facts = Facts {
     keys: &[
         Key::needed("to", Kind::Force, "force above tare"),
         Key::needed("speed", Kind::Speed, "of the indentation"),
-        Key::needed(
-            "deepest",
-            Kind::Length,
-            "depth at which the step is given up",
-        ),
+        Key::needed("deepest", Kind::Length, "depth at which the step is given up"),
         Key::optional(
             "brake",
             Kind::Force,

@@ -66,17 +66,9 @@ pub(super) const FACTS: Facts = Facts {
             "by hand: all that shall lie on the load cell, `\"0 g\"` for nothing",
         )
         .zero_allowed(),
-        Key::optional(
-            "mount",
-            Kind::Count,
-            "by hand: the number of the specimen to clip in",
-        )
-        .zero_allowed(),
-        Key::optional(
-            "unmount",
-            Kind::Flag,
-            "by hand: `true` takes the specimen out",
-        ),
+        Key::optional("mount", Kind::Count, "by hand: the number of the specimen to clip in")
+            .zero_allowed(),
+        Key::optional("unmount", Kind::Flag, "by hand: `true` takes the specimen out"),
     ],
     build: Some(read),
     may_touch: false,
@@ -88,9 +80,7 @@ fn read(args: &Args) -> Result<Step, String> {
     let hand = match (args.maybe("cell_mass"), mount, args.is_true("unmount")) {
         (None, None, false) => None,
         (Some(mass_g), None, false) => Some(HandAction::LoadCell { mass_g }),
-        (None, Some(specimen), false) => Some(HandAction::Mount {
-            specimen: specimen.into(),
-        }),
+        (None, Some(specimen), false) => Some(HandAction::Mount { specimen: specimen.into() }),
         (None, None, true) => Some(HandAction::Unmount),
         _ => {
             return Err(
@@ -145,14 +135,8 @@ impl Executable for Prompt {
     type Run = Asking;
 
     fn begin(&self, cx: &mut Context<'_>) -> Result<Asking, String> {
-        cx.record(Record::Prompted {
-            message: self.message.clone(),
-            timeout: self.timeout,
-        });
-        Ok(Asking {
-            plan: self.clone(),
-            deadline: cx.now + Nanos::from_seconds(self.timeout),
-        })
+        cx.record(Record::Prompted { message: self.message.clone(), timeout: self.timeout });
+        Ok(Asking { plan: self.clone(), deadline: cx.now + Nanos::from_seconds(self.timeout) })
     }
 }
 
@@ -166,9 +150,7 @@ impl InProgress for Asking {
         if cx.now < self.deadline {
             return Ok(Progress::Continue);
         }
-        cx.record(Record::Answered {
-            answer: Answer::TimedOut,
-        });
+        cx.record(Record::Answered { answer: Answer::TimedOut });
         Ok(match self.plan.on_timeout {
             OnTimeout::Continue => Progress::Done,
             OnTimeout::Stop => Progress::Stop(format!("nobody answered within {timeout:.0}")),
@@ -181,9 +163,7 @@ impl InProgress for Asking {
         };
         cx.record(Record::Answered { answer });
         if answer != Answer::Confirmed {
-            return Some(Progress::Stop(
-                "the operator declined what the plan asked for".into(),
-            ));
+            return Some(Progress::Stop("the operator declined what the plan asked for".into()));
         }
         if matches!(self.plan.hand, Some(HandAction::Mount { .. })) {
             // What was known of the tissue was known of another specimen.

@@ -25,11 +25,7 @@ pub(super) const FACTS: Facts = Facts {
         Key::needed("depth", Kind::Length, "from contact"),
     ],
     build: Some(|args| {
-        Ok(Ramp {
-            speed: args.speed("speed")?,
-            depth: Depth(args.number("depth")?),
-        }
-        .into())
+        Ok(Ramp { speed: args.speed("speed")?, depth: Depth(args.number("depth")?) }.into())
     }),
     needs: FROM_SURFACE,
     is_measuring: true,

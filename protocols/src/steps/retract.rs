@@ -22,20 +22,11 @@ pub(super) const FACTS: Facts = Facts {
     about: "Leave the tissue.",
     keys: &[
         Key::usual("speed", Kind::Speed, "6 mm/s", "of the way out"),
-        Key::usual(
-            "clearance",
-            Kind::Length,
-            "10 mm",
-            "distance from the surface to stop at",
-        )
-        .zero_allowed(),
+        Key::usual("clearance", Kind::Length, "10 mm", "distance from the surface to stop at")
+            .zero_allowed(),
     ],
     build: Some(|args| {
-        Ok(Retract {
-            speed: args.speed("speed")?,
-            clearance_mm: args.number("clearance")?,
-        }
-        .into())
+        Ok(Retract { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())
     }),
     needs: FROM_SURFACE,
     may_touch: false,

@@ -19,12 +19,7 @@ pub struct SelfTest {
 
 pub(super) const FACTS: Facts = Facts {
     about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
-    keys: &[Key::usual(
-        "for",
-        Kind::Time,
-        "0.5 s",
-        "how long the signal is watched",
-    )],
+    keys: &[Key::usual("for", Kind::Time, "0.5 s", "how long the signal is watched")],
     build: Some(|args| {
         let duration = args.seconds("for")?;
         Ok(SelfTest { duration }.into())
@@ -95,9 +90,7 @@ impl Testing {
         // samples by a computer with much else to do may get half of them.
         let share = if rig.ticks_per_sample > 1.0 { 50 } else { 99 };
         if received * 100 < expected * share {
-            return Err(format!(
-                "only {received} of {expected} samples arrived; check the link"
-            ));
+            return Err(format!("only {received} of {expected} samples arrived; check the link"));
         }
         let noise = self.volts.std_dev();
         if noise == 0.0 && rig.shows_noise() {

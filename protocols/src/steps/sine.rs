@@ -23,11 +23,7 @@ pub struct Sine {
 pub(super) const FACTS: Facts = Facts {
     about: "Swing from where the probe stands to deeper and back, beginning and ending at rest.",
     keys: &[
-        Key::needed(
-            "amplitude",
-            Kind::Length,
-            "half of the way between the turning points",
-        ),
+        Key::needed("amplitude", Kind::Length, "half of the way between the turning points"),
         Key::needed("frequency", Kind::Frequency, "of the swing"),
         Key::needed("cycles", Kind::Count, "whole cycles"),
     ],
@@ -111,9 +107,7 @@ impl StepKind for Sine {
     }
 
     fn doubt(&self, done: &Done<'_>) -> Option<String> {
-        let lowest = done
-            .lowest_force()
-            .filter(|lowest| *lowest <= FORCE_FLOOR)?;
+        let lowest = done.lowest_force().filter(|lowest| *lowest <= FORCE_FLOOR)?;
         Some(format!(
             "the force came back to {lowest:.3} N, where nothing tells contact from none (below {FORCE_FLOOR} N): the probe may have lost the tissue; go deeper or swing less"
         ))

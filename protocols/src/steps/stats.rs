@@ -26,11 +26,7 @@ impl RunningStats {
 
     /// Sample standard deviation; zero below two values.
     pub fn std_dev(&self) -> f64 {
-        if self.count < 2 {
-            0.0
-        } else {
-            (self.sum_squares / (self.count - 1) as f64).sqrt()
-        }
+        if self.count < 2 { 0.0 } else { (self.sum_squares / (self.count - 1) as f64).sqrt() }
     }
 }
 

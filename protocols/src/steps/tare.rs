@@ -86,27 +86,11 @@ impl InProgress for Taring {
         let volts = Volts(self.volts.mean());
         check_unloaded(cx, volts)?;
         // Quantisation adds a uniform error of one count; a quiet signal may hide inside it.
-        let noise = Volts(
-            self.volts
-                .std_dev()
-                .max(cx.volts_per_count() / 12f64.sqrt()),
-        );
+        let noise = Volts(self.volts.std_dev().max(cx.volts_per_count() / 12f64.sqrt()));
         let drift = self.line.and_then(|(_, line)| line.slope());
-        let drift = drift.map(|(volts_per_s, std_error)| Drift {
-            volts_per_s,
-            std_error,
-        });
-        cx.set_unloaded(Some(UnloadedSignal {
-            volts,
-            noise,
-            drift,
-        }));
-        cx.record(Record::Tared {
-            volts,
-            noise,
-            samples: self.volts.count(),
-            drift,
-        });
+        let drift = drift.map(|(volts_per_s, std_error)| Drift { volts_per_s, std_error });
+        cx.set_unloaded(Some(UnloadedSignal { volts, noise, drift }));
+        cx.record(Record::Tared { volts, noise, samples: self.volts.count(), drift });
         Ok(Progress::Done)
     }
 }

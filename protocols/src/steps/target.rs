@@ -131,8 +131,7 @@ impl StepMeter {
             if self.is_cruising(&first, sample) {
                 self.by_path.push(t, depth);
                 if let Some(pulses) = sample.pulses {
-                    self.by_pulses
-                        .push(t, pulses as f64 * self.rig.mm_per_pulse);
+                    self.by_pulses.push(t, pulses as f64 * self.rig.mm_per_pulse);
                 }
             }
         }
@@ -160,9 +159,7 @@ impl StepMeter {
         let way =
             |speed: f64| 0.5 * speed * speed / self.rig.acceleration.0 + self.rig.mm_per_pulse;
         let kind = self.step.kind();
-        first
-            .depth
-            .is_some_and(|begun| kind.is_cruising(begun, sample, &way))
+        first.depth.is_some_and(|begun| kind.is_cruising(begun, sample, &way))
     }
 
     /// The step is done; `last` is the last sample before the next one began. Its targets, and what speaks against it
@@ -215,10 +212,7 @@ impl Done<'_> {
     pub fn speed(&mut self, MmPerS(target): MmPerS) {
         let cruise = CRUISE_MS_MIN * u64::from(self.rig.samples_per_ms());
         let meter = self.meter;
-        for (name, slope) in [
-            ("speed", &meter.by_path),
-            ("speed by pulses", &meter.by_pulses),
-        ] {
+        for (name, slope) in [("speed", &meter.by_path), ("speed by pulses", &meter.by_pulses)] {
             let achieved = slope.slope(cruise).map(f64::abs);
             self.add((name, "mm/s"), target, achieved, RATE_SHARE * target);
         }

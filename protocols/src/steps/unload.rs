@@ -22,20 +22,11 @@ pub(super) const FACTS: Facts = Facts {
     about: "Come back to the surface at constant speed, recorded like the way in.",
     keys: &[
         Key::needed("speed", Kind::Speed, "of the way back"),
-        Key::usual(
-            "clearance",
-            Kind::Length,
-            "0.5 mm",
-            "distance from the surface to stop at",
-        )
-        .zero_allowed(),
+        Key::usual("clearance", Kind::Length, "0.5 mm", "distance from the surface to stop at")
+            .zero_allowed(),
     ],
     build: Some(|args| {
-        Ok(Unload {
-            speed: args.speed("speed")?,
-            clearance_mm: args.number("clearance")?,
-        }
-        .into())
+        Ok(Unload { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())
     }),
     needs: FROM_SURFACE,
     may_touch: false,

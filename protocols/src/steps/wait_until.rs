@@ -59,11 +59,7 @@ pub(super) const FACTS: Facts = Facts {
             Kind::Temperature,
             "lowest temperature of the bath; goes with `bath_to`",
         ),
-        Key::optional(
-            "bath_to",
-            Kind::Temperature,
-            "highest temperature of the bath",
-        ),
+        Key::optional("bath_to", Kind::Temperature, "highest temperature of the bath"),
         Key::usual("timeout", Kind::Time, "10 min", "longest wait"),
         Key::usual(
             "on_timeout",
@@ -85,10 +81,9 @@ fn read(args: &Args) -> Result<Step, String> {
             number: u8::try_from(number).unwrap_or(u8::MAX),
             is_high: args.text("level")? == "high",
         },
-        (None, Some(from_celsius), Some(to_celsius)) => WaitCondition::Bath {
-            from_celsius,
-            to_celsius,
-        },
+        (None, Some(from_celsius), Some(to_celsius)) => {
+            WaitCondition::Bath { from_celsius, to_celsius }
+        }
         _ => return Err("give either 'input', or 'bath_from' and 'bath_to'".into()),
     };
     condition.check()?;
@@ -106,16 +101,13 @@ impl WaitCondition {
             Self::DigitalInput { number, .. }
                 if !(1..=DIGITAL_INPUTS_MAX).contains(&usize::from(number)) =>
             {
-                Err(format!(
-                    "there is no digital input {number}; give 1 to {DIGITAL_INPUTS_MAX}"
-                ))
+                Err(format!("there is no digital input {number}; give 1 to {DIGITAL_INPUTS_MAX}"))
             }
-            Self::Bath {
-                from_celsius: from,
-                to_celsius: to,
-            } if from >= to || from.is_nan() || to.is_nan() => Err(format!(
-                "no temperature is from {from} to {to} °C; give the lower end first"
-            )),
+            Self::Bath { from_celsius: from, to_celsius: to }
+                if from >= to || from.is_nan() || to.is_nan() =>
+            {
+                Err(format!("no temperature is from {from} to {to} °C; give the lower end first"))
+            }
             _ => Ok(()),
         }
     }
@@ -125,10 +117,7 @@ impl WaitCondition {
         let sensors = cx.sensors();
         match *self {
             Self::DigitalInput { number, is_high } => sensors.is_high(number) == Some(is_high),
-            Self::Bath {
-                from_celsius,
-                to_celsius,
-            } => sensors
+            Self::Bath { from_celsius, to_celsius } => sensors
                 .bath_celsius()
                 .is_some_and(|celsius| (from_celsius..=to_celsius).contains(&celsius)),
         }
@@ -142,10 +131,9 @@ impl fmt::Display for WaitCondition {
                 let level = if *is_high { "high" } else { "low" };
                 write!(f, "digital input {number} is {level}")
             }
-            Self::Bath {
-                from_celsius,
-                to_celsius,
-            } => write!(f, "the bath is between {from_celsius} and {to_celsius} °C"),
+            Self::Bath { from_celsius, to_celsius } => {
+                write!(f, "the bath is between {from_celsius} and {to_celsius} °C")
+            }
         }
     }
 }
@@ -193,11 +181,7 @@ pub(crate) struct Waiting {
 impl InProgress for Waiting {
     /// A pause stops the clock of the timeout; it begins anew when the run goes on.
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
-        let WaitUntil {
-            condition,
-            timeout,
-            on_timeout,
-        } = self.plan;
+        let WaitUntil { condition, timeout, on_timeout } = self.plan;
         if cx.is_extended() {
             self.deadline = cx.now + Nanos::from_seconds(timeout);
             return Ok(Progress::Continue);

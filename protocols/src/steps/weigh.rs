@@ -43,12 +43,7 @@ pub(super) const FACTS: Facts = Facts {
         )
         .one_of(&["up", "down"]),
         Key::usual("pass", Kind::Count, "1", "which pass through the masses"),
-        Key::usual(
-            "window",
-            Kind::Time,
-            "2 s",
-            "time that must be steady, and is averaged",
-        ),
+        Key::usual("window", Kind::Time, "2 s", "time that must be steady, and is averaged"),
         Key::usual("timeout", Kind::Time, "30 s", "longest wait"),
     ],
     build: Some(|args| {
@@ -56,10 +51,7 @@ pub(super) const FACTS: Facts = Facts {
             mass_g: args.number("mass")?,
             is_loading: args.text("masses_go")? == "up",
             repeat: args.count("pass")?,
-            settle: Settle {
-                window: args.seconds("window")?,
-                timeout: args.seconds("timeout")?,
-            },
+            settle: Settle { window: args.seconds("window")?, timeout: args.seconds("timeout")? },
         }
         .into())
     }),
@@ -113,9 +105,7 @@ impl Executable for Weigh {
 impl InProgress for Weighing {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         // A controller that restarted counts from zero again.
-        let ticks = self
-            .newest_tick
-            .map_or(1, |newest| reading.tick.saturating_sub(newest));
+        let ticks = self.newest_tick.map_or(1, |newest| reading.tick.saturating_sub(newest));
         self.newest_tick = Some(reading.tick);
         match self.settling.push(ticks, reading.volts) {
             Settled::Waiting => Ok(Progress::Continue),

@@ -42,11 +42,7 @@ fn bench() -> (RigDescription, Limits, Calibration) {
     let rig = palpate_drivers::open("sim", &settings).expect("the simulated rig opens");
     let rig = rig.description().clone();
     let limits = Limits::for_travel(rig.travel);
-    (
-        rig,
-        limits,
-        palpate_drivers::sim::calibration(settings.profile),
-    )
+    (rig, limits, palpate_drivers::sim::calibration(settings.profile))
 }
 
 #[test]
@@ -95,10 +91,7 @@ fn the_ramp_and_hold_is_the_plan_it_was() {
         let mut from_file = plan("ramp-hold", &pairs);
         let source = from_file.source.take().unwrap();
         assert_eq!(from_file, params.plan());
-        assert_eq!(
-            source.values["speed"],
-            pairs.first().map_or("0.75 mm/s", |pair| pair.1)
-        );
+        assert_eq!(source.values["speed"], pairs.first().map_or("0.75 mm/s", |pair| pair.1));
         assert_eq!(source.crc32.len(), 8);
     }
 }
@@ -120,14 +113,7 @@ fn cycles_are_numbered_and_end_at_checkpoints() {
     let cycles: Vec<u32> = plan.steps.iter().map(|planned| planned.cycle).collect();
     assert_eq!(cycles, [0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 0]);
     let checkpoints: Vec<(usize, &str)> = plan.checkpoints_from(0).collect();
-    assert_eq!(
-        checkpoints,
-        [
-            (6, "after cycle 1"),
-            (9, "after cycle 2"),
-            (12, "after cycle 3")
-        ]
-    );
+    assert_eq!(checkpoints, [(6, "after cycle 1"), (9, "after cycle 2"), (12, "after cycle 3")]);
     // Two speeds and two depths are four repeats of the measurement, not twice two.
     let series = self::plan("validation-series", &[]);
     let last = series.steps.iter().map(|planned| planned.cycle).max();
@@ -149,12 +135,7 @@ fn a_calibration_goes_up_and_down_over_every_mass() {
         .collect();
     let up = [0, 140, 240, 340, 440, 540, 640, 740, 840, 940, 1040];
     let mut wanted: Vec<(f64, bool)> = up.iter().map(|mass| (f64::from(*mass), true)).collect();
-    wanted.extend(
-        up.iter()
-            .rev()
-            .skip(1)
-            .map(|mass| (f64::from(*mass), false)),
-    );
+    wanted.extend(up.iter().rev().skip(1).map(|mass| (f64::from(*mass), false)));
     assert_eq!(readings, wanted);
 }
 
@@ -162,29 +143,17 @@ fn a_calibration_goes_up_and_down_over_every_mass() {
 fn values_that_are_typed_are_checked_by_name() {
     for (name, pairs, words) in [
         ("ramp-hold", [("speed", "30 mm")], "parameter 'speed': "),
-        (
-            "ramp-hold",
-            [("sped", "1 mm/s")],
-            "'sped'; did you mean 'speed'?",
-        ),
+        ("ramp-hold", [("sped", "1 mm/s")], "'sped'; did you mean 'speed'?"),
         ("ramp-hold", [("hold", "-1 s")], "0 s or more"),
         ("ramp-hold", [("depth", "none")], "none is"),
         ("ramp-hold", [("until", "tau")], "'hold': 'tau'"),
         ("preconditioning", [("cycles", "0")], "1 or more"),
         ("preconditioning", [("cycles", "2.5")], "not a whole number"),
-        (
-            "validation-series",
-            [("speeds", "1 mm/s, 2")],
-            "2 has no unit",
-        ),
+        ("validation-series", [("speeds", "1 mm/s, 2")], "2 has no unit"),
         ("zeroing", [("thickness", "yes")], "true or false"),
     ] {
         let problems = protocol(name).plan(&values(&pairs)).unwrap_err();
-        assert!(
-            sentences(&problems).contains(words),
-            "{}",
-            sentences(&problems)
-        );
+        assert!(sentences(&problems).contains(words), "{}", sentences(&problems));
     }
 }
 
@@ -196,10 +165,7 @@ fn typical_mistakes_get_a_sentence_to_act_on() {
     for entry in fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
         let text = fs::read_to_string(&path).unwrap();
-        let wanted: Vec<&str> = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("#: "))
-            .collect();
+        let wanted: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("#: ")).collect();
         assert!(!wanted.is_empty(), "{}", path.display());
         let found = match Protocol::read(&text) {
             Err(problems) => problems,
@@ -316,15 +282,12 @@ fn no_text_makes_it_panic_and_every_problem_has_its_line() {
 fn a_protocol_cannot_be_made_endless() {
     let head = "palpate = 1\nname = \"x\"\nversion = 1\ntitle = \"x\"\nabout = \"x\"\nsource = \"x\"\n[procedure]\n";
     let rest = "{ do = \"rest\", for = \"1 s\" }";
-    let nested = (0..5).fold(rest.to_owned(), |inner, _| {
-        format!("{{ repeat = 9000, steps = [ {inner} ] }}")
-    });
-    let hollow = (0..5).fold(String::new(), |inner, _| {
-        format!("{{ repeat = 9000, steps = [ {inner} ] }}")
-    });
-    let deep = (0..7).fold(rest.to_owned(), |inner, _| {
-        format!("{{ repeat = 1, steps = [ {inner} ] }}")
-    });
+    let nested = (0..5)
+        .fold(rest.to_owned(), |inner, _| format!("{{ repeat = 9000, steps = [ {inner} ] }}"));
+    let hollow =
+        (0..5).fold(String::new(), |inner, _| format!("{{ repeat = 9000, steps = [ {inner} ] }}"));
+    let deep =
+        (0..7).fold(rest.to_owned(), |inner, _| format!("{{ repeat = 1, steps = [ {inner} ] }}"));
     let brackets = "[".repeat(100_000);
     for (steps, words) in [
         (nested, "more than 10000 steps"),
@@ -333,11 +296,7 @@ fn a_protocol_cannot_be_made_endless() {
         (brackets, "not TOML"),
     ] {
         let problems = Protocol::read(&format!("{head}steps = [ {steps} ]\n")).unwrap_err();
-        assert!(
-            sentences(&problems).contains(words),
-            "{}",
-            sentences(&problems)
-        );
+        assert!(sentences(&problems).contains(words), "{}", sentences(&problems));
     }
 }
 

@@ -111,9 +111,7 @@ impl FromStr for Condition {
     type Err = ConditionError;
 
     fn from_str(text: &str) -> Result<Self, ConditionError> {
-        let form = || ConditionError::Form {
-            text: text.to_owned(),
-        };
+        let form = || ConditionError::Form { text: text.to_owned() };
         let at = text.find(['<', '>', '=', '!']).ok_or_else(form)?;
         let (name, rest) = text.split_at(at);
         let sign = SIGNS.iter().find(|(sign, _)| rest.starts_with(sign));
@@ -134,25 +132,14 @@ impl FromStr for Condition {
         let ways = ways(text, name, value)?;
         let is_words = |way: &Way| matches!(way.with, With::Text(_));
         if is_order && ways.iter().all(is_words) {
-            return Err(ConditionError::Words {
-                text: text.to_owned(),
-                value: value.to_owned(),
-            });
+            return Err(ConditionError::Words { text: text.to_owned(), value: value.to_owned() });
         }
-        Ok(Self {
-            source,
-            relation,
-            ways,
-        })
+        Ok(Self { source, relation, ways })
     }
 }
 
 fn ways(text: &str, name: &str, value: &str) -> Result<Vec<Way>, ConditionError> {
-    let way = |name: &str, unit, with| Way {
-        name: name.to_owned(),
-        unit,
-        with,
-    };
+    let way = |name: &str, unit, with| Way { name: name.to_owned(), unit, with };
     let ending = name.rsplit_once('_').filter(|(stem, _)| !stem.is_empty());
     let ending = ending.and_then(|(stem, unit)| Some((stem, unit, base_unit(unit)?)));
     let of_value = split(value).filter(|(_, unit)| unit.is_empty() || base_unit(unit).is_some());
@@ -168,10 +155,9 @@ fn ways(text: &str, name: &str, value: &str) -> Result<Vec<Way>, ConditionError>
             name: own.to_owned(),
             value: unit.to_owned(),
         }),
-        Some((stem, own, base)) => Ok(vec![
-            way(name, None, With::Number(number)),
-            way(stem, Some(base), converted(own)),
-        ]),
+        Some((stem, own, base)) => {
+            Ok(vec![way(name, None, With::Number(number)), way(stem, Some(base), converted(own))])
+        }
     }
 }
 
@@ -180,9 +166,7 @@ impl Condition {
     #[must_use]
     pub fn is_met(&self, entry: &Entry) -> bool {
         let is_way = |one: &Named, way: &Way| {
-            let is_unit = way
-                .unit
-                .is_none_or(|unit| one.unit.is_empty() || one.unit == unit);
+            let is_unit = way.unit.is_none_or(|unit| one.unit.is_empty() || one.unit == unit);
             let holds = match (&way.with, one.number) {
                 (With::Number(right), Some(left)) => self.relation.holds(left, *right),
                 (With::Text(right), _) => {
@@ -278,10 +262,7 @@ mod tests {
             unit: (*unit).to_owned(),
             text: (*text).to_owned(),
         });
-        Entry {
-            named: named.collect(),
-            ..Entry::default()
-        }
+        Entry { named: named.collect(), ..Entry::default() }
     }
 
     #[test]

@@ -184,10 +184,7 @@ impl Entry {
         let mut trouble = Vec::new();
         let analyses = analyses.unwrap_or_else(|err| {
             trouble.push(err.to_string());
-            Analyses {
-                head: heads.analyses,
-                ..Analyses::default()
-            }
+            Analyses { head: heads.analyses, ..Analyses::default() }
         });
         entry.heads.analyses = analyses.head;
         match edits {
@@ -299,8 +296,7 @@ impl Entry {
             });
             if let Analysed::Fit { results, .. } = &one.what {
                 let parameters = results["parameters"].as_array();
-                self.named
-                    .extend(parameters.into_iter().flatten().filter_map(fitted));
+                self.named.extend(parameters.into_iter().flatten().filter_map(fitted));
             }
         }
     }
@@ -370,9 +366,7 @@ fn leaves(name: &str, value: &Value, named: &mut Vec<Named>) {
             name: name.to_owned(),
             number: value.as_f64(),
             unit: String::new(),
-            text: value
-                .as_str()
-                .map_or_else(|| value.to_string(), str::to_owned),
+            text: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
         }),
         Value::Array(items) => items.iter().for_each(|item| leaves(name, item, named)),
         Value::Null => {}

@@ -53,10 +53,7 @@ impl Catalog {
         name: &str,
     ) -> Result<(Vec<Event>, Vec<String>), CatalogError> {
         let wanted = Some(name.to_owned());
-        let mut query = Query {
-            order: Order::Started,
-            ..Query::default()
-        };
+        let mut query = Query { order: Order::Started, ..Query::default() };
         match subject {
             Subject::Specimen => query.specimen = wanted,
             Subject::Rig => query.rig = wanted,
@@ -77,12 +74,7 @@ impl Catalog {
                 events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)));
             }
             remarks.extend(entry.trouble);
-            events.extend(
-                entry
-                    .analyses
-                    .iter()
-                    .map(|one| Event::made(&entry.folder, one)),
-            );
+            events.extend(entry.analyses.iter().map(|one| Event::made(&entry.folder, one)));
         }
         let calibrations = Shelf::<Calibration>::open(&self.library);
         documents(&calibrations, &mut events, &mut remarks, |one| {
@@ -156,10 +148,7 @@ impl Event {
                 let signs = |sign: &str, tags: &[String]| -> Vec<String> {
                     tags.iter().map(|tag| format!("{sign}{tag}")).collect()
                 };
-                (
-                    "tags",
-                    [signs("+", add), signs("-", remove)].concat().join(" "),
-                )
+                ("tags", [signs("+", add), signs("-", remove)].concat().join(" "))
             }
             Change::Review { decision, .. } => ("review", decision.word().to_owned()),
             Change::Note => ("note", String::new()),

@@ -178,11 +178,7 @@ impl Catalog {
             }
             Err(err) => return Err(err),
         };
-        Ok(Self {
-            db,
-            library: library.to_owned(),
-            remarks,
-        })
+        Ok(Self { db, library: library.to_owned(), remarks })
     }
 
     /// Whether it is in memory, for want of a library that may be written: then it starts empty whenever it is opened.
@@ -214,12 +210,10 @@ fn open_file(path: &Path) -> Result<Opened, CatalogError> {
     let mut db = Connection::open(path).map_err(failed)?;
     db.busy_timeout(PATIENCE).map_err(failed)?;
     let number = |name: &str| -> Result<i64, CatalogError> {
-        db.pragma_query_value(None, name, |row| row.get(0))
-            .map_err(failed)
+        db.pragma_query_value(None, name, |row| row.get(0)).map_err(failed)
     };
-    let tables: i64 = db
-        .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
-        .map_err(failed)?;
+    let tables: i64 =
+        db.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(failed)?;
     match (number("application_id")?, number("user_version")?) {
         (schema::APPLICATION, schema::VERSION) => {}
         (schema::APPLICATION, _) => return Ok(Opened::OtherVersion),
@@ -241,16 +235,10 @@ fn open_new(path: &Path) -> Result<Connection, CatalogError> {
 /// One process at a time opens or replaces the file. The system lets go when the process dies.
 fn gate(library: &Path) -> Result<fs::File, CatalogError> {
     let path = library.join(GATE_FILE);
-    let failed = |source| CatalogError::Io {
-        what: "opened",
-        path: path.clone(),
-        source,
-    };
+    let failed = |source| CatalogError::Io { what: "opened", path: path.clone(), source };
     let mut options = fs::OpenOptions::new();
     let options = options.write(true).create(true).truncate(false);
-    let file = fs::create_dir_all(library)
-        .and_then(|()| options.open(&path))
-        .map_err(failed)?;
+    let file = fs::create_dir_all(library).and_then(|()| options.open(&path)).map_err(failed)?;
     match lock_soon(&file, &path) {
         Ok(()) => Ok(file),
         Err(NotLocked::Busy(busy)) => Err(CatalogError::Busy(busy)),
@@ -271,11 +259,7 @@ fn remove(path: &Path) -> Result<(), CatalogError> {
     for part in parts(path) {
         match fs::remove_file(&part) {
             Err(err) if err.kind() != io::ErrorKind::NotFound => {
-                return Err(CatalogError::Io {
-                    what: "replaced",
-                    path: part,
-                    source: err,
-                });
+                return Err(CatalogError::Io { what: "replaced", path: part, source: err });
             }
             _ => {}
         }
@@ -292,11 +276,7 @@ fn set_aside(path: &Path, reason: &str) -> Result<String, CatalogError> {
     for (part, to) in parts(path).iter().zip(parts(&aside)) {
         match fs::rename(part, &to) {
             Err(err) if err.kind() != io::ErrorKind::NotFound => {
-                return Err(CatalogError::Io {
-                    what: "replaced",
-                    path: part.clone(),
-                    source: err,
-                });
+                return Err(CatalogError::Io { what: "replaced", path: part.clone(), source: err });
             }
             _ => {}
         }

@@ -62,10 +62,7 @@ impl FromStr for VerdictIs {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "none" => Ok(Self::None),
-            text => text
-                .parse()
-                .map(Self::Given)
-                .map_err(|err: String| format!("{err}, or none")),
+            text => text.parse().map(Self::Given).map_err(|err: String| format!("{err}, or none")),
         }
     }
 }
@@ -189,8 +186,7 @@ pub struct Choices {
 
 /// The words of a text. Anything but letters and digits parts them, so nothing in it is a sign to SQLite.
 pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|letter: char| !letter.is_alphanumeric())
-        .filter(|word| !word.is_empty())
+    text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
 impl Query {
@@ -234,9 +230,7 @@ impl Query {
         for condition in &self.conditions {
             parts.push(condition.sql(&mut values));
         }
-        let quoted: Vec<String> = words(&self.words)
-            .map(|word| format!("\"{word}\"*"))
-            .collect();
+        let quoted: Vec<String> = words(&self.words).map(|word| format!("\"{word}\"*")).collect();
         if !quoted.is_empty() {
             let sql = "id IN (SELECT rowid FROM words WHERE words MATCH ?)";
             parts.push(sql.to_owned());
@@ -263,10 +257,7 @@ impl Catalog {
             let page = ids.iter().skip(query.skip);
             let page = page.take(query.limit.unwrap_or(usize::MAX));
             let entries = page.map(|id| statement.query_row([id], entry_of));
-            Ok(Found {
-                count: ids.len(),
-                entries: entries.collect::<rusqlite::Result<_>>()?,
-            })
+            Ok(Found { count: ids.len(), entries: entries.collect::<rusqlite::Result<_>>()? })
         };
         find().map_err(self.failed())
     }

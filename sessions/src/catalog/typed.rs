@@ -61,9 +61,8 @@ pub fn words_and_conditions(line: &str) -> Result<(String, Vec<Condition>), Cond
             None => pieces.push(piece),
         }
     }
-    let (conditions, words): (Vec<String>, Vec<String>) = pieces
-        .into_iter()
-        .partition(|piece| piece.contains(is_sign));
+    let (conditions, words): (Vec<String>, Vec<String>) =
+        pieces.into_iter().partition(|piece| piece.contains(is_sign));
     let conditions = conditions.iter().map(|piece| piece.parse());
     Ok((words.join(" "), conditions.collect::<Result<_, _>>()?))
 }
@@ -114,11 +113,7 @@ mod tests {
             ("depth=20 Ada", "Ada", &["depth=20"]),
             ("mode != slow", "", &["mode!=slow"]),
             ("\"stomach 7\" good!", "stomach 7 good!", &[]),
-            (
-                "\"specimen.source=pig stomach\"",
-                "",
-                &["specimen.source=pig stomach"],
-            ),
+            ("\"specimen.source=pig stomach\"", "", &["specimen.source=pig stomach"]),
         ] {
             let wanted: Vec<Condition> =
                 conditions.iter().map(|one| one.parse().unwrap()).collect();

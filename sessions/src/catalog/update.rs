@@ -60,12 +60,7 @@ impl Catalog {
         for place in &places {
             known.remove(&place.name);
         }
-        let mut changes = Changes {
-            sessions: places.len(),
-            read: 0,
-            removed: 0,
-            remarks,
-        };
+        let mut changes = Changes { sessions: places.len(), read: 0, removed: 0, remarks };
         let mut done = 0;
         let mut flow = progress(done, new.len());
         for batch in new.chunks(BATCH) {
@@ -82,11 +77,7 @@ impl Catalog {
                 done += 1;
                 flow = progress(done, new.len());
             }
-            self.write(|db| {
-                entries
-                    .iter()
-                    .try_for_each(|(place, entry)| put(db, place, entry))
-            })?;
+            self.write(|db| entries.iter().try_for_each(|(place, entry)| put(db, place, entry)))?;
         }
         changes.read = done;
         let gone: Vec<String> = known.into_keys().collect();
@@ -113,11 +104,8 @@ impl Catalog {
     /// Reads every session and tells where the catalog says something else; it is left as it is.
     pub fn check(&self, progress: Progress<'_>) -> Result<Vec<Doubt>, CatalogError> {
         let (places, _) = walk(&self.library);
-        let mut known: BTreeMap<String, Entry> = self
-            .all()?
-            .into_iter()
-            .map(|entry| (entry.folder.clone(), entry))
-            .collect();
+        let mut known: BTreeMap<String, Entry> =
+            self.all()?.into_iter().map(|entry| (entry.folder.clone(), entry)).collect();
         let mut doubts = Vec::new();
         for (done, place) in places.iter().enumerate() {
             progress(done, places.len());
@@ -128,10 +116,7 @@ impl Catalog {
                 }
                 Some(_) => continue,
             };
-            doubts.push(Doubt {
-                folder: place.name.clone(),
-                sentence: sentence.to_owned(),
-            });
+            doubts.push(Doubt { folder: place.name.clone(), sentence: sentence.to_owned() });
         }
         doubts.extend(known.into_keys().map(|folder| Doubt {
             folder,
@@ -178,9 +163,7 @@ impl Catalog {
     ) -> Result<(), CatalogError> {
         let failed = self.failed();
         let write = || -> rusqlite::Result<()> {
-            let transaction = self
-                .db
-                .transaction_with_behavior(TransactionBehavior::Immediate)?;
+            let transaction = self.db.transaction_with_behavior(TransactionBehavior::Immediate)?;
             work(&transaction)?;
             transaction.commit()
         };
@@ -241,9 +224,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     )?;
     for one in &entry.named {
         let source = one.source.word();
-        named.execute(params![
-            id, source, one.name, one.unit, one.number, one.text
-        ])?;
+        named.execute(params![id, source, one.name, one.unit, one.number, one.text])?;
     }
     let mut tags = db.prepare_cached("INSERT INTO tag (session, tag) VALUES (?, ?)")?;
     for tag in &entry.tags {

@@ -228,10 +228,7 @@ impl<'v> Content<'v> {
                 self.has_raw &= channel == Channel::Derived;
             }
         } else if sequence != expected && !is_again {
-            return Err(format!(
-                "message {expected} of {} is missing",
-                channel.topic()
-            ));
+            return Err(format!("message {expected} of {} is missing", channel.topic()));
         }
         if !is_again {
             *next = Some(sequence.wrapping_add(1));
@@ -273,9 +270,7 @@ impl<'v> Content<'v> {
         let value: serde_json::Value = serde_json::from_slice(data).map_err(unreadable)?;
         let version = &value["record_version"];
         if version.is_number() && !version.is_u64() {
-            return Err(format!(
-                "the manifest's record version is {version}, and none is"
-            ));
+            return Err(format!("the manifest's record version is {version}, and none is"));
         }
         let Some(version) = version.as_u64() else {
             self.refusal = Some(Refusal::Foreign);
@@ -372,10 +367,7 @@ impl<'v> Content<'v> {
         if let Some(last) = self.entries.last()
             && message.order <= last.order
         {
-            return Err(format!(
-                "entry {} comes after entry {}",
-                message.order, last.order
-            ));
+            return Err(format!("entry {} comes after entry {}", message.order, last.order));
         }
         self.entries.push(Entry {
             kind,
@@ -393,21 +385,16 @@ impl<'v> Content<'v> {
             return Ok(());
         };
         // What a lone later segment does not know of the ones before is not compared.
-        let first = self
-            .first_sample
-            .unwrap_or_else(|| end.samples.saturating_sub(self.samples));
+        let first = self.first_sample.unwrap_or_else(|| end.samples.saturating_sub(self.samples));
         let samples = first.saturating_add(self.samples);
         let entries = self.entries.len() as u64;
         let has_entries = end.entries == entries || (self.is_later_part && end.entries >= entries);
-        let before = self
-            .first_raw_byte
-            .unwrap_or_else(|| end.raw_bytes.saturating_sub(self.raw_bytes));
+        let before =
+            self.first_raw_byte.unwrap_or_else(|| end.raw_bytes.saturating_sub(self.raw_bytes));
         let raw_bytes = before.saturating_add(self.raw_bytes);
         if end.raw_bytes != raw_bytes {
             let recorded = end.raw_bytes;
-            return Err(format!(
-                "{recorded} raw bytes were recorded but {raw_bytes} are there"
-            ));
+            return Err(format!("{recorded} raw bytes were recorded but {raw_bytes} are there"));
         }
         if !self.has_raw && end.samples == samples && has_entries {
             return Ok(());

@@ -69,25 +69,16 @@ pub enum LogError {
 
 impl LogError {
     pub(crate) fn disk(err: &io::Error, path: &str) -> Self {
-        Self::Disk {
-            reason: err.to_string(),
-            path: path.into(),
-        }
+        Self::Disk { reason: err.to_string(), path: path.into() }
     }
 }
 
 pub(super) fn json_error(what: &'static str) -> impl Fn(serde_json::Error) -> LogError {
-    move |err| LogError::Encode {
-        what,
-        reason: err.to_string(),
-    }
+    move |err| LogError::Encode { what, reason: err.to_string() }
 }
 
 pub(crate) fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> LogError {
-    move |err| LogError::Encode {
-        what,
-        reason: err.to_string(),
-    }
+    move |err| LogError::Encode { what, reason: err.to_string() }
 }
 
 /// A session could not be opened.

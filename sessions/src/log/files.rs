@@ -18,10 +18,7 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.is_dir() {
         return Ok(vec![path.into()]);
     }
-    let failed = |source| ReadError::Io {
-        path: path.into(),
-        source,
-    };
+    let failed = |source| ReadError::Io { path: path.into(), source };
     let mut found = BTreeMap::new();
     let mut add = |folder: &Path| -> io::Result<()> {
         for item in std::fs::read_dir(folder)? {
@@ -82,8 +79,5 @@ pub(crate) fn check_files(path: &Path, files: &[PathBuf]) -> Result<(), ReadErro
     if files[0].is_file() || (files.len() > 1 && path.is_dir()) {
         return Ok(());
     }
-    Err(ReadError::NotASession {
-        path: path.into(),
-        reason: format!("it holds no {LOG_FILE}"),
-    })
+    Err(ReadError::NotASession { path: path.into(), reason: format!("it holds no {LOG_FILE}") })
 }

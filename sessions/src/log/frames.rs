@@ -43,11 +43,7 @@ pub(crate) fn frame_at(bytes: &[u8], offset: usize) -> Result<Frame<'_>, FrameEr
     if length > FRAME_BYTES_MAX {
         return Err(FrameError::TooLong);
     }
-    Ok(Frame {
-        opcode,
-        body: &fields.0[..length],
-        next: offset + FRAME_HEADER_BYTES + length,
-    })
+    Ok(Frame { opcode, body: &fields.0[..length], next: offset + FRAME_HEADER_BYTES + length })
 }
 
 /// Reads little-endian fields off the front of a slice; `None` when it is too short.
@@ -94,20 +90,14 @@ pub(crate) struct ChunkReader {
 
 impl ChunkReader {
     pub fn new() -> std::io::Result<Self> {
-        Ok(Self {
-            decompressor: zstd::bulk::Decompressor::new()?,
-            records: Vec::new(),
-        })
+        Ok(Self { decompressor: zstd::bulk::Decompressor::new()?, records: Vec::new() })
     }
 
     /// The records of a chunk, or what is wrong with it.
     pub fn open(&mut self, body: &[u8]) -> Result<&[u8], String> {
         let too_short = || "a chunk is too short".to_owned();
         let mut fields = Fields(body);
-        let _times = (
-            fields.u64().ok_or_else(too_short)?,
-            fields.u64().ok_or_else(too_short)?,
-        );
+        let _times = (fields.u64().ok_or_else(too_short)?, fields.u64().ok_or_else(too_short)?);
         let size = fields.u64().ok_or_else(too_short)?;
         let checksum = fields.u32().ok_or_else(too_short)?;
         let compression = fields.text().ok_or_else(too_short)?;

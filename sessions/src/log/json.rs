@@ -45,9 +45,6 @@ where
     if back == *value {
         Ok(json)
     } else {
-        Err(LogError::Encode {
-            what,
-            reason: "it does not read back as it was written".into(),
-        })
+        Err(LogError::Encode { what, reason: "it does not read back as it was written".into() })
     }
 }

@@ -37,10 +37,7 @@ impl Notice {
     /// Whether a run should come to its end while all of it can still be saved.
     #[must_use]
     pub fn ends_the_run(&self) -> bool {
-        matches!(
-            self,
-            Self::Moved { is_last: true, .. } | Self::Altered(_) | Self::TooSlow
-        )
+        matches!(self, Self::Moved { is_last: true, .. } | Self::Altered(_) | Self::TooSlow)
     }
 }
 
@@ -55,11 +52,9 @@ impl std::fmt::Display for Notice {
                 f,
                 "{err}; what is recorded from now on goes into another file, and the run ends"
             ),
-            Self::Slow => write!(
-                f,
-                "the disk is too slow: {} s of samples wait in memory",
-                QUEUE_SECONDS / 2
-            ),
+            Self::Slow => {
+                write!(f, "the disk is too slow: {} s of samples wait in memory", QUEUE_SECONDS / 2)
+            }
             Self::TooSlow => write!(
                 f,
                 "the disk is too slow: {} s of samples wait in memory, so the run ends while all can be saved",

@@ -156,12 +156,7 @@ struct Damage {
 impl Damage {
     /// Damage that no interrupted write explains.
     fn at(path: &Path, offset: u64, reason: &str) -> Self {
-        Self {
-            path: path.into(),
-            offset,
-            reason: reason.into(),
-            is_torn: false,
-        }
+        Self { path: path.into(), offset, reason: reason.into(), is_torn: false }
     }
 }
 
@@ -189,10 +184,8 @@ impl<'v> Reader<'v> {
         let is_folder = path.is_dir();
         let first = &files[0];
         check_files(path, &files)?;
-        let chunks = ChunkReader::new().map_err(|source| ReadError::Io {
-            path: first.clone(),
-            source,
-        })?;
+        let chunks =
+            ChunkReader::new().map_err(|source| ReadError::Io { path: first.clone(), source })?;
         Ok(Self {
             absent_spare: absent_spare(path),
             files,
@@ -240,30 +233,18 @@ impl<'v> Reader<'v> {
 
     fn outline(mut self, path: PathBuf, end: Option<EndRecord>) -> Result<Outline, ReadError> {
         let Some(manifest) = self.content.manifest.take() else {
-            return Err(ReadError::Damaged {
-                path,
-                offset: 0,
-                reason: NOT_BEGUN.into(),
-            });
+            return Err(ReadError::Damaged { path, offset: 0, reason: NOT_BEGUN.into() });
         };
         let entries = std::mem::take(&mut self.content.entries);
-        let last = entries
-            .last()
-            .map_or(Nanos::ZERO, |entry| entry.now)
-            .max(self.last_sample)
-            .seconds()
-            .0;
+        let last =
+            entries.last().map_or(Nanos::ZERO, |entry| entry.now).max(self.last_sample).seconds().0;
         let mut notes = self.notes;
         if let Some(imported) = &manifest.imported {
             notes.extend(imported.notes());
         }
         if let Some(recovered) = &manifest.recovered {
             let lost = recovered.missing.sentences();
-            let lost = if lost.is_empty() {
-                "nothing is missing".into()
-            } else {
-                lost.join("; ")
-            };
+            let lost = if lost.is_empty() { "nothing is missing".into() } else { lost.join("; ") };
             notes.push(format!("recovered from {}: {lost}", recovered.from));
         }
         // Only a segment that others follow is finished without an end.
@@ -276,9 +257,7 @@ impl<'v> Reader<'v> {
             && let Some(spare) = &self.absent_spare
         {
             let away = away(spare);
-            notes.push(format!(
-                "no end record: the recording stops at {last:.1} s here; {away}"
-            ));
+            notes.push(format!("no end record: the recording stops at {last:.1} s here; {away}"));
         } else if end.is_none() {
             notes.push(format!(
                 "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
@@ -296,10 +275,7 @@ impl<'v> Reader<'v> {
             entries,
             end,
             notes,
-            beside: Beside {
-                raw_bytes: self.content.raw_bytes,
-                health: self.content.health,
-            },
+            beside: Beside { raw_bytes: self.content.raw_bytes, health: self.content.health },
         })
     }
 
@@ -311,10 +287,7 @@ impl<'v> Reader<'v> {
         is_alone: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
-        let failed = |source| ReadError::Io {
-            path: path.into(),
-            source,
-        };
+        let failed = |source| ReadError::Io { path: path.into(), source };
         if !path.is_file() {
             let mut reason = "this segment is missing, though a later one is there".to_owned();
             if let Some(spare) = &self.absent_spare {
@@ -346,10 +319,7 @@ impl<'v> Reader<'v> {
         is_first: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
-        let failed = |source| ReadError::Io {
-            path: path.into(),
-            source,
-        };
+        let failed = |source| ReadError::Io { path: path.into(), source };
         let had_end = self.content.end.is_some();
         self.content.begin_segment();
         let walked = walk(source, &mut self.chunks, &mut self.content).map_err(failed)?;
@@ -377,10 +347,8 @@ impl<'v> Reader<'v> {
                 return Ok(Err(damage(source.length(), &reason)));
             }
         }
-        let here = stop.map(|stop| Damage {
-            is_torn: stop.is_torn,
-            ..damage(stop.offset, &stop.reason)
-        });
+        let here =
+            stop.map(|stop| Damage { is_torn: stop.is_torn, ..damage(stop.offset, &stop.reason) });
         let is_damaged = here.as_ref().is_some_and(|here| !here.is_torn);
         // Messages that go on without a gap prove that nothing is missing. But what is damaged, and
         // not only torn, is made good by nothing but a segment that was begun because of it.
@@ -419,18 +387,11 @@ pub(crate) const NOT_BEGUN: &str =
     "the recording was interrupted before it began, or its beginning is lost";
 
 pub(crate) fn damaged(path: &Path, offset: u64, reason: &str) -> ReadError {
-    ReadError::Damaged {
-        path: path.into(),
-        offset,
-        reason: reason.into(),
-    }
+    ReadError::Damaged { path: path.into(), offset, reason: reason.into() }
 }
 
 pub(crate) fn name_of(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-        .into_owned()
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 pub(crate) fn check_beginning(
@@ -445,10 +406,7 @@ pub(crate) fn check_beginning(
     } else {
         return Ok(());
     };
-    Err(ReadError::NotASession {
-        path: path.into(),
-        reason: reason.into(),
-    })
+    Err(ReadError::NotASession { path: path.into(), reason: reason.into() })
 }
 
 pub(crate) fn refused(path: &Path, refusal: Refusal) -> ReadError {
@@ -457,10 +415,8 @@ pub(crate) fn refused(path: &Path, refusal: Refusal) -> ReadError {
             path: path.into(),
             reason: "its header names another program".into(),
         },
-        Refusal::Newer(software_version, record_version) => ReadError::Newer {
-            path: path.into(),
-            software_version,
-            record_version,
-        },
+        Refusal::Newer(software_version, record_version) => {
+            ReadError::Newer { path: path.into(), software_version, record_version }
+        }
     }
 }

@@ -59,9 +59,7 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         let mut carried = None;
         let mut has_event = false;
         loop {
-            let next = carried
-                .take()
-                .map_or_else(|| receiver.recv_timeout(self.patience()), Ok);
+            let next = carried.take().map_or_else(|| receiver.recv_timeout(self.patience()), Ok);
             match next {
                 Ok(batch) => {
                     has_event |= batch.has_event;
@@ -251,11 +249,7 @@ mod tests {
     }
 
     fn disk(sync_ms: u64) -> Slow {
-        Slow {
-            now_ms: Arc::default(),
-            sync_ms,
-            syncs: Arc::default(),
-        }
+        Slow { now_ms: Arc::default(), sync_ms, syncs: Arc::default() }
     }
 
     fn batch(number: u64) -> Batch {
@@ -272,12 +266,7 @@ mod tests {
             phase: palpate_model::rig::Phase::Idle,
             cycle: 0,
         };
-        Batch {
-            rows: vec![row],
-            through: row.host,
-            span: BATCH,
-            ..Batch::default()
-        }
+        Batch { rows: vec![row], through: row.host, span: BATCH, ..Batch::default() }
     }
 
     #[test]

@@ -80,13 +80,8 @@ impl<S: Sink> Segment<S> {
             .emit_message_indexes(true)
             .create(tape.clone())
             .map_err(encode_error("manifest"))?;
-        let mut segment = Self {
-            container,
-            tape,
-            sink,
-            path,
-            channel_ids: [0; Channel::ALL.len()],
-        };
+        let mut segment =
+            Self { container, tape, sink, path, channel_ids: [0; Channel::ALL.len()] };
         segment.add_channels()?;
         Ok(segment)
     }
@@ -118,13 +113,8 @@ impl<S: Sink> Segment<S> {
         header: MessageHeader,
         data: &[u8],
     ) -> Result<(), LogError> {
-        let header = MessageHeader {
-            channel_id: self.channel_ids[channel as usize],
-            ..header
-        };
-        self.container
-            .write_to_known_channel(&header, data)
-            .map_err(encode_error(channel.topic()))
+        let header = MessageHeader { channel_id: self.channel_ids[channel as usize], ..header };
+        self.container.write_to_known_channel(&header, data).map_err(encode_error(channel.topic()))
     }
 
     /// Ends the chunk and hands everything so far to the sink.
@@ -146,10 +136,7 @@ impl<S: Sink> Segment<S> {
     }
 
     fn unaltered(&self, outcome: Result<(), Alteration>) -> Result<(), LogError> {
-        outcome.map_err(|alteration| LogError::Altered {
-            alteration,
-            path: self.path.clone(),
-        })
+        outcome.map_err(|alteration| LogError::Altered { alteration, path: self.path.clone() })
     }
 
     /// Free room on the sink's disk in bytes, if that is known.

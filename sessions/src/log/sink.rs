@@ -79,9 +79,7 @@ pub trait SegmentSource: Send {
     /// Makes the segment in another place because its own cannot have it, and says where.
     fn create_elsewhere(&mut self, number: u32) -> io::Result<(Self::Sink, String)> {
         let path = self.path(number);
-        Err(io::Error::other(format!(
-            "there is no other place for {path}"
-        )))
+        Err(io::Error::other(format!("there is no other place for {path}")))
     }
 }
 
@@ -96,10 +94,7 @@ impl FolderSegments {
     /// Segments in this folder.
     #[must_use]
     pub fn new(folder: &Path) -> Self {
-        Self {
-            folder: folder.into(),
-            spare: None,
-        }
+        Self { folder: folder.into(), spare: None }
     }
 
     /// Segments in this folder, or in one in `spare`, named by the session's id, when its disk fails. The
@@ -114,10 +109,7 @@ impl FolderSegments {
         let mut pointer = FileSink::create(&folder.join(SPARE_FILE))?;
         pointer.append(text.as_bytes())?;
         pointer.sync()?;
-        Ok(Self {
-            folder: folder.into(),
-            spare: Some(spare),
-        })
+        Ok(Self { folder: folder.into(), spare: Some(spare) })
     }
 }
 
@@ -159,10 +151,7 @@ const WINDOW_BYTES: usize = 1 << 18;
 impl FileSink {
     /// Makes a file. An existing one is never touched.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new()
-            .append(true)
-            .create_new(true)
-            .open(path)?;
+        let file = OpenOptions::new().append(true).create_new(true).open(path)?;
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => File::open(parent)?,
             _ => File::open(".")?,

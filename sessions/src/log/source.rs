@@ -91,10 +91,7 @@ impl Source {
         if length > FRAME_BYTES_MAX as u64 {
             return Ok(Err(NoFrame::TooLong));
         }
-        Ok(Ok(FrameHead {
-            opcode,
-            next: body + length,
-        }))
+        Ok(Ok(FrameHead { opcode, next: body + length }))
     }
 
     /// Everything behind the last byte that is not zero may never have reached the disk.

@@ -36,10 +36,7 @@ impl Summary {
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let first = &files[0];
-        let failed = |source| ReadError::Io {
-            path: path.into(),
-            source,
-        };
+        let failed = |source| ReadError::Io { path: path.into(), source };
         let mut chunks = ChunkReader::new().map_err(failed)?;
         let (manifest, mut found) = read_ends(first, &mut chunks)?;
         let mut bytes = std::fs::metadata(first).map_err(failed)?.len();
@@ -75,10 +72,7 @@ struct Ends {
 }
 
 fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), ReadError> {
-    let failed = |source| ReadError::Io {
-        path: path.into(),
-        source,
-    };
+    let failed = |source| ReadError::Io { path: path.into(), source };
     let source = Source::open(path).map_err(failed)?;
     let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
     check_beginning(path, &source, is_ours)?;
@@ -92,10 +86,7 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
     let mut content = Content::new(true, &mut visit);
     let mut bytes = Vec::new();
     let header = source.frame_at(mcap::MAGIC.len() as u64, &mut bytes);
-    if header
-        .map_err(failed)?
-        .is_ok_and(|frame| frame.opcode == op::HEADER)
-    {
+    if header.map_err(failed)?.is_ok_and(|frame| frame.opcode == op::HEADER) {
         content.take_header(&bytes[FRAME_HEADER_BYTES..]);
     }
     let places = chunk_places(&source).map_err(failed)?;
@@ -130,11 +121,8 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
 
 /// Places of the first chunk and of the last two, in order.
 fn chunk_places(source: &Source) -> io::Result<Vec<u64>> {
-    let mut places = if source.has_footer()? {
-        indexed_chunks(source)?
-    } else {
-        walked_chunks(source)?
-    };
+    let mut places =
+        if source.has_footer()? { indexed_chunks(source)? } else { walked_chunks(source)? };
     if places.len() > 3 {
         places.drain(1..places.len() - 2);
     }

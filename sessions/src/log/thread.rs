@@ -58,12 +58,7 @@ pub(super) struct Batch {
 
 impl Batch {
     pub fn parts(&self) -> Parts<'_> {
-        Parts {
-            rows: &self.rows,
-            entries: &self.entries,
-            raw: &self.raw,
-            health: &self.health,
-        }
+        Parts { rows: &self.rows, entries: &self.entries, raw: &self.raw, health: &self.health }
     }
 }
 
@@ -170,9 +165,7 @@ impl SessionWriter {
     pub fn push_row(&mut self, row: Row) -> Result<(), LogError> {
         self.shared.check()?;
         if let Some(what) = row.non_finite() {
-            return Err(LogError::NotFinite {
-                what: format!("{what} of a sample"),
-            });
+            return Err(LogError::NotFinite { what: format!("{what} of a sample") });
         }
         self.make_room(row.host)?;
         self.batch.rows.push(row);
@@ -308,11 +301,8 @@ impl SessionWriter {
         // Counted from the end of the batch before, two batches never span more than 200 ms.
         let start = self.batch_start.replace(through).unwrap_or(through);
         self.batch.span = through.since(start).min(BATCH);
-        let next = Batch {
-            rows: Vec::with_capacity(self.batch.rows.len()),
-            through,
-            ..Batch::default()
-        };
+        let next =
+            Batch { rows: Vec::with_capacity(self.batch.rows.len()), through, ..Batch::default() };
         let batch = std::mem::replace(&mut self.batch, next);
         match self.pace {
             Pace::Virtual => self.send_waiting(batch),
@@ -324,15 +314,11 @@ impl SessionWriter {
         let Some(sender) = &self.sender else {
             return Err(LogError::Closed);
         };
-        self.shared
-            .queued_ns
-            .fetch_add(batch.span.0, Ordering::AcqRel);
+        self.shared.queued_ns.fetch_add(batch.span.0, Ordering::AcqRel);
         let raw = batch.raw_bytes as u64;
         self.shared.queued_raw.fetch_add(raw, Ordering::AcqRel);
         // The thread only goes away after it has failed, and then has said why.
-        sender
-            .send(batch)
-            .or_else(|_| self.shared.check().and(Err(LogError::Closed)))
+        sender.send(batch).or_else(|_| self.shared.check().and(Err(LogError::Closed)))
     }
 
     fn send_at_once(&mut self, batch: Batch) -> Result<(), LogError> {
@@ -351,10 +337,8 @@ impl SessionWriter {
         match outcome {
             Ok(()) => Ok(()),
             Err(TrySendError::Full(_)) => {
-                self.shared.fail(LogError::TooSlow {
-                    seconds: QUEUE_SECONDS,
-                    path: self.path.clone(),
-                });
+                self.shared
+                    .fail(LogError::TooSlow { seconds: QUEUE_SECONDS, path: self.path.clone() });
                 self.shared.check()
             }
             Err(TrySendError::Disconnected(_)) => self.shared.check().and(Err(LogError::Closed)),

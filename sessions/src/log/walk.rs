@@ -27,13 +27,7 @@ pub(crate) fn walk(
     let mut sum = crc32fast::Hasher::new();
     sum.update(mcap::MAGIC);
     while offset < source.length() {
-        let damage = |reason: String, is_torn: bool| {
-            Ok(Err(Stop {
-                offset,
-                reason,
-                is_torn,
-            }))
-        };
+        let damage = |reason: String, is_torn: bool| Ok(Err(Stop { offset, reason, is_torn }));
         // Zeros from within a frame to the end of the file are what a power cut leaves.
         let is_zeroed = |frame_end: u64| -> io::Result<bool> {
             let written = source.written_length()?;
@@ -43,10 +37,7 @@ pub(crate) fn walk(
             Ok(frame) => frame,
             Err(NoFrame::TooLong) => {
                 let is_torn = is_zeroed(offset)?;
-                return damage(
-                    "a record is longer than any that is written".into(),
-                    is_torn,
-                );
+                return damage("a record is longer than any that is written".into(), is_torn);
             }
             Err(NoFrame::PastEnd) => {
                 let is_torn = !is_finished && !has_chunk_after(source, offset, chunks)?;

@@ -137,14 +137,9 @@ impl<S: Sink> LogWriter<S> {
         manifest: &Manifest,
     ) -> Result<Self, LogError> {
         let path = source.path(0);
-        let sink = source
-            .create(0)
-            .map_err(|err| LogError::disk(&err, &path))?;
+        let sink = source.create(0).map_err(|err| LogError::disk(&err, &path))?;
         let mut writer = Self::begin(sink, &path, manifest)?;
-        writer.rotation = Some(Rotation {
-            source,
-            batches_per_segment,
-        });
+        writer.rotation = Some(Rotation { source, batches_per_segment });
         Ok(writer)
     }
 
@@ -197,11 +192,7 @@ impl<S: Sink> LogWriter<S> {
     ///
     /// Entries are JSON and must come in strictly increasing `order`.
     pub fn append(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
-        self.append_parts(&Parts {
-            rows,
-            entries,
-            ..Parts::default()
-        })
+        self.append_parts(&Parts { rows, entries, ..Parts::default() })
     }
 
     /// As [`append`](Self::append), for everything that a log holds.
@@ -291,10 +282,7 @@ impl<S: Sink> LogWriter<S> {
         let (sink, path) = if is_elsewhere {
             rotation.source.create_elsewhere(number)
         } else {
-            rotation
-                .source
-                .create(number)
-                .map(|sink| (sink, own.clone()))
+            rotation.source.create(number).map(|sink| (sink, own.clone()))
         }
         .map_err(|err| LogError::disk(&err, &own))?;
         self.failure = None;
@@ -308,11 +296,7 @@ impl<S: Sink> LogWriter<S> {
             "entries": self.at.entries,
         });
         self.put_manifest()?;
-        self.put(
-            Channel::Rewrite,
-            Nanos::ZERO,
-            rewrite.to_string().as_bytes(),
-        )?;
+        self.put(Channel::Rewrite, Nanos::ZERO, rewrite.to_string().as_bytes())?;
         for parts in since_sync {
             self.put_batch(parts)?;
         }
@@ -346,9 +330,7 @@ impl<S: Sink> LogWriter<S> {
     pub fn finish(&mut self, end: EndRecord) -> Result<(), LogError> {
         self.check_alive()?;
         if let Some((name, _)) = end.time_use.iter().find(|(_, secs)| !secs.is_finite()) {
-            return Err(LogError::NotFinite {
-                what: format!("time used by '{name}'"),
-            });
+            return Err(LogError::NotFinite { what: format!("time used by '{name}'") });
         }
         let end = EndRecord {
             samples: self.at.samples,
@@ -406,10 +388,7 @@ impl<S: Sink> LogWriter<S> {
         if data.len() > MESSAGE_BYTES_MAX {
             return Err(LogError::Encode {
                 what: channel.topic(),
-                reason: format!(
-                    "it has {} bytes, {MESSAGE_BYTES_MAX} are the most",
-                    data.len()
-                ),
+                reason: format!("it has {} bytes, {MESSAGE_BYTES_MAX} are the most", data.len()),
             });
         }
         let index = channel as usize;
@@ -437,9 +416,7 @@ impl<S: Sink> LogWriter<S> {
 
 pub(crate) fn check_rows(rows: &[Row]) -> Result<(), LogError> {
     match rows.iter().find_map(Row::non_finite) {
-        Some(what) => Err(LogError::NotFinite {
-            what: format!("{what} of a sample"),
-        }),
+        Some(what) => Err(LogError::NotFinite { what: format!("{what} of a sample") }),
         None => Ok(()),
     }
 }

@@ -41,9 +41,7 @@ impl Beside {
         let edits = match Edits::read(path, &left.manifest.session_id) {
             Ok(edits) => edits,
             Err(err) => {
-                self.left_out.push(format!(
-                    "no verdict, tag or other edit is taken over: {err}"
-                ));
+                self.left_out.push(format!("no verdict, tag or other edit is taken over: {err}"));
                 return;
             }
         };
@@ -74,8 +72,7 @@ impl Beside {
         let analyses = match Analyses::read(path, &left.manifest.session_id) {
             Ok(analyses) => analyses,
             Err(err) => {
-                self.left_out
-                    .push(format!("no analysis is taken over: {err}"));
+                self.left_out.push(format!("no analysis is taken over: {err}"));
                 return;
             }
         };
@@ -100,8 +97,7 @@ impl Beside {
             };
             if analyses.withdrawal(&one.name).is_none() {
                 let (word, name) = (one.what.word(), &one.name);
-                self.left_out
-                    .push(format!("{word} '{name}' is not taken over: {reason}"));
+                self.left_out.push(format!("{word} '{name}' is not taken over: {reason}"));
             }
         }
     }
@@ -114,10 +110,7 @@ impl Beside {
             return Ok(());
         };
         let copied = copy_files(original, &folder.join(ORIGINAL_FOLDER));
-        copied.map_err(|source| RecoverError::Original {
-            path: original.clone(),
-            source,
-        })
+        copied.map_err(|source| RecoverError::Original { path: original.clone(), source })
     }
 }
 

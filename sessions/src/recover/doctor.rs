@@ -119,9 +119,7 @@ pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>
         Ok(found) => found,
         Err(err) => {
             let folder = library.display();
-            return vec![format!(
-                "cannot read {folder} ({err}); check its permissions"
-            )];
+            return vec![format!("cannot read {folder} ({err}); check its permissions")];
         }
     };
     let one = |path: &PathBuf| match recover(path, software_version, at) {
@@ -142,9 +140,7 @@ pub fn examine_library(library: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for item in std::fs::read_dir(sessions)? {
         let path = item?.path();
-        let is_made = path
-            .extension()
-            .is_some_and(|end| end == "recovered" || end == "recovering");
+        let is_made = path.extension().is_some_and(|end| end == "recovered" || end == "recovering");
         if is_made || !path.is_dir() || recovered_folder(&path).is_dir() || is_in_use(&path) {
             continue;
         }

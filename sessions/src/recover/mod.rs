@@ -75,9 +75,7 @@ impl Missing {
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();
         for gap in &self.gaps {
-            let Gap {
-                samples, from_s, ..
-            } = gap;
+            let Gap { samples, from_s, .. } = gap;
             told.push(match gap.to_s {
                 Some(to_s) if gap.after_sample == 0 => format!(
                     "the first {samples} samples, before {to_s:.3} s of the recording, are missing: t_s counts from the first sample that was kept, so it is less than in the original by their time"
@@ -96,12 +94,7 @@ impl Missing {
             let raw_bytes = self.raw_bytes;
             told.push(format!("{raw_bytes} raw bytes of devices are missing"));
         }
-        for Wound {
-            file,
-            offset,
-            reason,
-        } in &self.wounds
-        {
+        for Wound { file, offset, reason } in &self.wounds {
             told.push(format!("{file} is damaged at byte {offset}: {reason}"));
         }
         if self.is_end_lost {

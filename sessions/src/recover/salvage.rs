@@ -45,17 +45,9 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     })?;
     // All that is kept may be whole and the file still be damaged where none of it is, as in its index.
     if !left.missing.is_lossy()
-        && let Err(ReadError::Damaged {
-            path,
-            offset,
-            reason,
-        }) = Session::scan(path, &mut |_| {})
+        && let Err(ReadError::Damaged { path, offset, reason }) = Session::scan(path, &mut |_| {})
     {
-        left.missing.wounds.push(Wound {
-            file: name_of(&path),
-            offset,
-            reason,
-        });
+        left.missing.wounds.push(Wound { file: name_of(&path), offset, reason });
     }
     Ok(left)
 }
@@ -64,10 +56,7 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
 pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     check_files(path, &files)?;
-    let failed = |source| ReadError::Io {
-        path: path.into(),
-        source,
-    };
+    let failed = |source| ReadError::Io { path: path.into(), source };
     let mut tally = Tally::default();
     let mut note = |part: Part<'_>| {
         visit(part);
@@ -87,11 +76,7 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
     while next < files.len() {
         next = search.read(next)?;
     }
-    let Search {
-        mut content,
-        wounds,
-        ..
-    } = search;
+    let Search { mut content, wounds, .. } = search;
     let (mut lost_entries, later) = (content.lost_entries, content.is_later_part);
     let lost_decisions = content.lost_decisions;
     let (raw_bytes, mut lost_raw_bytes) = (content.raw_bytes, content.lost_raw_bytes);
@@ -111,9 +96,7 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         && (!later || path.is_dir())
     {
         lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
-        lost_after_last = end
-            .entries
-            .saturating_sub(entries.len() as u64 + lost_entries);
+        lost_after_last = end.entries.saturating_sub(entries.len() as u64 + lost_entries);
         lost_entries += lost_after_last;
     }
     // The first sample of a later part that is read alone is not its first.
@@ -198,10 +181,7 @@ impl Search<'_, '_> {
             self.wound(file, 0, "this segment is missing");
             return Ok(next);
         }
-        let failed = |source| ReadError::Io {
-            path: file.clone(),
-            source,
-        };
+        let failed = |source| ReadError::Io { path: file.clone(), source };
         let source = Source::open(file).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
         if !is_ours && self.content.manifest.is_none() {
@@ -236,11 +216,7 @@ impl Search<'_, '_> {
     }
 
     fn wound(&mut self, file: &Path, offset: u64, reason: &str) {
-        self.wounds.push(Wound {
-            file: name_of(file),
-            offset,
-            reason: reason.into(),
-        });
+        self.wounds.push(Wound { file: name_of(file), offset, reason: reason.into() });
     }
 
     /// The number of the file that was begun because this one failed; its own if none was. What was begun

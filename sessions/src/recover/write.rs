@@ -127,11 +127,7 @@ impl Recovery {
 #[must_use]
 pub fn recovered_folder(path: &Path) -> PathBuf {
     // A file stands for the folder it is in.
-    let folder = if path.is_file() {
-        path.parent().unwrap_or(path)
-    } else {
-        path
-    };
+    let folder = if path.is_file() { path.parent().unwrap_or(path) } else { path };
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     folder.with_file_name(format!("{name}.recovered"))
 }
@@ -171,10 +167,7 @@ pub fn recover(
     let folder = recovered_folder(path);
     // A finished one is not made anew; an unfinished one is what a crash left of another attempt.
     if crate::log::Summary::read(&folder).is_ok_and(|summary| summary.end.is_some()) {
-        return Err(RecoverError::Before {
-            path: path.into(),
-            folder,
-        });
+        return Err(RecoverError::Before { path: path.into(), folder });
     }
     let mut left = salvage(path, &mut |_| {})?;
     let lacks_files = left.missing.is_end_lost || left.lacks_segments;
@@ -212,15 +205,8 @@ pub fn recover(
     // Either all of it is there, or nothing is.
     std::fs::rename(&unfinished, &folder)
         .and_then(|()| sync_folder_of(&folder))
-        .map_err(|source| FolderError::Io {
-            path: folder.clone(),
-            source,
-        })?;
-    Ok(Recovery {
-        folder,
-        session_id,
-        salvage: left,
-    })
+        .map_err(|source| FolderError::Io { path: folder.clone(), source })?;
+    Ok(Recovery { folder, session_id, salvage: left })
 }
 
 /// Makes sure that nobody else recovers the session, and waits a little for who does. The folder itself is locked, so nothing is
@@ -242,10 +228,8 @@ fn alone(path: &Path) -> Result<Option<File>, RecoverError> {
 /// Takes away what an attempt that died left behind. It holds nothing that the original does not.
 fn clear(folder: &Path) -> Result<(), RecoverError> {
     if folder.exists() {
-        std::fs::remove_dir_all(folder).map_err(|source| FolderError::Io {
-            path: folder.into(),
-            source,
-        })?;
+        std::fs::remove_dir_all(folder)
+            .map_err(|source| FolderError::Io { path: folder.into(), source })?;
     }
     Ok(())
 }
@@ -262,18 +246,12 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
             Part::Samples(block) => block,
             Part::Raw(block) => {
                 let raw = &block.to_pieces();
-                outcome = log.append_parts(&Parts {
-                    raw,
-                    ..Parts::default()
-                });
+                outcome = log.append_parts(&Parts { raw, ..Parts::default() });
                 return;
             }
             Part::Health(health) => {
                 let health = std::slice::from_ref(health);
-                outcome = log.append_parts(&Parts {
-                    health,
-                    ..Parts::default()
-                });
+                outcome = log.append_parts(&Parts { health, ..Parts::default() });
                 return;
             }
         };
@@ -283,10 +261,7 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         while let Some(entry) = pending.next_if(|entry| entry.after_sample < end) {
             // Between the samples that are left it comes where it came.
             let seen = entry.after_sample.saturating_sub(block.first_sample());
-            entries.push(Entry {
-                after_sample: kept + seen,
-                ..entry.clone()
-            });
+            entries.push(Entry { after_sample: kept + seen, ..entry.clone() });
         }
         kept += rows.len() as u64;
         last = block.last_time().unwrap_or(last);
@@ -294,12 +269,8 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
     };
     parts(path, &mut visit)?;
     outcome?;
-    let rest: Vec<Entry> = pending
-        .map(|entry| Entry {
-            after_sample: kept,
-            ..entry.clone()
-        })
-        .collect();
+    let rest: Vec<Entry> =
+        pending.map(|entry| Entry { after_sample: kept, ..entry.clone() }).collect();
     log.append(&[], &rest)?;
     let ended_at = rest.last().map_or(last, |entry| entry.now.max(last));
     let end = left.end.clone().unwrap_or(EndRecord {

@@ -14,15 +14,8 @@ pub(super) fn wrong_beside(path: &Path, manifest: &Manifest) -> Vec<String> {
     let edits = Edits::read(path, id).err().map(|err| err.to_string());
     let analyses = Analyses::read(path, id).err().map(|err| err.to_string());
     // A file stands for the folder it is in.
-    let folder = if path.is_file() {
-        path.parent().unwrap_or(path)
-    } else {
-        path
-    };
-    let original = manifest
-        .imported
-        .as_ref()
-        .and_then(|from| wrong_original(folder, from));
+    let folder = if path.is_file() { path.parent().unwrap_or(path) } else { path };
+    let original = manifest.imported.as_ref().and_then(|from| wrong_original(folder, from));
     [edits, analyses, original].into_iter().flatten().collect()
 }
 
@@ -49,12 +42,10 @@ fn wrong_original(folder: &Path, from: &Imported) -> Option<String> {
         ));
     }
     match checksum_of(&path) {
-        Err(err) => Some(format!(
-            "the imported file {shown} cannot be read ({err}); {KEPT}"
-        )),
-        Ok(checksum) if checksum != from.checksum => Some(format!(
-            "the imported file {shown} is not as it was; {KEPT}"
-        )),
+        Err(err) => Some(format!("the imported file {shown} cannot be read ({err}); {KEPT}")),
+        Ok(checksum) if checksum != from.checksum => {
+            Some(format!("the imported file {shown} is not as it was; {KEPT}"))
+        }
         Ok(_) => None,
     }
 }

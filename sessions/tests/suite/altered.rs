@@ -13,10 +13,7 @@ use std::process::Command;
 
 /// Does something to the file `$1` in a process of its own.
 fn stranger(command: &str, file: &Path) {
-    let done = Command::new("sh")
-        .args(["-ec", command, "stranger"])
-        .arg(file)
-        .status();
+    let done = Command::new("sh").args(["-ec", command, "stranger"]).arg(file).status();
     assert!(done.expect("there is a shell").success(), "{command}");
 }
 
@@ -93,10 +90,7 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
         );
         assert!(told[0].ends_the_run());
         let closed = writer.close(end(rows[5999].host));
-        assert!(
-            matches!(closed, Err(LogError::Altered { .. })),
-            "{command}: {closed:?}"
-        );
+        assert!(matches!(closed, Err(LogError::Altered { .. })), "{command}: {closed:?}");
         // What came after is whole, and what is missing is told.
         let patient = examine(&path);
         if command == REPLACE {
@@ -108,10 +102,7 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
             panic!("{command}: {patient:?}");
         };
         assert!(!missing.is_end_lost, "{command}: {missing:?}");
-        assert!(
-            patient.samples >= 3000 && patient.until_s > 5.9,
-            "{command}: {patient:?}"
-        );
+        assert!(patient.samples >= 3000 && patient.until_s > 5.9, "{command}: {patient:?}");
         let lost: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
         assert_eq!(patient.samples + lost, 6000, "{command}");
         assert!(Session::open(&path).is_err());

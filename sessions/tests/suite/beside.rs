@@ -16,17 +16,10 @@ fn at() -> chrono::DateTime<Utc> {
 }
 
 fn edits() -> Vec<Edit> {
-    let edit = |reason: &str, change| Edit {
-        at: at(),
-        by: "Ada".into(),
-        reason: reason.into(),
-        change,
-    };
-    let contact = |number| Change::Contact {
-        number,
-        position_mm: Position(41.05),
-        was_mm: Position(41.0),
-    };
+    let edit =
+        |reason: &str, change| Edit { at: at(), by: "Ada".into(), reason: reason.into(), change };
+    let contact =
+        |number| Change::Contact { number, position_mm: Position(41.05), was_mm: Position(41.0) };
     let verdict = Verdict::Rejected;
     let add = vec!["pilot".to_owned()];
     let remove = Vec::new();
@@ -49,18 +42,9 @@ fn analyses() -> Vec<Analysis> {
         inputs: Vec::new(),
         what,
     };
-    let mask = || Analysed::Mask {
-        left_out_s: vec![[1.0, 1.5]],
-    };
-    let fit = Analysed::Fit {
-        based_on: None,
-        settings: "kelvin".into(),
-        results: 1.5.into(),
-    };
-    let calibration = Analysed::Recalibration {
-        calibration: "lab".into(),
-        results: 0.5.into(),
-    };
+    let mask = || Analysed::Mask { left_out_s: vec![[1.0, 1.5]] };
+    let fit = Analysed::Fit { based_on: None, settings: "kelvin".into(), results: 1.5.into() };
+    let calibration = Analysed::Recalibration { calibration: "lab".into(), results: 0.5.into() };
     vec![
         analysis("stretch", mask()),
         analysis("mistake", mask()),
@@ -158,15 +142,8 @@ fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
         let original = recovery.folder.join(ORIGINAL_FOLDER).join("a.csv");
         assert_eq!(fs::read(original).unwrap(), b"t_s,F_N\n");
     }
-    let Counts {
-        samples,
-        first_samples,
-        decisions,
-    } = counts;
-    assert!(
-        samples > 5 && first_samples > 0 && decisions > 1,
-        "{counts:?}"
-    );
+    let Counts { samples, first_samples, decisions } = counts;
+    assert!(samples > 5 && first_samples > 0 && decisions > 1, "{counts:?}");
 }
 
 /// Of an interrupted session everything up to the last sample is there, so what was said of it goes with it.
@@ -182,11 +159,7 @@ fn a_copy_of_an_interrupted_session_keeps_its_edits_but_those_of_contacts_it_lac
     assert_eq!(copy.entries.len(), 1, "the cut is elsewhere");
     let kept = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
     assert_eq!(kept.all, edits()[..3]);
-    assert!(
-        copy.notes[0].contains("contact 2 by Ada"),
-        "{:?}",
-        copy.notes
-    );
+    assert!(copy.notes[0].contains("contact 2 by Ada"), "{:?}", copy.notes);
 }
 
 #[test]

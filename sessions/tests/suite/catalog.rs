@@ -115,9 +115,7 @@ fn talk(folder: &Path, id: &str, random: &mut Random) {
     }
     let decision = [Decision::Accepted, Decision::Rejected, Decision::Repeat][random.below(3)];
     if random.below(2) == 0 {
-        let seen = palpate_sessions::Analyses::read(folder, id)
-            .unwrap()
-            .input();
+        let seen = palpate_sessions::Analyses::read(folder, id).unwrap().input();
         let seen = seen.into_iter().collect();
         let change = Change::Review { decision, seen };
         add_edit(folder, id, &edit("seen by two", change)).unwrap();
@@ -208,22 +206,16 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
         && is(&query.protocol, &entry.protocol)
         && is(&query.rig, &entry.rig)
         && query.tags.iter().all(|tag| entry.tags.contains(tag))
-        && query
-            .review
-            .is_none_or(|wanted| match (wanted, &entry.review) {
-                (ReviewIs::None, review) => review.is_none() && entry.trouble.is_none(),
-                (_, None) => false,
-                (ReviewIs::Outdated, Some(review)) => !review.changed.is_empty(),
-                (ReviewIs::Given(decision), Some(review)) => {
-                    review.changed.is_empty() && review.decision == decision
-                }
-            })
-        && query
-            .since
-            .is_none_or(|since| start.is_some_and(|at| at >= since))
-        && query
-            .before
-            .is_none_or(|before| start.is_some_and(|at| at < before))
+        && query.review.is_none_or(|wanted| match (wanted, &entry.review) {
+            (ReviewIs::None, review) => review.is_none() && entry.trouble.is_none(),
+            (_, None) => false,
+            (ReviewIs::Outdated, Some(review)) => !review.changed.is_empty(),
+            (ReviewIs::Given(decision), Some(review)) => {
+                review.changed.is_empty() && review.decision == decision
+            }
+        })
+        && query.since.is_none_or(|since| start.is_some_and(|at| at >= since))
+        && query.before.is_none_or(|before| start.is_some_and(|at| at < before))
         && query.conditions.iter().all(|one| one.is_met(entry))
         && query.verdict.is_none_or(|wanted| match wanted {
             VerdictIs::Given(verdict) => entry.verdict == Some(verdict),
@@ -235,8 +227,7 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
 fn random_query(random: &mut Random) -> Query {
     let mut query = Query::default();
     let day = |random: &mut Random| {
-        Utc.with_ymd_and_hms(2026, 3, 1 + random.below(12) as u32, 0, 0, 0)
-            .unwrap()
+        Utc.with_ymd_and_hms(2026, 3, 1 + random.below(12) as u32, 0, 0, 0).unwrap()
     };
     let conditions = [
         "depth>=3",
@@ -323,11 +314,7 @@ fn every_search_finds_what_a_plain_scan_finds() {
     for _ in 0..600 {
         let query = random_query(&mut random);
         let found = catalog.find(&query).unwrap();
-        let mut got: Vec<&str> = found
-            .entries
-            .iter()
-            .map(|one| one.folder.as_str())
-            .collect();
+        let mut got: Vec<&str> = found.entries.iter().map(|one| one.folder.as_str()).collect();
         got.sort_unstable();
         let meant = entries.iter().filter(|entry| is_meant(&query, entry));
         let meant: Vec<&str> = meant.map(|entry| entry.folder.as_str()).collect();
@@ -365,12 +352,7 @@ fn pages_and_orders_make_up_the_whole() {
     ] {
         let mut pages = Vec::new();
         for page in 0..5 {
-            let query = Query {
-                order,
-                skip: 7 * page,
-                limit: Some(7),
-                ..Query::default()
-            };
+            let query = Query { order, skip: 7 * page, limit: Some(7), ..Query::default() };
             let found = catalog.find(&query).unwrap();
             assert_eq!(found.count, 31);
             pages.extend(found.entries);
@@ -379,18 +361,10 @@ fn pages_and_orders_make_up_the_whole() {
         let is_falling = matches!(order, Order::Started | Order::Duration);
         for pair in pages.windows(2) {
             let keys = (key(order, &pair[0]), key(order, &pair[1]));
-            let is_sorted = if is_falling {
-                keys.0 >= keys.1
-            } else {
-                keys.0 <= keys.1
-            };
+            let is_sorted = if is_falling { keys.0 >= keys.1 } else { keys.0 <= keys.1 };
             assert!(is_sorted, "{order:?}: {keys:?}");
         }
-        let query = Query {
-            order,
-            is_reversed: true,
-            ..Query::default()
-        };
+        let query = Query { order, is_reversed: true, ..Query::default() };
         pages.reverse();
         assert_eq!(catalog.find(&query).unwrap().entries, pages);
         let folders: Vec<String> = pages.iter().map(|entry| entry.folder.clone()).collect();
@@ -424,12 +398,7 @@ fn an_updated_catalog_is_one_made_anew() {
                 fs::rename(&folder, to).unwrap();
             }
             4 if one.trouble.is_none() => {
-                judge(
-                    &folder,
-                    &one.session_id,
-                    Verdict::Suspect,
-                    "looked at again",
-                );
+                judge(&folder, &one.session_id, Verdict::Suspect, "looked at again");
             }
             // Cut off somewhere: an interrupted session, or no session any more.
             _ => {
@@ -445,18 +414,13 @@ fn an_updated_catalog_is_one_made_anew() {
     }
     assert!(read > 20, "{read}");
     let grown = catalog.all().unwrap();
-    let words = Query {
-        words: "ada".into(),
-        ..Query::default()
-    };
+    let words = Query { words: "ada".into(), ..Query::default() };
     let found = catalog.find(&words).unwrap();
     drop(catalog);
     // Deleted, nothing is lost.
-    for name in [
-        CATALOG_FILE.to_owned(),
-        format!("{CATALOG_FILE}-wal"),
-        format!("{CATALOG_FILE}-shm"),
-    ] {
+    for name in
+        [CATALOG_FILE.to_owned(), format!("{CATALOG_FILE}-wal"), format!("{CATALOG_FILE}-shm")]
+    {
         let _ = fs::remove_file(at.join(name));
     }
     let anew = updated(at);
@@ -485,15 +449,9 @@ fn a_changed_log_is_noticed_and_only_that_is_read() {
     assert_eq!(doubts.len(), 1);
     assert!(doubts[0].sentence.contains("has changed"), "{doubts:?}");
     assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 1);
-    assert_eq!(
-        (of(&catalog).samples, of(&catalog).ending),
-        (400, Some("finish".into()))
-    );
+    assert_eq!((of(&catalog).samples, of(&catalog).ending), (400, Some("finish".into())));
     // As long as before, and other: its time tells.
-    let other = Manifest {
-        specimen: "µ-gel 4 %".into(),
-        ..manifest
-    };
+    let other = Manifest { specimen: "µ-gel 4 %".into(), ..manifest };
     write_session(&folder, &other, 400, true);
     assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 1);
     assert_eq!(of(&catalog).specimen, "µ-gel 4 %");
@@ -520,17 +478,9 @@ fn several_at_a_time_end_with_the_same_catalog() {
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap().len(), 41);
     assert_eq!(catalog.check(&mut |_, _| {}).unwrap(), []);
-    let query = Query {
-        words: "hair".into(),
-        ..Query::default()
-    };
+    let query = Query { words: "hair".into(), ..Query::default() };
     let found = catalog.find(&query).unwrap();
-    let meant = catalog
-        .all()
-        .unwrap()
-        .iter()
-        .filter(|one| is_meant(&query, one))
-        .count();
+    let meant = catalog.all().unwrap().iter().filter(|one| is_meant(&query, one)).count();
     assert_eq!(found.count, meant);
 }
 
@@ -575,18 +525,9 @@ fn what_is_typed_is_never_taken_for_syntax() {
     }
     for text in texts {
         for query in [
-            Query {
-                words: text.clone(),
-                ..Query::default()
-            },
-            Query {
-                specimen: Some(text.clone()),
-                ..Query::default()
-            },
-            Query {
-                operator: Some(text.clone()),
-                ..Query::default()
-            },
+            Query { words: text.clone(), ..Query::default() },
+            Query { specimen: Some(text.clone()), ..Query::default() },
+            Query { operator: Some(text.clone()), ..Query::default() },
         ] {
             let found = catalog.find(&query);
             assert!(found.is_ok(), "{text:?}: {found:?}");
@@ -605,11 +546,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
     fs::write(&file, "thesis, last chapter").unwrap();
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap(), expected);
-    assert!(
-        catalog.remarks[0].contains("set aside"),
-        "{:?}",
-        catalog.remarks
-    );
+    assert!(catalog.remarks[0].contains("set aside"), "{:?}", catalog.remarks);
     let aside = at.join(format!("{CATALOG_FILE}.aside-1"));
     assert_eq!(fs::read_to_string(aside).unwrap(), "thesis, last chapter");
     drop(catalog);
@@ -620,9 +557,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
         let mut bytes = whole.clone();
         let from = random.below(bytes.len());
         let until = (from + 1 + random.below(5000)).min(bytes.len());
-        bytes[from..until]
-            .iter_mut()
-            .for_each(|byte| *byte = random_byte(&mut random));
+        bytes[from..until].iter_mut().for_each(|byte| *byte = random_byte(&mut random));
         if random.below(3) == 0 {
             bytes.truncate(from);
         }
@@ -630,10 +565,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
             let _ = fs::remove_file(at.join(format!("{CATALOG_FILE}{ending}")));
         }
         fs::write(&file, &bytes).unwrap();
-        let words = Query {
-            words: "ada".into(),
-            ..Query::default()
-        };
+        let words = Query { words: "ada".into(), ..Query::default() };
         let done = Catalog::with(at, |catalog| {
             set_aside += catalog.remarks.len();
             catalog.update(&mut |_, _| {})?;

@@ -36,9 +36,7 @@ fn library() -> (tempfile::TempDir, PathBuf) {
         software_version: "0.1.0".into(),
         engine_version: 1,
         inputs: Vec::new(),
-        what: Analysed::Mask {
-            left_out_s: vec![[1.0, 2.0]],
-        },
+        what: Analysed::Mask { left_out_s: vec![[1.0, 2.0]] },
     };
     add_analysis(&session, &manifest().session_id, &mask).unwrap();
     (library, session)
@@ -81,10 +79,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
         damage(&analyses);
         let (events, remarks) = of_specimen();
         assert_eq!(events, all[..3]);
-        assert!(
-            remarks.len() == 1 && remarks[0].contains(ANALYSES_FILE),
-            "{remarks:?}"
-        );
+        assert!(remarks.len() == 1 && remarks[0].contains(ANALYSES_FILE), "{remarks:?}");
         // With the edits too, both are named.
         let edits = session.join(EDITS_FILE);
         let kept_edits = fs::read(&edits).unwrap();
@@ -92,10 +87,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
         let (events, remarks) = of_specimen();
         assert_eq!(events, all[..1]);
         let remarks = remarks.join("\n");
-        assert!(
-            remarks.contains(ANALYSES_FILE) && remarks.contains(EDITS_FILE),
-            "{remarks}"
-        );
+        assert!(remarks.contains(ANALYSES_FILE) && remarks.contains(EDITS_FILE), "{remarks}");
         fs::write(&edits, kept_edits).unwrap();
         fs::write(&analyses, kept).unwrap();
     }
@@ -110,22 +102,14 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     };
     add_check(at, &check).unwrap();
     let (events, remarks) = history(at, Subject::Rig, "sim");
-    assert!(
-        events.contains(&"check".into()) && remarks.is_empty(),
-        "{events:?}"
-    );
+    assert!(events.contains(&"check".into()) && remarks.is_empty(), "{events:?}");
     let file = at.join("checks/sim.jsonl");
     let kept = fs::read(&file).unwrap();
-    for damage in [flip, cut_last_line, |path: &Path| {
-        fs::remove_file(path).unwrap()
-    }] {
+    for damage in [flip, cut_last_line, |path: &Path| fs::remove_file(path).unwrap()] {
         damage(&file);
         let (events, remarks) = history(at, Subject::Rig, "sim");
         assert_eq!(events, all);
-        assert!(
-            remarks.len() == 1 && remarks[0].contains("sim.jsonl"),
-            "{remarks:?}"
-        );
+        assert!(remarks.len() == 1 && remarks[0].contains("sim.jsonl"), "{remarks:?}");
         fs::write(&file, &kept).unwrap();
     }
 }
@@ -150,11 +134,7 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
     let is_told = |text: &str| text.contains(EDITS_FILE) && text.contains("1 of 2");
     assert!(matches!(
         Edits::read(&session, &id),
-        Err(EditError::Chain(ChainError::Shortened {
-            found: 1,
-            written: 2,
-            ..
-        }))
+        Err(EditError::Chain(ChainError::Shortened { found: 1, written: 2, .. }))
     ));
     let wrong = examine(&session).wrong_beside;
     assert!(wrong.len() == 1 && is_told(&wrong[0]), "{wrong:?}");

@@ -20,11 +20,7 @@ impl Original {
         let entries = entries(&rows, 40);
         let end = is_finished.then(|| end(Nanos::from_millis(3000)));
         let bytes = log_bytes(&rows, &entries, end);
-        Self {
-            rows,
-            entries,
-            bytes,
-        }
+        Self { rows, entries, bytes }
     }
 
     /// Everything returned must be as recorded, and what is missing must be announced.
@@ -39,10 +35,7 @@ impl Original {
         assert_eq!(session.entries, self.entries[..entry_count], "{context}");
         let is_short = count < self.rows.len() || entry_count < self.entries.len();
         if is_short {
-            assert!(
-                session.end.is_none(),
-                "{context}: short, yet said to be complete"
-            );
+            assert!(session.end.is_none(), "{context}: short, yet said to be complete");
             assert!(!session.notes.is_empty(), "{context}: short without a word");
         }
     }
@@ -53,10 +46,7 @@ impl Original {
     pub fn check_salvage(&self, path: &Path, context: &str) -> Option<usize> {
         let mut blocks = Vec::new();
         let mut visit = |block: &Block| {
-            blocks.push((
-                block.first_sample() as usize,
-                block.rows().collect::<Vec<_>>(),
-            ));
+            blocks.push((block.first_sample() as usize, block.rows().collect::<Vec<_>>()));
         };
         let left = salvage(path, &mut visit).ok()?;
         assert_eq!(left.manifest, manifest(), "{context}");
@@ -78,15 +68,9 @@ impl Original {
         assert_eq!(left.samples as usize, kept, "{context}");
         let is_kept = |entry: &&Entry| left.entries.contains(entry);
         let entries: Vec<&Entry> = self.entries.iter().filter(is_kept).collect();
-        assert!(
-            entries.iter().copied().eq(&left.entries),
-            "{context}: wrong entries"
-        );
+        assert!(entries.iter().copied().eq(&left.entries), "{context}: wrong entries");
         if kept < self.rows.len() || entries.len() < self.entries.len() {
-            assert!(
-                !left.missing.sentences().is_empty(),
-                "{context}: short without a word"
-            );
+            assert!(!left.missing.sentences().is_empty(), "{context}: short without a word");
         }
         Some(kept)
     }
@@ -179,11 +163,7 @@ fn one_flipped_bit_costs_a_batch() {
     let rows = rows(20_000, 13);
     let entries = entries(&rows, 400);
     let bytes = log_bytes(&rows, &entries, Some(end(Nanos::from_millis(20_000))));
-    let original = Original {
-        rows,
-        entries,
-        bytes,
-    };
+    let original = Original { rows, entries, bytes };
     let folder = quick_folder();
     let path = folder.path().join("000.mcap");
     let mut random = Random(14);
@@ -211,13 +191,7 @@ fn one_flipped_bit_costs_a_batch() {
 #[test]
 fn absurd_lengths_are_refused() {
     let original = Original::new(false);
-    for (opcode, length) in [
-        (6u8, u64::MAX),
-        (6, 1 << 40),
-        (9, 3),
-        (0x80, 0),
-        (1, u64::MAX),
-    ] {
+    for (opcode, length) in [(6u8, u64::MAX), (6, 1 << 40), (9, 3), (0x80, 0), (1, u64::MAX)] {
         let mut bytes = original.bytes.clone();
         let mut frame = vec![opcode];
         frame.extend(length.to_le_bytes());
@@ -225,10 +199,7 @@ fn absurd_lengths_are_refused() {
         let folder = quick_folder();
         let path = folder.path().join("000.mcap");
         put(&path, &bytes);
-        assert!(
-            Session::open(&path).is_err(),
-            "opcode {opcode}, length {length}"
-        );
+        assert!(Session::open(&path).is_err(), "opcode {opcode}, length {length}");
     }
     // A chunk that claims to hold more than it may.
     let mut bytes = original.bytes.clone();
@@ -251,11 +222,7 @@ fn raw_bytes_that_are_lost_are_counted() {
     let mut places = Vec::new();
     for batch in rows.chunks(100) {
         places.push(sink.bytes().len());
-        let parts = Parts {
-            rows: batch,
-            raw: &raw_of(batch),
-            ..Parts::default()
-        };
+        let parts = Parts { rows: batch, raw: &raw_of(batch), ..Parts::default() };
         log.append_parts(&parts).unwrap();
     }
     log.finish(end(Nanos::from_millis(1000))).unwrap();
@@ -279,12 +246,7 @@ fn raw_bytes_that_are_lost_are_counted() {
         assert!(told.contains(&format!("{missing} raw bytes")), "{told}");
         let copy = recover(&session, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
         let kept: Vec<Row> = [&rows[..lost.start], &rows[lost.end..]].concat();
-        check_raw(
-            &read_raw(&copy.folder).unwrap(),
-            &kept,
-            kept.len(),
-            "a copy",
-        );
+        check_raw(&read_raw(&copy.folder).unwrap(), &kept, kept.len(), "a copy");
         let copied = Session::open(&copy.folder).unwrap();
         assert_eq!(copied.beside.raw_bytes, left.raw_bytes);
     }

@@ -121,11 +121,7 @@ impl SegmentSource for Disk {
     fn create(&mut self, number: u32) -> io::Result<DiskSink> {
         self.count()?;
         self.note(Step::Create(number));
-        Ok(DiskSink {
-            disk: self.clone(),
-            number,
-            has_name: false,
-        })
+        Ok(DiskSink { disk: self.clone(), number, has_name: false })
     }
 }
 

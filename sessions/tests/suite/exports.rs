@@ -45,16 +45,10 @@ fn csv_holds_every_digit_and_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.csv");
     let session = session();
-    assert_eq!(
-        export(&session, CSV, &Selection::default(), &path).unwrap(),
-        3000
-    );
+    assert_eq!(export(&session, CSV, &Selection::default(), &path).unwrap(), 3000);
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
-    assert_eq!(
-        lines.next(),
-        Some("t_s,depth_mm,force_N,signal_V,counts,pulses,phase,cycle")
-    );
+    assert_eq!(lines.next(), Some("t_s,depth_mm,force_N,signal_V,counts,pulses,phase,cycle"));
     for (i, line) in lines.enumerate() {
         let row = &session.rows[i];
         let cells: Vec<&str> = line.split(',').collect();
@@ -72,9 +66,8 @@ fn csv_holds_every_digit_and_reads_back() {
 
     let table = read_table(&path, None).unwrap();
     let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold | Phase::Unload);
-    let kept: Vec<usize> = (0..session.rows.len())
-        .filter(|&i| is_measured(session.rows[i].phase))
-        .collect();
+    let kept: Vec<usize> =
+        (0..session.rows.len()).filter(|&i| is_measured(session.rows[i].phase)).collect();
     assert_eq!(table.t.len(), kept.len());
     for (k, &i) in kept.iter().enumerate() {
         assert_eq!(table.t[k], time_of(&session, i));
@@ -114,11 +107,7 @@ fn parquet_holds_the_same_with_units() {
 
     let frame = reader.finish().unwrap();
     let column = |name: &str| frame.column(name).unwrap().clone();
-    let names: Vec<String> = frame
-        .get_column_names()
-        .iter()
-        .map(|name| name.to_string())
-        .collect();
+    let names: Vec<String> = frame.get_column_names().iter().map(|name| name.to_string()).collect();
     let expected = "t_s depth_mm force_N signal_V counts pulses phase cycle";
     assert_eq!(names.join(" "), expected);
     let (depth, force) = (column("depth_mm"), column("force_N"));
@@ -147,10 +136,7 @@ fn python(script: &str, path: &Path) -> Option<serde_json::Value> {
     if skip::lacks_program("python3") {
         return None;
     }
-    let run = Command::new("python3")
-        .args(["-c", script])
-        .arg(path)
-        .output();
+    let run = Command::new("python3").args(["-c", script]).arg(path).output();
     let output = run.unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     if let Some(package) = text.trim().strip_prefix("no ") {
@@ -180,11 +166,7 @@ print(json.dumps([t.num_rows, str(t['counts'].type), str(t['cycle'].type), str(t
         return;
     };
     let last = &session.rows[2999];
-    let nulls = session
-        .rows
-        .iter()
-        .filter(|row| row.force.is_none())
-        .count();
+    let nulls = session.rows.iter().filter(|row| row.force.is_none()).count();
     let expected = serde_json::json!([
         3000,
         "int32",
@@ -220,11 +202,7 @@ print(json.dumps([session, topics]))
 ";
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("000.mcap");
-    std::fs::write(
-        &path,
-        log_bytes(&rows(1000, 42), &[], Some(end(Nanos::ZERO))),
-    )
-    .unwrap();
+    std::fs::write(&path, log_bytes(&rows(1000, 42), &[], Some(end(Nanos::ZERO)))).unwrap();
     let Some(found) = python(SCRIPT, &path) else {
         return;
     };
@@ -238,11 +216,9 @@ print(json.dumps([session, topics]))
 fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    for (name, format) in [
-        ("one.csv", CSV),
-        ("one.parquet", Format::Parquet),
-        ("one.arrow", Format::Arrow),
-    ] {
+    for (name, format) in
+        [("one.csv", CSV), ("one.parquet", Format::Parquet), ("one.arrow", Format::Arrow)]
+    {
         let path = folder.path().join(name);
         let all = Selection::default();
         std::fs::write(&path, "mine").unwrap();
@@ -250,10 +226,7 @@ fn exports_never_replace_a_file() {
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
-        assert!(matches!(
-            export(&session, format, &all, &nowhere),
-            Err(ExportError::Io { .. })
-        ));
+        assert!(matches!(export(&session, format, &all, &nowhere), Err(ExportError::Io { .. })));
         // Nor a dictionary that somebody wrote.
         let path = folder.path().join(format!("two.{name}"));
         std::fs::write(dictionary_path(&path), "mine").unwrap();
@@ -269,9 +242,7 @@ fn exports_never_replace_a_file() {
 fn cells(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
     let lines = text.lines().skip(1);
-    lines
-        .map(|line| line.split(',').map(String::from).collect())
-        .collect()
+    lines.map(|line| line.split(',').map(String::from).collect()).collect()
 }
 
 #[test]
@@ -287,65 +258,39 @@ fn a_selection_is_what_a_plain_filter_finds() {
     };
     let filtered = |takes: &dyn Fn(usize, &Row) -> bool| -> Vec<usize> {
         let rows = session.rows.iter().enumerate();
-        rows.filter(|(i, row)| takes(*i, row))
-            .map(|(i, _)| i)
-            .collect()
+        rows.filter(|(i, row)| takes(*i, row)).map(|(i, _)| i).collect()
     };
-    let numbers = Selection {
-        columns: vec!["sample".into(), "force_N".into()],
-        ..Selection::default()
-    };
+    let numbers =
+        Selection { columns: vec!["sample".into(), "force_N".into()], ..Selection::default() };
     let phases = [session.rows[10].phase, session.rows[2000].phase];
-    let by_phase = Selection {
-        phases: phases.into(),
-        ..numbers.clone()
-    };
+    let by_phase = Selection { phases: phases.into(), ..numbers.clone() };
     let expected = filtered(&|_, row| phases.contains(&row.phase));
     assert!(!expected.is_empty() && expected.len() < 3000);
     assert_eq!(found(&by_phase, "phase"), expected);
 
     let cycle = session.rows[1500].cycle;
-    let by_cycle = Selection {
-        cycles: vec![cycle],
-        ..numbers.clone()
-    };
+    let by_cycle = Selection { cycles: vec![cycle], ..numbers.clone() };
     let expected = filtered(&|_, row| row.cycle == cycle);
     assert!(!expected.is_empty() && expected.len() < 3000);
     assert_eq!(found(&by_cycle, "cycle"), expected);
 
     let (from, to) = (time_of(&session, 700), time_of(&session, 2100));
-    let by_time = Selection {
-        from_s: Some(from),
-        to_s: Some(to),
-        ..numbers.clone()
-    };
+    let by_time = Selection { from_s: Some(from), to_s: Some(to), ..numbers.clone() };
     let within = |i: usize| (from..=to).contains(&time_of(&session, i));
     assert_eq!(found(&by_time, "time"), filtered(&|i, _| within(i)));
 
     // Thinned after the selection, and the name and the first column say so.
-    let thinned = Selection {
-        every: Some(7),
-        ..by_time
-    };
+    let thinned = Selection { every: Some(7), ..by_time };
     let expected: Vec<usize> = filtered(&|i, _| within(i)).into_iter().step_by(7).collect();
     assert_eq!(found(&thinned, "thin"), expected);
     let text = std::fs::read_to_string(folder.path().join("thin.every7.csv")).unwrap();
-    assert!(
-        text.starts_with("sample_every_7,sample,force_N\n"),
-        "{text:.60}"
-    );
+    assert!(text.starts_with("sample_every_7,sample,force_N\n"), "{text:.60}");
 
-    let nothing = Selection {
-        from_s: Some(1e9),
-        ..numbers
-    };
+    let nothing = Selection { from_s: Some(1e9), ..numbers };
     assert_eq!(found(&nothing, "nothing"), [0usize; 0]);
     let text = std::fs::read_to_string(folder.path().join("nothing.csv")).unwrap();
     assert_eq!(text, "sample,force_N\n");
-    let unknown = Selection {
-        columns: vec!["force".into()],
-        ..Selection::default()
-    };
+    let unknown = Selection { columns: vec!["force".into()], ..Selection::default() };
     let path = folder.path().join("unknown.csv");
     let refusal = export(&session, CSV, &unknown, &path).unwrap_err();
     assert!(refusal.to_string().contains("force_N"), "{refusal}");
@@ -413,10 +358,7 @@ fn the_dictionary_tells_every_column_of_the_table() {
         let names: Vec<&str> = rows.iter().map(|row| row[0]).collect();
         assert_eq!(names, header);
         // Every column has a type, a meaning and an origin.
-        assert!(
-            rows.iter()
-                .all(|row| row.len() == 5 && !row[2..].contains(&""))
-        );
+        assert!(rows.iter().all(|row| row.len() == 5 && !row[2..].contains(&"")));
         assert!(told.contains("a \\| b c"), "{told}");
         assert_eq!(told.contains("every 100th"), selection.every.is_some());
     }

@@ -88,10 +88,7 @@ fn the_thread_reports_its_failure_on_the_next_push_and_on_close() {
             }
         }
         let err = refused.unwrap();
-        assert!(
-            matches!(&err, LogError::Disk { path, .. } if path == "/data/000.mcap"),
-            "{err:?}"
-        );
+        assert!(matches!(&err, LogError::Disk { path, .. } if path == "/data/000.mcap"), "{err:?}");
         assert_eq!(writer.failure(), Some(err.to_string()));
         assert_eq!(writer.close(end(Nanos::ZERO)), Err(err));
         let bytes = sink.bytes();

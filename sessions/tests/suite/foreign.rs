@@ -92,10 +92,7 @@ fn a_table_is_understood_and_everything_is_said() {
         ("force", "column 3 'Kraft' in mN"),
     ] {
         let found = said(part, what);
-        assert!(
-            found.contains(expected) && found.ends_with("(detected)"),
-            "{found}"
-        );
+        assert!(found.contains(expected) && found.ends_with("(detected)"), "{found}");
     }
 }
 
@@ -113,25 +110,15 @@ fn what_is_told_outweighs_what_is_detected() {
     let read = read(text, &telling(&options));
     let part = &read.parts[0];
     let gram = 0.009_806_65;
-    let expected = [
-        [0.0, 0.0, 2.0 * gram],
-        [1e-3, 0.25, 3.0 * gram],
-        [2e-3, 0.5, 4.0 * gram],
-    ];
+    let expected = [[0.0, 0.0, 2.0 * gram], [1e-3, 0.25, 3.0 * gram], [2e-3, 0.5, 4.0 * gram]];
     for (found, expected) in numbers(part).iter().zip(expected) {
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() <= 1e-16, "{found} {expected}");
         }
     }
-    for (what, expected) in [
-        ("depth", "column 2 'z' in mm"),
-        ("force", "column 4 'load' in gf"),
-    ] {
+    for (what, expected) in [("depth", "column 2 'z' in mm"), ("force", "column 4 'load' in gf")] {
         let found = said(part, what);
-        assert!(
-            found.starts_with(expected) && found.ends_with("(told)"),
-            "{found}"
-        );
+        assert!(found.starts_with(expected) && found.ends_with("(told)"), "{found}");
     }
     // A file without names.
     let bare = "0 0,5 1\n1 0,75 2\n";
@@ -156,59 +143,23 @@ fn read_one(text: &str, told: &Told) -> ForeignPart {
 #[test]
 fn what_has_two_readings_is_refused_with_the_question() {
     for (text, options, told) in [
-        (
-            "t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n",
-            &[][..],
-            "'1,234' in line 2",
-        ),
+        ("t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n", &[][..], "'1,234' in line 2"),
         ("t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n", &[], "'0.75' in line 3"),
-        (
-            "t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n",
-            &[("decimal", "comma")],
-            "line 3: the depth '0.75'",
-        ),
-        (
-            "t_s,Step time,x_mm,F_N\n0,0,0,0\n1,1,1,1\n",
-            &[],
-            "'t_s' and 'Step time'",
-        ),
+        ("t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n", &[("decimal", "comma")], "line 3: the depth '0.75'"),
+        ("t_s,Step time,x_mm,F_N\n0,0,0,0\n1,1,1,1\n", &[], "'t_s' and 'Step time'"),
         ("t_s,x_mm,F_furlong\n0,0,0\n1,1,1\n", &[], "'furlong'"),
         ("t_s,x_mm,force\n0,0,0\n1,1,1\n", &[], "N, mN"),
         ("t_s,x_mm\n0,0\n1,1\n", &[], "'t_s', 'x_mm'"),
         ("0,0,0\n1,1,1\n", &[], "names of columns"),
         ("0,0,0\n1,1,1\n", &[("columns", "t_s,x_mm")], "3 columns"),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,1,1\n",
-            &[("column", "depth=y")],
-            "'y' in line 1",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,1\n", &[("column", "depth=y")], "'y' in line 1"),
         ("t_s,x_mm,F_N\n0,0,0\n1,1,1,9\n", &[], "column 4"),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,1,one\n2,2,2\n",
-            &[],
-            "line 3: the force 'one'",
-        ),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n",
-            &[],
-            "line 3: there is no depth",
-        ),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n",
-            &[],
-            "line 3: there is no force",
-        ),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n0,1,1\n2,2,2\n",
-            &[],
-            "line 3: the time 0 s",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,one\n2,2,2\n", &[], "line 3: the force 'one'"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n", &[], "line 3: there is no depth"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n", &[], "line 3: there is no force"),
+        ("t_s,x_mm,F_N\n0,0,0\n0,1,1\n2,2,2\n", &[], "line 3: the time 0 s"),
         ("t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n", &[], "from 2 to 1 s"),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n",
-            &[("part", "x")],
-            "'x'",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n", &[("part", "x")], "'x'"),
         ("t_s,x_mm,F_N\n0,0,0\n", &[], "two rows"),
         ("nothing of use\n", &[], "two numbers"),
         ("t_s,x_mm,F_N\n0,0,0\n1,1,\"1\n", &[], "line 3: a quote"),
@@ -227,11 +178,7 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
         writeln!(text, "{t:.1},{},{}", 0.01 * t, 0.2 * t).unwrap();
     }
     text += "5.0,,1\n4.9,1,1\n4.9,1,1\n4.0,1,1\n5.5,1,1\n5.6,1,nan\n";
-    let all = [
-        ("skip", "missing"),
-        ("skip", "repeated"),
-        ("skip", "backward"),
-    ];
+    let all = [("skip", "missing"), ("skip", "repeated"), ("skip", "backward")];
     let part = read_one(&text, &telling(&all));
     assert_eq!(part.samples.len(), 51);
     let expected = [
@@ -242,10 +189,7 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
     ];
     assert_eq!(part.imported.remarks.len(), expected.len());
     for (remark, facts) in part.imported.remarks.iter().zip(expected) {
-        assert!(
-            facts.iter().all(|fact| remark.contains(fact)),
-            "{facts:?}: {remark}"
-        );
+        assert!(facts.iter().all(|fact| remark.contains(fact)), "{facts:?}: {remark}");
     }
     for (option, value) in all {
         let others: Vec<(&str, &str)> = all.into_iter().filter(|one| one.1 != value).collect();
@@ -253,11 +197,7 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
         assert!(reason.ends_with(value), "{option} {value}: {reason}");
     }
     let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &told());
-    assert!(
-        turned.imported.remarks[0].contains("turn its sign"),
-        "{:?}",
-        turned.imported.remarks
-    );
+    assert!(turned.imported.remarks[0].contains("turn its sign"), "{:?}", turned.imported.remarks);
     let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &told());
     assert!(uneven.imported.remarks[0].contains("1.000000 to 90.000000 s"));
 }
@@ -271,28 +211,12 @@ fn mach1() -> String {
     };
     let header = "Time, s\tPosition (z), mm\tPosition (x), mm\tFz, gf\r\n";
     let mut text = format!("<Mach-1 File>\r\n{}Load cell:\tz\r\n", info("Zero Load"));
-    write!(
-        text,
-        "{}Velocity, mm/s:\t0.1\r\n<DATA>\r\n{header}",
-        info("Move Relative")
-    )
-    .unwrap();
+    write!(text, "{}Velocity, mm/s:\t0.1\r\n<DATA>\r\n{header}", info("Move Relative")).unwrap();
     for i in 0..5 {
         let t = 0.01 * f64::from(i);
-        write!(
-            text,
-            "{t:.3}\t{:.4}\t2.0000\t{:.4}\r\n",
-            10.0 + t,
-            100.0 * t
-        )
-        .unwrap();
+        write!(text, "{t:.3}\t{:.4}\t2.0000\t{:.4}\r\n", 10.0 + t, 100.0 * t).unwrap();
     }
-    write!(
-        text,
-        "<END DATA>\r\n{}<DATA>\r\n{header}",
-        info("Stress Relaxation")
-    )
-    .unwrap();
+    write!(text, "<END DATA>\r\n{}<DATA>\r\n{header}", info("Stress Relaxation")).unwrap();
     text += "0.000\t10.0400\t2.0000\t4.0000\r\n0.010\t10.1400\t2.0000\t14.0000\r\n<divider>\r\n";
     text += "0.000\t10.1400\t2.0000\t13.0000\r\n0.010\t10.2400\t2.0000\t29.0000\r\n<END DATA>\r\n";
     text
@@ -301,25 +225,14 @@ fn mach1() -> String {
 #[test]
 fn mach1_blocks_become_parts_in_newtons() {
     let read = read(&mach1(), &told());
-    let names: Vec<&str> = read
-        .parts
-        .iter()
-        .map(|part| part.imported.part.as_str())
-        .collect();
-    let expected = [
-        "Move Relative 1",
-        "Stress Relaxation 1 ramp 1",
-        "Stress Relaxation 1 ramp 2",
-    ];
+    let names: Vec<&str> = read.parts.iter().map(|part| part.imported.part.as_str()).collect();
+    let expected = ["Move Relative 1", "Stress Relaxation 1 ramp 1", "Stress Relaxation 1 ramp 2"];
     assert_eq!(names, expected);
     let last = numbers(&read.parts[2]);
     assert_eq!(last[1][..2], [0.01, 10.24]);
     assert!((last[1][2] - 29.0 * 0.009_806_65).abs() < 1e-15);
     let facts = &read.parts[0].imported.facts;
-    assert!(
-        facts.contains(&("Velocity, mm/s".into(), "0.1".into())),
-        "{facts:?}"
-    );
+    assert!(facts.contains(&("Velocity, mm/s".into(), "0.1".into())), "{facts:?}");
     assert_eq!(said(&read.parts[0], "layout"), "mach-1 (detected)");
     let by_number = self::read(&mach1(), &telling(&[("part", "3")]));
     assert_eq!(by_number.parts.len(), 1);
@@ -339,12 +252,8 @@ fn rheometer() -> String {
         .unwrap();
         for i in 0..3 {
             let t = 10.0 * f64::from(interval) + 0.5 * f64::from(i);
-            let line = format!(
-                "\t{}\t{t:.3}\t{:.4}\t{:.3E}\tMV-\r\n",
-                i + 1,
-                2.5 - 0.1 * t,
-                0.2 * t
-            );
+            let line =
+                format!("\t{}\t{t:.3}\t{:.4}\t{:.3E}\tMV-\r\n", i + 1, 2.5 - 0.1 * t, 0.2 * t);
             text += &line.replace('.', ",");
         }
         text += "\r\n";
@@ -380,27 +289,17 @@ fn rheometer_intervals_in_utf16_become_parts() {
 }
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
 #[test]
 fn sheets_with_a_time_become_parts_in_both_formats() {
     for name in ["zwick.xlsx", "zwick.xls"] {
         let read = open_foreign(&data(name), &told()).unwrap_or_else(|err| panic!("{err}"));
-        let names: Vec<&str> = read
-            .parts
-            .iter()
-            .map(|part| part.imported.part.as_str())
-            .collect();
+        let names: Vec<&str> = read.parts.iter().map(|part| part.imported.part.as_str()).collect();
         assert_eq!(names, ["P002-1", "P002-2"], "{name}");
         assert_eq!(read.left_out.len(), 2, "{:?}", read.left_out);
-        assert!(
-            read.left_out[0].contains("Paramètres"),
-            "{:?}",
-            read.left_out
-        );
+        assert!(read.left_out[0].contains("Paramètres"), "{:?}", read.left_out);
         // Both sheets hold what make_workbooks.py wrote, in units of their own.
         for part in &read.parts {
             assert_eq!(part.samples.len(), 20);
@@ -408,18 +307,12 @@ fn sheets_with_a_time_become_parts_in_both_formats() {
                 let i = i as f64;
                 for (found, expected) in found.iter().zip([0.1 * i, 0.25 * i, 0.5 + 0.125 * i * i])
                 {
-                    assert!(
-                        (found - expected).abs() < 1e-12,
-                        "{name}: {found} {expected}"
-                    );
+                    assert!((found - expected).abs() < 1e-12, "{name}: {found} {expected}");
                 }
             }
         }
         let force = said(&read.parts[1], "force");
-        assert!(
-            force.starts_with("column 3 'Force standard' in mN"),
-            "{force}"
-        );
+        assert!(force.starts_with("column 3 'Force standard' in mN"), "{force}");
     }
 }
 
@@ -439,10 +332,7 @@ fn a_session_is_made_and_the_original_kept() {
             session_id: "20260305T141507Z-0badcafe".into(),
             at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
             software_version: "0.1.0",
-            labels: Labels {
-                specimen: "gel 3".into(),
-                ..Labels::default()
-            },
+            labels: Labels { specimen: "gel 3".into(), ..Labels::default() },
         };
         keep(part, kept)
     };
@@ -455,15 +345,8 @@ fn a_session_is_made_and_the_original_kept() {
     assert_eq!(session.manifest.imported.as_ref(), Some(&part.imported));
     assert_eq!(session.manifest.specimen, "gel 3");
     assert!(session.manifest.rig.is_none() && session.manifest.calibration.is_null());
-    assert_eq!(
-        session.end.as_ref().unwrap().samples,
-        part.samples.len() as u64
-    );
-    assert!(
-        session.notes[0].contains("Gel 3 (first).txt"),
-        "{:?}",
-        session.notes
-    );
+    assert_eq!(session.end.as_ref().unwrap().samples, part.samples.len() as u64);
+    assert!(session.notes[0].contains("Gel 3 (first).txt"), "{:?}", session.notes);
     for (row, sample) in session.rows.iter().zip(&part.samples) {
         // Nothing that the file does not have is made up.
         assert_eq!((row.volts, row.pulses, row.counts), (None, None, None));
@@ -471,15 +354,9 @@ fn a_session_is_made_and_the_original_kept() {
             (row.depth, row.force, row.phase),
             (sample.depth, sample.force, Phase::Imported)
         );
-        assert_eq!(
-            session.manifest.time_of(row.tick as i64).0.to_bits(),
-            sample.t.to_bits()
-        );
+        assert_eq!(session.manifest.time_of(row.tick as i64).0.to_bits(), sample.t.to_bits());
     }
-    assert!(matches!(
-        make(),
-        Err(KeepError::Folder(FolderError::NotEmpty { .. }))
-    ));
+    assert!(matches!(make(), Err(KeepError::Folder(FolderError::NotEmpty { .. }))));
 }
 
 #[test]
@@ -515,8 +392,7 @@ fn real_recordings_are_read_as_another_reader_reads_them() {
     // Columns t_s, F_N, x_mm; the reader of tables for fits goes another way to the numbers.
     let table = palpate_tables::parse_table(&text, None).unwrap();
     let part = open_foreign(&path, &told()).unwrap().parts.remove(0);
-    let expected: Vec<[f64; 3]> = (0..table.t.len())
-        .map(|i| [table.t[i], table.depth[i], table.force[i]])
-        .collect();
+    let expected: Vec<[f64; 3]> =
+        (0..table.t.len()).map(|i| [table.t[i], table.depth[i], table.force[i]]).collect();
     assert_eq!(numbers(&part), expected);
 }

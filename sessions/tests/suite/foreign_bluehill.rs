@@ -12,21 +12,14 @@ fn detected(text: &str) -> Foreign {
     let read = read(text, &Told::default()).unwrap_or_else(|reason| panic!("{reason}\n{text}"));
     let layout = &read.parts[0].imported.readings[0];
     assert_eq!(
-        (
-            layout.what.as_str(),
-            layout.found.as_str(),
-            layout.how.as_str()
-        ),
+        (layout.what.as_str(), layout.found.as_str(), layout.how.as_str()),
         ("layout", "bluehill", "detected")
     );
     read
 }
 
 fn refused(text: &str) -> String {
-    let told = Told {
-        format: Some("bluehill".parse().unwrap()),
-        ..Told::default()
-    };
+    let told = Told { format: Some("bluehill".parse().unwrap()), ..Told::default() };
     match read(text, &told) {
         Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
         Err(reason) => reason,
@@ -36,21 +29,12 @@ fn refused(text: &str) -> String {
 /// Time in s, depth in mm and force in N of a part.
 fn numbers(read: &Foreign, part: usize) -> Vec<[f64; 3]> {
     let samples = &read.parts[part].samples;
-    let one = |i: usize| {
-        [
-            samples[i].t,
-            samples[i].depth.unwrap(),
-            samples[i].force.unwrap(),
-        ]
-    };
+    let one = |i: usize| [samples[i].t, samples[i].depth.unwrap(), samples[i].force.unwrap()];
     (0..samples.len()).map(one).collect()
 }
 
 fn names(read: &Foreign) -> Vec<&str> {
-    read.parts
-        .iter()
-        .map(|part| part.imported.part.as_str())
-        .collect()
+    read.parts.iter().map(|part| part.imported.part.as_str()).collect()
 }
 
 fn fact<'a>(read: &'a Foreign, part: usize, key: &str) -> Option<&'a str> {
@@ -68,13 +52,7 @@ fn specimen(label: &str, first: u32) -> String {
     );
     for i in 0..4 {
         let (t, n) = (f64::from(i) * 0.1, f64::from(first + i));
-        write!(
-            text,
-            "\"{t:.5}\",\"{:.5}\",\"{:.5}\",\"0\"\r\n",
-            0.25 * n,
-            1250.5 * n
-        )
-        .unwrap();
+        write!(text, "\"{t:.5}\",\"{:.5}\",\"{:.5}\",\"0\"\r\n", 0.25 * n, 1250.5 * n).unwrap();
     }
     text
 }
@@ -90,10 +68,7 @@ fn expected(first: u32) -> Vec<[f64; 3]> {
 #[test]
 fn specimen_is_read_with_what_the_file_says_of_it() {
     let read = detected(&specimen("gel 3", 0));
-    assert_eq!(
-        (names(&read), numbers(&read, 0)),
-        (vec!["gel 3"], expected(0))
-    );
+    assert_eq!((names(&read), numbers(&read, 0)), (vec!["gel 3"], expected(0)));
     assert_eq!(fact(&read, 0, "Test : Rate 1"), Some("15.00000 mm/min"));
     assert_eq!(fact(&read, 0, "Test : Load cell"), Some("2530-100N"));
     assert_eq!(fact(&read, 0, "Notes"), None);
@@ -102,10 +77,7 @@ fn specimen_is_read_with_what_the_file_says_of_it() {
         let one = readings.iter().find(|one| one.what == what);
         one.unwrap().found.clone()
     };
-    assert_eq!(
-        (said("header"), said("units")),
-        ("line 6".into(), "line 7".into())
-    );
+    assert_eq!((said("header"), said("units")), ("line 6".into(), "line 7".into()));
     assert_eq!(said("force"), "column 3 'Load' in N");
     // One that nobody named has no name.
     assert_eq!(names(&detected(&specimen("", 0))), [""]);
@@ -126,10 +98,7 @@ fn specimens_of_one_file_are_parts_of_their_own() {
     assert_eq!(numbers(&read, 1), expected(7));
     assert_eq!(numbers(&read, 2), expected(2));
     assert_eq!(numbers(&read, 4), [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]);
-    let told = Told {
-        parts: vec!["b".into()],
-        ..Told::default()
-    };
+    let told = Told { parts: vec!["b".into()], ..Told::default() };
     assert_eq!(names(&self::read(&text, &told).unwrap()), ["b"]);
 }
 
@@ -138,15 +107,9 @@ fn other_languages_and_units_are_read() {
     let polish = "Test : Tempo 1;\"15,00000\";mm/min\n\nGodzina;Przemieszczenie;Obciążenie\n(min);(cm);(kN)\n\
         \"0,00000\";\"0,00746\";\"1,25000\"\n\"0,50000\";\"0,02761\";\"2,50000\"\n";
     let read = detected(polish);
-    assert_eq!(
-        numbers(&read, 0),
-        [[0.0, 0.0746, 1250.0], [30.0, 0.2761, 2500.0]]
-    );
+    assert_eq!(numbers(&read, 0), [[0.0, 0.0746, 1250.0], [30.0, 0.2761, 2500.0]]);
     let chinese = "时间,位移,载荷,压缩应变 (位移),循环计数\n(s),(mm),(N),(%),\n0,0,-0.5,0,0\n0.1,0.25,0.5,0.05,0\n";
-    assert_eq!(
-        numbers(&detected(chinese), 0),
-        [[0.0, 0.0, -0.5], [0.1, 0.25, 0.5]]
-    );
+    assert_eq!(numbers(&detected(chinese), 0), [[0.0, 0.0, -0.5], [0.1, 0.25, 0.5]]);
 }
 
 /// Bluehill Universal: results first, units behind the names.
@@ -157,15 +120,9 @@ const UNIVERSAL: &str = "Results Table 1\n,Maximum Force,Note\n,(N),\n1,12.5,goo
 fn results_are_facts_and_units_may_stand_behind_names() {
     let read = detected(UNIVERSAL);
     assert_eq!(numbers(&read, 0), [[0.0, 0.0, 1.0], [0.5, 2.0, 1250.25]]);
-    assert_eq!(
-        fact(&read, 0, "Results Table 1, 1: Maximum Force"),
-        Some("12.5 N")
-    );
+    assert_eq!(fact(&read, 0, "Results Table 1, 1: Maximum Force"), Some("12.5 N"));
     assert_eq!(fact(&read, 0, "Results Table 1, 1: Note"), Some("good"));
-    assert_eq!(
-        fact(&read, 0, "Results Table 1, Mean: Maximum Force"),
-        Some("12.5 N")
-    );
+    assert_eq!(fact(&read, 0, "Results Table 1, Mean: Maximum Force"), Some("12.5 N"));
 }
 
 #[test]
@@ -176,10 +133,8 @@ fn extension_and_its_compressive_twin_are_a_question() {
         reason.contains("columns 'Extension' and 'Compressive extension' could both be the depth"),
         "{reason}"
     );
-    let told = Told {
-        columns: vec!["depth=Compressive extension".parse().unwrap()],
-        ..Told::default()
-    };
+    let told =
+        Told { columns: vec!["depth=Compressive extension".parse().unwrap()], ..Told::default() };
     let read = read(twins, &told).unwrap();
     assert_eq!(numbers(&read, 0), [[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]);
 }
@@ -194,51 +149,27 @@ fn damaged_files_are_refused_with_the_line() {
         lines.join("\n")
     };
     for (text, expected) in [
-        (
-            lines[8..].join("\n"),
-            "line 1: numbers stand here before the names",
-        ),
+        (lines[8..].join("\n"), "line 1: numbers stand here before the names"),
         (with(7, ""), "line 8: numbers stand here before the names"),
-        (
-            with(7, "(s),(mm),(N)"),
-            "line 7: there are 3 units for the 4 columns of line 6",
-        ),
-        (
-            with(9, "torn,1,2,0"),
-            "line 9: 'torn,1,2,0' stands among the numbers or behind them",
-        ),
+        (with(7, "(s),(mm),(N)"), "line 7: there are 3 units for the 4 columns of line 6"),
+        (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' stands among the numbers or behind them"),
         (with(11, "\"0.3"), "line 11: a quote is not closed"),
         (
             with(11, "End of test,1"),
             "line 11: 'End of test,1' stands among the numbers or behind them",
         ),
-        (
-            with(10, "\"0.2\",\"x\",\"1\",\"0\""),
-            "line 10: the depth 'x' is not a number",
-        ),
-        (
-            with(10, "\"0.2\",\"\",\"1\",\"0\""),
-            "line 10: there is no depth",
-        ),
+        (with(10, "\"0.2\",\"x\",\"1\",\"0\""), "line 10: the depth 'x' is not a number"),
+        (with(10, "\"0.2\",\"\",\"1\",\"0\""), "line 10: there is no depth"),
         (
             with(10, "\"0.1\",\"0\",\"1\",\"0\""),
             "line 10: the time 0.1 s is that of the row before",
         ),
         (with(10, "0.2,0,1,0,0"), "line 10 has a cell in column 5"),
-        (
-            with(1, "a remark of somebody"),
-            "line 1: 'a remark of somebody' is neither",
-        ),
+        (with(1, "a remark of somebody"), "line 1: 'a remark of somebody' is neither"),
         (lines[..7].join("\n") + "\n1,1,1,1\n", "fewer than two rows"),
         ("0,1\n1,2\n".to_owned(), "line 1: numbers stand here"),
-        (
-            lines[..3].join("\n") + "\na,1,2\n",
-            "no names of columns above a line of units",
-        ),
-        (
-            whole.clone() + &lines[..4].join("\n"),
-            "line 12: 'Test : Rate 1",
-        ),
+        (lines[..3].join("\n") + "\na,1,2\n", "no names of columns above a line of units"),
+        (whole.clone() + &lines[..4].join("\n"), "line 12: 'Test : Rate 1"),
     ] {
         let reason = refused(&text);
         assert!(reason.contains(expected), "{reason}\n{text}");
@@ -259,9 +190,7 @@ fn a_file_cut_off_anywhere_is_refused_or_has_what_is_left() {
             continue;
         };
         let left_parts = left.parts.len();
-        let mut left: Vec<_> = (0..left_parts)
-            .flat_map(|part| numbers(&left, part))
-            .collect();
+        let mut left: Vec<_> = (0..left_parts).flat_map(|part| numbers(&left, part)).collect();
         // The last number may be cut off within; the rest is as it was.
         left.pop();
         assert_eq!(left, all[..left.len()], "{length}");

@@ -17,11 +17,8 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         \t[s]\t[mm]\t[N]\n\t0,0\t1,5\t2\n\t0,1\t1,6\t3\n[step]\nS\nTime\tPosition\tForce\ns\tmm\tN\n0\t1\t2\n1\t2\t3\n";
     let bluehill = "Test : Rate 1,\"1.0\",mm/s\nResults Table 1\n,Load\n,(N)\n1,3\n\nTime,Extension,Load\n(s),(mm),(N)\n\
         \"0.0\",\"1\",\"2\"\n\"0.1\",\"2\",\"3\"\nSpecimen label,b\nTime,Extension,Load\n(s),(mm),(N)\n0,1,2\n1,2,3\n";
-    let wide: Vec<u8> = "\u{feff}"
-        .encode_utf16()
-        .chain(table.encode_utf16())
-        .flat_map(u16::to_le_bytes)
-        .collect();
+    let wide: Vec<u8> =
+        "\u{feff}".encode_utf16().chain(table.encode_utf16()).flat_map(u16::to_le_bytes).collect();
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     vec![
         ("table", table.into()),
@@ -58,8 +55,7 @@ fn an_archive_that_unpacks_to_too_much_is_refused() {
     let reason = reason_of(bomb);
     assert!(reason.contains("unpacks"), "{reason}");
     let liar = xlsx_with("xl/sharedStrings.xml", &mut |file| {
-        file.write_all(b"<sst uniqueCount=\"9999999999999\"></sst>")
-            .unwrap();
+        file.write_all(b"<sst uniqueCount=\"9999999999999\"></sst>").unwrap();
     });
     let reason = reason_of(liar);
     assert!(reason.contains("more texts"), "{reason}");
@@ -100,10 +96,7 @@ fn workbook(rows: usize) -> Vec<u8> {
     let space = "http://schemas.openxmlformats.org";
     let relation = format!("{space}/officeDocument/2006/relationships");
     let parts = [
-        (
-            "[Content_Types].xml",
-            format!("<Types xmlns=\"{space}/package/2006/content-types\"/>"),
-        ),
+        ("[Content_Types].xml", format!("<Types xmlns=\"{space}/package/2006/content-types\"/>")),
         (
             "_rels/.rels",
             format!(
@@ -130,9 +123,7 @@ fn workbook(rows: usize) -> Vec<u8> {
         archive.start_file(name, options).unwrap();
         archive.write_all(text.as_bytes()).unwrap();
     }
-    archive
-        .start_file("xl/worksheets/sheet1.xml", options)
-        .unwrap();
+    archive.start_file("xl/worksheets/sheet1.xml", options).unwrap();
     let mut sheet =
         format!("<worksheet xmlns=\"{space}/spreadsheetml/2006/main\"><sheetData><row r=\"1\">");
     for (column, name) in [("A", "t_s"), ("B", "depth_mm"), ("C", "force_N")] {

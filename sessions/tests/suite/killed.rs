@@ -44,33 +44,16 @@ fn kill(task: &str, folder: &Path, files: &[PathBuf], call: &str, number: u32) -
     let trace = format!("trace={call}");
     let mut program = vec!["strace", "-f", "-qq", "-o", "/dev/null"];
     for file in files {
-        program.extend([
-            "-P",
-            file.to_str().expect("a temporary folder has a plain name"),
-        ]);
+        program.extend(["-P", file.to_str().expect("a temporary folder has a plain name")]);
     }
     program.extend(["-e", &trace, "-e", &inject]);
-    let output = command(&program, task, folder)
-        .output()
-        .expect("strace is there");
+    let output = command(&program, task, folder).output().expect("strace is there");
     let last = |word| told(&output, word).last().copied().unwrap_or(0);
-    Left {
-        saved: last("saved"),
-        taken: last("taken"),
-        was_killed: !output.status.success(),
-    }
+    Left { saved: last("saved"), taken: last("taken"), was_killed: !output.status.success() }
 }
 
 /// Calls that change what is on the disk.
-const CALLS: [&str; 7] = [
-    "write",
-    "openat",
-    "fdatasync",
-    "fsync",
-    "rename",
-    "ftruncate",
-    "mkdir",
-];
+const CALLS: [&str; 7] = ["write", "openat", "fdatasync", "fsync", "rename", "ftruncate", "mkdir"];
 
 /// Kills a task at every call of every kind, or at so many evenly spread ones; `check` looks at what is left.
 fn sweep(
@@ -109,9 +92,7 @@ fn points() -> usize {
 
 fn log_files(folder: &Path) -> Vec<PathBuf> {
     let numbers = 0..8;
-    let mut files: Vec<PathBuf> = numbers
-        .map(|number| folder.join(segment_file(number)))
-        .collect();
+    let mut files: Vec<PathBuf> = numbers.map(|number| folder.join(segment_file(number))).collect();
     files.extend([folder.to_path_buf(), folder.join("lock")]);
     files
 }
@@ -133,9 +114,7 @@ fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u
     check_raw(&raw, &work.rows, count, context);
     let entries = &work.entries[..session.entries.len()];
     assert_eq!(session.entries, entries, "{context}");
-    let due = work
-        .entries
-        .partition_point(|entry| (entry.after_sample as usize) < saved);
+    let due = work.entries.partition_point(|entry| (entry.after_sample as usize) < saved);
     assert!(entries.len() >= due, "{context}: entries are missing");
     // The lock went with the process, and what is left can be recovered.
     drop(SessionFolder::create(folder).expect_err("a session is in it"));
@@ -195,9 +174,7 @@ fn a_session_is_on_the_disk_before_a_sample_is_taken() {
         let end = format!("<{}>", path.display());
         let is_it = |line: &&str| line.contains(call) && line.contains(&end);
         let found = text.lines().enumerate().find(|(_, line)| is_it(line));
-        found
-            .unwrap_or_else(|| panic!("no {call} of {end} in\n{text}"))
-            .0
+        found.unwrap_or_else(|| panic!("no {call} of {end} in\n{text}")).0
     };
     let log = folder.join(LOG_FILE);
     let first = text.lines().position(|line| line.contains("\"taken \""));
@@ -228,23 +205,18 @@ fn a_killed_recovery_leaves_the_original_and_can_be_repeated() {
         let parent = folder.parent().expect("it has one").to_path_buf();
         vec![parent, unfinished, log, copy]
     };
-    let killed = sweep(
-        "recover",
-        points(),
-        &prepare,
-        &mut |folder, left, context| {
-            assert_eq!(fs::read(folder.join(LOG_FILE)).expect(context), bytes);
-            let copy = recovered_folder(folder);
-            if left.saved == 0 && !copy.exists() {
-                recover(folder, "1", chrono::DateTime::UNIX_EPOCH).expect(context);
-            }
-            let copy = Session::open(&copy).expect(context);
-            assert!(same_bits(&copy.rows, &work.rows), "{context}");
-            assert_eq!(copy.entries, work.entries, "{context}");
-            let left = salvage(folder, &mut |_| {}).expect(context);
-            assert_eq!(left.samples, 2000, "{context}");
-        },
-    );
+    let killed = sweep("recover", points(), &prepare, &mut |folder, left, context| {
+        assert_eq!(fs::read(folder.join(LOG_FILE)).expect(context), bytes);
+        let copy = recovered_folder(folder);
+        if left.saved == 0 && !copy.exists() {
+            recover(folder, "1", chrono::DateTime::UNIX_EPOCH).expect(context);
+        }
+        let copy = Session::open(&copy).expect(context);
+        assert!(same_bits(&copy.rows, &work.rows), "{context}");
+        assert_eq!(copy.entries, work.entries, "{context}");
+        let left = salvage(folder, &mut |_| {}).expect(context);
+        assert_eq!(left.samples, 2000, "{context}");
+    });
     println!("{killed} crash points of a recovery");
     assert!(killed >= 3, "{killed}");
 }
@@ -263,11 +235,7 @@ fn a_killed_edit_counts_or_does_not() {
         killed += sweep(task, points(), &prepare, &mut |folder, left, context| {
             let found: Vec<Edit> = match file {
                 JOURNAL_FILE => Journal::open(folder).expect(context).1,
-                _ => {
-                    Edits::read(folder, &manifest().session_id)
-                        .expect(context)
-                        .all
-                }
+                _ => Edits::read(folder, &manifest().session_id).expect(context).all,
             };
             assert!(found.len() as u64 >= left.saved, "{context}");
             assert!(found.len() as u64 <= left.saved + 1, "{context}");

@@ -98,10 +98,7 @@ fn files_of_a_lake_never_change() {
     let lake = folder.path();
     let session = session();
     put(lake, &session, Told::default()).unwrap();
-    let before: Vec<Vec<u8>> = files(lake)
-        .iter()
-        .map(|path| fs::read(path).unwrap())
-        .collect();
+    let before: Vec<Vec<u8>> = files(lake).iter().map(|path| fs::read(path).unwrap()).collect();
     // What a killed writer left.
     let samples = &files(lake)[2];
     let name = samples.file_name().unwrap().to_string_lossy();
@@ -112,14 +109,8 @@ fn files_of_a_lake_never_change() {
     let mut other = session.clone();
     other.rows[100].force = Some(1.0);
     let refusal = put(lake, &other, Told::default()).unwrap_err();
-    assert!(
-        matches!(refusal, ExportError::Different { .. }),
-        "{refusal}"
-    );
-    let after: Vec<Vec<u8>> = files(lake)
-        .iter()
-        .map(|path| fs::read(path).unwrap())
-        .collect();
+    assert!(matches!(refusal, ExportError::Different { .. }), "{refusal}");
+    let after: Vec<Vec<u8>> = files(lake).iter().map(|path| fs::read(path).unwrap()).collect();
     assert!(before == after, "something changed or was left behind");
 }
 
@@ -131,11 +122,7 @@ fn a_name_or_a_rig_never_leads_out_of_the_lake() {
     session.manifest.rig.as_mut().unwrap().name = "../../Rig 1".into();
     put(&lake, &session, Told::default()).unwrap();
     assert_eq!(sessions(&lake).unwrap().len(), 1);
-    assert!(
-        files(&lake)[0]
-            .to_string_lossy()
-            .contains("rig=..%2F..%2FRig%201/")
-    );
+    assert!(files(&lake)[0].to_string_lossy().contains("rig=..%2F..%2FRig%201/"));
     session.manifest.session_id = "../../evil".into();
     let refusal = put(&lake, &session, Told::default()).unwrap_err();
     assert!(matches!(refusal, ExportError::BadName { .. }), "{refusal}");
@@ -179,25 +166,11 @@ fn a_fit_is_kept_once_and_made_with_other_settings_refused() {
     assert_eq!(state_of_fit(&file).unwrap(), FitState::Missing);
     keep_fit(&file, &serde_json::json!({"r2": 0.5})).unwrap();
     assert_eq!(state_of_fit(&file).unwrap(), FitState::There);
-    let path = folder
-        .path()
-        .join("v1/fits/model=kelvin%2F3/20260305T141507Z-0badcafe.json");
+    let path = folder.path().join("v1/fits/model=kelvin%2F3/20260305T141507Z-0badcafe.json");
     assert_eq!(files(folder.path()), [path]);
-    let other = FitFile {
-        settings: &others,
-        ..file
-    };
-    assert!(matches!(
-        state_of_fit(&other),
-        Err(ExportError::Different { .. })
-    ));
+    let other = FitFile { settings: &others, ..file };
+    assert!(matches!(state_of_fit(&other), Err(ExportError::Different { .. })));
     assert!(keep_fit(&other, &serde_json::json!({"r2": 0.5})).is_err());
-    let evil = FitFile {
-        session_id: "../evil",
-        ..file
-    };
-    assert!(matches!(
-        keep_fit(&evil, &1),
-        Err(ExportError::BadName { .. })
-    ));
+    let evil = FitFile { session_id: "../evil", ..file };
+    assert!(matches!(keep_fit(&evil, &1), Err(ExportError::BadName { .. })));
 }

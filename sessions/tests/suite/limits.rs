@@ -38,14 +38,9 @@ pub fn record_with_spare(folder: &Path, samples: usize) {
         }
     }
     let news = writer.news();
-    writer
-        .close(end(Nanos::from_millis(samples as u64)))
-        .unwrap();
+    writer.close(end(Nanos::from_millis(samples as u64))).unwrap();
     for notice in news.take() {
-        let Notice::Moved {
-            reason, is_last, ..
-        } = &notice
-        else {
+        let Notice::Moved { reason, is_last, .. } = &notice else {
             panic!("{notice}");
         };
         eprintln!("moved {}\nreason {reason}", u8::from(*is_last));
@@ -66,9 +61,7 @@ pub fn record_in_little_memory(folder: &Path, samples: usize) {
     for row in &work.rows {
         writer.push_row(*row).unwrap();
     }
-    writer
-        .close(end(Nanos::from_millis(samples as u64)))
-        .unwrap();
+    writer.close(end(Nanos::from_millis(samples as u64))).unwrap();
     eprintln!("saved {samples}");
 }
 
@@ -94,37 +87,19 @@ fn a_disk_that_is_really_full_sends_the_recording_elsewhere() {
     let folder = tempfile::tempdir().unwrap();
     let mounted = folder.path().join("small");
     fs::create_dir(&mounted).unwrap();
-    let script = format!(
-        "mount -t tmpfs -o size=256k none '{}' && exec \"$0\" \"$@\"",
-        mounted.display()
-    );
-    let own_disk = [
-        "unshare",
-        "--user",
-        "--map-root-user",
-        "--mount",
-        "sh",
-        "-c",
-    ];
-    let possible = Command::new(own_disk[0])
-        .args(&own_disk[1..])
-        .args([&script, "true"])
-        .output();
+    let script =
+        format!("mount -t tmpfs -o size=256k none '{}' && exec \"$0\" \"$@\"", mounted.display());
+    let own_disk = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"];
+    let possible = Command::new(own_disk[0]).args(&own_disk[1..]).args([&script, "true"]).output();
     if !possible.is_ok_and(|output| output.status.success()) {
-        skip(
-            Need::System("mount namespaces"),
-            "unshare or mount is refused",
-        );
+        skip(Need::System("mount namespaces"), "unshare or mount is refused");
         return;
     }
     let program = [&own_disk[..], &[&script]].concat();
     let output = command(&program, "spare 40000", &mounted).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     assert_eq!(told(&output, "moved"), [1], "it is the last place");
-    assert!(
-        reasons(&output).contains("No space left on device"),
-        "{output:?}"
-    );
+    assert!(reasons(&output).contains("No space left on device"), "{output:?}");
     assert_eq!(told(&output, "saved"), [40_000]);
 }
 
@@ -145,9 +120,7 @@ fn a_file_that_may_not_grow_is_left_for_another() {
 fn a_recording_takes_little_memory_however_long_it_is() {
     let folder = tempfile::tempdir().unwrap();
     // All samples would take 96 MB.
-    let output = command(&[], "little 800000", folder.path())
-        .output()
-        .unwrap();
+    let output = command(&[], "little 800000", folder.path()).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let mut samples = 0;
     let path = folder.path().join("one");
@@ -162,11 +135,7 @@ fn failing(file: &Path, call: &str, error: &str, when: &str) -> Vec<String> {
     let inject = format!("inject={call}:error={error}:when={when}");
     let quiet = ["strace", "-f", "-qq", "-o", "/dev/null"];
     let what = ["-P", shown, "-e", &trace, "-e", &inject];
-    [&quiet[..], &what]
-        .concat()
-        .into_iter()
-        .map(Into::into)
-        .collect()
+    [&quiet[..], &what].concat().into_iter().map(Into::into).collect()
 }
 
 fn words(program: &[String]) -> Vec<&str> {
@@ -179,19 +148,12 @@ fn an_error_of_the_disk_costs_a_real_recording_nothing() {
         return;
     }
     let work = Work::new(3000);
-    for (call, number) in [
-        ("write", 4),
-        ("write", 11),
-        ("fdatasync", 2),
-        ("fdatasync", 5),
-    ] {
+    for (call, number) in [("write", 4), ("write", 11), ("fdatasync", 2), ("fdatasync", 5)] {
         let folder = tempfile::tempdir().unwrap();
         let session = folder.path().join("one");
         let log = session.join(LOG_FILE);
         let program = failing(&log, call, "EIO", &format!("{number}+"));
-        let output = command(&words(&program), "session 3000", &session)
-            .output()
-            .unwrap();
+        let output = command(&words(&program), "session 3000", &session).output().unwrap();
         assert!(output.status.success(), "{output:?}");
         let read = Session::open(&session).unwrap();
         assert!(same_bits(&read.rows, &work.rows), "{call} {number}");
@@ -208,11 +170,9 @@ fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
     }
     let rows = rows(1500, 92);
     let bytes = log_bytes(&rows, &[], None);
-    for (call, number, error) in [
-        ("write", 1, "EIO"),
-        ("write", 3, "ENOSPC"),
-        ("fdatasync", 2, "EIO"),
-    ] {
+    for (call, number, error) in
+        [("write", 1, "EIO"), ("write", 3, "ENOSPC"), ("fdatasync", 2, "EIO")]
+    {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("one");
         fs::create_dir(&folder).unwrap();
@@ -220,9 +180,7 @@ fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
         let copy = recovered_folder(&folder);
         let log = copy.with_extension("recovering").join(LOG_FILE);
         let program = failing(&log, call, error, &number.to_string());
-        let output = command(&words(&program), "recover", &folder)
-            .output()
-            .unwrap();
+        let output = command(&words(&program), "recover", &folder).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success(), "{call} {number}: {said}");
         assert!(said.contains("Disk {"), "{said}");

@@ -77,10 +77,7 @@ impl Sink for StuckSink {
 fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     let gate = Arc::new(Mutex::new(()));
     let inner = MemorySink::default();
-    let sink = StuckSink {
-        inner: inner.clone(),
-        gate: Arc::clone(&gate),
-    };
+    let sink = StuckSink { inner: inner.clone(), gate: Arc::clone(&gate) };
     let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
     let rows = rows(40_000, 33);
     let stuck = gate.lock().unwrap();
@@ -93,10 +90,7 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
             told.push((notice, row.host.seconds().0));
         }
         if let Err(err) = outcome {
-            assert!(
-                matches!(err, LogError::TooSlow { seconds: 30, .. }),
-                "{err}"
-            );
+            assert!(matches!(err, LogError::TooSlow { seconds: 30, .. }), "{err}");
             failed_at = Some(row.host.seconds().0);
             break;
         }

@@ -34,11 +34,7 @@ impl Recording {
                 entry.kind = EntryKind::Fit;
             }
         }
-        Self {
-            rows,
-            entries,
-            trace: Vec::new(),
-        }
+        Self { rows, entries, trace: Vec::new() }
     }
 
     /// Written as the writer thread does it, but step by step, and the caller told of every synchronisation.
@@ -64,12 +60,7 @@ impl Recording {
             let (due, later) =
                 rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
             rest = later;
-            let parts = Parts {
-                rows: batch,
-                entries: due,
-                raw: &raw[number],
-                health: &[],
-            };
+            let parts = Parts { rows: batch, entries: due, raw: &raw[number], health: &[] };
             since_sync.push(parts);
             let is_event = due.iter().any(|entry| entry.kind != EntryKind::Fit);
             let mut outcome = log.append_parts(&parts);
@@ -112,21 +103,14 @@ impl Recording {
             while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
                 // Were they answers of the fit, nothing would be synchronised before a second has passed.
                 let kind = EntryKind::Input;
-                let entry = Entry {
-                    kind,
-                    ..entry.clone()
-                };
+                let entry = Entry { kind, ..entry.clone() };
                 writer.push_entry(entry).expect("it goes on elsewhere");
             }
             let raw = raw_of(std::slice::from_ref(row));
-            writer
-                .push_raw(row.host, raw)
-                .expect("it goes on elsewhere");
+            writer.push_raw(row.host, raw).expect("it goes on elsewhere");
             writer.push_row(*row).expect("it goes on elsewhere");
         }
-        writer
-            .close(end(Nanos::from_millis(1)))
-            .expect("it goes on elsewhere");
+        writer.close(end(Nanos::from_millis(1))).expect("it goes on elsewhere");
         for entry in &mut self.entries {
             entry.kind = EntryKind::Input;
         }
@@ -138,10 +122,7 @@ impl Recording {
     fn tell_what_is_synchronised(&mut self) {
         let taken = self.rows.len();
         // So that there is a step under way after the last synchronisation.
-        self.trace.extend([0, 0].map(|told| Traced {
-            step: Step::Told(told),
-            taken,
-        }));
+        self.trace.extend([0, 0].map(|told| Traced { step: Step::Told(told), taken }));
         for at in (0..self.trace.len()).rev() {
             if matches!(self.trace[at].step, Step::Sync(_)) {
                 // The folder's own may follow.
@@ -198,10 +179,7 @@ impl Recording {
             kept += found.len();
         });
         // Nothing but the beginning that never reached the disk makes a session useless.
-        let Ok(Salvage {
-            entries, missing, ..
-        }) = left
-        else {
+        let Ok(Salvage { entries, missing, .. }) = left else {
             return 0;
         };
         let is_own = |entry: &Entry| self.entries.contains(entry);
@@ -275,9 +253,7 @@ fn a_power_cut_after_a_failed_write_costs_no_more() {
     let (mut most, mut count) = (0, 0);
     for number in 0..cuts().div_ceil(8) as u64 {
         // The first three operations make the session; a failure there is a refused start.
-        let fail_at: Vec<u32> = (0..1 + number % 3)
-            .map(|_| 3 + random.below(45) as u32)
-            .collect();
+        let fail_at: Vec<u32> = (0..1 + number % 3).map(|_| 3 + random.below(45) as u32).collect();
         let recording = Recording::new(2500, 500 + number).by_log(8, &fail_at);
         most = most.max(sweep(&recording, 16, number));
         count += 16;

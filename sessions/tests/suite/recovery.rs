@@ -17,12 +17,8 @@ fn at() -> chrono::DateTime<Utc> {
 
 /// Every file below a folder with its bytes.
 fn contents(folder: &Path) -> BTreeMap<std::path::PathBuf, Vec<u8>> {
-    let files = fs::read_dir(folder)
-        .unwrap()
-        .map(|item| item.unwrap().path());
-    files
-        .map(|path| (path.clone(), fs::read(path).unwrap()))
-        .collect()
+    let files = fs::read_dir(folder).unwrap().map(|item| item.unwrap().path());
+    files.map(|path| (path.clone(), fs::read(path).unwrap())).collect()
 }
 
 /// A session folder in a library, with bytes as its log.
@@ -40,16 +36,9 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
     let entries = entries(&rows, 60);
     let whole = log_bytes(&rows, &entries, None);
     let folder = session_with(library.path(), "a", &whole[..whole.len() - 77]);
-    session_with(
-        library.path(),
-        "b",
-        &log_bytes(&rows, &entries, Some(end(Nanos::ZERO))),
-    );
+    session_with(library.path(), "b", &log_bytes(&rows, &entries, Some(end(Nanos::ZERO))));
     let before = contents(&folder);
-    assert_eq!(
-        examine_library(library.path()).unwrap(),
-        std::slice::from_ref(&folder)
-    );
+    assert_eq!(examine_library(library.path()).unwrap(), std::slice::from_ref(&folder));
 
     let recovery = recover(&folder, "1.2.3", at()).unwrap();
     assert_eq!(contents(&folder), before, "the original was touched");
@@ -67,21 +56,12 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
     let mut told = session.manifest.clone();
     let recovered = told.recovered.take().unwrap();
     assert_eq!(recovered.from, manifest().session_id);
-    assert_eq!(
-        (recovered.at, recovered.software_version.as_str()),
-        (at(), "1.2.3")
-    );
+    assert_eq!((recovered.at, recovered.software_version.as_str()), (at(), "1.2.3"));
     told.session_id = manifest().session_id;
     assert_eq!(told, manifest());
     // Found no more, and not made twice.
-    assert_eq!(
-        examine_library(library.path()).unwrap(),
-        Vec::<std::path::PathBuf>::new()
-    );
-    assert!(matches!(
-        recover(&folder, "1.2.3", at()),
-        Err(RecoverError::Before { .. })
-    ));
+    assert_eq!(examine_library(library.path()).unwrap(), Vec::<std::path::PathBuf>::new());
+    assert!(matches!(recover(&folder, "1.2.3", at()), Err(RecoverError::Before { .. })));
 }
 
 #[test]
@@ -112,15 +92,8 @@ fn entries_stay_between_the_samples_they_came_between() {
         for entry in &session.entries {
             let old = entries.iter().find(|one| one.order == entry.order).unwrap();
             assert_eq!(old.body, entry.body);
-            let before = numbers
-                .iter()
-                .filter(|n| (**n as u64) < old.after_sample)
-                .count();
-            assert_eq!(
-                entry.after_sample, before as u64,
-                "case {case}, entry {}",
-                entry.order
-            );
+            let before = numbers.iter().filter(|n| (**n as u64) < old.after_sample).count();
+            assert_eq!(entry.after_sample, before as u64, "case {case}, entry {}", entry.order);
         }
     }
 }
@@ -139,9 +112,7 @@ fn the_doctor_says_what_each_file_is() {
         let patient = examine(&session_with(library.path(), "try", &hurt));
         patient.samples < 1500
     };
-    let middle = (whole.len() / 2..whole.len())
-        .step_by(500)
-        .find(costs_samples);
+    let middle = (whole.len() / 2..whole.len()).step_by(500).find(costs_samples);
     let middle = middle.expect("a byte of samples");
     let mut hurt = whole.clone();
     hurt[middle] ^= 4;
@@ -150,26 +121,12 @@ fn the_doctor_says_what_each_file_is() {
     let patient = health("whole", &whole);
     assert_eq!((patient.health, patient.samples), (Health::Healthy, 1500));
     let patient = health("open", &open);
-    assert_eq!(
-        (patient.health, patient.samples),
-        (Health::Interrupted, 1500)
-    );
-    assert!(
-        patient.findings[0].contains("interrupted at 1.5 s"),
-        "{:?}",
-        patient.findings
-    );
+    assert_eq!((patient.health, patient.samples), (Health::Interrupted, 1500));
+    assert!(patient.findings[0].contains("interrupted at 1.5 s"), "{:?}", patient.findings);
     let patient = health("hurt", &hurt);
-    let Health::Damaged { missing } = &patient.health else {
-        panic!("{patient:?}")
-    };
+    let Health::Damaged { missing } = &patient.health else { panic!("{patient:?}") };
     assert_eq!(missing.gaps[0].samples + patient.samples, 1500);
-    assert!(
-        patient
-            .findings
-            .iter()
-            .any(|one| one.contains("000.mcap") && one.contains("byte"))
-    );
+    assert!(patient.findings.iter().any(|one| one.contains("000.mcap") && one.contains("byte")));
     // Where no sample is: nothing is missing, and it is still made whole again.
     let mut hurt = whole.clone();
     let index = hurt.len() - 100;
@@ -181,16 +138,10 @@ fn the_doctor_says_what_each_file_is() {
     let copy = recover(&library.path().join("sessions/index"), "1", at()).unwrap();
     let copy = Session::open(&copy.folder).unwrap();
     assert!(same_bits(&copy.rows, &rows) && copy.end.is_some());
-    assert_eq!(
-        health("foreign", b"PK\x03\x04 a spreadsheet").health,
-        Health::Foreign
-    );
+    assert_eq!(health("foreign", b"PK\x03\x04 a spreadsheet").health, Health::Foreign);
     assert_eq!(health("empty", b"").health, Health::Foreign);
     assert_eq!(health("begun", &whole[..60]).health, Health::Lost);
-    assert_eq!(
-        examine(&library.path().join("nothing")).health,
-        Health::Foreign
-    );
+    assert_eq!(examine(&library.path().join("nothing")).health, Health::Foreign);
 
     // Where nothing is, nothing is damaged, and recovery would not help.
     let hollow = library.path().join("hollow");
@@ -207,17 +158,11 @@ fn the_doctor_says_what_each_file_is() {
     let mut writer = SessionWriter::start(held, None, &manifest(), Pace::Virtual).unwrap();
     rows.iter().for_each(|row| writer.push_row(*row).unwrap());
     assert_eq!(examine(&path).health, Health::BeingRecorded);
-    assert!(matches!(
-        recover(&path, "1", at()),
-        Err(RecoverError::InUse { .. })
-    ));
+    assert!(matches!(recover(&path, "1", at()), Err(RecoverError::InUse { .. })));
     assert!(!examine_library(library.path()).unwrap().contains(&path));
     writer.close(end(Nanos::from_millis(1500))).unwrap();
     assert_eq!(examine(&path).health, Health::Healthy);
-    assert!(matches!(
-        recover(&path, "1", at()),
-        Err(RecoverError::Whole { .. })
-    ));
+    assert!(matches!(recover(&path, "1", at()), Err(RecoverError::Whole { .. })));
 }
 
 #[test]
@@ -233,9 +178,7 @@ fn a_record_version_that_is_none_is_told_as_it_is() {
         log_time: 0,
         publish_time: 0,
     };
-    writer
-        .write_to_known_channel(&header, br#"{"record_version": -1}"#)
-        .unwrap();
+    writer.write_to_known_channel(&header, br#"{"record_version": -1}"#).unwrap();
     writer.finish().unwrap();
     drop(writer);
     let path = session_with(folder.path(), "odd", &file.into_inner());

@@ -19,9 +19,7 @@ fn a_session_comes_back_bit_for_bit_at_either_pace() {
         let mut rows = rows(5000, 1);
         rows[17].force = Some(-0.0);
         // A rig whose converter drops out: counts vanish and come back.
-        rows[2345..2350]
-            .iter_mut()
-            .for_each(|row| row.counts = None);
+        rows[2345..2350].iter_mut().for_each(|row| row.counts = None);
         let entries = entries(&rows, 50);
         let mut writer = SessionWriter::start(folder, None, &manifest(), pace).unwrap();
         let mut pending = entries.iter().peekable();
@@ -63,10 +61,7 @@ fn the_file_is_a_valid_mcap_file() {
     let mut count = 0;
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
-        assert!(
-            message.channel.schema.is_some(),
-            "viewers skip channels without"
-        );
+        assert!(message.channel.schema.is_some(), "viewers skip channels without");
         let sequence: &mut u32 = last.entry(message.channel.topic.clone()).or_default();
         assert_eq!(message.sequence, *sequence);
         *sequence += 1;
@@ -87,10 +82,7 @@ fn a_log_without_an_end_opens_with_a_note() {
     assert!(same_bits(&session.rows, &rows));
     assert_eq!(session.end, None);
     let note = &session.notes[0];
-    assert!(
-        note.starts_with("no end record") && note.contains("12.3 s"),
-        "{note}"
-    );
+    assert!(note.starts_with("no end record") && note.contains("12.3 s"), "{note}");
 }
 
 #[test]
@@ -104,12 +96,7 @@ fn a_newer_session_is_refused_with_both_versions() {
     log.finish(end(Nanos::ZERO)).unwrap();
     let bytes = sink.bytes();
     let refusal = open_bytes(&bytes).unwrap_err();
-    let ReadError::Newer {
-        software_version,
-        record_version,
-        ..
-    } = refusal
-    else {
+    let ReadError::Newer { software_version, record_version, .. } = refusal else {
         panic!("{refusal:?}");
     };
     assert_eq!((software_version.as_str(), record_version), ("3.1.4", 3));
@@ -124,16 +111,11 @@ fn what_is_no_session_is_told_apart() {
     assert!(matches!(empty, ReadError::NotASession { .. }), "{empty}");
     for bytes in [&b""[..], b"this is no session", &[0; 4096]] {
         let refusal = open_bytes(bytes).unwrap_err();
-        assert!(
-            matches!(refusal, ReadError::NotASession { .. }),
-            "{refusal}"
-        );
+        assert!(matches!(refusal, ReadError::NotASession { .. }), "{refusal}");
     }
     let mut foreign = Vec::new();
     let mut other = mcap::Writer::new(std::io::Cursor::new(&mut foreign)).unwrap();
-    let channel = other
-        .add_channel(0, "/daq/block", "json", &Default::default())
-        .unwrap();
+    let channel = other.add_channel(0, "/daq/block", "json", &Default::default()).unwrap();
     let header = mcap::records::MessageHeader {
         channel_id: channel,
         sequence: 0,
@@ -144,10 +126,7 @@ fn what_is_no_session_is_told_apart() {
     other.finish().unwrap();
     drop(other);
     let refusal = open_bytes(&foreign).unwrap_err();
-    assert!(
-        matches!(refusal, ReadError::NotASession { .. }),
-        "{refusal}"
-    );
+    assert!(matches!(refusal, ReadError::NotASession { .. }), "{refusal}");
 }
 
 #[test]

@@ -126,9 +126,7 @@ fn check(session: &Session, rows: &[Row], entries: &[Entry], at_least: usize, co
     assert!(count >= at_least, "{context}: {count} of {at_least} rows");
     assert!(same_bits(&session.rows, &rows[..count]), "{context}");
     assert_eq!(session.entries, entries[..entry_count], "{context}");
-    let due = entries
-        .iter()
-        .filter(|entry| entry.after_sample < at_least as u64);
+    let due = entries.iter().filter(|entry| entry.after_sample < at_least as u64);
     assert!(entry_count >= due.count(), "{context}: entries are missing");
     assert_eq!(session.manifest, manifest());
     if session.end.is_none() {
@@ -282,9 +280,7 @@ fn whatever_operation_fails_across_rotations_is_reported_and_loses_nothing() {
             check(&session, &rows, &entries, *at_least, &context);
         }
     }
-    let names: Vec<String> = (0..3)
-        .map(|number| Journal::default().path(number))
-        .collect();
+    let names: Vec<String> = (0..3).map(|number| Journal::default().path(number)).collect();
     assert!(blamed.iter().eq(&names), "{blamed:?}");
 }
 
@@ -323,24 +319,13 @@ fn a_missing_segment_is_refused_and_can_be_recovered_from() {
     assert!(same_bits(&kept[..2 * BATCH], &rows[..2 * BATCH]));
     assert!(same_bits(&kept[2 * BATCH..], &rows[4 * BATCH..]));
     let told = left.missing.sentences().join("; ");
-    assert!(
-        told.contains("001.mcap") && told.contains("80 samples between"),
-        "{told}"
-    );
+    assert!(told.contains("001.mcap") && told.contains("80 samples between"), "{told}");
     // Another segment does not pass for it, nor for the first one.
-    fs::rename(
-        folder.path().join("002.mcap"),
-        folder.path().join("001.mcap"),
-    )
-    .unwrap();
+    fs::rename(folder.path().join("002.mcap"), folder.path().join("001.mcap")).unwrap();
     assert!(Session::open(folder.path()).is_err());
     fs::remove_file(folder.path().join("000.mcap")).unwrap();
     assert!(Session::open(folder.path()).is_err());
-    fs::rename(
-        folder.path().join("001.mcap"),
-        folder.path().join("000.mcap"),
-    )
-    .unwrap();
+    fs::rename(folder.path().join("001.mcap"), folder.path().join("000.mcap")).unwrap();
     assert!(Session::open(folder.path()).is_err());
 }
 
@@ -361,10 +346,7 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
     let (left, kept) = salvaged(folder.path());
     let gap = &left.missing.gaps[0];
-    let (before, after) = (
-        gap.after_sample as usize,
-        (gap.after_sample + gap.samples) as usize,
-    );
+    let (before, after) = (gap.after_sample as usize, (gap.after_sample + gap.samples) as usize);
     assert!(same_bits(&kept[..before], &rows[..before]));
     assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
 }
@@ -406,11 +388,7 @@ fn segments_of_another_session_are_refused() {
     log.finish(end(Nanos::ZERO)).unwrap();
     let theirs = quick_folder();
     replay_steps(&journal.0.lock().unwrap().steps, theirs.path());
-    fs::copy(
-        theirs.path().join("001.mcap"),
-        folder.path().join("001.mcap"),
-    )
-    .unwrap();
+    fs::copy(theirs.path().join("001.mcap"), folder.path().join("001.mcap")).unwrap();
     let refusal = Session::open(folder.path()).unwrap_err().to_string();
     assert!(refusal.contains("manifest"), "{refusal}");
 

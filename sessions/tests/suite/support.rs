@@ -34,9 +34,7 @@ impl Random {
 
 fn about() -> About {
     let mut labels = Labels::default();
-    labels
-        .tell_pair("specimen.temperature_c=36.6")
-        .expect("a known key");
+    labels.tell_pair("specimen.temperature_c=36.6").expect("a known key");
     labels.about
 }
 
@@ -293,12 +291,7 @@ fn log_bytes_with(
         while let Some(entry) = entries.next_if(|entry| entry.after_sample < (i as u64 + 1) * 100) {
             due.push(entry.clone());
         }
-        let parts = Parts {
-            rows: batch,
-            entries: &due,
-            raw: &raw_of(batch),
-            health: &[],
-        };
+        let parts = Parts { rows: batch, entries: &due, raw: &raw_of(batch), health: &[] };
         log.append_parts(&parts).unwrap();
     }
     if let Some(end) = end {
@@ -318,21 +311,14 @@ pub fn open_bytes(bytes: &[u8]) -> Result<Session, palpate_sessions::ReadError> 
 /// Whether two sets of rows agree in every bit, the sign of zero included.
 pub fn same_bits(a: &[Row], b: &[Row]) -> bool {
     let bits = |row: &Row| {
-        (
-            row.volts.map(f64::to_bits),
-            row.force.map(f64::to_bits),
-            row.depth.map(f64::to_bits),
-        )
+        (row.volts.map(f64::to_bits), row.force.map(f64::to_bits), row.depth.map(f64::to_bits))
     };
     a == b && a.iter().map(bits).eq(b.iter().map(bits))
 }
 
 /// A count that the soak script may raise by an environment variable.
 pub fn count_from(variable: &str, usual: usize) -> usize {
-    std::env::var(variable)
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(usual)
+    std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
 /// A folder in memory, where there is one: thousands of files are written for each test.

@@ -19,10 +19,7 @@ struct Beside(Child);
 impl Beside {
     fn start(task: &str, folder: &Path) -> Self {
         let mut command = command(&[], task, folder);
-        let piped = command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped());
+        let piped = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = piped.spawn().expect("a test is a program");
         let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
         let mut line = String::new();
@@ -68,17 +65,10 @@ fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
     let at = library.path();
     let session = at.join("sessions/one");
     fs::create_dir_all(&session).unwrap();
-    fs::write(
-        session.join(LOG_FILE),
-        log_bytes(&rows(100, 1), &[], Some(end(Nanos(0)))),
-    )
-    .unwrap();
+    fs::write(session.join(LOG_FILE), log_bytes(&rows(100, 1), &[], Some(end(Nanos(0))))).unwrap();
     let count = || Catalog::with(at, |catalog| Ok(catalog.update(&mut |_, _| {})?.sessions));
     assert_eq!(count().unwrap(), 1);
-    for task in [
-        "lock catalog.lock".to_owned(),
-        format!("sqlite {CATALOG_FILE}"),
-    ] {
+    for task in ["lock catalog.lock".to_owned(), format!("sqlite {CATALOG_FILE}")] {
         let stranger = Beside::start(&task, at);
         match count() {
             Err(CatalogError::Busy(busy)) => assert!(stranger.is(&busy), "{busy}"),
@@ -99,10 +89,7 @@ fn what_a_killed_process_was_writing_is_told_and_swept_and_no_other() {
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
     let left = leftovers(at, 1);
-    assert!(
-        left.len() == 1 && left[0].to_string_lossy().contains("killed.csv"),
-        "{left:?}"
-    );
+    assert!(left.len() == 1 && left[0].to_string_lossy().contains("killed.csv"), "{left:?}");
     assert_eq!(sweep(at, 1), left);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1);
 }
@@ -122,33 +109,16 @@ fn of_many_recoveries_at_once_one_wins_and_nothing_is_left_over() {
                 quiet.spawn().unwrap()
             })
             .collect();
-        let outputs: Vec<_> = children
-            .into_iter()
-            .map(|it| it.wait_with_output().unwrap())
-            .collect();
-        let won: u64 = outputs
-            .iter()
-            .flat_map(|output| told(output, "saved"))
-            .sum();
+        let outputs: Vec<_> =
+            children.into_iter().map(|it| it.wait_with_output().unwrap()).collect();
+        let won: u64 = outputs.iter().flat_map(|output| told(output, "saved")).sum();
         assert_eq!(won, 1, "{outputs:?}");
-        assert!(
-            outputs.iter().all(|output| output.status.success()),
-            "{outputs:?}"
-        );
-        assert_eq!(
-            Session::open(&recovered_folder(&folder))
-                .unwrap()
-                .rows
-                .len(),
-            all.len()
-        );
+        assert!(outputs.iter().all(|output| output.status.success()), "{outputs:?}");
+        assert_eq!(Session::open(&recovered_folder(&folder)).unwrap().rows.len(), all.len());
         let again = recover(&folder, "1", chrono::DateTime::UNIX_EPOCH).unwrap_err();
         assert!(matches!(again, RecoverError::Before { .. }), "{again}");
         // The session and its copy, of each round so far.
-        assert_eq!(
-            fs::read_dir(parent.path()).unwrap().count(),
-            2 * (round + 1)
-        );
+        assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 2 * (round + 1));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
     }
 }

@@ -104,12 +104,7 @@ fn write_log(folder: &Path, samples: usize) {
         let (due, later) = rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
         rest = later;
         eprintln!("taken {stop}");
-        let parts = Parts {
-            rows: batch,
-            entries: due,
-            raw: &raw_of(batch),
-            health: &[],
-        };
+        let parts = Parts { rows: batch, entries: due, raw: &raw_of(batch), health: &[] };
         log.append_parts(&parts).unwrap();
         eprintln!("saved {stop}");
         if number % 9 == 8 {
@@ -141,9 +136,7 @@ fn write_session(folder: &Path, samples: usize) {
             eprintln!("taken {}\nsaved {count}", number + 1);
         }
     }
-    writer
-        .close(end(Nanos::from_millis(samples as u64)))
-        .unwrap();
+    writer.close(end(Nanos::from_millis(samples as u64))).unwrap();
     eprintln!("saved {samples}");
 }
 
@@ -173,8 +166,7 @@ fn draft(file: &Path) {
 /// Locks a database for itself alone until its input ends.
 fn lock_database(file: &Path) {
     let db = rusqlite::Connection::open(file).unwrap();
-    db.execute_batch("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE; DELETE FROM tag;")
-        .unwrap();
+    db.execute_batch("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE; DELETE FROM tag;").unwrap();
     eprintln!("saved 0");
     std::io::read_to_string(std::io::stdin()).unwrap();
 }
@@ -194,10 +186,7 @@ pub fn edit(number: usize) -> Edit {
         at: DateTime::UNIX_EPOCH,
         by: "Ada".into(),
         reason: format!("number {number}"),
-        change: Change::Tags {
-            add: vec![format!("tag-{number}")],
-            remove: Vec::new(),
-        },
+        change: Change::Tags { add: vec![format!("tag-{number}")], remove: Vec::new() },
     }
 }
 

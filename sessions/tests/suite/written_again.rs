@@ -115,12 +115,7 @@ impl SegmentSource for Failing {
     fn create(&mut self, number: u32) -> io::Result<FailingSink> {
         self.count()?;
         let path = self.folder.join(segment_file(number));
-        Ok(FailingSink {
-            inner: FileSink::create(&path)?,
-            path,
-            synced: 0,
-            disk: self.clone(),
-        })
+        Ok(FailingSink { inner: FileSink::create(&path)?, path, synced: 0, disk: self.clone() })
     }
 }
 
@@ -153,11 +148,7 @@ fn record(
 
 fn check_whole(folder: &Path, rows: &[Row], entries: &[Entry], context: &str) -> Session {
     let session = Session::open(folder).unwrap_or_else(|err| panic!("{context}: {err}"));
-    assert!(
-        same_bits(&session.rows, rows),
-        "{context}: {}",
-        session.rows.len()
-    );
+    assert!(same_bits(&session.rows, rows), "{context}: {}", session.rows.len());
     assert_eq!(session.entries, entries, "{context}");
     assert_eq!(session.end.as_ref().unwrap().samples, rows.len() as u64);
     let summary = Summary::read(folder).unwrap();
@@ -184,14 +175,7 @@ fn whichever_operation_fails_the_session_lacks_nothing() {
             match outcome {
                 Ok(notices) => {
                     moved += 1;
-                    let [
-                        Notice::Moved {
-                            reason,
-                            is_last: false,
-                            ..
-                        },
-                    ] = &notices[..]
-                    else {
+                    let [Notice::Moved { reason, is_last: false, .. }] = &notices[..] else {
                         panic!("{context}: {notices:?}");
                     };
                     assert!(reason.contains("Input/output error"), "{reason}");
@@ -214,9 +198,7 @@ fn several_failures_lose_nothing_and_too_many_are_told() {
     for case in 0..200 {
         let folder = quick_folder();
         let leaves = [Leaves::All, Leaves::Synced, Leaves::Zeros, Leaves::Garbage][case % 4];
-        let fail_at: Vec<u32> = (0..2 + case % 4)
-            .map(|_| 3 + random.below(40) as u32)
-            .collect();
+        let fail_at: Vec<u32> = (0..2 + case % 4).map(|_| 3 + random.below(40) as u32).collect();
         let source = Failing::new(folder.path(), leaves, &fail_at);
         let context = format!("{leaves:?}, operations {fail_at:?}");
         match record(source, 3, &rows, &entries) {
@@ -231,10 +213,7 @@ fn several_failures_lose_nothing_and_too_many_are_told() {
                     Ok(session) => {
                         let count = session.rows.len();
                         assert!(same_bits(&session.rows, &rows[..count]), "{context}");
-                        assert!(
-                            session.end.is_none() && !session.notes.is_empty(),
-                            "{context}"
-                        );
+                        assert!(session.end.is_none() && !session.notes.is_empty(), "{context}");
                     }
                     Err(ReadError::Damaged { .. }) => {}
                     Err(err) => panic!("{context}: {err}"),
@@ -292,10 +271,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
         let (folder, spare) = (quick_folder(), quick_folder());
         let own = FolderSegments::with_spare(folder.path(), spare.path(), "id").unwrap();
         let room = Arc::new(Mutex::new(room));
-        let source = Full {
-            own,
-            room: Arc::clone(&room),
-        };
+        let source = Full { own, room: Arc::clone(&room) };
         let start = SessionWriter::start_in_segments(source, 100, &manifest(), Pace::Virtual);
         let mut writer = start.unwrap();
         rows.iter().for_each(|row| writer.push_row(*row).unwrap());
@@ -303,14 +279,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
         writer.close(end(Nanos::from_millis(1000))).unwrap();
         let notices = news.take();
         if *room.lock().unwrap() == 0 {
-            let [
-                Notice::Moved {
-                    is_last: true,
-                    path,
-                    ..
-                },
-            ] = &notices[..]
-            else {
+            let [Notice::Moved { is_last: true, path, .. }] = &notices[..] else {
                 panic!("{notices:?}");
             };
             assert!(path.starts_with(spare.path().to_str().unwrap()), "{path}");
@@ -368,10 +337,7 @@ fn a_crash_while_writing_again_keeps_what_the_old_file_held() {
     // Operations: create, manifest, sync; then appends, with one sync at the end of ten batches.
     let source = Failing::new(folder.path(), Leaves::All, &[9]);
     record(source, 100, &rows, &[]).unwrap();
-    let first = Session::open(&folder.path().join("000.mcap"))
-        .unwrap()
-        .rows
-        .len();
+    let first = Session::open(&folder.path().join("000.mcap")).unwrap().rows.len();
     assert!(first >= 300, "{first}");
     let second = folder.path().join("001.mcap");
     let whole = fs::read(&second).unwrap();
@@ -379,11 +345,7 @@ fn a_crash_while_writing_again_keeps_what_the_old_file_held() {
     for length in (0..whole.len()).step_by(7) {
         fs::write(&second, &whole[..length]).unwrap();
         let session = Session::open(folder.path()).unwrap();
-        assert!(
-            session.rows.len() >= first,
-            "{length}: {}",
-            session.rows.len()
-        );
+        assert!(session.rows.len() >= first, "{length}: {}", session.rows.len());
         assert!(same_bits(&session.rows, &rows[..session.rows.len()]));
     }
 }

@@ -76,9 +76,7 @@ impl<R: Rig> FaultyRig<R> {
                 let what = match fault.kind {
                     FaultKind::Disconnect => Timed::Disconnect,
                     FaultKind::Reset => Timed::Reset { is_announced: true },
-                    FaultKind::UnannouncedReset => Timed::Reset {
-                        is_announced: false,
-                    },
+                    FaultKind::UnannouncedReset => Timed::Reset { is_announced: false },
                     _ => return None,
                 };
                 Some((fault.at, what))
@@ -107,9 +105,7 @@ impl<R: Rig> FaultyRig<R> {
     }
 
     fn is_active(&self, is_kind: impl Fn(FaultKind) -> bool) -> bool {
-        self.script
-            .iter()
-            .any(|fault| fault.is_active(self.now) && is_kind(fault.kind))
+        self.script.iter().any(|fault| fault.is_active(self.now) && is_kind(fault.kind))
     }
 
     fn put(&mut self, at: Nanos, body: RigEventBody) {
@@ -140,9 +136,7 @@ impl<R: Rig> FaultyRig<R> {
                 // Reports still on their way are lost with the link.
                 self.reports.clear();
                 self.newest = self.handed_out;
-                Fault::LinkLost {
-                    detail: "no answer, the other end has gone".to_owned(),
-                }
+                Fault::LinkLost { detail: "no answer, the other end has gone".to_owned() }
             }
             Timed::Reset { is_announced } => {
                 self.reset = Some(Reset::default());
@@ -153,9 +147,9 @@ impl<R: Rig> FaultyRig<R> {
                 }
                 Fault::ControllerReset
             }
-            Timed::Refusal => Fault::CommandRefused {
-                detail: "told to refuse by the test's script".to_owned(),
-            },
+            Timed::Refusal => {
+                Fault::CommandRefused { detail: "told to refuse by the test's script".to_owned() }
+            }
         };
         self.put(at, RigEventBody::Fault(fault));
     }
@@ -168,9 +162,7 @@ impl<R: Rig> FaultyRig<R> {
         }
         let body = match event.body {
             RigEventBody::Reading(reading) => {
-                let reading = self
-                    .after_reset(reading)
-                    .and_then(|reading| self.distorted(reading));
+                let reading = self.after_reset(reading).and_then(|reading| self.distorted(reading));
                 match reading {
                     Some(reading) => RigEventBody::Reading(reading),
                     None => return,
@@ -184,14 +176,13 @@ impl<R: Rig> FaultyRig<R> {
             }
             fault @ RigEventBody::Fault(_) => fault,
         };
-        let delay = self
-            .script
-            .iter()
-            .filter(|fault| fault.is_active(event.at))
-            .fold(Nanos::ZERO, |sum, fault| match fault.kind {
+        let delay = self.script.iter().filter(|fault| fault.is_active(event.at)).fold(
+            Nanos::ZERO,
+            |sum, fault| match fault.kind {
                 FaultKind::Late(delay) => sum + delay,
                 _ => sum,
-            });
+            },
+        );
         self.put(event.at + delay, body);
     }
 
@@ -208,11 +199,7 @@ impl<R: Rig> FaultyRig<R> {
         if !reset.is_motor_enabled {
             bits &= !AxisStatus::MOTOR_ON.0;
         }
-        Some(Reading {
-            tick: reading.tick - zero_tick,
-            status: AxisStatus(bits),
-            ..reading
-        })
+        Some(Reading { tick: reading.tick - zero_tick, status: AxisStatus(bits), ..reading })
     }
 
     /// The reading after every active fault, in the order of the script; `None` if it is lost.
@@ -307,10 +294,7 @@ impl<R: Rig> Rig for FaultyRig<R> {
         // The rig inside is brought up to the time of the event to hand out, never past it: a
         // command sent in answer must not act before that event.
         loop {
-            let due = self
-                .reports
-                .front()
-                .map_or(until, |event| event.at.min(until));
+            let due = self.reports.front().map_or(until, |event| event.at.min(until));
             let timed_at = self.timed.front().map_or(due, |(at, _)| due.min(*at));
             if let Some(event) = self.inner.next_event(timed_at) {
                 self.on_event(event);

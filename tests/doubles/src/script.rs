@@ -58,21 +58,13 @@ impl ScriptedFault {
     /// A fault from `at` on, for good.
     #[must_use]
     pub fn from(at: Nanos, kind: FaultKind) -> Self {
-        Self {
-            at,
-            lasts: None,
-            kind,
-        }
+        Self { at, lasts: None, kind }
     }
 
     /// A fault from `at` for as long as `lasts`.
     #[must_use]
     pub fn during(at: Nanos, lasts: Nanos, kind: FaultKind) -> Self {
-        Self {
-            at,
-            lasts: Some(lasts),
-            kind,
-        }
+        Self { at, lasts: Some(lasts), kind }
     }
 
     /// Whether the fault acts at `now`.

@@ -12,9 +12,8 @@ impl Noise {
     /// Equal seeds give equal noise.
     #[must_use]
     pub fn seeded(seed: u64) -> Self {
-        let mut noise = Self {
-            state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B,
-        };
+        let mut noise =
+            Self { state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B };
         noise.uniform();
         noise
     }
@@ -22,9 +21,8 @@ impl Noise {
     /// Uniform in 0..1, never 0.
     pub fn uniform(&mut self) -> f64 {
         let old = self.state;
-        self.state = old
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.state =
+            old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let mixed = (((old >> 18) ^ old) >> 27) as u32;
         let word = mixed.rotate_right((old >> 59) as u32);
         (f64::from(word) + 0.5) / 4_294_967_296.0
@@ -58,12 +56,7 @@ pub fn respond(body: &ModifiedKelvin, path: &[(f64, f64)]) -> Vec<FitSample> {
         .map(|&(t, depth)| {
             let force = state.step(body, Depth(depth), Seconds(t - before));
             before = t;
-            FitSample {
-                t: Seconds(t),
-                depth: Depth(depth),
-                force,
-                sigma: Newtons(0.02),
-            }
+            FitSample { t: Seconds(t), depth: Depth(depth), force, sigma: Newtons(0.02) }
         })
         .collect()
 }
@@ -99,10 +92,7 @@ pub fn remembering(
             state = kept * state + (1.0 - kept * kept).sqrt() * noise.normal();
             before = sample.t.0;
             let error = slow * state + white * noise.normal();
-            FitSample {
-                force: Newtons(sample.force.0 + error),
-                ..*sample
-            }
+            FitSample { force: Newtons(sample.force.0 + error), ..*sample }
         })
         .collect()
 }

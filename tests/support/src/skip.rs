@@ -1,8 +1,5 @@
 //! Tests that cannot run on a computer say so in one way, and are counted.
-#![expect(
-    clippy::print_stdout,
-    reason = "a test that is skipped says so where tests say things"
-)]
+#![expect(clippy::print_stdout, reason = "a test that is skipped says so where tests say things")]
 
 use std::io::Write;
 use std::path::Path;
@@ -49,10 +46,7 @@ pub fn skip(need: Need, reason: &str) {
     };
     let one_line = reason.split_whitespace().collect::<Vec<_>>().join(" ");
     let line = format!("{kind}\t{name}\t{test}\t{one_line}\n");
-    let file = std::fs::OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(list);
+    let file = std::fs::OpenOptions::new().create(true).append(true).open(list);
     // One write, so that lines of programs that run at the same time stay whole.
     let written = file.and_then(|mut file| file.write_all(line.as_bytes()));
     written.expect("the list of skipped tests can be written");

@@ -16,10 +16,7 @@ pub struct Deadline(Instant);
 impl Deadline {
     /// When patience, counted from now, ends.
     #[must_use]
-    #[expect(
-        clippy::new_without_default,
-        reason = "it begins now, whenever that is"
-    )]
+    #[expect(clippy::new_without_default, reason = "it begins now, whenever that is")]
     pub fn new() -> Self {
         Self(Instant::now() + PATIENCE)
     }

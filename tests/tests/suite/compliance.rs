@@ -56,17 +56,11 @@ fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
     for um_per_n in ["20", "60", "100"] {
         let wanted = um_per_n.parse::<f64>().unwrap() * 1e-3 + BASE;
         let found = measured(&stiff_surface(um_per_n), None).unwrap();
-        println!(
-            "{um_per_n} um/N: {:.5} ± {:.5} mm/N",
-            found.mm_per_n, found.std_error_mm_per_n
-        );
+        println!("{um_per_n} um/N: {:.5} ± {:.5} mm/N", found.mm_per_n, found.std_error_mm_per_n);
         assert_eq!(found.presses.len(), 3);
         let error = found.mm_per_n - wanted;
         // Four standard errors; of three presses the scatter itself is known to a half.
-        assert!(
-            error.abs() < 4.0 * found.std_error_mm_per_n + 1e-4 * wanted,
-            "{error} {found:?}"
-        );
+        assert!(error.abs() < 4.0 * found.std_error_mm_per_n + 1e-4 * wanted, "{error} {found:?}");
         let folder = library.path().join(um_per_n);
         save(&folder, &found).unwrap();
 
@@ -96,10 +90,7 @@ fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
             // The contact's own error is left, which no compliance makes or mends: the rig that does not give way
             // has it too. Three standard errors of the difference of two fits.
             let left = (corrected.1 - stiff.1).abs();
-            assert!(
-                left < 3.0 * corrected.2.hypot(stiff.2),
-                "{corrected:?} {stiff:?}"
-            );
+            assert!(left < 3.0 * corrected.2.hypot(stiff.2), "{corrected:?} {stiff:?}");
             assert!((raw.1 - stiff.1).abs() > 3.0 * left, "{raw:?} {stiff:?}");
         }
     }
@@ -126,8 +117,5 @@ fn source(session: &Session) -> FitSource {
 #[test]
 fn a_session_that_touched_no_base_tells_no_compliance() {
     let refused = measured(&recorded_on("60"), None);
-    assert!(
-        matches!(refused, Err(MeasureError::NoSurface)),
-        "{refused:?}"
-    );
+    assert!(matches!(refused, Err(MeasureError::NoSurface)), "{refused:?}");
 }

@@ -94,10 +94,7 @@ fn row(noise: &str, stiffness: &str) -> Row {
         let Some(contact) = found.contact else {
             // The one honest way out: the noise of this search leaves the position open.
             let reason = found.outcome.reason;
-            assert!(
-                reason.contains("known to"),
-                "{noise} mN {stiffness} % seed {seed}: {reason}"
-            );
+            assert!(reason.contains("known to"), "{noise} mN {stiffness} % seed {seed}: {reason}");
             row.refused += 1;
             continue;
         };
@@ -106,10 +103,7 @@ fn row(noise: &str, stiffness: &str) -> Row {
         let noise = settings.noise.newtons();
         let bound = bound_mm(&found.body, found.pass, plan.pass_speed, noise);
         row.bounds.push(bound);
-        row.force_max = row
-            .force_max
-            .max(found.force_true_max)
-            .max(found.force_filtered_max);
+        row.force_max = row.force_max.max(found.force_true_max).max(found.force_filtered_max);
     }
     row.print(noise, stiffness);
     assert!(row.force_max <= FORCE_MAX, "{} N", row.force_max);
@@ -122,27 +116,16 @@ fn check_noisy(noise: &str) {
         let row = row(noise, stiffness);
         let is_long = row.count() + row.refused as f64 >= 1000.0;
         // Measured: one in a thousand of the noisiest, none of the others.
-        assert!(
-            row.refused as f64 <= 1.0 + 0.002 * row.count(),
-            "{stiffness} %: {}",
-            row.refused
-        );
+        assert!(row.refused as f64 <= 1.0 + 0.002 * row.count(), "{stiffness} %: {}", row.refused);
         let (ratio, low, high) = if is_long {
             (1.3, 0.92, 0.97)
         } else {
             let slack = 3.0 * (0.95 * 0.05 / row.count()).sqrt();
-            (
-                1.3 * (1.0 + 3.0 / (2.0 * row.count()).sqrt()),
-                0.95 - slack,
-                1.0,
-            )
+            (1.3 * (1.0 + 3.0 / (2.0 * row.count()).sqrt()), 0.95 - slack, 1.0)
         };
         assert!(row.ratio() <= ratio, "{stiffness} %: {}", row.ratio());
         let coverage = row.coverage();
-        assert!(
-            (low..=high).contains(&coverage),
-            "{stiffness} %: {coverage}"
-        );
+        assert!((low..=high).contains(&coverage), "{stiffness} %: {coverage}");
         // What a run claims scatters little, so few runs tell: an interval wider than the limit is as bad as
         // an error beyond it.
         let claimed = Row::rms(&row.claimed) / Row::rms(&row.bounds);
@@ -191,20 +174,12 @@ fn assert_refused(found: &Searched, words: &str) {
     assert!(found.contact.is_none(), "accepted {:?}", found.contact);
     assert_ne!(outcome.ending, EndingKind::Finish);
     assert!(outcome.reason.contains(words), "{}", outcome.reason);
-    assert!(
-        !found
-            .records
-            .iter()
-            .any(|record| matches!(record, Record::ContactFound { .. }))
-    );
+    assert!(!found.records.iter().any(|record| matches!(record, Record::ContactFound { .. })));
 }
 
 #[test]
 fn a_search_without_tissue_is_refused() {
-    let settings = SimSettings {
-        thickness: "200".parse().unwrap(),
-        ..settings(1, "20", "100")
-    };
+    let settings = SimSettings { thickness: "200".parse().unwrap(), ..settings(1, "20", "100") };
     let found = search(settings, FindContact::default(), Some(HandAction::Unmount));
     assert_refused(&found, "149.0 mm");
     assert_eq!(found.force_true_max, 0.0);
@@ -212,11 +187,7 @@ fn a_search_without_tissue_is_refused() {
 
 #[test]
 fn a_search_that_meets_the_base_is_refused() {
-    let found = search(
-        settings(1, "20", "100"),
-        FindContact::default(),
-        Some(HandAction::Unmount),
-    );
+    let found = search(settings(1, "20", "100"), FindContact::default(), Some(HandAction::Unmount));
     assert_refused(&found, "force");
     // A rig that gives way: the base answers like stiff tissue, and is not taken for it.
     for compliance in ["20", "30", "60"] {
@@ -227,11 +198,7 @@ fn a_search_that_meets_the_base_is_refused() {
         let found = search(settings, FindContact::default(), Some(HandAction::Unmount));
         assert_refused(&found, "force");
         // The way of the brake at 1.5 mm/s over the compliance, and the answer of the engine.
-        assert!(
-            found.force_filtered_max < 2.5,
-            "{compliance}: {}",
-            found.force_filtered_max
-        );
+        assert!(found.force_filtered_max < 2.5, "{compliance}: {}", found.force_filtered_max);
     }
 }
 
@@ -249,10 +216,7 @@ fn a_second_pass_that_felt_nothing_for_noise_says_so() {
     let blind: Vec<String> = reasons.filter(|why| why.contains("did not feel")).collect();
     assert!(!blind.is_empty(), "no search failed so");
     for why in blind {
-        assert!(
-            why.contains("from 0.0") && why.contains("quieten the signal"),
-            "{why}"
-        );
+        assert!(why.contains("from 0.0") && why.contains("quieten the signal"), "{why}");
     }
 }
 
@@ -298,10 +262,7 @@ fn a_drifting_signal_is_refused_and_a_steady_one_recorded() {
 
 #[test]
 fn an_interval_wider_than_the_plan_allows_is_refused() {
-    let plan = FindContact {
-        std_error_mm_max: 0.005,
-        ..FindContact::default()
-    };
+    let plan = FindContact { std_error_mm_max: 0.005, ..FindContact::default() };
     let found = search(settings(1, "50", "100"), plan, None);
     assert_refused(&found, "wider than 0.005 mm");
 }
@@ -366,10 +327,7 @@ fn a_specimen_that_changes_between_the_touches_is_refused() {
 
 #[test]
 fn one_pass_alone_still_finds_the_tissue() {
-    let plan = FindContact {
-        press: None,
-        ..FindContact::default()
-    };
+    let plan = FindContact { press: None, ..FindContact::default() };
     let found = search(settings(4, "20", "100"), plan, None);
     let contact = found.contact.expect("a contact");
     let error = contact.position.0 - found.surface_mm;

@@ -56,22 +56,12 @@ fn samples(lab: &Lab<SimRig>) -> Vec<CycleSample> {
 
 /// Ten cycles to 25 mm at 3 mm/s, each followed by a rest of 20 s.
 fn ten_cycles() -> impl Iterator<Item = PlannedStep> {
-    let ramp = Step::Ramp(Ramp {
-        speed: MmPerS(3.0),
-        depth: Depth(25.0),
-    });
-    let unload = Step::Unload(Unload {
-        speed: MmPerS(3.0),
-        clearance_mm: 0.5,
-    });
-    let rest = Step::Rest(Rest {
-        duration: Seconds(20.0),
-    });
+    let ramp = Step::Ramp(Ramp { speed: MmPerS(3.0), depth: Depth(25.0) });
+    let unload = Step::Unload(Unload { speed: MmPerS(3.0), clearance_mm: 0.5 });
+    let rest = Step::Rest(Rest { duration: Seconds(20.0) });
     (1..=10).flat_map(move |cycle| {
-        [ramp.clone(), unload.clone(), rest.clone()].map(|step| PlannedStep {
-            cycle,
-            ..step.into()
-        })
+        [ramp.clone(), unload.clone(), rest.clone()]
+            .map(|step| PlannedStep { cycle, ..step.into() })
     })
 }
 
@@ -79,10 +69,7 @@ fn ten_cycles() -> impl Iterator<Item = PlannedStep> {
 fn a_preconditioned_specimen_becomes_steady_and_an_elastic_one_is() {
     let report = |percent: u8| {
         let lab = run(rig(percent), plan(ten_cycles()));
-        let source = CycleSource {
-            samples: samples(&lab),
-            ..CycleSource::default()
-        };
+        let source = CycleSource { samples: samples(&lab), ..CycleSource::default() };
         let name = format!("ten cycles, preconditioning {percent} %");
         CycleReport::of(name, source, &Question::default())
     };
@@ -96,29 +83,16 @@ fn a_preconditioned_specimen_becomes_steady_and_an_elastic_one_is() {
         let shift = change.shift.unwrap().0;
         // Later ones drown in the noise of a peak, some 5 mN, and of a place, some 15 um.
         let is_early = index < 4;
-        assert!(
-            !is_early || (change.peak_percent < -0.1 && shift > 0.02),
-            "{change:?}"
-        );
+        assert!(!is_early || (change.peak_percent < -0.1 && shift > 0.02), "{change:?}");
         assert!(change.peak_percent < 0.5 && shift > -0.08, "{change:?}");
     }
-    let first_three: Vec<f64> = changes[..3]
-        .iter()
-        .map(|one| one.shift.unwrap().0)
-        .collect();
-    assert!(
-        first_three.is_sorted_by(|one, next| one > next),
-        "{first_three:?}"
-    );
+    let first_three: Vec<f64> = changes[..3].iter().map(|one| one.shift.unwrap().0).collect();
+    assert!(first_three.is_sorted_by(|one, next| one > next), "{first_three:?}");
     assert!((4..=9).contains(&soft.steadiness.steady_from.unwrap()));
     // Without it only the first loop meets tissue that the search for contact has not just left.
     assert!(plain.steadiness.steady_from.unwrap() <= 2);
     // Loops keep part of the energy, and the first pays for what is rearranged in it.
-    assert!(
-        soft.cycles
-            .iter()
-            .all(|one| (0.1..1.0).contains(&one.loss_share().unwrap()))
-    );
+    assert!(soft.cycles.iter().all(|one| (0.1..1.0).contains(&one.loss_share().unwrap())));
     assert!(soft.cycles[0].work_loop.unwrap() > soft.cycles[9].work_loop.unwrap());
 }
 
@@ -126,28 +100,14 @@ fn a_preconditioned_specimen_becomes_steady_and_an_elastic_one_is() {
 fn a_sine_finds_the_stiffness_of_the_body() {
     let frequency = 0.5;
     let steps = [
-        Step::Ramp(Ramp {
-            speed: MmPerS(3.0),
-            depth: Depth(18.0),
-        }),
-        Step::Hold(Hold {
-            duration: Seconds(10.0),
-            until: None,
-            rate: None,
-        }),
-        Step::Sine(Sine {
-            amplitude_mm: 0.75,
-            frequency_hz: frequency,
-            cycles: 10,
-        }),
+        Step::Ramp(Ramp { speed: MmPerS(3.0), depth: Depth(18.0) }),
+        Step::Hold(Hold { duration: Seconds(10.0), until: None, rate: None }),
+        Step::Sine(Sine { amplitude_mm: 0.75, frequency_hz: frequency, cycles: 10 }),
     ];
     let lab = run(rig(0), plan(steps.map(PlannedStep::from)));
     let all = samples(&lab);
-    let measured: Vec<CycleSample> = all
-        .iter()
-        .filter(|one| one.phase == Phase::Sine)
-        .copied()
-        .collect();
+    let measured: Vec<CycleSample> =
+        all.iter().filter(|one| one.phase == Phase::Sine).copied().collect();
     let found = sinusoid(&measured, frequency).unwrap();
     println!("{found:?}");
     // The same body on the same path from the true surface, without noise.
@@ -167,10 +127,7 @@ fn a_sine_finds_the_stiffness_of_the_body() {
         .filter(|one| one.phase == Phase::Sine)
         .collect();
     let exact = sinusoid(&exact, frequency).unwrap();
-    assert!(
-        exact.storage.value > 0.1 && exact.loss.value > 0.05,
-        "{exact:?}"
-    );
+    assert!(exact.storage.value > 0.1 && exact.loss.value > 0.05, "{exact:?}");
     for (one, other) in [(found.storage, exact.storage), (found.loss, exact.loss)] {
         let miss = (one.value - other.value).abs();
         assert!(miss < 4.0 * one.std_error, "{miss} {one:?}");

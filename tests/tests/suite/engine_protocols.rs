@@ -13,19 +13,13 @@ use palpate_protocols::preview::preview;
 use palpate_tests::lab::{Lab, retract, set_up};
 
 fn rig(profile: SimProfile) -> SimRig {
-    SimRig::new(SimSettings {
-        profile,
-        seed: 3,
-        ..SimSettings::default()
-    })
+    SimRig::new(SimSettings { profile, seed: 3, ..SimSettings::default() })
 }
 
 /// A set-up, steps, and a retract.
 fn plan(steps: Vec<Step>) -> Plan {
-    let all = set_up(Seconds(1.0), FindContact::default())
-        .into_iter()
-        .chain(steps)
-        .chain([retract()]);
+    let all =
+        set_up(Seconds(1.0), FindContact::default()).into_iter().chain(steps).chain([retract()]);
     Plan::of("test", 1, all.collect())
 }
 
@@ -49,17 +43,9 @@ fn cycles(count: u32, rest: f64) -> Plan {
     let last = plan.steps.pop().unwrap();
     for cycle in 1..=count {
         let steps = [
-            Step::Ramp(Ramp {
-                speed: MmPerS(1.5),
-                depth: Depth(12.0),
-            }),
-            Step::Unload(Unload {
-                speed: MmPerS(1.5),
-                clearance_mm: 0.0,
-            }),
-            Step::Rest(Rest {
-                duration: Seconds(rest),
-            }),
+            Step::Ramp(Ramp { speed: MmPerS(1.5), depth: Depth(12.0) }),
+            Step::Unload(Unload { speed: MmPerS(1.5), clearance_mm: 0.0 }),
+            Step::Rest(Rest { duration: Seconds(rest) }),
         ];
         plan.steps.extend(steps.map(|step| PlannedStep {
             cycle,
@@ -91,25 +77,14 @@ fn cycles_last_as_long_as_the_preview_says() {
         })
         .sum();
     let took = (last - first) as f64;
-    assert!(
-        (took - known / tick).abs() <= 1.0,
-        "{took} {}",
-        known / tick
-    );
+    assert!((took - known / tick).abs() <= 1.0, "{took} {}", known / tick);
     for cycle in 1..=10 {
         let own = |phase| {
-            let own = lab
-                .seen
-                .iter()
-                .filter(|seen| (seen.cycle, seen.phase) == (cycle, phase));
+            let own = lab.seen.iter().filter(|seen| (seen.cycle, seen.phase) == (cycle, phase));
             own.count()
         };
         // 12 mm at 1.5 mm/s are 8 s and the ramps of the profile.
-        assert!(
-            (8000..8040).contains(&own(Phase::Ramp)),
-            "{}",
-            own(Phase::Ramp)
-        );
+        assert!((8000..8040).contains(&own(Phase::Ramp)), "{}", own(Phase::Ramp));
         assert!((8000..8040).contains(&own(Phase::Unload)));
         assert_eq!(own(Phase::Rest), 20_000);
     }
@@ -118,17 +93,11 @@ fn cycles_last_as_long_as_the_preview_says() {
 #[test]
 fn a_force_is_reached_and_not_passed() {
     // The way of braking grows with the square of the speed: without it in mind the fast one goes too far.
-    for (speed, brake, most) in [
-        (1.5, None, 0.06),
-        (1.5, Some(Newtons(0.5)), 0.03),
-        (4.5, None, 0.12),
-    ] {
-        let load = LoadTo {
-            speed: MmPerS(speed),
-            force: Newtons(2.0),
-            depth_max: Depth(35.0),
-            brake,
-        };
+    for (speed, brake, most) in
+        [(1.5, None, 0.06), (1.5, Some(Newtons(0.5)), 0.03), (4.5, None, 0.12)]
+    {
+        let load =
+            LoadTo { speed: MmPerS(speed), force: Newtons(2.0), depth_max: Depth(35.0), brake };
         let lab = finished(lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)])));
         let reached = lab.records.iter().find_map(|(_, record)| match record {
             Record::ForceReached { force, .. } => Some(*force),
@@ -142,12 +111,8 @@ fn a_force_is_reached_and_not_passed() {
 
 #[test]
 fn a_force_that_is_not_there_ends_the_run() {
-    let load = LoadTo {
-        speed: MmPerS(3.0),
-        force: Newtons(5.0),
-        depth_max: Depth(8.0),
-        brake: None,
-    };
+    let load =
+        LoadTo { speed: MmPerS(3.0), force: Newtons(5.0), depth_max: Depth(8.0), brake: None };
     let mut lab = lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)]));
     lab.run();
     let reason = &lab.state().holding().unwrap().reason;
@@ -156,12 +121,8 @@ fn a_force_that_is_not_there_ends_the_run() {
 
 #[test]
 fn force_is_kept_while_the_tissue_creeps() {
-    let load = LoadTo {
-        speed: MmPerS(1.5),
-        force: Newtons(1.5),
-        depth_max: Depth(35.0),
-        brake: None,
-    };
+    let load =
+        LoadTo { speed: MmPerS(1.5), force: Newtons(1.5), depth_max: Depth(35.0), brake: None };
     let creep = HoldForce {
         force: Newtons(1.5),
         duration: Seconds(20.0),
@@ -170,11 +131,7 @@ fn force_is_kept_while_the_tissue_creeps() {
     };
     let steps = vec![Step::LoadTo(load), Step::HoldForce(creep)];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
-    let creep: Vec<_> = lab
-        .seen
-        .iter()
-        .filter(|seen| seen.phase == Phase::Creep)
-        .collect();
+    let creep: Vec<_> = lab.seen.iter().filter(|seen| seen.phase == Phase::Creep).collect();
     let mean = |part: &[&palpate_tests::lab::Seen], of: fn(&palpate_tests::lab::Seen) -> f64| {
         part.iter().map(|seen| of(seen)).sum::<f64>() / part.len() as f64
     };
@@ -184,10 +141,7 @@ fn force_is_kept_while_the_tissue_creeps() {
     // 0.8 N/mm is the grain.
     for (index, second) in creep[2000..].chunks(1000).enumerate() {
         let miss = mean(second, force) - 1.5;
-        assert!(
-            miss.abs() < if index < 8 { 0.1 } else { 0.02 },
-            "second {index}: {miss}"
-        );
+        assert!(miss.abs() < if index < 8 { 0.1 } else { 0.02 }, "second {index}: {miss}");
     }
     let crept = mean(&creep[19_000..], depth) - mean(&creep[..1000], depth);
     assert!(crept > 0.3, "{crept}");
@@ -196,18 +150,12 @@ fn force_is_kept_while_the_tissue_creeps() {
 #[test]
 fn a_hold_ends_when_the_force_is_steady() {
     let steps = vec![
-        Step::Ramp(Ramp {
-            speed: MmPerS(3.0),
-            depth: Depth(15.0),
-        }),
+        Step::Ramp(Ramp { speed: MmPerS(3.0), depth: Depth(15.0) }),
         Step::Hold(Hold {
             duration: Seconds(300.0),
             until: None,
             // 0.01 N/min over 10 s, as Mach-1 ends its holds.
-            rate: Some(HoldRate {
-                below_n_per_s: 0.01 / 60.0,
-                over: Seconds(10.0),
-            }),
+            rate: Some(HoldRate { below_n_per_s: 0.01 / 60.0, over: Seconds(10.0) }),
         }),
     ];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
@@ -240,18 +188,8 @@ fn a_hold_ends_when_the_force_is_steady() {
 
 #[test]
 fn a_sine_comes_back_to_where_it_began() {
-    let sine = Sine {
-        amplitude_mm: 1.5,
-        frequency_hz: 0.5,
-        cycles: 4,
-    };
-    let steps = vec![
-        Step::Ramp(Ramp {
-            speed: MmPerS(3.0),
-            depth: Depth(8.0),
-        }),
-        Step::Sine(sine),
-    ];
+    let sine = Sine { amplitude_mm: 1.5, frequency_hz: 0.5, cycles: 4 };
+    let steps = vec![Step::Ramp(Ramp { speed: MmPerS(3.0), depth: Depth(8.0) }), Step::Sine(sine)];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
     let depths: Vec<f64> = lab
         .seen
@@ -260,20 +198,13 @@ fn a_sine_comes_back_to_where_it_began() {
         .map(|seen| seen.derived.depth.unwrap().0)
         .collect();
     let deepest = depths.iter().copied().fold(0.0, f64::max);
-    assert!(
-        (deepest - depths[0] - 3.0).abs() < 0.016,
-        "{deepest} {}",
-        depths[0]
-    );
+    assert!((deepest - depths[0] - 3.0).abs() < 0.016, "{deepest} {}", depths[0]);
     assert!((depths[depths.len() - 1] - depths[0]).abs() < 0.016);
 }
 
 #[test]
 fn home_is_where_it_was() {
-    let check = Step::CheckHome(CheckHome {
-        speed: MmPerS(9.0),
-        touch_speed: MmPerS(0.3),
-    });
+    let check = Step::CheckHome(CheckHome { speed: MmPerS(9.0), touch_speed: MmPerS(0.3) });
     let mut plan = plan(Vec::new());
     plan.steps.push(check.into());
     let lab = finished(lab(SimProfile::Lab, plan));
@@ -290,10 +221,7 @@ fn a_pause_asked_for_comes_at_its_checkpoint() {
     let mut lab = lab(SimProfile::Ideal, plan.clone());
     lab.operator(Operator::Start);
     assert!(lab.run_until(Seconds(1e3), |state| state.phase() == Phase::Unload));
-    let (index, name) = plan
-        .checkpoints_from(lab.state().step_progress().0)
-        .next()
-        .unwrap();
+    let (index, name) = plan.checkpoints_from(lab.state().step_progress().0).next().unwrap();
     assert_eq!(name, "after cycle 1");
     lab.operator(Operator::PauseAfter { step_index: index });
     assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Paused));
@@ -331,31 +259,21 @@ fn the_base_tells_how_thick_the_specimen_is() {
         let lab = finished(Lab::new(rig, curve, plan));
         let found = lab.records.iter().find_map(|(_, record)| match record {
             Record::BaseFound {
-                thickness_mm,
-                thickness_std_error_mm,
-                compliance_mm_per_n,
-                ..
-            } => Some((
-                thickness_mm.unwrap(),
-                thickness_std_error_mm.unwrap(),
-                *compliance_mm_per_n,
-            )),
+                thickness_mm, thickness_std_error_mm, compliance_mm_per_n, ..
+            } => {
+                Some((thickness_mm.unwrap(), thickness_std_error_mm.unwrap(), *compliance_mm_per_n))
+            }
             _ => None,
         });
         let (mm, error, gave) = found.unwrap();
         let truth: f64 = thickness.parse().unwrap();
         // The contact's standard error, mostly; four of them, and a pulse for the rig that gives way at the contact.
-        assert!(
-            (mm - truth).abs() < 4.0 * error + 0.015,
-            "{mm} ± {error}, {truth}"
-        );
+        assert!((mm - truth).abs() < 4.0 * error + 0.015, "{mm} ± {error}, {truth}");
         // The rig's own and a thousandth of a millimetre a newton of the base, known to a fifth from 0.4 N.
         let wanted = compliance.parse::<f64>().unwrap() * 1e-3 + 1e-3;
         assert!((gave / wanted - 1.0).abs() < 0.2, "{gave} {wanted}");
         let felt = lab.seen.iter().filter(|seen| seen.phase == Phase::Contact);
-        let most = felt
-            .filter_map(|seen| seen.derived.force)
-            .map(|force| force.0);
+        let most = felt.filter_map(|seen| seen.derived.force).map(|force| force.0);
         // A touch ends at 0.4 N; stopping on a whole pulse adds up to half of one.
         assert!(most.fold(0.0, f64::max) < 0.75);
     }
@@ -363,13 +281,8 @@ fn the_base_tells_how_thick_the_specimen_is() {
 
 /// A plan that loads, with a monitor of the force.
 fn watched(action: Action, threshold: f64) -> Plan {
-    let ramp = Step::Ramp(Ramp {
-        speed: MmPerS(1.5),
-        depth: Depth(20.0),
-    });
-    let rest = Step::Rest(Rest {
-        duration: Seconds(30.0),
-    });
+    let ramp = Step::Ramp(Ramp { speed: MmPerS(1.5), depth: Depth(20.0) });
+    let rest = Step::Rest(Rest { duration: Seconds(30.0) });
     let mut plan = plan(vec![rest, ramp]);
     plan.monitors = vec![Monitor {
         source: Source::Force,
@@ -416,10 +329,8 @@ fn a_condition_that_comes_back_with_its_step_ends_the_run() {
     assert!(lab.run_until(Seconds(2000.0), |state| state.holding().is_some()));
     let reason = &lab.state().holding().unwrap().reason;
     assert!(reason.contains("3 times already"), "{reason}");
-    let searches = lab
-        .records
-        .iter()
-        .filter(|(_, record)| matches!(record, Record::MonitorTripped { .. }));
+    let searches =
+        lab.records.iter().filter(|(_, record)| matches!(record, Record::MonitorTripped { .. }));
     assert_eq!(searches.count(), 4);
 }
 
@@ -429,14 +340,9 @@ fn a_search_that_presses_beyond_the_limit_is_refused() {
     plan.limits.force_max = Some(Newtons(0.2));
     let rig = rig(SimProfile::Ideal);
     let curve = rig.calibration().curve().unwrap();
-    let limits = plan
-        .limits
-        .tighten(Limits::for_travel(rig.description().travel));
+    let limits = plan.limits.tighten(Limits::for_travel(rig.description().travel));
     let refusals = preview(&plan, rig.description(), &limits, &curve, false).refusals;
-    assert!(
-        refusals.iter().any(|one| one.contains("presses to")),
-        "{refusals:?}"
-    );
+    assert!(refusals.iter().any(|one| one.contains("presses to")), "{refusals:?}");
 }
 
 #[test]
@@ -454,10 +360,7 @@ fn a_pause_that_cannot_go_on_ends_where_nobody_watches() {
 /// force's rate lets pass.
 fn touchable(plan: Plan) -> Lab<SimRig> {
     let lab = lab(SimProfile::Ideal, plan);
-    let limits = Limits {
-        force_rate_max: 1e4,
-        ..lab.state().config().limits
-    };
+    let limits = Limits { force_rate_max: 1e4, ..lab.state().config().limits };
     lab.within(limits)
 }
 
@@ -525,29 +428,16 @@ fn a_base_that_hardly_gives_way_trips_with_what_to_do() {
     lab.run();
     let ended = lab.outcome.as_ref().or(lab.state().holding());
     let reason = &ended.unwrap().reason;
-    assert!(
-        reason.contains("50 N/s") && reason.contains("find-base"),
-        "{reason}"
-    );
+    assert!(reason.contains("50 N/s") && reason.contains("find-base"), "{reason}");
 }
 
 #[test]
 fn depth_counts_from_the_base_once_it_is_found() {
-    let load = LoadTo {
-        speed: MmPerS(1.5),
-        force: Newtons(2.0),
-        depth_max: Depth(1.0),
-        brake: None,
-    };
+    let load =
+        LoadTo { speed: MmPerS(1.5), force: Newtons(2.0), depth_max: Depth(1.0), brake: None };
     // A stiff surface is left slowly: the force's rate has an interlock.
-    let unload = Step::Unload(Unload {
-        speed: MmPerS(0.3),
-        clearance_mm: 0.0,
-    });
-    let lab = finished(base_search(
-        "60",
-        vec![Step::LoadTo(load), unload, retract()],
-    ));
+    let unload = Step::Unload(Unload { speed: MmPerS(0.3), clearance_mm: 0.0 });
+    let lab = finished(base_search("60", vec![Step::LoadTo(load), unload, retract()]));
     let reached = lab.records.iter().find_map(|(_, record)| match record {
         Record::ForceReached { depth, .. } => Some(depth.0),
         _ => None,
@@ -559,9 +449,7 @@ fn depth_counts_from_the_base_once_it_is_found() {
         .filter(|seen| seen.phase == Phase::Ramp)
         .map(|seen| seen.derived.force.unwrap().0)
         .collect();
-    let means = forces
-        .windows(20)
-        .map(|part| part.iter().sum::<f64>() / 20.0);
+    let means = forces.windows(20).map(|part| part.iter().sum::<f64>() / 20.0);
     let peak = means.fold(0.0, f64::max);
     assert!((1.85..2.03).contains(&peak), "{peak}");
     // 0.061 mm/N with the base under 2 N, and a pulse each for the place of the base and for where the load stopped.
@@ -580,11 +468,7 @@ fn a_search_for_contact_goes_on_from_any_moment_of_it() {
         lab.operator(Operator::Start);
         let wanted = first + (last - first) * (2 * part + 1) / 24;
         let mut phase = Phase::Idle;
-        while lab
-            .seen
-            .last()
-            .is_none_or(|seen| seen.reading.tick < wanted)
-        {
+        while lab.seen.last().is_none_or(|seen| seen.reading.tick < wanted) {
             lab.advance();
             phase = lab.state().phase();
         }
@@ -595,19 +479,10 @@ fn a_search_for_contact_goes_on_from_any_moment_of_it() {
         let outcome = lab.outcome.clone();
         let outcome =
             outcome.unwrap_or_else(|| panic!("{part}, {phase}: {:?}", lab.state().holding()));
-        assert_eq!(
-            outcome.ending,
-            EndingKind::Finish,
-            "{part}: {}",
-            outcome.reason
-        );
-        let apart = contact(&lab)
-            .position
-            .distance_from(contact(&undisturbed).position);
+        assert_eq!(outcome.ending, EndingKind::Finish, "{part}: {}", outcome.reason);
+        let apart = contact(&lab).position.distance_from(contact(&undisturbed).position);
         // Two searches of one surface, each known to its own standard error.
-        let error = contact(&lab)
-            .std_error_mm
-            .hypot(contact(&undisturbed).std_error_mm);
+        let error = contact(&lab).std_error_mm.hypot(contact(&undisturbed).std_error_mm);
         assert!(apart.abs() < 4.0 * error, "{part}: {apart} {error}");
     }
 }
@@ -619,10 +494,7 @@ fn a_calibration_can_be_paused_with_a_weight_beyond_every_limit_on_the_cell() {
             mass_g,
             is_loading: true,
             repeat: 1,
-            settle: Settle {
-                window: Seconds(1.0),
-                timeout: Seconds(20.0),
-            },
+            settle: Settle { window: Seconds(1.0), timeout: Seconds(20.0) },
         })
     };
     let load = Step::Prompt(Prompt {

@@ -17,30 +17,17 @@ use palpate_tests::shipped;
 use palpate_tests::simulated::run;
 
 fn settings(profile: SimProfile, rate: &str, seed: u64) -> SimSettings {
-    SimSettings {
-        profile,
-        rate: rate.parse().unwrap(),
-        seed,
-        ..SimSettings::default()
-    }
+    SimSettings { profile, rate: rate.parse().unwrap(), seed, ..SimSettings::default() }
 }
 
 fn short() -> RampHold {
-    RampHold {
-        speed: MmPerS(3.0),
-        depth: Depth(15.0),
-        hold: Seconds(4.0),
-        ..RampHold::default()
-    }
+    RampHold { speed: MmPerS(3.0), depth: Depth(15.0), hold: Seconds(4.0), ..RampHold::default() }
 }
 
 #[test]
 fn a_fast_rig_finds_contact_and_body_as_well_as_its_samples_allow() {
     let known = |rate: &str, clock: SimClock, seed: u64| {
-        let settings = SimSettings {
-            clock,
-            ..settings(SimProfile::Ideal, rate, seed)
-        };
+        let settings = SimSettings { clock, ..settings(SimProfile::Ideal, rate, seed) };
         let run = run(settings, short());
         let outcome = run.state.outcome().unwrap();
         assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
@@ -84,10 +71,7 @@ fn a_fast_rig_finds_contact_and_body_as_well_as_its_samples_allow() {
 fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
     for (name, values) in [
         ("stiff-surface", &[("force", "1 N"), ("repeats", "1")][..]),
-        (
-            "preconditioning-force",
-            &[("force", "1 N"), ("cycles", "1"), ("rest", "0 s")],
-        ),
+        ("preconditioning-force", &[("force", "1 N"), ("cycles", "1"), ("rest", "0 s")]),
         ("creep", &[("force", "1 N"), ("duration", "10 s")]),
         ("load-cell-calibration", &[("repeats", "1")]),
     ] {
@@ -106,10 +90,7 @@ fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
             lab.now.seconds().0
         });
         // Corrections of a held force depend on the noise.
-        assert!(
-            (times[1] / times[0] - 1.0).abs() < 0.02,
-            "{name}: {times:?}"
-        );
+        assert!((times[1] / times[0] - 1.0).abs() < 0.02, "{name}: {times:?}");
     }
 }
 
@@ -140,10 +121,7 @@ fn is_whole(session: &Session, rate: f64) {
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "finish", "{}", end.reason);
     assert_eq!(session.rows.len() as u64, end.samples);
-    let gapless = session
-        .rows
-        .windows(2)
-        .all(|two| two[1].tick == two[0].tick + 1);
+    let gapless = session.rows.windows(2).all(|two| two[1].tick == two[0].tick + 1);
     assert!(gapless, "samples are missing");
     // From the first sample to the last, less what reports vary by on their way.
     let [first, last] = [0, session.rows.len() - 1].map(|i| session.rows[i].host.seconds().0);
@@ -160,25 +138,13 @@ fn all_samples_are_on_disk_and_replay() {
     let (calibration, tau) = (rig.calibration(), rig.truth().body.tau_eps);
     let session = recorded::session(Box::new(rig), calibration, short());
     is_whole(&session, 20_000.0);
-    assert_eq!(
-        session.manifest.rig.as_ref().unwrap().settings["rate"],
-        "20000"
-    );
+    assert_eq!(session.manifest.rig.as_ref().unwrap().settings["rate"], "20000");
     // Two answers of the live fit a second, the last near the truth: 0.3 % is three standard errors.
     let measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold);
-    let samples = session
-        .rows
-        .iter()
-        .filter(|row| measured(row.phase))
-        .count();
-    let mut fits = session
-        .entries
-        .iter()
-        .filter(|entry| entry.kind == EntryKind::Fit);
+    let samples = session.rows.iter().filter(|row| measured(row.phase)).count();
+    let mut fits = session.entries.iter().filter(|entry| entry.kind == EntryKind::Fit);
     assert!(fits.clone().count().abs_diff(samples / 10_000) <= 1);
-    let last = fits.next_back().unwrap().body["parameters"]
-        .as_array()
-        .unwrap();
+    let last = fits.next_back().unwrap().body["parameters"].as_array().unwrap();
     let found = last.iter().find(|one| one["name"] == "tau_eps").unwrap();
     let found = found["value"].as_f64().unwrap();
     assert!((found / tau - 1.0).abs() < 3e-3, "{found} {tau}");
@@ -191,20 +157,9 @@ fn a_fast_rig_loses_nothing_at_real_pace_with_the_live_fit() {
     let rig = SimRig::new(settings(SimProfile::Lab, "20000", 6));
     let calibration = rig.calibration();
     // Twenty times as fast as the wall, for a run of two minutes would be a long test.
-    let (runner, woken) = recorded::start(
-        Box::new(rig),
-        calibration,
-        short().plan(),
-        TimeScale::Factor(20.0),
-        &out,
-    );
-    let ended = || {
-        runner
-            .snapshot()
-            .run
-            .as_ref()
-            .is_some_and(|run| run.outcome.is_some())
-    };
+    let (runner, woken) =
+        recorded::start(Box::new(rig), calibration, short().plan(), TimeScale::Factor(20.0), &out);
+    let ended = || runner.snapshot().run.as_ref().is_some_and(|run| run.outcome.is_some());
     while !ended() {
         woken.recv_timeout(PATIENCE).unwrap();
     }

@@ -13,12 +13,7 @@ use palpate_test_support::wait::PATIENCE;
 use palpate_tests::recorded;
 
 fn params() -> RampHold {
-    RampHold {
-        speed: MmPerS(3.0),
-        depth: Depth(12.0),
-        hold: Seconds(2.0),
-        ..RampHold::default()
-    }
+    RampHold { speed: MmPerS(3.0), depth: Depth(12.0), hold: Seconds(2.0), ..RampHold::default() }
 }
 
 /// Runs with one scripted fault and returns the session.
@@ -36,11 +31,7 @@ const MID_RUN: Nanos = Nanos::from_millis(30_000);
 fn every_fault_ends_the_run_with_its_reason_and_replays() {
     for (kind, ending, word) in [
         (FaultKind::Silent, "interlock", "no sample"),
-        (
-            FaultKind::Late(Nanos::from_millis(400)),
-            "interlock",
-            "no sample",
-        ),
+        (FaultKind::Late(Nanos::from_millis(400)), "interlock", "no sample"),
         (FaultKind::NotANumber, "interlock", "not a number"),
         (FaultKind::Saturated(Rail::High), "interlock", ""),
         (FaultKind::Saturated(Rail::Low), "interlock", "tension"),
@@ -54,24 +45,16 @@ fn every_fault_ends_the_run_with_its_reason_and_replays() {
     ] {
         let name = format!("{kind:?}");
         let session = run_with(kind, MID_RUN);
-        let end = session
-            .end
-            .as_ref()
-            .unwrap_or_else(|| panic!("{name}: no end record"));
+        let end = session.end.as_ref().unwrap_or_else(|| panic!("{name}: no end record"));
         assert_eq!(end.outcome, ending, "{name}: {}", end.reason);
         assert!(end.reason.contains(word), "{name}: {}", end.reason);
         let report = replay(&session, &[]).unwrap();
         assert_eq!(report.first_difference, None, "{name}");
         if let Some(last) = session.rows.last() {
             let is_moving = AxisStatus(last.status).has(AxisStatus::MOVING);
-            let is_seen = !matches!(
-                name.as_str(),
-                "Silent" | "Disconnect" | "NotANumber" | "RefuseCommands"
-            );
-            assert!(
-                !is_moving || !is_seen,
-                "{name}: still moving at the last sample"
-            );
+            let is_seen =
+                !matches!(name.as_str(), "Silent" | "Disconnect" | "NotANumber" | "RefuseCommands");
+            assert!(!is_moving || !is_seen, "{name}: still moving at the last sample");
         }
     }
 }
@@ -82,12 +65,7 @@ fn a_noisy_cell_is_refused_before_anything_moves() {
     let end = session.end.unwrap();
     assert_eq!(end.outcome, "abort");
     assert!(end.reason.contains("noise"), "{}", end.reason);
-    assert!(
-        session
-            .rows
-            .iter()
-            .all(|row| !AxisStatus(row.status).has(AxisStatus::MOVING))
-    );
+    assert!(session.rows.iter().all(|row| !AxisStatus(row.status).has(AxisStatus::MOVING)));
 }
 
 #[test]
@@ -101,11 +79,7 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
         .spawn(move || {
             let rig = SimRig::new(SimSettings::default());
             // The hold outlasts the report of the panic, however long that takes to write.
-            let plan = RampHold {
-                hold: Seconds(3600.0),
-                ..params()
-            }
-            .plan();
+            let plan = RampHold { hold: Seconds(3600.0), ..params() }.plan();
             let calibration = rig.calibration();
             let scale = TimeScale::Factor(50.0);
             let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
@@ -122,10 +96,7 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
         .unwrap();
     assert!(watcher.join().is_err());
     let session = Session::open(&out).unwrap();
-    assert_eq!(
-        session.rows.last().map(|row| row.phase),
-        Some(Phase::Stopped)
-    );
+    assert_eq!(session.rows.last().map(|row| row.phase), Some(Phase::Stopped));
     let last = session.rows.last().unwrap();
     assert!(!AxisStatus(last.status).has(AxisStatus::MOVING));
     let end = session.end.as_ref().expect("the session is closed");

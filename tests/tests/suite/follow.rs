@@ -25,19 +25,11 @@ use std::sync::{Arc, Mutex};
 const PULSE: f64 = 0.015;
 
 fn rig() -> SimRig {
-    SimRig::new(SimSettings {
-        profile: SimProfile::Ideal,
-        seed: 3,
-        ..SimSettings::default()
-    })
+    SimRig::new(SimSettings { profile: SimProfile::Ideal, seed: 3, ..SimSettings::default() })
 }
 
 fn follow(seconds: f64, speed: f64, depth_max: f64) -> Follow {
-    Follow {
-        duration: Seconds(seconds),
-        speed: MmPerS(speed),
-        depth_max: Depth(depth_max),
-    }
+    Follow { duration: Seconds(seconds), speed: MmPerS(speed), depth_max: Depth(depth_max) }
 }
 
 /// A run that has come to the step that follows.
@@ -81,12 +73,7 @@ fn depth(lab: &Lab<SimRig>) -> f64 {
 }
 
 fn is_at_rest(lab: &Lab<SimRig>) -> bool {
-    !lab.seen
-        .last()
-        .unwrap()
-        .reading
-        .status
-        .has(AxisStatus::MOVING)
+    !lab.seen.last().unwrap().reading.status.has(AxisStatus::MOVING)
 }
 
 fn moves(lab: &Lab<SimRig>, from: Nanos) -> Vec<(Nanos, f64)> {
@@ -106,29 +93,19 @@ fn it_goes_where_it_is_led_and_never_deeper_or_faster_than_the_plan_says() {
     // Deeper than it may, by a little and by far.
     for wanted in [8.004, 12.0, 1e9] {
         lead(&mut lab, 3.0, |_| Some(wanted));
-        assert!(
-            (8.0 - PULSE..=8.0 + 1e-9).contains(&depth(&lab)),
-            "{wanted}"
-        );
+        assert!((8.0 - PULSE..=8.0 + 1e-9).contains(&depth(&lab)), "{wanted}");
     }
     lead(&mut lab, 3.0, |_| Some(1.0));
     assert!((depth(&lab) - 1.0).abs() <= 0.5 * PULSE + 1e-9);
     // Home is the end of the way out.
     lead(&mut lab, 60.0, |_| Some(-1e9));
-    let deepest = followed(&lab)
-        .iter()
-        .map(|seen| seen.derived.depth.unwrap().0)
-        .fold(0.0, f64::max);
+    let deepest =
+        followed(&lab).iter().map(|seen| seen.derived.depth.unwrap().0).fold(0.0, f64::max);
     assert!(deepest <= 8.0 + 1e-9, "{deepest}");
     let sent = moves(&lab, begun);
-    assert!(
-        sent.len() >= 4 && sent.iter().all(|(_, speed)| *speed <= 6.0),
-        "{sent:?}"
-    );
-    let fastest = followed(&lab)
-        .iter()
-        .map(|seen| seen.derived.velocity.0.abs())
-        .fold(0.0, f64::max);
+    assert!(sent.len() >= 4 && sent.iter().all(|(_, speed)| *speed <= 6.0), "{sent:?}");
+    let fastest =
+        followed(&lab).iter().map(|seen| seen.derived.velocity.0.abs()).fold(0.0, f64::max);
     assert!(fastest > 5.9 && fastest <= 6.0 + 1e-9, "{fastest}");
     assert!(lab.run_until(Seconds(60.0), |_| false));
     assert_eq!(lab.outcome.unwrap().ending, EndingKind::Finish);
@@ -145,10 +122,8 @@ fn on_a_ramp_it_is_behind_by_the_speed_times_the_duration_of_a_move() {
         // Once it goes on steadily, and before the end.
         let late = begun + Nanos::from_millis(3000);
         let sent = moves(&lab, late);
-        let steady: Vec<&(Nanos, f64)> = sent
-            .iter()
-            .take_while(|(at, _)| at.since(begun).seconds().0 < 6.8)
-            .collect();
+        let steady: Vec<&(Nanos, f64)> =
+            sent.iter().take_while(|(at, _)| at.since(begun).seconds().0 < 6.8).collect();
         let span = steady[steady.len() - 1].0.since(steady[0].0).seconds().0;
         let apart = span / (steady.len() - 1) as f64;
         // The answer is 2 to 4 ms; a lead comes every 5 ms.
@@ -177,10 +152,7 @@ fn on_a_ramp_it_is_behind_by_the_speed_times_the_duration_of_a_move() {
         }
         let lag = sum / f64::from(count);
         // A lead is 2.5 ms old on the mean when the axis takes it, and its target up to half a pulse off.
-        assert!(
-            (lag - v * apart).abs() < v * 0.008 + 0.5 * PULSE,
-            "{v}: {lag} {apart}"
-        );
+        assert!((lag - v * apart).abs() < v * 0.008 + 0.5 * PULSE, "{v}: {lag} {apart}");
     }
 }
 
@@ -220,18 +192,12 @@ fn a_lead_that_is_no_number_is_refused_once_and_is_no_lead() {
     let mut lab = following(follow(60.0, 3.0, 30.0));
     lead(&mut lab, 2.0, |_| Some(1.0));
     let before = lab.records.len();
-    for depth in [
-        None,
-        Some(Depth(f64::NAN)),
-        Some(Depth(f64::INFINITY)),
-        None,
-    ] {
+    for depth in [None, Some(Depth(f64::NAN)), Some(Depth(f64::INFINITY)), None] {
         lab.give(Input::Lead { depth });
     }
     let told = |lab: &Lab<SimRig>| {
         let own = lab.records[before..].iter();
-        own.filter(|(_, record)| matches!(record, Record::Refused { .. }))
-            .count()
+        own.filter(|(_, record)| matches!(record, Record::Refused { .. })).count()
     };
     assert_eq!(told(&lab), 1);
     let at = lab.now;
@@ -276,9 +242,7 @@ fn the_operator_and_every_interlock_end_it_as_any_step() {
     type Change = fn(&mut Reading);
     let changes: [(Interlock, Change); 7] = [
         (Interlock::Signal, |one| one.volts = Volts(f64::NAN)),
-        (Interlock::Travel, |one| {
-            one.status = one.status | AxisStatus::FORWARD_LIMIT
-        }),
+        (Interlock::Travel, |one| one.status = one.status | AxisStatus::FORWARD_LIMIT),
         (Interlock::Force, |one| one.volts = Volts(1e3)),
         (Interlock::Motor, |one| one.status = AxisStatus::MOVING),
         (Interlock::Path, |one| one.pulses += 100),
@@ -306,13 +270,7 @@ fn the_operator_and_every_interlock_end_it_as_any_step() {
     let mut lab = following(follow(60.0, 3.0, 60.0));
     lead(&mut lab, 60.0, |_| Some(60.0));
     let tripped = lab.records.iter().any(|(_, record)| {
-        matches!(
-            record,
-            Record::InterlockTripped {
-                interlock: Interlock::Force,
-                ..
-            }
-        )
+        matches!(record, Record::InterlockTripped { interlock: Interlock::Force, .. })
     });
     assert!(tripped, "{:?}", lab.records.last());
     check(&mut lab, EndingKind::Interlock);
@@ -365,21 +323,13 @@ fn slaved(path: HandPath, follow: Follow) -> (Session, Slaved) {
 
 #[test]
 fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
-    let path = HandPath::Sine {
-        middle: 5.0,
-        amplitude: 5.0,
-        hz: 0.1,
-    };
+    let path = HandPath::Sine { middle: 5.0, amplitude: 5.0, hz: 0.1 };
     let (session, told) = slaved(path, follow(20.0, 9.0, 8.0));
     assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
     // The closed force of the specimen under the depth that the slave had.
     let body: ModifiedKelvin = rig().truth().body;
     let tick = session.manifest.tick().0;
-    let rows: Vec<_> = session
-        .rows
-        .iter()
-        .filter(|row| row.phase == Phase::Follow)
-        .collect();
+    let rows: Vec<_> = session.rows.iter().filter(|row| row.phase == Phase::Follow).collect();
     let mut state = KelvinState::at_rest();
     let mut means = [(); 2].map(|()| MovingMean::new(50));
     let (mut worst, mut most, mut before) = (0.0_f64, 0.0_f64, rows[0].tick);
@@ -399,20 +349,14 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     assert!(most > 0.3 && worst < 0.025, "{most} {worst}");
     // What was told is the same.
     assert!((told.model_max_n - most).abs() < 1e-9, "{told:?}");
-    assert!(
-        told.model_less_cell.worst_n < 0.025 && told.model_less_cell.rms_n < 0.01,
-        "{told:?}"
-    );
+    assert!(told.model_less_cell.worst_n < 0.025 && told.model_less_cell.rms_n < 0.01, "{told:?}");
     // The handle feels more than the cell: its place is ahead.
     assert!(told.handle_less_cell.worst_n > told.model_less_cell.worst_n);
     assert!(told.depth_max_mm <= 8.0 + 1e-9);
     assert_eq!(told.contact_changes, 4, "{told:?}");
     let lag = told.lag_ms.unwrap();
     assert!(lag.median > 50.0 && lag.median < 400.0, "{told:?}");
-    assert!(
-        told.damping_through_slave.unwrap() > 4.0 * told.damping_needed.max(1.0),
-        "{told:?}"
-    );
+    assert!(told.damping_through_slave.unwrap() > 4.0 * told.damping_needed.max(1.0), "{told:?}");
     // Leads are inputs like any other.
     let leads = session
         .entries
@@ -434,16 +378,12 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     let mut other = session;
     let lead = other.entries.iter_mut().rfind(|entry| {
         entry.body["input"] == "lead"
-            && entry.body["depth"]
-                .as_f64()
-                .is_some_and(|depth| depth > 3.0)
+            && entry.body["depth"].as_f64().is_some_and(|depth| depth > 3.0)
     });
     lead.unwrap().body["depth"] = serde_json::json!(null);
     for entry in &mut other.entries {
         if entry.body["input"] == "lead"
-            && entry.body["depth"]
-                .as_f64()
-                .is_some_and(|depth| depth > 3.0)
+            && entry.body["depth"].as_f64().is_some_and(|depth| depth > 3.0)
         {
             entry.body["depth"] = serde_json::json!(3.0);
         }
@@ -476,26 +416,15 @@ fn what_leads_may_fail_and_the_session_says_so() {
     let session = recorded::of_led_plan(Box::new(rig), calibration, plan, TimeScale::Max, leader);
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "finish");
-    let records = |name: &str| {
-        session
-            .entries
-            .iter()
-            .filter(|entry| entry.body["record"] == name)
-            .count()
-    };
+    let records =
+        |name: &str| session.entries.iter().filter(|entry| entry.body["record"] == name).count();
     assert_eq!((records("lead_lost"), records("refused")), (1, 1));
     let remarks = of_session(&session).unwrap().remarks;
     assert!(
-        remarks
-            .iter()
-            .any(|remark| remark.contains("nothing has led the slave")),
+        remarks.iter().any(|remark| remark.contains("nothing has led the slave")),
         "{remarks:?}"
     );
-    let followed = session
-        .rows
-        .iter()
-        .filter(|row| row.phase == Phase::Follow)
-        .count();
+    let followed = session.rows.iter().filter(|row| row.phase == Phase::Follow).count();
     assert!((5050..5200).contains(&followed), "{followed}");
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }
@@ -509,15 +438,8 @@ fn limits_of_the_rig_stand_before_the_plan() {
     let surface = rig.truth().surface_counted().0;
     let mut lab = Lab::new(rig, curve, follow(10.0, 6.0, 90.0).plan()).within(limits);
     lab.operator(Operator::Start);
-    assert!(
-        lab.run_until(Seconds(600.0), |state| state.phase() == Phase::Follow),
-        "{surface}"
-    );
+    assert!(lab.run_until(Seconds(600.0), |state| state.phase() == Phase::Follow), "{surface}");
     lead(&mut lab, 60.0, |_| Some(90.0));
-    let position = lab
-        .seen
-        .iter()
-        .map(|seen| seen.derived.position.0)
-        .fold(0.0, f64::max);
+    let position = lab.seen.iter().map(|seen| seen.derived.position.0).fold(0.0, f64::max);
     assert!(position <= 55.0 + 1e-9, "{position}");
 }

@@ -69,19 +69,14 @@ fn checks_stand_over_time_with_what_their_sessions_measured() {
     check(&mut flow);
     let library = flow.folder.path().to_owned();
     let rig = flow.window.state().snapshot().rig.description.name.clone();
-    let session = flow
-        .sessions()
-        .into_iter()
-        .find(|path| Session::open(path).is_ok());
+    let session = flow.sessions().into_iter().find(|path| Session::open(path).is_ok());
     let session = session.unwrap();
     let gone = keep(&library, &session, &rig, Some("a session that is gone"));
     let kept = keep(&library, &session, &rig, None);
 
     flow.click(SCREEN.name);
     flow.click("Read again  F6");
-    flow.wait("both checks", |window| {
-        checks(window).is_some_and(|checks| checks.len() == 2)
-    });
+    flow.wait("both checks", |window| checks(window).is_some_and(|checks| checks.len() == 2));
     flow.window.run_steps(2);
     flow.window.check_accessibility();
     let [first, second] = checks(&flow.window).unwrap() else {
@@ -93,29 +88,15 @@ fn checks_stand_over_time_with_what_their_sessions_measured() {
     let (zero, weight) = (second.zero.unwrap(), second.weight.unwrap());
     let part = |what: &str| kept.parts.iter().find(|part| part.what == what).unwrap();
     // The numbers of the plot are those of the sentences.
-    for (what, text) in [
-        ("zero", format!("{:+.3} N", zero.newtons)),
-        ("zero", format!("{:.3} N", zero.limit)),
-    ] {
-        assert!(
-            part(what).sentence.contains(&text),
-            "{text}: {:?}",
-            part(what)
-        );
+    for (what, text) in
+        [("zero", format!("{:+.3} N", zero.newtons)), ("zero", format!("{:.3} N", zero.limit))]
+    {
+        assert!(part(what).sentence.contains(&text), "{text}: {:?}", part(what));
     }
     // 840 g weigh 8.238 N, of which 1 % is allowed.
-    assert!(
-        (weight.limit - 0.01 * 0.840 * 9.806_65).abs() < 1e-6,
-        "{weight:?}"
-    );
-    assert_eq!(
-        weight.newtons.abs() <= weight.limit,
-        part("weight").is_passed
-    );
-    for words in [
-        format!("{:+.4}", weight.newtons),
-        format!("{:+.4}", zero.newtons),
-    ] {
+    assert!((weight.limit - 0.01 * 0.840 * 9.806_65).abs() < 1e-6, "{weight:?}");
+    assert_eq!(weight.newtons.abs() <= weight.limit, part("weight").is_passed);
+    for words in [format!("{:+.4}", weight.newtons), format!("{:+.4}", zero.newtons)] {
         assert!(flow.says(&words), "{words}");
     }
     assert!(flow.says(&part("weight").sentence));

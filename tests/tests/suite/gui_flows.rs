@@ -19,9 +19,7 @@ use palpate_window::workers::fit::Refit;
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {
     let mut flow = Flow::open(TimeScale::Max);
-    flow.wait("the serial ports", |window| {
-        window.query_by_label("looking for them").is_none()
-    });
+    flow.wait("the serial ports", |window| window.query_by_label("looking for them").is_none());
     flow.window.run();
     flow.window.check_accessibility();
     for name in ["Stop motion  F12", "Start  F5"] {
@@ -52,10 +50,7 @@ fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
     assert_eq!(session.manifest.operator, "A. Tester");
     assert_eq!(session.rows.len() as u64, run.samples);
     flow.window.step();
-    assert!(
-        flow.is_enabled("Start  F5"),
-        "a second run must be possible"
-    );
+    assert!(flow.is_enabled("Start  F5"), "a second run must be possible");
 }
 
 #[test]
@@ -77,16 +72,11 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
     assert!((first.x - ramp.unwrap().0).abs() < 0.05, "{first:?}");
     let highest = exact.curve.iter().map(|point| point.y).fold(0.0, f64::max);
     // Noise makes the highest of ten thousand forces higher than the model: five times the rmse.
-    assert!(
-        (highest - peak).abs() < 6.0 * report.rmse_n,
-        "{highest} {peak}"
-    );
+    assert!((highest - peak).abs() < 6.0 * report.rmse_n, "{highest} {peak}");
     assert!(exact.residual.len() > 1000 && exact.residual.len() <= 4000);
     // A second run begins with live numbers again.
     flow.click("Start  F5");
-    flow.wait("live numbers", |window| {
-        window.query_by_label("Live parameters").is_some()
-    });
+    flow.wait("live numbers", |window| window.query_by_label("Live parameters").is_some());
     assert!(!flow.says("Exact fit"));
 }
 
@@ -145,10 +135,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
         assert!(!flow.is_enabled("Start  F5"));
         flow.window.key_press(Key::F5);
         flow.window.run_steps(5);
-        assert!(
-            flow.run().is_none(),
-            "F5 must not start what the button refuses"
-        );
+        assert!(flow.run().is_none(), "F5 must not start what the button refuses");
     }
     flow.type_into("speed", "1.5");
     assert!(flow.is_enabled("Start  F5"));
@@ -187,9 +174,7 @@ fn the_probe_is_retracted_after_a_stop_in_the_tissue() {
     flow.click("Start  F5");
     flow.wait_for_phase(Phase::Ramp);
     flow.click("Stop motion  F12");
-    flow.wait("the offer to retract", |window| {
-        window.query_by_label("Retract  F8").is_some()
-    });
+    flow.wait("the offer to retract", |window| window.query_by_label("Retract  F8").is_some());
     assert!(flow.is_enabled("Retract  F8"));
     let stopped_at = flow.run().unwrap().derived.position;
     flow.window.key_press(Key::F8);
@@ -213,15 +198,10 @@ fn closing_while_moving_stops_first() {
     flow.window.step();
     assert!(commands(&flow.window).contains(&ViewportCommand::CancelClose));
     assert!(!commands(&flow.window).contains(&ViewportCommand::Close));
-    flow.wait("the window closing", |window| {
-        commands(window).contains(&ViewportCommand::Close)
-    });
+    flow.wait("the window closing", |window| commands(window).contains(&ViewportCommand::Close));
     assert!(!is_motion_possible(flow.window.state().snapshot()));
     let session = flow.sessions().remove(0);
-    let Flow {
-        window,
-        folder: _folder,
-    } = flow;
+    let Flow { window, folder: _folder } = flow;
     // eframe drops the app when the window closes; the runner then closes the session.
     drop(window);
     let session = Session::open(&session).unwrap();
@@ -299,10 +279,7 @@ fn frames_draw_as_much_of_a_long_run_as_of_a_short_one() {
     assert!(after > before + 20_000, "{before} {after}");
     // Two points a pixel of three plots as wide as the window, four corners a point, and the words; each sample drawn
     // would be over 400 000.
-    assert!(
-        early.max(late) < 3 * 2 * 1280 * 4 + 20_000,
-        "{early} {late}"
-    );
+    assert!(early.max(late) < 3 * 2 * 1280 * 4 + 20_000, "{early} {late}");
 }
 
 #[test]
@@ -314,20 +291,12 @@ fn what_a_crash_left_is_recovered_when_the_window_opens_and_told() {
     let bytes = std::fs::read(whole).unwrap();
     std::fs::write(crashed.join("000.mcap"), &bytes[..bytes.len() / 2]).unwrap();
     let mut flow = Flow::open_in(folder, TimeScale::Max);
-    flow.wait("the recovery", |window| {
-        window.query_by_label("Recovered after a crash").is_some()
-    });
+    flow.wait("the recovery", |window| window.query_by_label("Recovered after a crash").is_some());
     let kept = flow.folder.path().join("sessions/crashed.recovered");
     let session = palpate_sessions::Session::open(&kept).unwrap();
     assert!(session.rows.len() > 10_000, "{}", session.rows.len());
     let told = format!("{} samples kept in", session.rows.len());
-    assert!(
-        flow.window.query_by_label_contains(&told).is_some(),
-        "{told}"
-    );
+    assert!(flow.window.query_by_label_contains(&told).is_some(), "{told}");
     // The original is as it was.
-    assert_eq!(
-        std::fs::read(crashed.join("000.mcap")).unwrap(),
-        bytes[..bytes.len() / 2]
-    );
+    assert_eq!(std::fs::read(crashed.join("000.mcap")).unwrap(), bytes[..bytes.len() / 2]);
 }

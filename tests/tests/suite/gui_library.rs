@@ -20,8 +20,7 @@ fn opened() -> (Flow, Vec<PathBuf>) {
     let sessions = (0..SESSIONS).map(|number| write(folder.path(), &original, number));
     let sessions = sessions.collect();
     let mut flow = Flow::open_in(folder, TimeScale::Max);
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     (flow, sessions)
 }
@@ -106,10 +105,8 @@ fn sessions_are_chosen_by_keys_and_by_the_pointer_and_reviewed() {
     flow.window.key_press(Key::ArrowDown);
     flow.window.run_steps(3);
     flow.wait_for_words("1 chosen");
-    flow.window
-        .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
-    flow.window
-        .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
+    flow.window.key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
+    flow.window.key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
     flow.wait_for_words("3 chosen");
     assert!(flow.says("3 sessions chosen"));
     flow.window.key_press(Key::End);
@@ -133,10 +130,7 @@ fn sessions_are_chosen_by_keys_and_by_the_pointer_and_reviewed() {
     assert!(flow.says(", 4 chosen"));
     click_row(&mut flow, 3, Modifiers::NONE);
     assert!(flow.says("finished, no sample missing"));
-    assert!(flow.says(&format!(
-        "palpate replay \"{}\" --window",
-        sessions[3].display()
-    )));
+    assert!(flow.says(&format!("palpate replay \"{}\" --window", sessions[3].display())));
     flow.window.key_press(Key::Enter);
     flow.window.run_steps(3);
     assert!(!flow.says("found in"), "the review screen is shown");
@@ -182,11 +176,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     let (worth, why) = told.verdict().unwrap();
     assert_eq!((worth, why.by.as_str()), (Verdict::Suspect, "Grace"));
     assert_eq!(told.notes().count(), 1);
-    assert!(
-        told.all
-            .iter()
-            .any(|edit| matches!(edit.change, Change::Review { .. }))
-    );
+    assert!(told.all.iter().any(|edit| matches!(edit.change, Change::Review { .. })));
     flow.window.check_accessibility();
     // Whoever types a note finds the session by it.
     flow.type_into("find", "warm gel");
@@ -204,9 +194,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.wait_for_words("rejected: hair again");
     let subject = palpate_analysis::edits::Subject::read(&sessions[20]).unwrap();
     let verdict = Verdict::Suspect;
-    subject
-        .say("Mary", "not that bad", Change::Verdict { verdict })
-        .unwrap();
+    subject.say("Mary", "not that bad", Change::Verdict { verdict }).unwrap();
     flow.click("Undo: verdict rejected on 1 session");
     flow.wait_for_words("given again");
     assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Suspect);
@@ -244,10 +232,7 @@ fn damage_is_told_and_sessions_are_written_out() {
     flow.click("Export");
     flow.wait_for_words("0 of 3 sessions written");
     flow.wait_for_words("exists already");
-    assert_eq!(
-        fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap(),
-        "mine"
-    );
+    assert_eq!(fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap(), "mine");
     let lake = flow.folder.path().join("out/lake");
     flow.type_into("to folder", &lake.display().to_string());
     flow.click("as");

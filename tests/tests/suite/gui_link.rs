@@ -37,9 +37,7 @@ impl Rig for Unplugged {
         if std::mem::replace(&mut self.is_told, true) {
             return None;
         }
-        let fault = Fault::LinkLost {
-            detail: "the device has hung up".into(),
-        };
+        let fault = Fault::LinkLost { detail: "the device has hung up".into() };
         Some(RigEvent::new(until, RigEventBody::Fault(fault)))
     }
 
@@ -60,15 +58,10 @@ impl Rig for Unplugged {
 fn a_lost_link_is_told_and_made_again_by_a_button() {
     let scale = TimeScale::Factor(1.0);
     let mut options = WindowOptions::open("sim", &SimSettings::default(), scale).unwrap();
-    options.rig = Box::new(Unplugged {
-        rig: SimRig::new(SimSettings::default()),
-        tries: 0,
-        is_told: false,
-    });
+    options.rig =
+        Box::new(Unplugged { rig: SimRig::new(SimSettings::default()), tries: 0, is_told: false });
     let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
-    flow.wait("the loss", |window| {
-        window.state().snapshot().rig.link_error.is_some()
-    });
+    flow.wait("the loss", |window| window.state().snapshot().rig.link_error.is_some());
     flow.window.step();
     assert!(flow.says("State: LINK LOST"));
     assert!(flow.says("the device has hung up"));
@@ -77,9 +70,7 @@ fn a_lost_link_is_told_and_made_again_by_a_button() {
     flow.click("Connect again");
     flow.wait("the refusal", |window| {
         let error = &window.state().snapshot().rig.link_error;
-        error
-            .as_ref()
-            .is_some_and(|error| error.contains("connected again"))
+        error.as_ref().is_some_and(|error| error.contains("connected again"))
     });
     flow.window.step();
     flow.click("Connect again");

@@ -16,14 +16,9 @@ use std::path::Path;
 
 /// A ramp and hold of a Kelvin body with 1 % of repeatable roughness, as a table.
 fn table(path: &Path, speed: f64) {
-    let body = by_key("kelvin")
-        .unwrap()
-        .model(&[1.5], &[0.15, 0.6])
-        .unwrap();
+    let body = by_key("kelvin").unwrap().model(&[1.5], &[0.15, 0.6]).unwrap();
     let times = || (0..500).map(|i| 0.05 * f64::from(i));
-    let forces = body
-        .along(times().map(|t| (Seconds(t), Depth((speed * t).min(10.0)))))
-        .unwrap();
+    let forces = body.along(times().map(|t| (Seconds(t), Depth((speed * t).min(10.0))))).unwrap();
     let mut text = String::from("t_s,F_N,x_mm\n");
     for (i, (t, force)) in times().zip(forces).enumerate() {
         // A linear congruence: like noise, and the same everywhere.
@@ -66,12 +61,7 @@ fn models_are_compared_in_the_window() {
     for sentence in &selection.verdict.sentences {
         assert!(flow.says(sentence), "{sentence}");
     }
-    for words in [
-        "series-3",
-        "fast: 10.0000 mm deep",
-        "tau_eps",
-        "kelvin > prony-2",
-    ] {
+    for words in ["series-3", "fast: 10.0000 mm deep", "tau_eps", "kelvin > prony-2"] {
         assert!(flow.says(words), "{words}");
     }
     flow.window.check_accessibility();
@@ -80,9 +70,7 @@ fn models_are_compared_in_the_window() {
     flow.click("Add");
     flow.click("Compare models  F6");
     flow.wait("the refusal", |window| {
-        screen_of::<ModelsScreen>(window)
-            .answer()
-            .is_some_and(Result::is_err)
+        screen_of::<ModelsScreen>(window).answer().is_some_and(Result::is_err)
     });
     flow.window.run_steps(2);
     assert!(flow.says("/nowhere/at-all"));
@@ -111,9 +99,7 @@ fn the_trade_is_measured_in_the_window() {
     show_screen(&mut flow, Key::Num7);
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
-    flow.wait("the curves", |window| {
-        screen_of::<TradeScreen>(window).curves().is_some()
-    });
+    flow.wait("the curves", |window| screen_of::<TradeScreen>(window).curves().is_some());
     flow.window.run_steps(3);
     assert!(flow.says("What to use") && flow.says("of the peak force"));
     for view in ["Families", "Fit", "Integrators"] {
@@ -131,21 +117,11 @@ fn the_extremes_are_tested_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num8);
     flow.click("Test the extremes  F6");
-    flow.wait("progress", |window| {
-        screen_of::<ExtremesScreen>(window).rows().is_none()
-    });
-    flow.wait("the rows", |window| {
-        screen_of::<ExtremesScreen>(window).rows().is_some()
-    });
+    flow.wait("progress", |window| screen_of::<ExtremesScreen>(window).rows().is_none());
+    flow.wait("the rows", |window| screen_of::<ExtremesScreen>(window).rows().is_some());
     flow.window.run_steps(3);
     assert!(flow.says("every case is right or refused with its reason"));
-    assert!(
-        screen_of::<ExtremesScreen>(&flow.window)
-            .rows()
-            .unwrap()
-            .len()
-            > 100
-    );
+    assert!(screen_of::<ExtremesScreen>(&flow.window).rows().unwrap().len() > 100);
     flow.window.check_accessibility();
 }
 
@@ -233,22 +209,14 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     // Above the surface there is none, and the screen says so.
     flow.click("Lift off");
     flow.wait("the words", |window| {
-        screen_of::<HapticsScreen>(window)
-            .feel()
-            .is_some_and(|feel| {
-                let flags = feel.flags();
-                flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
-            })
+        screen_of::<HapticsScreen>(window).feel().is_some_and(|feel| {
+            let flags = feel.flags();
+            flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
+        })
     });
     flow.window.run_steps(2);
     assert!(flow.says("Why no force?") && flow.says("the force is zero"));
-    for words in [
-        "force commanded",
-        "p99.9",
-        "ticks a second",
-        "priority",
-        "no buzz",
-    ] {
+    for words in ["force commanded", "p99.9", "ticks a second", "priority", "no buzz"] {
         assert!(flow.says(words), "{words}");
     }
     flow.window.check_accessibility();
@@ -259,12 +227,7 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     flow.click("Lift off");
     flow.wait("none", |window| felt(window)[1] == 0.0);
     // The slider leads the hand as the buttons do.
-    let at_hand = |flow: &Flow| {
-        screen_of::<HapticsScreen>(&flow.window)
-            .feel()
-            .unwrap()
-            .place()
-    };
+    let at_hand = |flow: &Flow| screen_of::<HapticsScreen>(&flow.window).feel().unwrap().place();
     let before = at_hand(&flow);
     flow.window.get_all_by_label("hand").next().unwrap().focus();
     flow.window.run_steps(2);
@@ -291,9 +254,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
     flow.type_into("shape", "5");
     flow.type_into("budget", "100000");
     flow.click("Measure here  F6");
-    flow.wait("the curves", |window| {
-        screen_of::<TradeScreen>(window).scene_curves().is_some()
-    });
+    flow.wait("the curves", |window| screen_of::<TradeScreen>(window).scene_curves().is_some());
     flow.window.run_steps(3);
     // So much is tolerated that the coarsest mesh does, and what that leaves out is told.
     for words in [
@@ -331,25 +292,14 @@ fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
     flow.window.key_press(Key::Escape);
     flow.wait_for_words("ticks recorded, none lost");
     flow.click("Replay it");
-    flow.wait("the replay", |window| {
-        screen_of::<HapticsScreen>(window).replayed().is_some()
-    });
+    flow.wait("the replay", |window| screen_of::<HapticsScreen>(window).replayed().is_some());
     let replayed = screen_of::<HapticsScreen>(&flow.window).replayed().unwrap();
     let replayed = replayed.as_ref().unwrap();
-    assert!(
-        replayed.is_identical && replayed.ticks > 100,
-        "{replayed:?}"
-    );
+    assert!(replayed.is_identical && replayed.ticks > 100, "{replayed:?}");
     assert!(replayed.name.contains("led by hand"));
     // Where the hand was led is what it is computed from.
     let ticks = std::fs::read_to_string(folder.join("ticks.csv")).unwrap();
-    let mut places: Vec<&str> = ticks
-        .lines()
-        .filter_map(|line| line.split(',').nth(3))
-        .collect();
+    let mut places: Vec<&str> = ticks.lines().filter_map(|line| line.split(',').nth(3)).collect();
     places.dedup();
-    assert!(
-        places.contains(&"30.0") && places.contains(&"-2.0"),
-        "{places:?}"
-    );
+    assert!(places.contains(&"30.0") && places.contains(&"-2.0"), "{places:?}");
 }

@@ -27,11 +27,7 @@ type Window = Harness<'static, WorkbenchApp>;
 /// Whether a software renderer is there.
 fn has_renderer() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-    let mut files = folders
-        .iter()
-        .flat_map(std::fs::read_dir)
-        .flatten()
-        .flatten();
+    let mut files = folders.iter().flat_map(std::fs::read_dir).flatten().flatten();
     files.any(|file| file.file_name().to_string_lossy().starts_with("lvp"))
 }
 
@@ -107,9 +103,8 @@ fn settle(window: &mut Window) {
             "reading the library",
             "searching",
         ];
-        let is_waiting = waits
-            .iter()
-            .any(|words| window.query_all_by_label_contains(words).next().is_some());
+        let is_waiting =
+            waits.iter().any(|words| window.query_all_by_label_contains(words).next().is_some());
         if !is_waiting && window.state().snapshot().rig.reading.is_some() {
             // What came last is drawn, and what it made wide has its width.
             window.run_steps(5);
@@ -130,9 +125,7 @@ fn show(window: &mut Window, session: &Path) {
     let path = session.display().to_string();
     window.get_by_label("session").focus();
     window.step();
-    window
-        .get_by_label("session")
-        .set_text_value_accesskit(&path);
+    window.get_by_label("session").set_text_value_accesskit(&path);
     window.run_steps(2);
     window.get_by_label("Show besides").click_accesskit();
     window.run_steps(3);
@@ -239,11 +232,7 @@ fn every_screen_looks_as_it_did() {
         results.add(window.try_snapshot_options(format!("palette-{theme}"), &options));
         window.key_press(Key::F1);
         window.run_steps(2);
-        let name = if theme == "light" {
-            "Dark screen"
-        } else {
-            "Light screen"
-        };
+        let name = if theme == "light" { "Dark screen" } else { "Light screen" };
         window.get_by_label(name).click_accesskit();
         window.run_steps(3);
     }

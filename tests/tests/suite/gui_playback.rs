@@ -45,18 +45,11 @@ fn wait(window: &mut Window, what: &str, is_so: impl Fn(&RunView) -> bool) {
         if is_so(&run) {
             return;
         }
-        still = if before == Some(run.now) {
-            still + 1
-        } else {
-            0
-        };
+        still = if before == Some(run.now) { still + 1 } else { 0 };
         before = Some(run.now);
         std::thread::sleep(Duration::from_millis(5));
     }
-    panic!(
-        "{what} did not come; the session stands at {}",
-        run(window).now
-    );
+    panic!("{what} did not come; the session stands at {}", run(window).now);
 }
 
 fn click(window: &mut Window, name: &str) {
@@ -70,11 +63,7 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
     wait(&mut window, "the end", |run| run.outcome.is_some());
     let end = run(&window);
     assert_eq!(end.outcome.as_ref().unwrap().ending, EndingKind::Finish);
-    assert!(
-        window
-            .query_by_label_contains("Replay of ramp-hold-lab")
-            .is_some()
-    );
+    assert!(window.query_by_label_contains("Replay of ramp-hold-lab").is_some());
     // It stays at the end, though that is no round number.
     for _ in 0..20 {
         window.step();
@@ -88,11 +77,7 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
     // The slider, to the middle of the session: everything as it was known then.
     window.run_steps(2);
     let middle = end.now.seconds().0 / 2.0;
-    window
-        .get_all_by_label("session time")
-        .next()
-        .unwrap()
-        .set_value_accesskit(middle);
+    window.get_all_by_label("session time").next().unwrap().set_value_accesskit(middle);
     let near = move |run: &RunView| (run.now.seconds().0 - middle).abs() < 0.2;
     wait(&mut window, "the middle", near);
     let then = run(&window);
@@ -105,9 +90,7 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
     // At ten times it goes on from there.
     click(&mut window, "10x");
     click(&mut window, "Play");
-    wait(&mut window, "what comes after", |run| {
-        run.now.seconds().0 > middle + 5.0
-    });
+    wait(&mut window, "what comes after", |run| run.now.seconds().0 > middle + 5.0);
     click(&mut window, "Pause");
     // What was asked for before is still shown, and then nothing moves any more.
     let (mut paused, mut still) = (run(&window).now, 0);

@@ -17,9 +17,7 @@ fn choose(flow: &mut Flow, title: &str) {
 
 /// Waits until the run on the screen is as wanted.
 fn wait_for(flow: &mut Flow, what: &str, is_so: impl Fn(&RunView) -> bool) {
-    flow.wait(what, |window| {
-        window.state().snapshot().run.as_ref().is_some_and(&is_so)
-    });
+    flow.wait(what, |window| window.state().snapshot().run.as_ref().is_some_and(&is_so));
     flow.window.run_steps(2);
 }
 
@@ -167,12 +165,9 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     assert!(!flow.is_enabled("Use this one  F6") && flow.says("it is in use"));
     assert!(!flow.is_enabled("Keep the last run's"));
     flow.click("Measure...");
-    for (name, text) in [
-        ("operator", "Ada"),
-        ("masses", "240, 540 g"),
-        ("heaviest", "1040"),
-        ("repeats", "1"),
-    ] {
+    for (name, text) in
+        [("operator", "Ada"), ("masses", "240, 540 g"), ("heaviest", "1040"), ("repeats", "1")]
+    {
         flow.type_into(name, text);
     }
     flow.click("Start  F5");
@@ -238,9 +233,5 @@ fn a_declined_prompt_stops_and_keeps_nothing() {
     flow.click("Close session");
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
-    assert!(
-        flow.window
-            .query_by_label("Keep this calibration")
-            .is_none()
-    );
+    assert!(flow.window.query_by_label("Keep this calibration").is_none());
 }

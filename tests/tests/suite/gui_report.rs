@@ -45,32 +45,20 @@ impl Panel {
         });
         let shown = Shown {
             panel: AnalysesPanel::new(Ok(folder.path().join("library"))),
-            looked: Looked {
-                session: session.clone(),
-                analysis: None,
+            looked: Looked { session: session.clone(), analysis: None },
+        };
+        let window = Harness::builder().with_size((340.0, 1400.0)).build_ui_state(
+            move |ui, shown: &mut Shown| {
+                shown.panel.poll(&ui.ctx().clone());
+                let second = Looked { session: beside.clone(), analysis: None };
+                let all = [shown.looked.clone(), second];
+                shown.panel.set_shown(&all);
+                let mut commands = Default::default();
+                shown.panel.ui(ui, &mut shown.looked, &mut commands);
             },
-        };
-        let window = Harness::builder()
-            .with_size((340.0, 1400.0))
-            .build_ui_state(
-                move |ui, shown: &mut Shown| {
-                    shown.panel.poll(&ui.ctx().clone());
-                    let second = Looked {
-                        session: beside.clone(),
-                        analysis: None,
-                    };
-                    let all = [shown.looked.clone(), second];
-                    shown.panel.set_shown(&all);
-                    let mut commands = Default::default();
-                    shown.panel.ui(ui, &mut shown.looked, &mut commands);
-                },
-                shown,
-            );
-        let mut panel = Self {
-            window,
-            session,
-            folder,
-        };
+            shown,
+        );
+        let mut panel = Self { window, session, folder };
         panel.wait_for("as measured");
         panel
     }
@@ -95,9 +83,7 @@ impl Panel {
     fn type_into(&mut self, name: &str, text: &str) {
         self.window.get_by_label(name).focus();
         self.window.step();
-        self.window
-            .get_by_label(name)
-            .set_text_value_accesskit(text);
+        self.window.get_by_label(name).set_text_value_accesskit(text);
         self.window.run_steps(2);
     }
 
@@ -205,16 +191,10 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("kept as 'simpler'");
     panel.wait_for("Found by 'simpler'");
     let kept = panel.analyses();
-    let Analysed::Fit {
-        based_on, settings, ..
-    } = &kept.all[1].what
-    else {
+    let Analysed::Fit { based_on, settings, .. } = &kept.all[1].what else {
         panic!("{:?}", kept.all[1]);
     };
-    assert_eq!(
-        (based_on.as_deref(), &settings["family"]),
-        (Some("knock"), &"kelvin".into())
-    );
+    assert_eq!((based_on.as_deref(), &settings["family"]), (Some("knock"), &"kelvin".into()));
     // A calibration of a file.
     let document = panel.at("other.json");
     let calibration = serde_json::to_string(&Calibration::thesis()).expect("a document");
@@ -247,10 +227,7 @@ fn sessions_shown_together_are_fitted_as_one_body() {
     panel.click("Make analysis");
     panel.wait_for("kept as 'together'");
     let kept = panel.analyses();
-    let Analysed::Fit {
-        settings, results, ..
-    } = &kept.all[0].what
-    else {
+    let Analysed::Fit { settings, results, .. } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);
     };
     assert_eq!(settings["together_with"][0]["session"], "beside");
@@ -278,9 +255,7 @@ fn a_verdict_and_a_contact_are_corrected_with_a_reason() {
     let changed = panel.window.state_mut().panel.take_changed();
     assert_eq!(changed.as_deref(), Some(panel.session.as_path()));
     let edits = Edits::read(&panel.session, &panel.id()).expect("edits");
-    let verdict = edits
-        .verdict()
-        .map(|(verdict, edit)| (verdict, edit.reason.as_str()));
+    let verdict = edits.verdict().map(|(verdict, edit)| (verdict, edit.reason.as_str()));
     assert_eq!(verdict, Some((Verdict::Suspect, "hair under the probe")));
     assert!(edits.contact(1).is_some());
 }
@@ -305,11 +280,7 @@ fn a_report_and_figures_are_written_once() {
     panel.click("Write report");
     panel.wait_for("both.html");
     wait_for_file(&both);
-    assert!(
-        fs::read_to_string(&both)
-            .expect("a page")
-            .contains("Comparison of 2 sessions")
-    );
+    assert!(fs::read_to_string(&both).expect("a page").contains("Comparison of 2 sessions"));
     let figure = panel.at("figure.png");
     panel.type_into("figure file", &figure.display().to_string());
     panel.click("Write figure");

@@ -9,8 +9,7 @@ use std::path::PathBuf;
 /// A window on the review screen.
 fn review() -> Flow {
     let mut flow = Flow::open(TimeScale::Max);
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Key::Num5);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num5);
     flow.window.run_steps(3);
     flow
 }
@@ -67,8 +66,7 @@ fn one_session_is_looked_at_closely() {
     }
     // From a third of the picture to behind contact, at 88.7 of 105 s.
     for _ in 0..220 {
-        flow.window
-            .key_press_modifiers(Modifiers::ALT, Key::ArrowRight);
+        flow.window.key_press_modifiers(Modifiers::ALT, Key::ArrowRight);
         flow.window.step();
     }
     flow.window.run_steps(2);
@@ -150,10 +148,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     flow.click("Foretell the second session");
     flow.wait("the prediction", |window| {
         use egui_kittest::kittest::Queryable;
-        window
-            .query_all_by_label_contains("mN rms")
-            .next()
-            .is_some()
+        window.query_all_by_label_contains("mN rms").next().is_some()
     });
     flow.window.run_steps(3);
     flow.window.check_accessibility();

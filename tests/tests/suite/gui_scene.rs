@@ -34,9 +34,7 @@ fn felt(window: &Window) -> Option<(f64, f64)> {
 #[test]
 fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     let mut flow = open();
-    flow.wait("the path", |window| {
-        screen_of::<SceneScreen>(window).ahead().is_some()
-    });
+    flow.wait("the path", |window| screen_of::<SceneScreen>(window).ahead().is_some());
     flow.window.run_steps(3);
     let ahead = screen_of::<SceneScreen>(&flow.window).ahead().unwrap();
     let deepest = ahead.as_ref().unwrap().deepest.tick;
@@ -57,8 +55,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     assert!(!flow.says(WhyNoForce::NoContact.words()));
     flow.window.check_accessibility();
     // Nothing else that keeps time is started beside it.
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Key::Num9);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num9);
     flow.window.run_steps(3);
     assert!(flow.says("the scene runs and would be disturbed"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
@@ -66,9 +63,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
         let touch = screen_of::<SceneScreen>(window).touch().unwrap();
         touch.is_running() && !touch.is_led()
     });
-    flow.wait("the stylus above", |window| {
-        felt(window).is_some_and(|(depth, _)| depth == 0.0)
-    });
+    flow.wait("the stylus above", |window| felt(window).is_some_and(|(depth, _)| depth == 0.0));
     flow.window.run_steps(2);
     assert!(flow.says(WhyNoForce::NoContact.words()));
     flow.window.key_press(Key::Escape);
@@ -115,32 +110,17 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
     read(&mut flow, &path, text, "soft pad");
     flow.click("Start the scene");
     let touch = screen_of::<SceneScreen>(&flow.window).touch().unwrap();
-    assert_eq!(
-        (touch.settings().side_mm, touch.settings().nodes),
-        (40.0, 81)
-    );
+    assert_eq!((touch.settings().side_mm, touch.settings().nodes), (40.0, 81));
     flow.click("Stop the scene");
     std::fs::write(&path, text.replace("40.0", "-1.0")).unwrap();
     flow.click("Open");
     flow.wait_for_words("side_mm");
-    assert_eq!(
-        screen_of::<SceneScreen>(&flow.window)
-            .touch()
-            .unwrap()
-            .settings()
-            .side_mm,
-        40.0
-    );
+    assert_eq!(screen_of::<SceneScreen>(&flow.window).touch().unwrap().settings().side_mm, 40.0);
 }
 
 fn replayed(window: &Window) -> Option<Result<bool, String>> {
     let replayed = screen_of::<SceneScreen>(window).replayed()?;
-    Some(
-        replayed
-            .as_ref()
-            .map(|one| one.is_identical)
-            .map_err(Clone::clone),
-    )
+    Some(replayed.as_ref().map(|one| one.is_identical).map_err(Clone::clone))
 }
 
 #[test]
@@ -177,18 +157,14 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     let text = std::fs::read_to_string(&settings).unwrap();
     std::fs::write(&settings, text.replacen("tau_eps = 1", "tau_eps = 2", 1)).unwrap();
     flow.click("Replay it");
-    flow.wait("the difference", |window| {
-        replayed(window) == Some(Ok(false))
-    });
+    flow.wait("the difference", |window| replayed(window) == Some(Ok(false)));
     flow.window.run_steps(3);
     assert!(flow.says("and was recorded as"));
     let ticks = folder.join("ticks.csv");
     let lines = std::fs::read_to_string(&ticks).unwrap();
     std::fs::write(&ticks, lines.replacen("\n10,", "\n11,", 1)).unwrap();
     flow.click("Replay it");
-    flow.wait("the damage", |window| {
-        replayed(window).is_some_and(|one| one.is_err())
-    });
+    flow.wait("the damage", |window| replayed(window).is_some_and(|one| one.is_err()));
     flow.window.run_steps(3);
     assert!(flow.says("the recording is damaged"));
 }
@@ -202,28 +178,20 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     read(&mut flow, &path, text, "loose");
     assert!(!flow.is_enabled("Take the plan"));
     assert!(flow.says("measure what a scene costs on the screen Trade first"));
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Key::Num7);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num7);
     flow.window.run_steps(3);
     flow.click("Scene: mesh");
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
-    flow.wait("the curves", |window| {
-        screen_of::<TradeScreen>(window).scene_curves().is_some()
-    });
+    flow.wait("the curves", |window| screen_of::<TradeScreen>(window).scene_curves().is_some());
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.window.run_steps(3);
     assert!(flow.says("left out: ") && flow.says("without effect: MinDist"));
     flow.click("Take the plan");
     flow.window.run_steps(3);
     flow.click("Start the scene");
-    let settings = *screen_of::<SceneScreen>(&flow.window)
-        .touch()
-        .unwrap()
-        .settings();
-    let curves = screen_of::<TradeScreen>(&flow.window)
-        .scene_curves()
-        .unwrap();
+    let settings = *screen_of::<SceneScreen>(&flow.window).touch().unwrap().settings();
+    let curves = screen_of::<TradeScreen>(&flow.window).scene_curves().unwrap();
     let meshes = curves.meshes.iter().map(|mesh| mesh.nodes as usize);
     assert!(meshes.clone().any(|nodes| nodes == settings.nodes));
     assert!(flow.says(&format!("plan: {0} x {0} nodes", settings.nodes)));
@@ -247,9 +215,7 @@ fn a_missed_budget_is_told_before_anything_was_measured_and_a_button_leads_to_th
     // It is that of the scene that ran, whatever stands in the form.
     flow.click("Stop the scene");
     flow.click("Built in");
-    flow.wait("the usual scene", |window| {
-        window.query_by_label("thesis body").is_some()
-    });
+    flow.wait("the usual scene", |window| window.query_by_label("thesis body").is_some());
     flow.window.run_steps(2);
     assert!(flow.says("500 µs") && flow.says("over the budget of 0.000001 µs"));
     flow.click("Measure on Trade...");

@@ -43,10 +43,7 @@ fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
     let whole = lines(folder);
     let end: Vec<&str> = whole.last().unwrap().split(',').collect();
     assert_eq!(end[0], "end");
-    let told = format!(
-        "{} ticks recorded, none lost; hash at the end {}",
-        end[1], end[3]
-    );
+    let told = format!("{} ticks recorded, none lost; hash at the end {}", end[1], end[3]);
     assert!(flow.says(&told), "{told}");
     flow.click("Replay it");
     flow.wait_for_words("every number bit for bit as recorded");

@@ -39,11 +39,7 @@ fn key(name: &str) -> (Key, Modifiers) {
 /// The words between single stars.
 fn said(sentence: &str) -> String {
     let without_bold = sentence.replace("**", "");
-    between(&without_bold, "*")
-        .first()
-        .copied()
-        .unwrap()
-        .to_owned()
+    between(&without_bold, "*").first().copied().unwrap().to_owned()
 }
 
 /// The deeds of a step. A sentence ends with a full stop before a verb that is a deed.
@@ -66,12 +62,7 @@ fn deeds(step: &str) -> Vec<Deed> {
                 // "Press A, then B" is two.
                 let names = between(rest, "**");
                 let count = if rest.contains(", then ") { 2 } else { 1 };
-                deeds.extend(
-                    names
-                        .iter()
-                        .take(count)
-                        .map(|name| Deed::Press((*name).into())),
-                );
+                deeds.extend(names.iter().take(count).map(|name| Deed::Press((*name).into())));
             }
         } else if let Some(rest) = sentence.strip_prefix("Type ") {
             let text = between(rest, "`")[0].to_owned();
@@ -161,11 +152,7 @@ fn every_step_of_the_tutorial_does_what_it_says() {
     let text = std::fs::read_to_string(workspace().join("docs/tutorial.md")).unwrap();
     let steps = steps(&text);
     let count: usize = steps.iter().map(|step| deeds(step).len()).sum();
-    assert!(
-        steps.len() > 20 && count > 45,
-        "{count} deeds in {} steps",
-        steps.len()
-    );
+    assert!(steps.len() > 20 && count > 45, "{count} deeds in {} steps", steps.len());
     let mut flow = Flow::open(TimeScale::Factor(20.0));
     std::fs::create_dir(flow.folder.path().join("out")).unwrap();
     for step in &steps {

@@ -31,12 +31,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     flow.window.key_press(Key::F1);
     flow.window.run_steps(3);
     flow.window.check_accessibility();
-    for words in [
-        "Stop motion",
-        "Retract after a stop",
-        "Protocol sine",
-        "no run is in progress",
-    ] {
+    for words in ["Stop motion", "Retract after a stop", "Protocol sine", "no run is in progress"] {
         assert!(flow.says(words), "{words}");
     }
     for screen in SCREENS {
@@ -88,27 +83,16 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
     let session = Session::open(&flow.sessions()[0]).unwrap();
-    let bodies: Vec<String> = session
-        .entries
-        .iter()
-        .map(|one| one.body.to_string())
-        .collect();
-    let noted = |words: &str| {
-        bodies
-            .iter()
-            .any(|body| body.contains("noted") && body.contains(words))
-    };
-    assert!(
-        noted("somebody leaned on the table") && noted("mark"),
-        "{bodies:?}"
-    );
+    let bodies: Vec<String> = session.entries.iter().map(|one| one.body.to_string()).collect();
+    let noted =
+        |words: &str| bodies.iter().any(|body| body.contains("noted") && body.contains(words));
+    assert!(noted("somebody leaned on the table") && noted("mark"), "{bodies:?}");
 }
 
 #[test]
 fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     let mut flow = Flow::open(TimeScale::Max);
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.window.check_accessibility();
     assert!(flow.says("counter, home not known") && flow.says("to 9.0 N"));
@@ -127,10 +111,7 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     let moved = (snapshot.rig.reading.unwrap().pulses - before) as f64;
     // Whole pulses.
     let mm = moved * snapshot.rig.description.mm_per_pulse;
-    assert!(
-        (mm - 5.0).abs() <= snapshot.rig.description.mm_per_pulse,
-        "{mm}"
-    );
+    assert!((mm - 5.0).abs() <= snapshot.rig.description.mm_per_pulse, "{mm}");
     assert_eq!(flow.sessions().len(), 2);
     // What makes no sense is told, and nothing moves.
     flow.type_into("distance", "far");
@@ -144,8 +125,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
     options.to_acknowledge = vec!["the daily check failed: zero".into()];
     let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
-    flow.window
-        .key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.click("+5 mm");
     flow.window.run_steps(10);
@@ -163,16 +143,9 @@ fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
     let mut seen = 0;
     for screen in SCREENS {
         by_name(&mut flow, &format!("screen {}", screen.name));
-        let known: Vec<String> = places(&flow.window.ctx)
-            .into_iter()
-            .map(|(name, _)| name)
-            .collect();
-        for role in [
-            Role::CheckBox,
-            Role::RadioButton,
-            Role::ComboBox,
-            Role::TextInput,
-        ] {
+        let known: Vec<String> =
+            places(&flow.window.ctx).into_iter().map(|(name, _)| name).collect();
+        for role in [Role::CheckBox, Role::RadioButton, Role::ComboBox, Role::TextInput] {
             for node in flow.window.query_all_by_role(role) {
                 let node = node.accesskit_node();
                 let name = node.label().unwrap_or_default();
@@ -214,9 +187,7 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
             flow.wait("the prompt before", |window| {
                 let run = window.state().snapshot().run.as_ref();
                 run.is_some_and(|run| {
-                    run.prompt
-                        .as_ref()
-                        .is_some_and(|one| one.message.contains("140 g"))
+                    run.prompt.as_ref().is_some_and(|one| one.message.contains("140 g"))
                 })
             });
             assert_eq!(weighed(&flow), 1);
@@ -237,15 +208,9 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
     assert_eq!((weighed(&flow), redone), (7, true));
     let folder = &flow.sessions()[0];
     let session = Session::open(folder).unwrap();
-    let readings = session
-        .entries
-        .iter()
-        .filter(|one| one.body.to_string().contains("\"weighed\""));
-    assert_eq!(
-        readings.count(),
-        8,
-        "what was read first stays in the session"
-    );
+    let readings =
+        session.entries.iter().filter(|one| one.body.to_string().contains("\"weighed\""));
+    assert_eq!(readings.count(), 8, "what was read first stays in the session");
     let calibration = calibration_of(&session, "again").unwrap();
     assert_eq!(calibration.series_steps().count(), 7);
     // The same decisions from the record alone.
@@ -261,21 +226,13 @@ fn zeroing_shows_what_the_probe_feels() {
     flow.wait_for_end();
     flow.window.run_steps(3);
     let run = flow.run().unwrap();
-    assert_eq!(
-        run.touches.iter().map(|one| one.pass).collect::<Vec<_>>(),
-        [1, 2]
-    );
+    assert_eq!(run.touches.iter().map(|one| one.pass).collect::<Vec<_>>(), [1, 2]);
     let contact = run.contact.unwrap();
     assert!(flow.says(&format!("the surface is at {:.3}", contact.position.0)));
     // The search felt the tissue where it says that it did.
     let points = run.approach.points();
     let deepest = points.iter().map(|point| point.depth).fold(0.0, f64::max);
-    assert!(
-        run.touches
-            .iter()
-            .all(|one| one.position.0 <= deepest + 0.1),
-        "{deepest}"
-    );
+    assert!(run.touches.iter().all(|one| one.position.0 <= deepest + 0.1), "{deepest}");
     flow.window.check_accessibility();
 }
 

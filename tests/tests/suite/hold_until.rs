@@ -45,12 +45,7 @@ fn a_hold_ends_early_with_its_reason_and_replays_exactly() {
     let mut session = run_until(0.0005);
     let held = held_secs(&session);
     let ends = early_ends(&session);
-    let [
-        Record::HoldEndedEarly {
-            relative, held: at, ..
-        },
-    ] = ends[..]
-    else {
+    let [Record::HoldEndedEarly { relative, held: at, .. }] = ends[..] else {
         panic!("{ends:?}");
     };
     println!("ended after {held:.3} s at {relative:.4}");
@@ -62,18 +57,11 @@ fn a_hold_ends_early_with_its_reason_and_replays_exactly() {
     assert_eq!(report.first_difference, None);
 
     // The decision comes from the recorded answer: without it the hold would go on.
-    let place = session
-        .entries
-        .iter()
-        .rposition(|entry| entry.kind == EntryKind::Fit)
-        .unwrap();
+    let place = session.entries.iter().rposition(|entry| entry.kind == EntryKind::Fit).unwrap();
     session.entries[place].body["parameters"][0]["ci95"] = json!([0.5, 1.5]);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
     // The first thing seen is a sample that the recording counts to the retract.
-    assert_eq!(
-        (difference.what.as_str(), difference.now),
-        ("phase", json!("hold"))
-    );
+    assert_eq!((difference.what.as_str(), difference.now), ("phase", json!("hold")));
 }
 
 #[test]
@@ -88,11 +76,7 @@ fn a_rule_that_cannot_be_met_holds_the_whole_time() {
 #[test]
 fn a_changed_verdict_or_standard_error_is_noticed() {
     let session = run_until(0.0005);
-    let place = session
-        .entries
-        .iter()
-        .rposition(|entry| entry.kind == EntryKind::Fit)
-        .unwrap();
+    let place = session.entries.iter().rposition(|entry| entry.kind == EntryKind::Fit).unwrap();
     for (pointer, value) in [
         ("/verdicts/0/is_identified", json!(false)),
         ("/verdicts/1/reason", json!("because")),
@@ -118,10 +102,7 @@ fn the_last_live_answer_is_the_fit_of_a_run_on_the_lab_rig() {
         hold: Seconds(2.0),
         ..RampHold::default()
     };
-    let settings = SimSettings {
-        seed: 11,
-        ..SimSettings::default()
-    };
+    let settings = SimSettings { seed: 11, ..SimSettings::default() };
     let run = palpate_tests::simulated::run(settings, params);
     let mut live = LiveFit::new(params.depth);
     for sample in &run.samples {
@@ -134,11 +115,7 @@ fn the_last_live_answer_is_the_fit_of_a_run_on_the_lab_rig() {
         let same = exact.parameter(&parameter.name).unwrap();
         let error = same.std_error.unwrap();
         let miss = (parameter.value - same.value).abs() / error;
-        println!(
-            "{} {miss:.1e} {:.3}",
-            same.name,
-            parameter.std_error.unwrap() / error
-        );
+        println!("{} {miss:.1e} {:.3}", same.name, parameter.std_error.unwrap() / error);
         assert!(miss < 0.01, "{}: {miss} standard errors", same.name);
     }
 }

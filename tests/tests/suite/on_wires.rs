@@ -100,10 +100,7 @@ fn finished<T>(mut attempt: impl FnMut() -> Result<Option<T>, String>) -> Option
     let found = (0..ATTEMPTS).find_map(|_| attempt().unwrap());
     if found.is_none() {
         let need = Need::System("a processor within 250 ms");
-        skip(
-            need,
-            "each run was ended by samples that came late, as it must be",
-        );
+        skip(need, "each run was ended by samples that came late, as it must be");
     }
     found
 }
@@ -119,10 +116,7 @@ fn bench(folder: &Path, port: &Path) -> Result<(Box<dyn Rig>, Calibration), Stri
     std::fs::write(&file, text).map_err(|err| err.to_string())?;
     // A computer with much else to do may hear no answer in time: who opens a rig tries again.
     let name = file.display().to_string();
-    let rig = until(
-        || open_wired(&name, &driver_clock()).ok(),
-        || "the rig does not open".into(),
-    );
+    let rig = until(|| open_wired(&name, &driver_clock()).ok(), || "the rig does not open".into());
     let calibration = SimRig::new(SimSettings::default()).calibration();
     Ok((rig, calibration))
 }
@@ -172,11 +166,7 @@ fn slave_once() -> Result<Option<(Slaved, Session)>, String> {
     let port = folder.path().join("galil");
     let _emulator = Emulator::at(&port).unwrap();
     let (rig, calibration) = bench(folder.path(), &port).unwrap();
-    let follow = Follow {
-        duration: Seconds(6.0),
-        speed: MmPerS(6.0),
-        depth_max: Depth(4.0),
-    };
+    let follow = Follow { duration: Seconds(6.0), speed: MmPerS(6.0), depth_max: Depth(4.0) };
     // As quickly as contact is found at all: how well is not the question here.
     let contact = FindContact {
         approach_speed: MmPerS(6.0),
@@ -189,11 +179,7 @@ fn slave_once() -> Result<Option<(Slaved, Session)>, String> {
     };
     let mut steps = set_up(Seconds(1.0), contact);
     steps.extend([Step::Follow(follow), retract()]);
-    let hand = Hand::firm(HandPath::Sine {
-        middle: 3.0,
-        amplitude: 3.0,
-        hz: 0.2,
-    });
+    let hand = Hand::firm(HandPath::Sine { middle: 3.0, amplitude: 3.0, hz: 0.2 });
     let body = ModifiedKelvin::THESIS;
     let leader = SlaveLeader::new(SlaveSettings {
         master: SimulationSettings::of(body, Period::MILLISECOND, hand),
@@ -234,10 +220,7 @@ fn protocol_once() -> Result<Option<()>, String> {
     let (runner, woken) = recorded::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
     let has_ended = || {
         let snapshot = runner.snapshot();
-        snapshot
-            .run
-            .as_ref()
-            .is_some_and(|run| run.outcome.is_some())
+        snapshot.run.as_ref().is_some_and(|run| run.outcome.is_some())
     };
     assert!(wait(&runner, &woken, has_ended), "the run does not end");
 
@@ -270,10 +253,6 @@ fn protocol_once() -> Result<Option<()>, String> {
         let rig = &runner.snapshot().rig;
         rig.link_error.is_none() && rig.reading.is_some() && !rig.is_homed
     };
-    assert!(
-        wait(&runner, &woken, is_back),
-        "{:?}",
-        runner.snapshot().rig.link_error
-    );
+    assert!(wait(&runner, &woken, is_back), "{:?}", runner.snapshot().rig.link_error);
     Ok(is_finished.then_some(()))
 }

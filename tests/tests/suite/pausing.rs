@@ -20,36 +20,21 @@ fn brief(name: &str) -> &'static [(&'static str, &'static str)] {
         "zeroing" => &[("thickness", "true")],
         "check-home" => &[("repeats", "1")],
         "stiff-surface" => &[("force", "1 N"), ("repeats", "1")],
-        "preconditioning" => &[
-            ("speed", "6 mm/s"),
-            ("depth", "10 mm"),
-            ("cycles", "2"),
-            ("rest", "1 s"),
-        ],
-        "preconditioning-force" => &[
-            ("speed", "3 mm/s"),
-            ("force", "1 N"),
-            ("cycles", "2"),
-            ("rest", "1 s"),
-        ],
-        "ramp-hold" => &[
-            ("speed", "6 mm/s"),
-            ("depth", "12 mm"),
-            ("hold", "1 s"),
-            ("unload", "6 mm/s"),
-        ],
-        "validation-series" => &[
-            ("speeds", "3 mm/s, 6 mm/s"),
-            ("depths", "8 mm"),
-            ("hold", "1 s"),
-            ("rest", "1 s"),
-        ],
-        "relaxation-series" => &[
-            ("force", "1 N"),
-            ("speed", "3 mm/s"),
-            ("hold", "3 s"),
-            ("repeats", "2"),
-        ],
+        "preconditioning" => {
+            &[("speed", "6 mm/s"), ("depth", "10 mm"), ("cycles", "2"), ("rest", "1 s")]
+        }
+        "preconditioning-force" => {
+            &[("speed", "3 mm/s"), ("force", "1 N"), ("cycles", "2"), ("rest", "1 s")]
+        }
+        "ramp-hold" => {
+            &[("speed", "6 mm/s"), ("depth", "12 mm"), ("hold", "1 s"), ("unload", "6 mm/s")]
+        }
+        "validation-series" => {
+            &[("speeds", "3 mm/s, 6 mm/s"), ("depths", "8 mm"), ("hold", "1 s"), ("rest", "1 s")]
+        }
+        "relaxation-series" => {
+            &[("force", "1 N"), ("speed", "3 mm/s"), ("hold", "3 s"), ("repeats", "2")]
+        }
         "multi-step-relaxation" => &[
             ("depths", "5 mm, 10 mm"),
             ("speed", "3 mm/s"),
@@ -58,12 +43,7 @@ fn brief(name: &str) -> &'static [(&'static str, &'static str)] {
             ("longest", "3 s"),
         ],
         "creep" => &[("force", "1 N"), ("speed", "3 mm/s"), ("duration", "2 s")],
-        "sine" => &[
-            ("speed", "6 mm/s"),
-            ("settle", "1 s"),
-            ("frequency", "1 Hz"),
-            ("cycles", "2"),
-        ],
+        "sine" => &[("speed", "6 mm/s"), ("settle", "1 s"), ("frequency", "1 Hz"), ("cycles", "2")],
         "frequency-sweep" => &[
             ("speed", "6 mm/s"),
             ("settle", "1 s"),
@@ -78,9 +58,7 @@ fn brief(name: &str) -> &'static [(&'static str, &'static str)] {
 
 fn plan(name: &str) -> Plan {
     let values = brief(name);
-    let values = values
-        .iter()
-        .map(|(key, value)| ((*key).into(), (*value).into()));
+    let values = values.iter().map(|(key, value)| ((*key).into(), (*value).into()));
     let values: BTreeMap<String, String> = values.collect();
     let mut plan = built_in(name).unwrap().unwrap().plan(&values).unwrap();
     for planned in &mut plan.steps {
@@ -89,10 +67,7 @@ fn plan(name: &str) -> Plan {
             Step::FindContact(search) => {
                 search.recovery = Seconds(0.5);
                 search.approach_speed = MmPerS(3.0);
-                search.press = search.press.map(|press| Press {
-                    dwell: Seconds(1.0),
-                    ..press
-                });
+                search.press = search.press.map(|press| Press { dwell: Seconds(1.0), ..press });
                 search.pass_speed = MmPerS(0.3);
             }
             Step::Tare(Tare { duration }) => *duration = Seconds(1.0),
@@ -164,14 +139,10 @@ fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
     let can_go_on = !is_paused(lab.state());
     assert_eq!(can_go_on, no_resume.is_none());
     if let Some(why) = no_resume {
-        let refused = lab
-            .records
-            .iter()
-            .rev()
-            .find_map(|(_, record)| match record {
-                Record::Refused { reason } => Some(reason.clone()),
-                _ => None,
-            });
+        let refused = lab.records.iter().rev().find_map(|(_, record)| match record {
+            Record::Refused { reason } => Some(reason.clone()),
+            _ => None,
+        });
         let reason = refused.unwrap();
         assert!(!why.is_empty() && reason.contains(why), "{reason}");
         assert!(reason.contains("finish early or stop"), "{reason}");
@@ -193,9 +164,7 @@ fn at_end(lab: &Lab<SimRig>, step_index: usize, of: fn(&Seen) -> Option<f64>) ->
 
 fn deepest(lab: &Lab<SimRig>, step_index: usize) -> Option<f64> {
     let own = lab.seen.iter().filter(|seen| seen.step_index == step_index);
-    own.filter_map(|seen| seen.derived.depth)
-        .map(|depth| depth.0)
-        .reduce(f64::max)
+    own.filter_map(|seen| seen.derived.depth).map(|depth| depth.0).reduce(f64::max)
 }
 
 /// What is measured to a force goes as deep as noise and creep have it: 0.18 mm apart at most in tissue of 0.1 to 0.3 N/mm.
@@ -211,10 +180,8 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
     let curve = before.rig.calibration().curve().unwrap();
     let previewed = preview(plan, rig, &limits, &curve, false);
     // Tissue goes on relaxing and recovering in a pause.
-    let has_rested = matches!(
-        plan.steps[paused].step,
-        Step::Hold(_) | Step::HoldForce(_) | Step::Rest(_)
-    );
+    let has_rested =
+        matches!(plan.steps[paused].step, Step::Hold(_) | Step::HoldForce(_) | Step::Rest(_));
     for (index, (planned, foreseen)) in plan.steps.iter().zip(&previewed.steps).enumerate() {
         // A prompt lasts until somebody answers.
         if index == paused || matches!(planned.step, Step::Prompt(_)) {
@@ -254,27 +221,13 @@ fn every_step_of(name: &str) {
     let before = undisturbed(&plan);
     let outcome = before.outcome.as_ref();
     let outcome = outcome.unwrap_or_else(|| panic!("{name}: {:?}", before.state().holding()));
-    assert_eq!(
-        outcome.ending,
-        EndingKind::Finish,
-        "{name}: {}",
-        outcome.reason
-    );
+    assert_eq!(outcome.ending, EndingKind::Finish, "{name}: {}", outcome.reason);
     for (index, planned) in plan.steps.iter().enumerate() {
-        let what = format!(
-            "{name} paused at step {} ({})",
-            index + 1,
-            planned.step.phase()
-        );
+        let what = format!("{name} paused at step {} ({})", index + 1, planned.step.phase());
         let (now, can_go_on) = paused_at(index, &plan);
         let outcome = now.outcome.as_ref();
         let outcome = outcome.unwrap_or_else(|| panic!("{what}: {:?}", now.state().holding()));
-        assert_eq!(
-            outcome.ending,
-            EndingKind::Finish,
-            "{what}: {}",
-            outcome.reason
-        );
+        assert_eq!(outcome.ending, EndingKind::Finish, "{what}: {}", outcome.reason);
         let is_motion_measured = matches!(
             planned.step,
             Step::Ramp(_) | Step::LoadTo(_) | Step::Unload(_) | Step::Sine(_)
@@ -283,11 +236,7 @@ fn every_step_of(name: &str) {
         if can_go_on {
             compare(&what, &plan, index, &now, &before);
         } else {
-            assert!(
-                outcome.reason.contains("early"),
-                "{what}: {}",
-                outcome.reason
-            );
+            assert!(outcome.reason.contains("early"), "{what}: {}", outcome.reason);
         }
     }
 }

@@ -17,11 +17,8 @@ use palpate_tests::lab::{Lab, retract, set_up};
 const PLANS: u64 = 30;
 
 fn bench(seed: u64) -> (SimRig, Curve) {
-    let rig = SimRig::new(SimSettings {
-        profile: SimProfile::Ideal,
-        seed,
-        ..SimSettings::default()
-    });
+    let rig =
+        SimRig::new(SimSettings { profile: SimProfile::Ideal, seed, ..SimSettings::default() });
     let curve = rig.calibration().curve().unwrap();
     (rig, curve)
 }
@@ -56,8 +53,7 @@ fn ending(lab: &Lab<SimRig>) -> Result<(), String> {
 /// Tick of the first sample at or behind a step, if the run came that far.
 fn begin(lab: &Lab<SimRig>, step_index: usize) -> Option<u64> {
     let mut seen = lab.seen.iter();
-    seen.find(|seen| seen.step_index >= step_index)
-        .map(|seen| seen.reading.tick)
+    seen.find(|seen| seen.step_index >= step_index).map(|seen| seen.reading.tick)
 }
 
 /// Compares every stretch of steps whose time is known with the run; how many steps were compared.
@@ -82,10 +78,8 @@ fn compare(lab: &Lab<SimRig>, expected: &Preview, what: &str) -> usize {
             first += 1;
             continue;
         }
-        let known: f64 = expected.steps[first..first + count]
-            .iter()
-            .map(|step| step.expected.0 / tick)
-            .sum();
+        let known: f64 =
+            expected.steps[first..first + count].iter().map(|step| step.expected.0 / tick).sum();
         let took = (begin(lab, first + count).unwrap() - begin(lab, first).unwrap()) as f64;
         assert!(
             (took - known).abs() <= 1.0 + 1e-6,
@@ -100,24 +94,15 @@ fn compare(lab: &Lab<SimRig>, expected: &Preview, what: &str) -> usize {
 }
 
 fn jog(distance_mm: f64) -> Step {
-    Step::Jog(Jog {
-        distance_mm,
-        speed: MmPerS(1.5),
-    })
+    Step::Jog(Jog { distance_mm, speed: MmPerS(1.5) })
 }
 
 fn ramp(depth: f64) -> Step {
-    Step::Ramp(Ramp {
-        speed: MmPerS(1.5),
-        depth: Depth(depth),
-    })
+    Step::Ramp(Ramp { speed: MmPerS(1.5), depth: Depth(depth) })
 }
 
 fn unload(clearance_mm: f64) -> Step {
-    Step::Unload(Unload {
-        speed: MmPerS(1.5),
-        clearance_mm,
-    })
+    Step::Unload(Unload { speed: MmPerS(1.5), clearance_mm })
 }
 
 fn load(deepest: f64) -> Step {
@@ -154,10 +139,7 @@ fn a_ramp_after_jogs_lasts_as_long_as_the_preview_says() {
 #[test]
 fn depths_between_pulses_are_not_called_exact() {
     let expected = previewed(&plan(vec![ramp(6.0), ramp(10.0), unload(0.0), retract()]));
-    let is_exact: Vec<bool> = expected.steps[4..]
-        .iter()
-        .map(|step| step.is_exact)
-        .collect();
+    let is_exact: Vec<bool> = expected.steps[4..].iter().map(|step| step.is_exact).collect();
     // 10 mm are 666.67 pulses, and contact is at none.
     assert_eq!(is_exact, [true, false, false, false]);
     // One pulse of 0.015 mm at 1.5 mm/s.
@@ -181,10 +163,7 @@ fn what_the_engine_refuses_at_its_start_the_preview_refuses_in_its_words() {
         (without(2), "tare"),
     ] {
         let refusals = previewed(&plan).refusals;
-        assert!(
-            refusals.len() == 1 && refusals[0].contains(wanted),
-            "{refusals:?}"
-        );
+        assert!(refusals.len() == 1 && refusals[0].contains(wanted), "{refusals:?}");
         let (rig, curve) = bench(3);
         let mut lab = Lab::new(rig, curve, plan);
         lab.run();
@@ -192,11 +171,7 @@ fn what_the_engine_refuses_at_its_start_the_preview_refuses_in_its_words() {
         assert!(reason.contains(wanted), "{reason} {wanted}");
     }
     // Where contact is nobody knows before: what is beyond the travel even if it were at home is refused.
-    let far = Sine {
-        amplitude_mm: 90.0,
-        frequency_hz: 0.005,
-        cycles: 1,
-    };
+    let far = Sine { amplitude_mm: 90.0, frequency_hz: 0.005, cycles: 1 };
     for (step, wanted) in [(Step::Sine(far), "a sine to "), (jog(150.0), "a jog to ")] {
         let refusals = previewed(&plan(vec![ramp(12.0), step])).refusals;
         assert!(
@@ -229,24 +204,11 @@ fn any_step(random: &mut SplitMix) -> Step {
     let speed = MmPerS((between(random, 0.6, 4.0) / 0.03).round() * 0.03);
     let span = Seconds(between(random, 0.0, 0.7));
     match random.below(9) {
-        0 | 1 => Step::Jog(Jog {
-            distance_mm: aside,
-            speed,
-        }),
-        2 | 3 => Step::Ramp(Ramp {
-            speed,
-            depth: Depth(depth),
-        }),
-        4 => Step::Unload(Unload {
-            speed,
-            clearance_mm: clearance,
-        }),
+        0 | 1 => Step::Jog(Jog { distance_mm: aside, speed }),
+        2 | 3 => Step::Ramp(Ramp { speed, depth: Depth(depth) }),
+        4 => Step::Unload(Unload { speed, clearance_mm: clearance }),
         5 => Step::Rest(Rest { duration: span }),
-        6 => Step::Hold(Hold {
-            duration: span,
-            until: None,
-            rate: None,
-        }),
+        6 => Step::Hold(Hold { duration: span, until: None, rate: None }),
         7 => Step::Sine(Sine {
             amplitude_mm: between(random, 0.1, 1.0),
             frequency_hz: between(random, 0.4, 1.0),
@@ -276,16 +238,10 @@ fn random_plans_last_as_long_as_previewed_and_begin() {
         // Tissue may be softer than a force asks for; nothing else may stop a plan that was previewed as fine.
         if let Err(reason) = ending(&lab) {
             let is_by_force = ["not reached", "greater depth"];
-            assert!(
-                is_by_force.iter().any(|words| reason.contains(words)),
-                "{what}: {reason}"
-            );
+            assert!(is_by_force.iter().any(|words| reason.contains(words)), "{what}: {reason}");
         }
         ended += 1;
     }
     println!("{ended} plans ran, {refused} refused, {compared} steps compared");
-    assert!(
-        ended > PLANS / 2 && compared > 60,
-        "{ended} ran, {compared} compared"
-    );
+    assert!(ended > PLANS / 2 && compared > 60, "{ended} ran, {compared} compared");
 }

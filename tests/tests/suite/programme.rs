@@ -89,18 +89,12 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
     for kept in 0..lines.len() {
         // What a crash leaves: whole lines, half a line, and the folders of runs that had begun.
         let folder = tempfile::tempdir().unwrap();
-        let mut text: String = lines[..kept]
-            .iter()
-            .flat_map(|line| [*line, "\n"])
-            .collect();
+        let mut text: String = lines[..kept].iter().flat_map(|line| [*line, "\n"]).collect();
         text += &lines[kept][..lines[kept].len() / 2];
         std::fs::write(folder.path().join(JOURNAL_FILE), &text).unwrap();
-        let entries = lines[..kept]
-            .iter()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap());
-        let entries: Vec<Entry> = entries
-            .map(|line| serde_json::from_value(line["body"].clone()).unwrap())
-            .collect();
+        let entries = lines[..kept].iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let entries: Vec<Entry> =
+            entries.map(|line| serde_json::from_value(line["body"].clone()).unwrap()).collect();
         for entry in &entries {
             if let Entry::Begun { session, .. } = entry {
                 std::fs::create_dir_all(folder.path().join(session)).unwrap();
@@ -208,15 +202,9 @@ repeats = 2
     std::fs::write(&path, &first).unwrap();
     std::fs::remove_file(folder.path().join("journal.jsonl.head")).unwrap();
 
-    let ideal = SimSettings {
-        profile: SimProfile::Ideal,
-        ..usual
-    };
+    let ideal = SimSettings { profile: SimProfile::Ideal, ..usual };
     let seed = SimSettings { seed: 7, ..usual };
-    let softer = SimSettings {
-        softening: "40".parse().unwrap(),
-        ..usual
-    };
+    let softer = SimSettings { softening: "40".parse().unwrap(), ..usual };
     let lower: &dyn Fn(&mut Limits, &mut Calibration) = &|limits, _| limits.force_max.0 = 5.0;
     let other: &dyn Fn(&mut Limits, &mut Calibration) =
         &|_, calibration| calibration.steps[3].mass_g += 1.0;
@@ -232,11 +220,7 @@ repeats = 2
         let refusal = went_on.unwrap_err().to_string();
         assert!(refusal.contains(words), "{words}: {refusal}");
         assert!(refusal.contains("'mine'"));
-        assert_eq!(
-            std::fs::read_to_string(&path).unwrap(),
-            first,
-            "something ran"
-        );
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), first, "something ran");
     }
     // A journal of an older palpate knows no conditions and no checksums, and goes on.
     let bodies = first.lines().map(|line| {
@@ -276,11 +260,7 @@ calibrates = true
     for step in &truth.steps {
         let volts = curve.volts_from_newtons(step.newtons());
         // The cell drifts by up to 0.2 mV a minute over some minutes; a converter's count is 0.3 mV.
-        assert!(
-            (volts.0 - step.volts.0).abs() < 3e-3,
-            "{} g: {volts}",
-            step.mass_g
-        );
+        assert!((volts.0 - step.volts.0).abs() < 3e-3, "{} g: {volts}", step.mass_g);
     }
     let quality = measured.quality().unwrap();
     assert!(!quality.flat.is_empty(), "the flat stretch is not told");
@@ -387,34 +367,16 @@ fn what_could_never_work_is_refused_with_its_line() {
         ("protocol = \"zeroing\"", compared.into(), 7, "zeroing"),
         ("protocol = \"sine\"", compared.into(), 7, "sine"),
         (cycles, compared.into(), 7, "10 cycles"),
-        (
-            press,
-            "protocol = \"zeroing\"\nvalidates = \"one\"".into(),
-            7,
-            "validates = \"one\"",
-        ),
-        (
-            press,
-            "protocol = \"zeroing\"\ncalibrates = true".into(),
-            7,
-            "zeroing",
-        ),
+        (press, "protocol = \"zeroing\"\nvalidates = \"one\"".into(), 7, "validates = \"one\""),
+        (press, "protocol = \"zeroing\"\ncalibrates = true".into(), 7, "zeroing"),
         (press, with_key("specimen = \"two\""), 10, "[specimen.2]"),
-        (
-            press,
-            with_key("specimen = -1"),
-            10,
-            "specimen cannot be -1",
-        ),
+        (press, with_key("specimen = -1"), 10, "specimen cannot be -1"),
         (press, with_key("rest_s = \"3 min\""), 10, "rest_s"),
         (press, with_key("calibrates = \"yes\""), 10, "calibrates"),
         (press, "protocol = 3".to_owned(), 9, "protocol cannot be 3"),
     ] {
         let refusal = whole(first, &second).unwrap_err();
-        assert!(
-            has_problem(&refusal, &(line, fact)),
-            "{line} {fact}: {refusal}"
-        );
+        assert!(has_problem(&refusal, &(line, fact)), "{line} {fact}: {refusal}");
     }
 }
 
@@ -476,34 +438,20 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
     assert_eq!((asked[0].line, asked[0].severity), (24, Severity::Warning));
     for (question, task) in asked.iter().zip(["'first'", "'second'"]) {
         let message = &question.message;
-        assert!(
-            message.contains(task) && message.contains("specimen.source"),
-            "{asked:?}"
-        );
+        assert!(message.contains(task) && message.contains("specimen.source"), "{asked:?}");
     }
     whole.tell("specimen.source", "pig").unwrap();
     assert_eq!(whole.questions(), []);
     let labels = |task, repeat| whole.labels(task, repeat).unwrap();
     // The scale has weights on it; then there is the specimen that is there, then each by its number.
     let names: Vec<String> = (0..5).map(|task| labels(task, 1).specimen).collect();
-    let wanted = [
-        "",
-        "stomach 7",
-        "stomach 7, specimen 1",
-        "stomach 8, fundus",
-        "stomach 8, fundus",
-    ];
+    let wanted =
+        ["", "stomach 7", "stomach 7, specimen 1", "stomach 8, fundus", "stomach 8, fundus"];
     assert_eq!(names, wanted);
     let (first, second) = (labels(2, 1), labels(3, 2));
-    assert_eq!(
-        (first.operator.as_str(), second.operator.as_str()),
-        ("Ada", "Ada")
-    );
+    assert_eq!((first.operator.as_str(), second.operator.as_str()), ("Ada", "Ada"));
     assert_eq!(first.about.get("specimen.thickness_mm"), None);
-    assert_eq!(
-        second.about.get("specimen.thickness_mm"),
-        Some(&11.0.into())
-    );
+    assert_eq!(second.about.get("specimen.thickness_mm"), Some(&11.0.into()));
     assert_eq!(second.about.get("specimen.source"), Some(&"pig".into()));
     assert_eq!(second.about.get("series.repeat"), Some(&2.into()));
     assert_eq!(second.about.get("series.id"), Some(&"told/second".into()));
@@ -516,10 +464,9 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
         (first.specimen.as_str(), second.specimen.as_str()),
         ("rabbit, specimen 1", "rabbit, specimen 2")
     );
-    for (key, value, words) in [
-        ("series.repeat", "2", "series"),
-        ("specimen.colour", "red", "nothing is called"),
-    ] {
+    for (key, value, words) in
+        [("series.repeat", "2", "series"), ("specimen.colour", "red", "nothing is called")]
+    {
         let refusal = whole.tell(key, value).unwrap_err();
         assert!(refusal.contains(words), "{refusal}");
     }
@@ -559,20 +506,11 @@ fn what_cannot_be_told_is_refused_with_its_line() {
 #[test]
 fn the_programme_of_the_guide_is_one() {
     let page = std::fs::read_to_string(workspace().join("docs/guide/programmes.md")).unwrap();
-    let text = page
-        .split("```toml")
-        .nth(1)
-        .unwrap()
-        .split("```")
-        .next()
-        .unwrap();
+    let text = page.split("```toml").nth(1).unwrap().split("```").next().unwrap();
     let told = programme(text);
     let labels = |task| told.labels(task, 1).unwrap();
     let (first, second) = (labels(0), labels(1));
-    assert_eq!(
-        (first.operator.as_str(), first.specimen.as_str()),
-        ("Ada", "specimen 1")
-    );
+    assert_eq!((first.operator.as_str(), first.specimen.as_str()), ("Ada", "specimen 1"));
     assert_eq!(second.specimen, "stomach 8, fundus");
     assert!(second.is_told("specimen.source") && second.is_told("specimen.thickness_mm"));
 }
@@ -589,10 +527,7 @@ fn the_probe_leaves_the_tissue_before_a_specimen_is_looked_after_anew() {
     assert!(fresh[0].starts_with("Prompt"), "{fresh:?}");
     // What broke off may have left it there, and the axis does not know where it is.
     let again = words(Some(1));
-    for (at, name) in ["SelfTest", "Home", "Prompt", "SelfTest"]
-        .iter()
-        .enumerate()
-    {
+    for (at, name) in ["SelfTest", "Home", "Prompt", "SelfTest"].iter().enumerate() {
         assert!(again[at].starts_with(name), "{again:?}");
     }
     assert_eq!(again[2..], fresh[..2]);

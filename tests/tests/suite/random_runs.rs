@@ -37,13 +37,10 @@ fn speed(random: &mut SplitMix, most: f64) -> MmPerS {
 
 fn any_step(random: &mut SplitMix) -> Step {
     match random.below(16) {
-        0 => Step::Jog(Jog {
-            distance_mm: between(random, -30.0, 30.0),
-            speed: speed(random, 20.0),
-        }),
-        1 => Step::Rest(Rest {
-            duration: Seconds(between(random, 0.0, 0.5)),
-        }),
+        0 => {
+            Step::Jog(Jog { distance_mm: between(random, -30.0, 30.0), speed: speed(random, 20.0) })
+        }
+        1 => Step::Rest(Rest { duration: Seconds(between(random, 0.0, 0.5)) }),
         2 => Step::Prompt(Prompt {
             message: "do something".into(),
             timeout: Seconds(between(random, 0.0, 1.0)),
@@ -59,15 +56,9 @@ fn any_step(random: &mut SplitMix) -> Step {
             mass_g: 0.0,
             is_loading: true,
             repeat: 1,
-            settle: Settle {
-                window: Seconds(0.1),
-                timeout: Seconds(0.5),
-            },
+            settle: Settle { window: Seconds(0.1), timeout: Seconds(0.5) },
         }),
-        4 => Step::CheckHome(CheckHome {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.9),
-        }),
+        4 => Step::CheckHome(CheckHome { speed: MmPerS(9.0), touch_speed: MmPerS(0.9) }),
         5 | 6 => Step::Ramp(Ramp {
             speed: speed(random, 20.0),
             depth: Depth(between(random, 0.5, 30.0)),
@@ -75,10 +66,7 @@ fn any_step(random: &mut SplitMix) -> Step {
         7 => Step::Hold(Hold {
             duration: Seconds(between(random, 0.0, 1.0)),
             until: Some(HoldUntil::parse("tau=50%").unwrap()),
-            rate: Some(HoldRate {
-                below_n_per_s: 1.0,
-                over: Seconds(0.3),
-            }),
+            rate: Some(HoldRate { below_n_per_s: 1.0, over: Seconds(0.3) }),
         }),
         8 => Step::Unload(Unload {
             speed: speed(random, 10.0),
@@ -117,28 +105,15 @@ fn any_step(random: &mut SplitMix) -> Step {
 
 fn any_plan(random: &mut SplitMix) -> Plan {
     let mut steps = vec![
-        Step::SelfTest(SelfTest {
-            duration: Seconds(0.1),
-        }),
-        Step::Home(Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.9),
-        }),
-        Step::Tare(Tare {
-            duration: Seconds(0.1),
-        }),
+        Step::SelfTest(SelfTest { duration: Seconds(0.1) }),
+        Step::Home(Home { speed: MmPerS(9.0), touch_speed: MmPerS(0.9) }),
+        Step::Tare(Tare { duration: Seconds(0.1) }),
     ];
     if random.below(4) > 0 {
-        let short = FindContact {
-            recovery: Seconds(0.3),
-            ..FindContact::default()
-        };
+        let short = FindContact { recovery: Seconds(0.3), ..FindContact::default() };
         steps.push(Step::FindContact(match random.below(3) {
             0 => FindContact {
-                press: short.press.map(|press| Press {
-                    dwell: Seconds(0.5),
-                    ..press
-                }),
+                press: short.press.map(|press| Press { dwell: Seconds(0.5), ..press }),
                 ..short
             },
             _ => FindContact {
@@ -156,29 +131,15 @@ fn any_plan(random: &mut SplitMix) -> Plan {
     let mut plan = Plan::of("random", 1, steps);
     for planned in &mut plan.steps {
         let on_failure = [OnFailure::Abort, OnFailure::Retry(2), OnFailure::Skip][random.below(3)];
-        *planned = PlannedStep {
-            cycle: random.below(3) as u32,
-            on_failure,
-            ..planned.clone()
-        };
+        *planned = PlannedStep { cycle: random.below(3) as u32, on_failure, ..planned.clone() };
     }
-    let actions = [
-        Action::Note,
-        Action::Pause,
-        Action::Stop,
-        Action::Retract,
-        Action::Halt,
-    ];
+    let actions = [Action::Note, Action::Pause, Action::Stop, Action::Retract, Action::Halt];
     plan.monitors = (0..random.below(3))
         .map(|_| {
             let threshold = between(random, 0.1, 3.0);
             Monitor {
-                source: [
-                    Source::Force,
-                    Source::Depth,
-                    Source::Volts,
-                    Source::Position,
-                ][random.below(4)],
+                source: [Source::Force, Source::Depth, Source::Volts, Source::Position]
+                    [random.below(4)],
                 side: Side::Above,
                 threshold,
                 resume: 0.8 * threshold,
@@ -249,16 +210,10 @@ impl Hidden {
     /// By a fault, with the times at which the run was homed and tared.
     fn by(fault: Option<&ScriptedFault>, homed: Option<Nanos>, tared: Option<Nanos>) -> Self {
         let Some(fault) = fault else {
-            return Self {
-                force: false,
-                position: false,
-            };
+            return Self { force: false, position: false };
         };
         // No command gets through: the axis goes where it was sent.
-        let is_deaf = matches!(
-            fault.kind,
-            FaultKind::RefuseCommands | FaultKind::Disconnect
-        );
+        let is_deaf = matches!(fault.kind, FaultKind::RefuseCommands | FaultKind::Disconnect);
         let is_before = |time: Option<Nanos>| time.is_none_or(|time| fault.at <= time);
         Self {
             force: is_deaf
@@ -306,9 +261,7 @@ fn one_run(seed: u64) -> EndingKind {
     };
     let about = format!("seed {seed}, {fault:?}, {:?}", plan.steps);
     let rig = FaultyRig::new(sim, fault.into_iter().collect(), seed);
-    let mut lab = Lab::new(rig, curve, plan.clone())
-        .within(limits)
-        .forgetful();
+    let mut lab = Lab::new(rig, curve, plan.clone()).within(limits).forgetful();
     lab.is_answering = random.below(4) > 0;
     lab.operator(Operator::Start);
     let acceleration = lab.rig.description().acceleration.0;
@@ -319,11 +272,7 @@ fn one_run(seed: u64) -> EndingKind {
     let mut speeds: VecDeque<(Nanos, f64)> = VecDeque::new();
     let (mut homed, mut tared) = (None, None);
     // Tissue is nowhere stiffer than 2 N/mm here; a base is as stiff as the rig.
-    let stiffness = if settings.thickness.mm() < 100.0 {
-        1.0 / 0.03
-    } else {
-        2.0
-    };
+    let stiffness = if settings.thickness.mm() < 100.0 { 1.0 / 0.03 } else { 2.0 };
     // What leads goes anywhere, even where nothing is.
     let (mut leading, mut place) = (SplitMix::seeded(!seed), 10.0);
     let is_stuck = fault.is_some_and(|fault| matches!(fault.kind, FaultKind::Stuck));
@@ -348,10 +297,7 @@ fn one_run(seed: u64) -> EndingKind {
             speeds.pop_back();
         }
         speeds.push_back((lab.now, own));
-        while speeds
-            .front()
-            .is_some_and(|(at, _)| lab.now.since(*at) > RECENT)
-        {
+        while speeds.front().is_some_and(|(at, _)| lab.now.since(*at) > RECENT) {
             speeds.pop_front();
         }
         let speed = speeds.front().map_or(0.0, |(_, speed)| *speed);
@@ -372,10 +318,7 @@ fn one_run(seed: u64) -> EndingKind {
     // A pause or a question may wait for ever; the operator is there.
     if lab.outcome.is_none() && lab.state().holding().is_none() {
         lab.operator(Operator::Stop);
-        assert!(
-            lab.run_until(Seconds(6.0), |_| false),
-            "does not stop: {about}"
-        );
+        assert!(lab.run_until(Seconds(6.0), |_| false), "does not stop: {about}");
     }
     let hidden = Hidden::by(fault.as_ref(), homed, tared);
     if !hidden.position {
@@ -385,26 +328,17 @@ fn one_run(seed: u64) -> EndingKind {
         // A specimen clipped in around the probe presses it at once, whatever the axis does.
         let is_pressed = |planned: &PlannedStep| matches!(&planned.step, Step::Prompt(prompt) if matches!(prompt.hand, Some(HandAction::Mount { .. })));
         let by_hand = plan.steps.iter().any(is_pressed);
-        assert!(
-            by_hand || worst_force <= 0.0,
-            "{worst_force} N too much: {about}"
-        );
+        assert!(by_hand || worst_force <= 0.0, "{worst_force} N too much: {about}");
     }
     if lab.outcome.is_none() {
         lab.operator([Operator::Retract, Operator::Close][random.below(2)]);
         assert!(lab.run_until(Seconds(60.0), |_| false), "no end: {about}");
         lab.operator(Operator::Close);
     }
-    let outcome = lab
-        .outcome
-        .clone()
-        .unwrap_or_else(|| panic!("no outcome: {about}"));
+    let outcome = lab.outcome.clone().unwrap_or_else(|| panic!("no outcome: {about}"));
     assert!(!outcome.reason.is_empty(), "{about}");
     let is_deaf = fault.is_some_and(|fault| {
-        matches!(
-            fault.kind,
-            FaultKind::Disconnect | FaultKind::RefuseCommands
-        )
+        matches!(fault.kind, FaultKind::Disconnect | FaultKind::RefuseCommands)
     });
     if outcome.ending != EndingKind::Finish {
         let is_stop = |command: &RigCommand| command.is_stopping();
@@ -475,10 +409,7 @@ fn whatever_happens_the_session_is_closed_with_its_reason() {
     for seed in 0.. {
         // Other seeds than those of the runs in memory.
         let mut random = SplitMix::seeded(1 << 40 | seed);
-        let sim = SimRig::new(SimSettings {
-            seed,
-            ..SimSettings::default()
-        });
+        let sim = SimRig::new(SimSettings { seed, ..SimSettings::default() });
         let calibration = sim.calibration();
         let plan = any_plan(&mut random);
         let fault = (random.below(2) == 0).then(|| any_fault(&mut random));

@@ -26,11 +26,7 @@ fn open(name: &str) -> Session {
 fn every_recorded_session_replays() {
     for folder in recorded() {
         let note = std::fs::read_to_string(folder.join("README.md")).unwrap();
-        assert!(
-            note.starts_with("Why: "),
-            "{} does not say why it exists",
-            folder.display()
-        );
+        assert!(note.starts_with("Why: "), "{} does not say why it exists", folder.display());
         let session = Session::open(&folder).unwrap();
         let report = replay(&session, &blessings_of(&folder).unwrap()).unwrap();
         assert_eq!(report.first_difference, None, "{}", folder.display());
@@ -43,32 +39,19 @@ fn every_recorded_session_replays() {
 fn a_changed_decision_is_found_where_it_is() {
     let mut session = open("over-force-galil");
     let is_contact = |body: &serde_json::Value| body["record"] == "contact_found";
-    let place = session
-        .entries
-        .iter()
-        .position(|entry| is_contact(&entry.body))
-        .unwrap();
+    let place = session.entries.iter().position(|entry| is_contact(&entry.body)).unwrap();
     session.entries[place].body["position"] = json!(39.0);
     let decisions = session.entries[..place].iter();
-    let index = decisions
-        .filter(|entry| entry.kind == EntryKind::Decision)
-        .count();
+    let index = decisions.filter(|entry| entry.kind == EntryKind::Decision).count();
     let report = replay(&session, &[]).unwrap();
     let difference = report.first_difference.unwrap();
-    assert_eq!(
-        (difference.what.as_str(), difference.decision),
-        ("decision", Some(index))
-    );
+    assert_eq!((difference.what.as_str(), difference.decision), ("decision", Some(index)));
     assert_eq!(difference.at_s, session.entries[place].now.seconds().0);
     assert_eq!(difference.recorded["position"], 39.0);
 
     // Blessed with its reason the difference is accepted, and only that one.
     let reason = "the position was rounded by hand".to_owned();
-    let blessing = Blessing {
-        decision: index,
-        now: difference.now.clone(),
-        reason,
-    };
+    let blessing = Blessing { decision: index, now: difference.now.clone(), reason };
     let report = replay(&session, &[blessing]).unwrap();
     assert_eq!((report.first_difference, report.blessed), (None, 1));
 }
@@ -83,38 +66,21 @@ fn a_changed_raw_sample_changes_what_is_derived() {
         .unwrap();
     session.rows[place].volts = session.rows[place].volts.map(|volts| volts + 1e-6);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
-    assert_eq!(
-        (difference.what.as_str(), difference.after_sample),
-        ("force_N", place as u64)
-    );
+    assert_eq!((difference.what.as_str(), difference.after_sample), ("force_N", place as u64));
 
     let mut session = open("hold-until-lab");
     session.rows[place].pulses = session.rows[place].pulses.map(|pulses| pulses + 3);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
-    assert_eq!(
-        difference.what, "decision",
-        "three lost pulses trip the path interlock"
-    );
+    assert_eq!(difference.what, "decision", "three lost pulses trip the path interlock");
 }
 
 #[test]
 fn a_changed_input_is_noticed() {
     let mut session = open("ramp-hold-lab");
-    let fit = session
-        .entries
-        .iter_mut()
-        .rfind(|entry| entry.kind == EntryKind::Fit)
-        .unwrap();
+    let fit = session.entries.iter_mut().rfind(|entry| entry.kind == EntryKind::Fit).unwrap();
     let value = fit.body["parameters"][0]["value"].as_f64().unwrap();
     fit.body["parameters"][0]["value"] = json!(value * 1.01);
-    assert_eq!(
-        replay(&session, &[])
-            .unwrap()
-            .first_difference
-            .unwrap()
-            .what,
-        "live fit"
-    );
+    assert_eq!(replay(&session, &[]).unwrap().first_difference.unwrap().what, "live fit");
 
     let mut session = open("ramp-hold-lab");
     let stop = palpate_sessions::Entry {
@@ -124,11 +90,7 @@ fn a_changed_input_is_noticed() {
         now: Nanos(session.rows[49_999].host.0),
         body: json!({ "input": "operator", "choice": "stop" }),
     };
-    let place = session
-        .entries
-        .iter()
-        .position(|entry| entry.after_sample > 50_000)
-        .unwrap();
+    let place = session.entries.iter().position(|entry| entry.after_sample > 50_000).unwrap();
     session.entries.insert(place, stop);
     assert!(replay(&session, &[]).unwrap().first_difference.is_some());
 }
@@ -137,26 +99,12 @@ fn a_changed_input_is_noticed() {
 fn decisions_of_another_engine_are_not_compared_but_numbers_are() {
     let mut session = open("ramp-hold-lab");
     session.manifest.engine_version = 0;
-    let place = session
-        .entries
-        .iter()
-        .position(|entry| entry.kind == EntryKind::Decision)
-        .unwrap();
+    let place = session.entries.iter().position(|entry| entry.kind == EntryKind::Decision).unwrap();
     session.entries[place].body = json!({ "effect": "record", "record": "of another time" });
     let report = replay(&session, &[]).unwrap();
-    assert_eq!(
-        (report.is_same_engine, report.first_difference),
-        (false, None)
-    );
+    assert_eq!((report.is_same_engine, report.first_difference), (false, None));
     session.rows[60_000].force = session.rows[60_000].force.map(|force| force + 1e-6);
-    assert_eq!(
-        replay(&session, &[])
-            .unwrap()
-            .first_difference
-            .unwrap()
-            .what,
-        "force_N"
-    );
+    assert_eq!(replay(&session, &[]).unwrap().first_difference.unwrap().what, "force_N");
 }
 
 #[test]
@@ -236,22 +184,11 @@ fn a_played_session_shows_what_was_recorded() {
 fn a_difference_is_told_in_the_words_of_the_protocol() {
     let mut session = open("over-force-galil");
     let is_contact = |body: &serde_json::Value| body["record"] == "contact_found";
-    let entry = session
-        .entries
-        .iter_mut()
-        .find(|entry| is_contact(&entry.body));
+    let entry = session.entries.iter_mut().find(|entry| is_contact(&entry.body));
     entry.unwrap().body["position"] = json!(39.0);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
-    assert!(
-        difference.step.contains("find-contact"),
-        "{}",
-        difference.step
-    );
-    assert!(
-        difference.step.starts_with("step 4 of "),
-        "{}",
-        difference.step
-    );
+    assert!(difference.step.contains("find-contact"), "{}", difference.step);
+    assert!(difference.step.starts_with("step 4 of "), "{}", difference.step);
     let recorded = difference.recorded_words();
     assert!(recorded.starts_with("contact at 39.000 ± "), "{recorded}");
     let now = difference.now_words();

@@ -20,11 +20,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 fn rig(profile: SimProfile) -> SimRig {
-    SimRig::new(SimSettings {
-        profile,
-        seed: 3,
-        ..SimSettings::default()
-    })
+    SimRig::new(SimSettings { profile, seed: 3, ..SimSettings::default() })
 }
 
 fn ran(profile: SimProfile, plan: &Plan) -> Session {
@@ -45,10 +41,7 @@ fn notes(plan: &Plan) -> Vec<String> {
 }
 
 fn verdict(session: &Session) -> (Verdict, String) {
-    let outcome = Outcome {
-        ending: EndingKind::Finish,
-        reason: String::new(),
-    };
+    let outcome = Outcome { ending: EndingKind::Finish, reason: String::new() };
     first_verdict(&outcome, &fidelity::of_session(session).unwrap())
 }
 
@@ -74,11 +67,7 @@ fn shipped_sines_keep_contact_and_find_the_stiffness_of_the_body() {
     for (profile, name, frequencies) in [
         (SimProfile::Lab, "sine", vec![0.5]),
         (SimProfile::Ideal, "sine", vec![0.5]),
-        (
-            SimProfile::Lab,
-            "frequency-sweep",
-            vec![0.05, 0.1, 0.2, 0.5, 1.0],
-        ),
+        (SimProfile::Lab, "frequency-sweep", vec![0.05, 0.1, 0.2, 0.5, 1.0]),
     ] {
         let plan = shipped(name, &[]);
         assert!(notes(&plan).is_empty(), "{:?}", notes(&plan));
@@ -113,9 +102,7 @@ fn shipped_sines_keep_contact_and_find_the_stiffness_of_the_body() {
             assert!((one.phase_degrees.value - phase).abs() < 1.5);
             assert!(one.distortion_percent < 3.0);
         }
-        if let Some(most) = found
-            .iter()
-            .max_by(|a, b| a.loss.value.total_cmp(&b.loss.value))
+        if let Some(most) = found.iter().max_by(|a, b| a.loss.value.total_cmp(&b.loss.value))
             && found.len() > 1
         {
             // As the sweep's page has it: one over two pi times that frequency, to the steps of the sweep.
@@ -132,19 +119,12 @@ fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
         ("sine", vec![("depth", "10 mm")]),
         (
             "frequency-sweep",
-            vec![
-                ("depth", "10 mm"),
-                ("frequencies", "0.2 Hz, 0.5 Hz"),
-                ("pause", "3 s"),
-            ],
+            vec![("depth", "10 mm"), ("frequencies", "0.2 Hz, 0.5 Hz"), ("pause", "3 s")],
         ),
     ] {
         let plan = shipped(name, &values);
         let told = notes(&plan);
-        assert!(
-            told.len() == 1 && told[0].contains("lose the tissue"),
-            "{told:?}"
-        );
+        assert!(told.len() == 1 && told[0].contains("lose the tissue"), "{told:?}");
         let session = ran(SimProfile::Lab, &plan);
         let (verdict, reason) = verdict(&session);
         assert_eq!(verdict, Verdict::Suspect, "{reason}");
@@ -165,10 +145,7 @@ fn a_force_too_small_to_tell_is_not_called_met() {
     let brief = ("duration", "3 s");
     let plan = shipped("creep", &[("force", "0.001 N"), brief]);
     let told = notes(&plan);
-    assert!(
-        told.len() == 1 && told[0].contains("whether it was met"),
-        "{told:?}"
-    );
+    assert!(told.len() == 1 && told[0].contains("whether it was met"), "{told:?}");
     let (of_little, reason) = verdict(&ran(SimProfile::Lab, &plan));
     assert_eq!(of_little, Verdict::Suspect, "{reason}");
     assert!(reason.contains("0.0010 N"), "{reason}");
@@ -205,10 +182,7 @@ steps = [
   { do = "retract" },
 ]
 "#;
-    let plan = Protocol::read(text)
-        .unwrap()
-        .plan(&BTreeMap::new())
-        .unwrap();
+    let plan = Protocol::read(text).unwrap().plan(&BTreeMap::new()).unwrap();
     let source = of_session(&ran(SimProfile::Lab, &plan)).unwrap();
     let cycles = analyse(&source.samples, None, source.pulse);
     let [cycle] = &cycles[..] else {
@@ -225,10 +199,7 @@ steps = [
         assert!(row.force_sd.0 < 0.25, "{row:?}");
         // A pulse of 0.015 mm in the uniform distribution of its width.
         let stair = source.pulse.unwrap().0 / 12f64.sqrt();
-        assert!(
-            (stair..2.0 * stair).contains(&row.depth_end.std_error.0),
-            "{row:?}"
-        );
+        assert!((stair..2.0 * stair).contains(&row.depth_end.std_error.0), "{row:?}");
     }
     assert_eq!((cycle.work_loop, cycle.loss_share()), (None, None));
 }

@@ -20,25 +20,15 @@ const EXPECTED_PERCENT: [f64; 5] = [0.166, 0.271, 0.126, 0.053, 0.068];
 const SEEDS: u64 = 30;
 
 fn truth(body: &ModifiedKelvin) -> [f64; 5] {
-    [
-        body.tau_eps,
-        body.mu[0],
-        body.mu[1],
-        body.mu[2],
-        body.tau_sig,
-    ]
+    [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig]
 }
 
 /// Fits of thirty runs with their truths; `is_contact_known` takes contact from the truth.
 fn fits(profile: SimProfile, is_contact_known: bool) -> Vec<(FitReport, [f64; 5], f64)> {
     (0..SEEDS)
         .map(|seed| {
-            let settings = SimSettings {
-                profile,
-                seed,
-                clock: SimClock::Nominal,
-                ..SimSettings::default()
-            };
+            let settings =
+                SimSettings { profile, seed, clock: SimClock::Nominal, ..SimSettings::default() };
             let run = run(settings, RampHold::default());
             let found = run.state.contact().expect("contact");
             let truth_of_rig = run.rig.truth();
@@ -56,9 +46,7 @@ fn fits(profile: SimProfile, is_contact_known: bool) -> Vec<(FitReport, [f64; 5]
 /// Relative errors of one parameter in percent, over the seeds.
 fn errors(fits: &[(FitReport, [f64; 5], f64)], i: usize) -> Vec<f64> {
     let value = |report: &FitReport| report.value(NAMES[i]).expect("a parameter");
-    fits.iter()
-        .map(|(report, truth, _)| 100.0 * (value(report) / truth[i] - 1.0))
-        .collect()
+    fits.iter().map(|(report, truth, _)| 100.0 * (value(report) / truth[i] - 1.0)).collect()
 }
 
 /// Mean standard error claimed, in percent of the true value, and how many 95 % intervals cover it.
@@ -93,11 +81,7 @@ fn print(title: &str, fits: &[(FitReport, [f64; 5], f64)]) {
 fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
-    let variance = values
-        .iter()
-        .map(|value| (value - mean).powi(2))
-        .sum::<f64>()
-        / (count - 1.0);
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (mean, variance.sqrt())
 }
 
@@ -107,21 +91,12 @@ fn ideal_runs_scatter_as_the_protocol_allows() {
     print("ideal, contact known", &fits);
     for (i, name) in NAMES.iter().enumerate() {
         let errors = errors(&fits, i);
-        let squares: f64 = errors
-            .iter()
-            .map(|error| (error / EXPECTED_PERCENT[i]).powi(2))
-            .sum();
+        let squares: f64 = errors.iter().map(|error| (error / EXPECTED_PERCENT[i]).powi(2)).sum();
         // Chi-square with 30 degrees of freedom: 11.6 to 59.7 holds all but one run in a thousand.
         // Bodies vary by some percent around the one the expectation is for, so a tenth more.
-        assert!(
-            (10.5..66.0).contains(&squares),
-            "{name}: sum of squared z {squares:.1}"
-        );
+        assert!((10.5..66.0).contains(&squares), "{name}: sum of squared z {squares:.1}");
         let (mean, _) = claims(&fits, i);
-        assert!(
-            (mean / EXPECTED_PERCENT[i] - 1.0).abs() < 0.2,
-            "{name}: claims {mean:.3} %"
-        );
+        assert!((mean / EXPECTED_PERCENT[i] - 1.0).abs() < 0.2, "{name}: claims {mean:.3} %");
     }
 }
 
@@ -135,10 +110,7 @@ fn what_contact_finding_and_a_real_cell_cost_is_bounded() {
         for (i, name) in NAMES.iter().enumerate() {
             let (mean, sd) = mean_and_sd(&errors(fits, i));
             // Not a promise of accuracy but a guard: a tenth would be a broken chain.
-            assert!(
-                mean.abs() < 10.0 && sd < 10.0,
-                "{name}: bias {mean:.2}, spread {sd:.2}"
-            );
+            assert!(mean.abs() < 10.0 && sd < 10.0, "{name}: bias {mean:.2}, spread {sd:.2}");
         }
     }
 }

@@ -29,9 +29,7 @@ const TOPS: [&str; 6] = ["app", "drivers", "model", "protocols", "sessions", "te
 
 /// Every Rust file of the folders with what is in it.
 fn sources<'a>(folders: impl IntoIterator<Item = &'a str>) -> Vec<(PathBuf, String)> {
-    let files = folders
-        .into_iter()
-        .flat_map(|folder| files_below(&workspace().join(folder), "rs"));
+    let files = folders.into_iter().flat_map(|folder| files_below(&workspace().join(folder), "rs"));
     files
         .map(|file| {
             let text = fs::read_to_string(&file).unwrap();
@@ -106,10 +104,7 @@ fn only_the_runner_sends_commands_to_a_rig() {
         .filter_map(|file| file.strip_prefix(workspace()).ok())
         .map(|file| file.display().to_string())
         .collect();
-    assert_eq!(
-        excepted,
-        ["clippy.toml", "drivers/clippy.toml", "tests/clippy.toml"]
-    );
+    assert_eq!(excepted, ["clippy.toml", "drivers/clippy.toml", "tests/clippy.toml"]);
     // Where rigs are made and tested all other rules hold.
     for path in &excepted[1..] {
         let here = lines(path);
@@ -162,10 +157,7 @@ fn every_package_takes_the_workspace_lints_and_explains_itself() {
             read(&format!("{package}/Cargo.toml")).contains("[lints]\nworkspace = true"),
             "{package}"
         );
-        assert!(
-            read(&format!("{package}/src/lib.rs")).starts_with("//! "),
-            "{package}"
-        );
+        assert!(read(&format!("{package}/src/lib.rs")).starts_with("//! "), "{package}");
     }
     for page in [
         "README.md",
@@ -177,10 +169,7 @@ fn every_package_takes_the_workspace_lints_and_explains_itself() {
     ] {
         assert!(!read(page).is_empty());
     }
-    assert!(
-        read("README.md").contains("docs/pictures/window.png"),
-        "the README shows the window"
-    );
+    assert!(read("README.md").contains("docs/pictures/window.png"), "the README shows the window");
     assert!(workspace().join("docs/pictures/window.png").exists());
 }
 
@@ -194,10 +183,7 @@ fn every_dependency_has_its_reason() {
         .flat_map(|names| names.split(", "))
         .collect();
     for package in PACKAGES {
-        for name in dependencies(package)
-            .iter()
-            .filter(|name| !name.starts_with("palpate-"))
-        {
+        for name in dependencies(package).iter().filter(|name| !name.starts_with("palpate-")) {
             assert!(
                 reasons.contains(name.as_str()),
                 "{name}, used by {package}, has no reason in docs/dependencies.md"
@@ -209,11 +195,7 @@ fn every_dependency_has_its_reason() {
 #[test]
 fn no_test_is_ignored_and_no_page_is_unsafe() {
     // Written in two halves so that this file does not find itself.
-    let banned = [
-        ["#[ign", "ore"].concat(),
-        ["unsafe", " {"].concat(),
-        ["to", "do!("].concat(),
-    ];
+    let banned = [["#[ign", "ore"].concat(), ["unsafe", " {"].concat(), ["to", "do!("].concat()];
     assert_without(&sources(TOPS), &banned.each_ref().map(String::as_str));
 }
 
@@ -223,16 +205,10 @@ fn the_soak_script_names_its_parts() {
         return;
     }
     let script = workspace().join("scripts/soak");
-    let help = std::process::Command::new("python3")
-        .arg(&script)
-        .arg("--help")
-        .output()
-        .unwrap();
+    let help = std::process::Command::new("python3").arg(&script).arg("--help").output().unwrap();
     let told = String::from_utf8_lossy(&help.stdout);
     assert!(help.status.success(), "{told}");
-    for part in [
-        "bodies", "select", "coverage", "extremes", "haptics", "runs", "contact",
-    ] {
+    for part in ["bodies", "select", "coverage", "extremes", "haptics", "runs", "contact"] {
         let is_named = told.lines().any(|line| line.trim_start().starts_with(part));
         assert!(is_named, "{part}: {told}");
     }
@@ -259,10 +235,7 @@ fn gate_fails_where_a_test_was_skipped_without_reason() {
             .unwrap();
         let summary = String::from_utf8_lossy(&judged.stdout);
         assert_eq!(judged.status.code(), Some(code), "{line}: {summary}");
-        assert!(
-            summary.contains(&format!("{count} tests skipped")),
-            "{summary}"
-        );
+        assert!(summary.contains(&format!("{count} tests skipped")), "{summary}");
         assert_eq!(summary.contains("suite::one"), count == 1, "{summary}");
     }
 }

@@ -54,11 +54,7 @@ fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
         let row = &mut changed.families[index];
         if row.error_n > 1e-8 {
             row.error_n *= 1.01;
-            assert!(
-                changed.agrees_with(&now).is_err(),
-                "{}",
-                row_name(&recorded, index)
-            );
+            assert!(changed.agrees_with(&now).is_err(), "{}", row_name(&recorded, index));
             perturbed += 1;
         }
     }

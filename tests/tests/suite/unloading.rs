@@ -69,11 +69,7 @@ fn agreement(samples: &[FitSample], forces: &[f64], block: usize) -> Agreement {
     let known = || pairs.iter().filter(|(one, _)| one.is_measured());
     let measured = work(known().map(|(one, _)| (one.depth, one.force)));
     let fitted = work(known().map(|(one, force)| (one.depth, Newtons(*force))));
-    Agreement {
-        unload_rms,
-        unload_share: unload_rms / peak,
-        area: fitted / measured - 1.0,
-    }
+    Agreement { unload_rms, unload_share: unload_rms / peak, area: fitted / measured - 1.0 }
 }
 
 fn along(model: &Model, samples: &[FitSample]) -> Vec<f64> {
@@ -96,18 +92,8 @@ fn one_loop_predicts_another_depth_and_another_speed() {
     // 1.0 and 0.1 % of the peak, and without softening 6.5, 3.7 and 6.2 %.
     for (what, samples, softening_at_most, none_at_least) in [
         ("itself", known, 0.004, 0.05),
-        (
-            "20 mm",
-            samples_of(&run(0.75, 20.0, 0.3), Stretch::WithUnload).unwrap(),
-            0.015,
-            0.03,
-        ),
-        (
-            "1.5 mm/s",
-            samples_of(&run(1.5, 30.0, 0.6), Stretch::WithUnload).unwrap(),
-            0.004,
-            0.05,
-        ),
+        ("20 mm", samples_of(&run(0.75, 20.0, 0.3), Stretch::WithUnload).unwrap(), 0.015, 0.03),
+        ("1.5 mm/s", samples_of(&run(1.5, 30.0, 0.6), Stretch::WithUnload).unwrap(), 0.004, 0.05),
     ] {
         let one = agreement(&samples, &along(&soft.body, &samples), 50);
         let other = agreement(&samples, &along(&hard.body, &samples), 50);
@@ -117,10 +103,7 @@ fn one_loop_predicts_another_depth_and_another_speed() {
         // The loop's energy: measured 0.4 to 1.6 %, without softening 2 to 18 %.
         assert!(one.area.abs() < 0.02, "{what}: {one:?}");
         // Of the shallow loop the way in takes nearly all the energy: there the area tells neither from the other.
-        assert!(
-            what == "20 mm" || other.area.abs() > 2.0 * one.area.abs(),
-            "{what}: {other:?}"
-        );
+        assert!(what == "20 mm" || other.area.abs() > 2.0 * one.area.abs(), "{what}: {other:?}");
     }
 }
 
@@ -157,9 +140,7 @@ fn unloading_of_real_tissue_is_explained() {
     if skip::lacks_file(&path) {
         return;
     }
-    let samples = read_stretch(&path, None, Stretch::WithUnload)
-        .unwrap()
-        .samples;
+    let samples = read_stretch(&path, None, Stretch::WithUnload).unwrap().samples;
     let held = &samples[..=turn(&samples)];
     let forces = |fit: &FitReport| -> Vec<f64> {
         fit.predict(&samples).into_iter().map(|one| one.0).collect()

@@ -13,17 +13,10 @@ use palpate_runner::replay::replay;
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
 
-const HIGH: WaitCondition = WaitCondition::DigitalInput {
-    number: 1,
-    is_high: true,
-};
+const HIGH: WaitCondition = WaitCondition::DigitalInput { number: 1, is_high: true };
 
 fn wait(condition: WaitCondition, secs: f64, on_timeout: OnTimeout) -> WaitUntil {
-    WaitUntil {
-        condition,
-        timeout: Seconds(secs),
-        on_timeout,
-    }
+    WaitUntil { condition, timeout: Seconds(secs), on_timeout }
 }
 
 fn plan(wait: WaitUntil) -> Plan {
@@ -71,10 +64,7 @@ fn run_goes_on_when_the_input_goes_high() {
 
 #[test]
 fn run_goes_on_when_the_bath_is_within_its_band() {
-    let band = WaitCondition::Bath {
-        from_celsius: 30.0,
-        to_celsius: 31.0,
-    };
+    let band = WaitCondition::Bath { from_celsius: 30.0, to_celsius: 31.0 };
     let mut lab = lab(wait(band, 600.0, OnTimeout::Stop));
     lab.run();
     assert_eq!(lab.outcome.as_ref().unwrap().ending, EndingKind::Finish);
@@ -95,10 +85,7 @@ fn input_that_never_comes_ends_as_the_plan_says() {
     assert_eq!(stopped.outcome.as_ref().unwrap().ending, EndingKind::Stop);
     let mut continued = lab(wait(HIGH, 5.0, OnTimeout::Continue));
     continued.run();
-    assert_eq!(
-        continued.outcome.as_ref().unwrap().ending,
-        EndingKind::Finish
-    );
+    assert_eq!(continued.outcome.as_ref().unwrap().ending, EndingKind::Finish);
     let waited = reported(&continued, "waited_s");
     assert!((waited[0] - 5.0).abs() < 0.01, "{waited:?}");
 }
@@ -107,18 +94,13 @@ fn input_that_never_comes_ends_as_the_plan_says() {
 fn recorded_wait_replays_to_identical_decisions() {
     let rig = rig();
     let calibration = rig.calibration();
-    let session = recorded::of_plan(
-        Box::new(rig),
-        calibration,
-        plan(wait(HIGH, 60.0, OnTimeout::Stop)),
-    );
+    let session =
+        recorded::of_plan(Box::new(rig), calibration, plan(wait(HIGH, 60.0, OnTimeout::Stop)));
     let replayed = replay(&session, &[]).unwrap();
     assert_eq!(replayed.first_difference, None);
     // Without the recorded level of the input the wait does not end where it did.
     let mut without = session.clone();
-    without
-        .entries
-        .retain(|entry| entry.body["value"]["sensor"] != "digital_input");
+    without.entries.retain(|entry| entry.body["value"]["sensor"] != "digital_input");
     assert!(without.entries.len() < session.entries.len());
     assert!(replay(&without, &[]).unwrap().first_difference.is_some());
 }
@@ -146,10 +128,7 @@ fn rig_without_the_sensor_is_refused_by_the_preview() {
     };
     assert_eq!(told(&rig()).refusals.len(), 0);
     let usual = told(&SimRig::new(SimSettings::default()));
-    assert_eq!(
-        (usual.refusals.len(), usual.steps[1].refusals.len()),
-        (1, 1)
-    );
+    assert_eq!((usual.refusals.len(), usual.steps[1].refusals.len()), (1, 1));
 }
 
 #[test]
@@ -159,18 +138,11 @@ fn words_of_a_protocol_make_the_step() {
             "palpate = 1\nname = \"w\"\nversion = 1\ntitle = \"Wait\"\nabout = \"Wait\"\nsource = \"none\"\n\n[procedure]\nsteps = [ {{ do = \"wait-until\", {keys} }} ]\n"
         );
         let protocol = Protocol::read(&text);
-        protocol.map(|protocol| {
-            protocol.plan(&Default::default()).unwrap().steps[0]
-                .step
-                .clone()
-        })
+        protocol.map(|protocol| protocol.plan(&Default::default()).unwrap().steps[0].step.clone())
     };
     let expected = wait(HIGH, 600.0, OnTimeout::Stop);
     assert_eq!(read("input = 1"), Ok(expected.into()));
-    let band = WaitCondition::Bath {
-        from_celsius: 36.5,
-        to_celsius: 37.5,
-    };
+    let band = WaitCondition::Bath { from_celsius: 36.5, to_celsius: 37.5 };
     let expected = wait(band, 30.0, OnTimeout::Continue);
     let keys = "bath_from = \"36.5 °C\", bath_to = \"37.5 degC\", timeout = \"30 s\", on_timeout = \"continue\"";
     assert_eq!(read(keys), Ok(expected.into()));

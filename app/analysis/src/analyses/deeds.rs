@@ -188,23 +188,14 @@ enum Kind {
 }
 
 fn done(session: &Path, sentence: String, kind: Kind) -> Done {
-    Done {
-        sentence,
-        changed: Some(session.to_path_buf()),
-        is_edit: kind == Kind::Edit,
-        made: None,
-    }
+    Done { sentence, changed: Some(session.to_path_buf()), is_edit: kind == Kind::Edit, made: None }
 }
 
 fn made(session: &Path, name: &str, sentence: String) -> Done {
     let name = name.trim();
     Done {
         made: Some(name.to_owned()),
-        ..done(
-            session,
-            format!("kept as '{name}': {sentence}"),
-            Kind::Analysis,
-        )
+        ..done(session, format!("kept as '{name}': {sentence}"), Kind::Analysis)
     }
 }
 
@@ -284,10 +275,11 @@ pub fn keep_fit(
     for one in fit.together_with {
         let id = id_of(&one.session)?;
         let theirs = inputs_of(&one.session)?;
-        inputs.extend(theirs.into_iter().map(|file| Input {
-            what: format!("{id}/{}", file.what),
-            sha256: file.sha256,
-        }));
+        inputs.extend(
+            theirs
+                .into_iter()
+                .map(|file| Input { what: format!("{id}/{}", file.what), sha256: file.sha256 }),
+        );
     }
     let what = Analysed::Fit {
         based_on: fit.based_on.map(str::to_owned),
@@ -318,10 +310,7 @@ pub fn recalibrate(
     let (opened, inputs, what, change) = analysed::recalibration(session, calibration)?;
     keep(session, &id, name, inputs, what, who)?;
     let rig = opened.edited.session.manifest.rig;
-    Ok(Recalibrated {
-        change,
-        rig: rig.map_or_else(String::new, |rig| rig.name),
-    })
+    Ok(Recalibrated { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
 }
 
 fn recalibrated(
@@ -372,11 +361,7 @@ pub fn mask(
     }
     step(progress, 1, 1, "keeping it")?;
     let what = Analysed::Mask { left_out_s };
-    Ok(Masked {
-        analysis: keep(session, &id, name, inputs, what, who)?,
-        left_out,
-        of,
-    })
+    Ok(Masked { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
 }
 
 /// Lets an analysis count no more.
@@ -458,16 +443,7 @@ pub fn correct(
         return Err(DeedFailure::OutsideTravel { position, travel });
     }
     let was = was.position;
-    let change = Change::Contact {
-        number,
-        position_mm: position,
-        was_mm: was,
-    };
+    let change = Change::Contact { number, position_mm: position, was_mm: was };
     let edit = Subject::read(session)?.say(&who.by, &who.reason, change)?;
-    Ok(Corrected {
-        number,
-        position,
-        was,
-        edit,
-    })
+    Ok(Corrected { number, position, was, edit })
 }

@@ -110,18 +110,12 @@ impl FitWanted {
             let source = self.read(&one.session, one.analysis.as_deref())?;
             all.push(Recording::of(name, source, None));
         }
-        let records = Recordings {
-            all,
-            notes: Vec::new(),
-        };
+        let records = Recordings { all, notes: Vec::new() };
         self.joint(&records, &options, progress)
     }
 
     fn intervals(&self) -> IntervalsWanted {
-        IntervalsWanted {
-            with_profile: self.with_profile,
-            bootstrap: None,
-        }
+        IntervalsWanted { with_profile: self.with_profile, bootstrap: None }
     }
 
     fn exact(

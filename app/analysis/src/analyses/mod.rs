@@ -52,9 +52,7 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
         analyses,
         verdict: verdict.map(|(verdict, edit)| (verdict, edit.by.clone(), edit.reason.clone())),
         contacts: found.iter().map(|one| one.position).collect(),
-        calibrations: kept
-            .map(|one| (one.id.clone(), one.document.clone()))
-            .collect(),
+        calibrations: kept.map(|one| (one.id.clone(), one.document.clone())).collect(),
     })
 }
 
@@ -73,12 +71,7 @@ pub struct Done {
 
 impl Done {
     fn told(sentence: String) -> Self {
-        Self {
-            sentence,
-            changed: None,
-            is_edit: false,
-            made: None,
-        }
+        Self { sentence, changed: None, is_edit: false, made: None }
     }
 }
 

@@ -19,10 +19,7 @@ pub enum Paper {
 /// Writes it as a new file, or says why not.
 pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, String> {
     if to.exists() {
-        return Err(format!(
-            "{} exists already; choose another name",
-            to.display()
-        ));
+        return Err(format!("{} exists already; choose another name", to.display()));
     }
     let bytes = match paper {
         Paper::Page(wanted) => {
@@ -45,9 +42,6 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
 /// Writes a file that was not there.
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {
     palpate_sessions::atomic::create(to, bytes).map_err(|err| {
-        format!(
-            "cannot write {} ({err}); choose a folder that may be written",
-            to.display()
-        )
+        format!("cannot write {} ({err}); choose a folder that may be written", to.display())
     })
 }

@@ -138,11 +138,8 @@ pub fn fit_lake(
         hear(LakeFit::Note(note));
     }
     found.retain(|one| !is_copied(one) && request.shard.has(&one.id));
-    let mut tally = LakeTally {
-        model: model.to_owned(),
-        sessions: found.len(),
-        ..LakeTally::default()
-    };
+    let mut tally =
+        LakeTally { model: model.to_owned(), sessions: found.len(), ..LakeTally::default() };
     let mut ids = found.iter().map(|one| one.id.as_str());
     let work = |one: &InLake| request.fit_one(one, model, &settings);
     in_order(request.jobs, &found, is_ending, work, |news| match news {
@@ -164,12 +161,7 @@ pub fn fit_lake(
 
 impl LakeRequest<'_> {
     fn fit_one(&self, one: &InLake, model: &str, settings: &Value) -> Result<Outcome, LakeFailure> {
-        let file = FitFile {
-            lake: self.lake,
-            model,
-            session_id: &one.id,
-            settings,
-        };
+        let file = FitFile { lake: self.lake, model, session_id: &one.id, settings };
         if state_of_fit(&file)? == FitState::There {
             return Ok(Outcome::There);
         }

@@ -113,10 +113,8 @@ impl KnownFit {
         }
         let source = source::read_named(path, columns)?;
         let report = fit(&source.samples, &FitOptions::default());
-        let report = report.map_err(|reason| KnownFitError::Fit {
-            path: path.to_owned(),
-            reason,
-        })?;
+        let report =
+            report.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
         let known = Self {
             source: Some(path.display().to_string()),
             rmse_n: report.rmse_n,
@@ -159,10 +157,7 @@ pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::E
         return Ok(());
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let remembered = Remembered {
-        source: source.display().to_string(),
-        report,
-    };
+    let remembered = Remembered { source: source.display().to_string(), report };
     write(&file, &remembered).map_err(|err| (file, err))
 }
 
@@ -186,11 +181,8 @@ fn state_file_from(
     variable: impl Fn(&str) -> Option<OsString>,
     home: Option<PathBuf>,
 ) -> Option<PathBuf> {
-    let folder = |name: &str| {
-        variable(name)
-            .map(PathBuf::from)
-            .filter(|path| !path.as_os_str().is_empty())
-    };
+    let folder =
+        |name: &str| variable(name).map(PathBuf::from).filter(|path| !path.as_os_str().is_empty());
     if let Some(library) = folder("PALPATE_HOME") {
         return Some(library.join(FILE));
     }

@@ -65,10 +65,7 @@ impl Recipe {
     /// Fits what was read.
     pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
-        let fitted = Fitted {
-            compliance,
-            ..Fitted::of(source, &self.options)
-        };
+        let fitted = Fitted { compliance, ..Fitted::of(source, &self.options) };
         Ok(match self.is_systematic {
             true => fitted.with_systematic(&self.options),
             false => fitted,

@@ -108,12 +108,6 @@ impl Together {
     #[must_use]
     pub fn object<'a>(&'a self, options: &FitOptions, beside: &[Beside<'a>]) -> JointObject<'a> {
         let systematic = self.systematic.as_deref();
-        JointObject::of(
-            options.family(),
-            &self.report,
-            beside,
-            systematic,
-            self.seconds,
-        )
+        JointObject::of(options.family(), &self.report, beside, systematic, self.seconds)
     }
 }

@@ -30,10 +30,7 @@ impl Band {
             };
             forces.iter().filter_map(at).collect()
         };
-        Self {
-            above: edge(SIGMAS),
-            below: edge(-SIGMAS),
-        }
+        Self { above: edge(SIGMAS), below: edge(-SIGMAS) }
     }
 
     /// What a panel has to have room for.
@@ -59,10 +56,6 @@ pub(super) fn legend(svg: &mut Svg, uncertainty: Option<&ForceUncertainty>) {
         return;
     }
     let x = RIGHT - 360.0;
-    svg.band(
-        &[[x, 40.0], [x + 24.0, 40.0]],
-        &[[x, 52.0], [x + 24.0, 52.0]],
-        LIGHT.series,
-    );
+    svg.band(&[[x, 40.0], [x + 24.0, 40.0]], &[[x, 52.0], [x + 24.0, 52.0]], LIGHT.series);
     svg.text([x + 30.0, 50.0], Ink::plain(LIGHT.text), WORDS);
 }

@@ -73,9 +73,7 @@ impl Entry {
     /// Whether it is in force, superseded, expired or only older, in words.
     #[must_use]
     pub fn state(&self) -> String {
-        let is_old = self
-            .age_days
-            .is_some_and(|age| age > i64::from(self.valid_days));
+        let is_old = self.age_days.is_some_and(|age| age > i64::from(self.valid_days));
         match (&self.superseded_by, is_old, self.is_in_force) {
             (Some(by), _, _) => format!("superseded by {by}"),
             (None, true, _) => "expired".to_owned(),
@@ -91,23 +89,10 @@ pub fn list(entries: &[Entry], folder: &Path) -> String {
     if entries.is_empty() {
         return format!("no calibration in {}", folder.display());
     }
-    let mut lines = vec![
-        ["id", "name", "rig", "cell", "age", "state"]
-            .map(String::from)
-            .to_vec(),
-    ];
+    let mut lines = vec![["id", "name", "rig", "cell", "age", "state"].map(String::from).to_vec()];
     lines.extend(entries.iter().map(|one| {
-        let age = one
-            .age_days
-            .map_or("not stated".to_owned(), |age| format!("{age} d"));
-        vec![
-            one.id.clone(),
-            one.name.clone(),
-            one.rig.clone(),
-            one.cell.clone(),
-            age,
-            one.state(),
-        ]
+        let age = one.age_days.map_or("not stated".to_owned(), |age| format!("{age} d"));
+        vec![one.id.clone(), one.name.clone(), one.rig.clone(), one.cell.clone(), age, one.state()]
     }));
     in_columns(&lines)
 }
@@ -154,11 +139,7 @@ impl Told {
         let points = calibration.points()?;
         let uncertainty = ForceUncertainty::of(calibration)?;
         let mut forces: Vec<f64> = points.iter().map(|point| point.newtons.0).collect();
-        forces.extend(
-            points
-                .windows(2)
-                .map(|pair| 0.5 * (pair[0].newtons.0 + pair[1].newtons.0)),
-        );
+        forces.extend(points.windows(2).map(|pair| 0.5 * (pair[0].newtons.0 + pair[1].newtons.0)));
         forces.sort_by(f64::total_cmp);
         let budget = |&force_n: &f64| Budget {
             force_n,
@@ -198,12 +179,7 @@ pub fn whole(
         parts.push(budget(told));
     }
     let sentences = told.quality.findings.iter().chain(doubts);
-    parts.push(
-        sentences
-            .map(|one| format!("- {one}"))
-            .collect::<Vec<_>>()
-            .join("\n"),
-    );
+    parts.push(sentences.map(|one| format!("- {one}")).collect::<Vec<_>>().join("\n"));
     parts.retain(|part| !part.is_empty());
     parts.join("\n\n")
 }
@@ -221,16 +197,8 @@ fn head(calibration: &Calibration, id: Option<&str>) -> String {
     fact("operator", calibration.operator.clone());
     fact("rig", calibration.rig.clone());
     fact("cell", calibration.cell.clone());
-    fact(
-        "excitation",
-        calibration
-            .excitation
-            .map_or(String::new(), |volts| volts.to_string()),
-    );
-    fact(
-        "supersedes",
-        calibration.supersedes.clone().unwrap_or_default(),
-    );
+    fact("excitation", calibration.excitation.map_or(String::new(), |volts| volts.to_string()));
+    fact("supersedes", calibration.supersedes.clone().unwrap_or_default());
     fact("curve", calibration.curve.to_string());
     lines.join("\n")
 }
@@ -268,26 +236,13 @@ fn points(quality: &Quality) -> String {
 
 fn curves(calibration: &Calibration, told: &Told) -> String {
     let newtons = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let heads = [
-        "curve",
-        "left out, rms (N)",
-        "worst (N)",
-        "ends, rms (N)",
-        "residuals, rms (mN)",
-        "",
-    ];
+    let heads =
+        ["curve", "left out, rms (N)", "worst (N)", "ends, rms (N)", "residuals, rms (mN)", ""];
     let mut lines = vec![heads.map(String::from).to_vec()];
     let is_chosen = |one: &Candidate| one.curve == calibration.curve;
-    let own = told
-        .chosen
-        .iter()
-        .filter(|_| !told.candidates.iter().any(is_chosen));
+    let own = told.chosen.iter().filter(|_| !told.candidates.iter().any(is_chosen));
     for one in told.candidates.iter().chain(own) {
-        let square: f64 = one
-            .residuals_n
-            .iter()
-            .map(|residual| residual * residual)
-            .sum();
+        let square: f64 = one.residuals_n.iter().map(|residual| residual * residual).sum();
         let count = one.residuals_n.len().max(1) as f64;
         if let Some(reason) = &one.refused {
             lines.push(vec![one.name.clone(), reason.clone()]);
@@ -326,10 +281,7 @@ fn spread(quality: &Quality) -> String {
         None => "hysteresis: not taken; go down again weight by weight".to_owned(),
     });
     lines.push(match quality.repeatability_v {
-        Some(volts) => format!(
-            "repeatability: {:.2} mV from reading to reading",
-            volts * 1e3
-        ),
+        Some(volts) => format!("repeatability: {:.2} mV from reading to reading", volts * 1e3),
         None => "repeatability: not taken; repeat the series".to_owned(),
     });
     lines.push(match (quality.zero_shift_v, quality.zero_shift_n) {
@@ -364,11 +316,9 @@ fn budget(told: &Told) -> String {
 #[must_use]
 pub fn check(result: &CheckResult) -> String {
     let verdict = if result.is_passed { "passed" } else { "FAILED" };
-    let own = result
-        .uncertainty_n
-        .map_or("not stated by the calibration".to_owned(), |sigma| {
-            format!("{sigma:.3} N from calibration and weight")
-        });
+    let own = result.uncertainty_n.map_or("not stated by the calibration".to_owned(), |sigma| {
+        format!("{sigma:.3} N from calibration and weight")
+    });
     let mut lines = vec![
         format!("{verdict}: {}", result.sentence),
         format!("  standard uncertainty of this error: {own}"),
@@ -389,11 +339,7 @@ mod tests {
         let told = Told::of(&thesis).unwrap();
         let page = whole(&thesis, Some("id-1"), &told, &["a doubt".into()]);
         for weight in &told.quality.points {
-            assert!(
-                page.contains(&format!("{:.1} ", weight.mass_g)),
-                "{}",
-                weight.mass_g
-            );
+            assert!(page.contains(&format!("{:.1} ", weight.mass_g)), "{}", weight.mass_g);
         }
         for one in &told.candidates {
             assert!(page.contains(&one.name), "{}", one.name);
@@ -411,10 +357,7 @@ mod tests {
         let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
         let told = Told::of(&line).unwrap();
         let page = whole(&line, None, &told, &[]);
-        assert!(
-            page.contains("monotone interpolation") && !page.contains("NaN"),
-            "{page}"
-        );
+        assert!(page.contains("monotone interpolation") && !page.contains("NaN"), "{page}");
         assert!(!picture(&line, &told).contains("NaN"));
     }
 

@@ -35,9 +35,7 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
     let zero = points
         .first()
         .filter(|point| point.newtons.0 == 0.0)
-        .map_or(0.0, |point| {
-            point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0
-        });
+        .map_or(0.0, |point| point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0);
     let signal = axis.along(|force| curve.volts_from_newtons(Newtons(force)).0 + zero);
     let (signal, beyond) = signal.into_iter().partition(|point| point[0] <= last.0);
     let mut readings = [Vec::new(), Vec::new()];
@@ -61,21 +59,13 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
         // Beyond the heaviest weight nothing was measured.
         Series::dashed("", Ink::Quiet, 1.0, beyond),
     ];
-    let zero = Level {
-        name: String::new(),
-        at: 0.0,
-        ink: Ink::Quiet,
-        is_dashed: false,
-    };
+    let zero = Level { name: String::new(), at: 0.0, ink: Ink::Quiet, is_dashed: false };
     Ok([
         plot("signal (V)", upright("signal (V)")).with(lines.into_iter().chain(dots(readings))),
         Plot {
             levels: vec![zero],
-            ..plot(
-                "residual (mN)",
-                upright("residual (mN)").seeing(&[-1.0, 1.0]),
-            )
-            .with(dots(misses))
+            ..plot("residual (mN)", upright("residual (mN)").seeing(&[-1.0, 1.0]))
+                .with(dots(misses))
         },
         plot("slope (V/N)", upright("slope (V/N)").seeing(&[0.0])).with([Series::line(
             "",
@@ -93,10 +83,7 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
 }
 
 fn flat(one: &FlatStretch) -> Stretch {
-    Stretch {
-        name: "flat stretch".to_owned(),
-        ends: [one.from_n, one.to_n],
-    }
+    Stretch { name: "flat stretch".to_owned(), ends: [one.from_n, one.to_n] }
 }
 
 fn dots([loading, unloading]: [Vec<[f64; 2]>; 2]) -> impl Iterator<Item = Series> {
@@ -113,14 +100,7 @@ fn uncertainties(told: &Told, axis: Axis) -> Vec<Series> {
     if !own.is_stated() {
         return Vec::new();
     }
-    let inks = [
-        Ink::Series,
-        Ink::Quiet,
-        Ink::Notice,
-        Ink::Alarm,
-        Ink::Active,
-        Ink::Limit,
-    ];
+    let inks = [Ink::Series, Ink::Quiet, Ink::Notice, Ink::Alarm, Ink::Active, Ink::Limit];
     let terms = Term::ALL.into_iter().zip(inks);
     let stated = terms.filter(|(term, _)| own.errors().any(|one| one == *term));
     let mut series: Vec<Series> = stated
@@ -145,12 +125,7 @@ pub fn picture(calibration: &Calibration, told: &Told) -> String {
 }
 
 /// Upper and lower edges of the plots in px.
-const PLACES_PX: [[f64; 2]; 4] = [
-    [84.0, 320.0],
-    [356.0, 450.0],
-    [486.0, 600.0],
-    [654.0, 820.0],
-];
+const PLACES_PX: [[f64; 2]; 4] = [[84.0, 320.0], [356.0, 450.0], [486.0, 600.0], [654.0, 820.0]];
 
 /// The same, not yet in any format.
 #[must_use]
@@ -176,9 +151,5 @@ pub fn drawing(calibration: &Calibration, told: &Told) -> Drawing {
     for finding in &told.quality.findings {
         y = sentence_lines(&mut svg, y, TextInk::plain(LIGHT.text), finding);
     }
-    svg.drawing(
-        y,
-        LIGHT.canvas,
-        &format!("Calibration {}", calibration.name),
-    )
+    svg.drawing(y, LIGHT.canvas, &format!("Calibration {}", calibration.name))
 }

@@ -9,16 +9,11 @@ pub fn list(found: &Found, page: usize, pages: usize) -> String {
     if found.count == 0 {
         return "no session is like that".into();
     }
-    let head = [
-        "started", "specimen", "operator", "protocol", "length", "verdict", "review", "folder",
-    ];
+    let head =
+        ["started", "specimen", "operator", "protocol", "length", "verdict", "review", "folder"];
     let mut lines = vec![head.map(String::from).to_vec()];
     lines.extend(found.entries.iter().map(line));
-    let sessions = if found.count == 1 {
-        "session"
-    } else {
-        "sessions"
-    };
+    let sessions = if found.count == 1 { "session" } else { "sessions" };
     let mut text = format!("{}\n{} {sessions}", in_columns(&lines), found.count);
     if pages > 1 {
         text += &format!(", page {page} of {pages}");
@@ -71,10 +66,7 @@ fn line(entry: &Entry) -> Vec<String> {
 #[must_use]
 pub fn history(events: &[Event]) -> String {
     let line = |event: &Event| {
-        let at = event
-            .at
-            .get(..19)
-            .map_or("undated".to_owned(), |at| at.replace('T', " "));
+        let at = event.at.get(..19).map_or("undated".to_owned(), |at| at.replace('T', " "));
         let by = match event.by.as_str() {
             "" => "-".to_owned(),
             by => one_line(by),
@@ -91,9 +83,6 @@ pub fn history(events: &[Event]) -> String {
 
 /// A text without anything that would end its line or move the cursor.
 pub fn one_line(text: &str) -> String {
-    let plain = text
-        .trim()
-        .chars()
-        .map(|letter| if letter.is_control() { ' ' } else { letter });
+    let plain = text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter });
     plain.collect()
 }

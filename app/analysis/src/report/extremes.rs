@@ -5,12 +5,8 @@ use palpate_rheology::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
 /// All verdicts, in the order of [`GroupSummary::counts`].
-pub const VERDICTS: [Verdict; 4] = [
-    Verdict::Right,
-    Verdict::Refused,
-    Verdict::Flagged,
-    Verdict::Wrong,
-];
+pub const VERDICTS: [Verdict; 4] =
+    [Verdict::Right, Verdict::Refused, Verdict::Flagged, Verdict::Wrong];
 
 /// One group of cases in numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,10 +29,7 @@ pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
             counts: VERDICTS
                 .map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count()),
             tightest: tightest(&rows).map(|(row, error)| {
-                format!(
-                    "{error:.1e} of {:.0e}: {}, {}",
-                    row.tolerance, row.subject, row.case
-                )
+                format!("{error:.1e} of {:.0e}: {}, {}", row.tolerance, row.subject, row.case)
             }),
         })
         .collect()
@@ -78,10 +71,7 @@ pub fn text(rows: &[Row]) -> String {
     }
     let wrong = rows.iter().filter(|row| row.verdict == Verdict::Wrong);
     lines.extend(wrong.map(|row| {
-        format!(
-            "WRONG {}: {}, {}: {}",
-            row.group, row.subject, row.case, row.sentence
-        )
+        format!("WRONG {}: {}, {}: {}", row.group, row.subject, row.case, row.sentence)
     }));
     lines.join("\n")
 }
@@ -139,9 +129,7 @@ terms 1e6, and all of them all with `palpate extremes --soak`.
 fn cell(rows: &[&Row]) -> String {
     let worst = rows.iter().max_by(|a, b| {
         let error = |row: &Row| row.relative_error.unwrap_or_default();
-        a.verdict
-            .cmp(&b.verdict)
-            .then(error(a).total_cmp(&error(b)))
+        a.verdict.cmp(&b.verdict).then(error(a).total_cmp(&error(b)))
     });
     match worst {
         None => String::new(),
@@ -163,23 +151,13 @@ fn by_time_and_step(rows: &[&Row]) -> String {
     let mut cells: BTreeMap<i32, BTreeMap<i32, Vec<&Row>>> = BTreeMap::new();
     for row in rows {
         if let Some((tau, step)) = exponents(&row.case) {
-            cells
-                .entry(tau)
-                .or_default()
-                .entry(step)
-                .or_default()
-                .push(row);
+            cells.entry(tau).or_default().entry(step).or_default().push(row);
         }
     }
-    let steps: Vec<i32> = cells
-        .values()
-        .next()
-        .map_or(Vec::new(), |row| row.keys().copied().collect());
+    let steps: Vec<i32> =
+        cells.values().next().map_or(Vec::new(), |row| row.keys().copied().collect());
     let mut table = "Worst error of any family, relative to the peak force, by relaxation time (down) and step\n(across). The path enters, is held, goes half back, leaves and comes again in 20 steps.\n\n".to_owned();
-    table += &header(
-        "tau \\ step",
-        steps.iter().map(|step| format!("1e{step} s")),
-    );
+    table += &header("tau \\ step", steps.iter().map(|step| format!("1e{step} s")));
     for (tau, row) in &cells {
         let line = row.values().map(|rows| cell(rows)).collect();
         table += &line_of(&format!("1e{tau} s"), line);
@@ -203,9 +181,8 @@ fn by_ratio(rows: &[&Row]) -> String {
     let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();
     table += &header("step / tau", subjects.iter().map(|&name| name.to_owned()));
     for (ratio, row) in &cells {
-        let line = subjects
-            .iter()
-            .map(|name| row.get(name).map_or(String::new(), |rows| cell(rows)));
+        let line =
+            subjects.iter().map(|name| row.get(name).map_or(String::new(), |rows| cell(rows)));
         table += &line_of(&format!("1e{ratio}"), line.collect());
     }
     table

@@ -55,10 +55,7 @@ pub fn picture(
     // Where the force is not known the fit is not drawn over depth: the probe may have left the tissue.
     let known = || pairs().filter(|(one, _)| one.is_measured());
     let over_time = [
-        thin(
-            known().map(|(one, _)| [one.t.0 - start, one.force.0]),
-            columns,
-        ),
+        thin(known().map(|(one, _)| [one.t.0 - start, one.force.0]), columns),
         thin(known().map(|(one, fit)| [one.t.0 - start, fit.0]), columns),
     ];
     let over_depth = [
@@ -77,11 +74,7 @@ pub fn picture(
         let top = if bottom < 400.0 { 66.0 } else { 360.0 };
         let band = Band::around(fitted, uncertainty);
         let [above, below] = band.edges();
-        let panel = Panel::around(
-            [LEFT, top, RIGHT, bottom],
-            x,
-            &[measured, fitted, above, below],
-        );
+        let panel = Panel::around([LEFT, top, RIGHT, bottom], x, &[measured, fitted, above, below]);
         panel.axes(&mut svg, [x_name, "force (N)"], look());
         band.draw(&mut svg, &panel, LIGHT.series);
         panel.line(&mut svg, measured, LIGHT.series, 2.6);

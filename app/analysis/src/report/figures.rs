@@ -31,10 +31,7 @@ pub struct Window {
 
 impl Window {
     /// All of it.
-    pub const WHOLE: Self = Self {
-        from: f64::NEG_INFINITY,
-        until: f64::INFINITY,
-    };
+    pub const WHOLE: Self = Self { from: f64::NEG_INFINITY, until: f64::INFINITY };
 
     fn holds(self, at: f64) -> bool {
         (self.from..=self.until).contains(&at)
@@ -97,10 +94,7 @@ impl Traces {
     /// The same, stretches marked whose forces do not count.
     #[must_use]
     pub fn leaving_out(self, left_out_s: &[[f64; 2]]) -> Self {
-        Self {
-            left_out_s: left_out_s.to_vec(),
-            ..self
-        }
+        Self { left_out_s: left_out_s.to_vec(), ..self }
     }
 
     /// The traces of a session within a window of time.
@@ -112,9 +106,8 @@ impl Traces {
             let ticks = i64::try_from(ticks).unwrap_or(i64::MAX);
             session.manifest.time_of(ticks).0
         };
-        let within: Vec<usize> = (0..session.rows.len())
-            .filter(|&index| window.holds(time(index)))
-            .collect();
+        let within: Vec<usize> =
+            (0..session.rows.len()).filter(|&index| window.holds(time(index))).collect();
         let ends = match within.as_slice() {
             [] => [0.0, 1.0],
             [only] => [time(*only), time(*only) + 1.0],
@@ -129,11 +122,7 @@ impl Traces {
                     if let Some(last) = last {
                         last.until = at;
                     }
-                    phases.push(Span {
-                        phase,
-                        from: at,
-                        until: at,
-                    });
+                    phases.push(Span { phase, from: at, until: at });
                 }
             }
         }
@@ -143,9 +132,7 @@ impl Traces {
         let force_time = runs.filter(|run| force(&run[0]).is_some()).map(|run| {
             let extent = time(run[run.len() - 1]) - time(run[0]);
             let columns = ((RIGHT - LEFT) * extent / width).ceil().max(1.0) as usize;
-            let points = run
-                .iter()
-                .map(|index| [time(*index), force(index).unwrap_or(0.0)]);
+            let points = run.iter().map(|index| [time(*index), force(index).unwrap_or(0.0)]);
             thin(points, columns)
         });
         let force_time: Vec<_> = force_time.collect();
@@ -218,9 +205,7 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
     let finite = || points().filter(|point| point.iter().all(|number| number.is_finite()));
     let ends = |axis: usize| {
         let start = [f64::INFINITY, f64::NEG_INFINITY];
-        finite().fold(start, |[low, high], point| {
-            [low.min(point[axis]), high.max(point[axis])]
-        })
+        finite().fold(start, |[low, high], point| [low.min(point[axis]), high.max(point[axis])])
     };
     let (x, y) = (ends(0), ends(1));
     let scale = |[low, high]: [f64; 2], px: f64| px / (high - low).max(1e-9);
@@ -283,11 +268,7 @@ pub fn force_time(traces: &Traces) -> Drawing {
             svg.text(place, Ink::plain(LIGHT.text), "left out");
         }
     }
-    panel.axes(
-        &mut svg,
-        ["time since the first sample (s)", "force (N)"],
-        look(),
-    );
+    panel.axes(&mut svg, ["time since the first sample (s)", "force (N)"], look());
     if let Some(limit) = limit {
         let line = traces.ends.map(|x| panel.at([x, limit]));
         svg.dashed_line(&line, LIGHT.limit, 1.2, 5.0);
@@ -300,11 +281,7 @@ pub fn force_time(traces: &Traces) -> Drawing {
         panel.line(&mut svg, line, LIGHT.series, 1.4);
     }
     nothing(&mut svg, traces.is_empty());
-    svg.drawing(
-        BOTTOM + 46.0,
-        LIGHT.canvas,
-        &format!("Force over time of {}", traces.name),
-    )
+    svg.drawing(BOTTOM + 46.0, LIGHT.canvas, &format!("Force over time of {}", traces.name))
 }
 
 /// Force over depth.
@@ -318,11 +295,7 @@ pub fn force_depth(traces: &Traces) -> Drawing {
         panel.line(&mut svg, line, LIGHT.series, 1.4);
     }
     nothing(&mut svg, traces.force_depth.is_empty());
-    svg.drawing(
-        BOTTOM + 46.0,
-        LIGHT.canvas,
-        &format!("Force over depth of {}", traces.name),
-    )
+    svg.drawing(BOTTOM + 46.0, LIGHT.canvas, &format!("Force over depth of {}", traces.name))
 }
 
 fn nothing(svg: &mut Svg, is_empty: bool) {
@@ -345,21 +318,15 @@ fn depth_panel(all: &[&Traces]) -> Panel {
 /// Ink and dashes of one of several.
 fn look_of(index: usize) -> (Color32, f64) {
     let round = index / LIGHT.sessions.len();
-    (
-        LIGHT.sessions[index % LIGHT.sessions.len()],
-        DASHES[round % DASHES.len()],
-    )
+    (LIGHT.sessions[index % LIGHT.sessions.len()], DASHES[round % DASHES.len()])
 }
 
 /// Several sessions over each other: force over time from where they are aligned, then force over depth. Those without
 /// that beginning are left out of the first, and named.
 #[must_use]
 pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
-    let lost: Vec<String> = all
-        .iter()
-        .filter(|one| one.origin(align).is_none())
-        .map(|one| one.name.clone())
-        .collect();
+    let lost: Vec<String> =
+        all.iter().filter(|one| one.origin(align).is_none()).map(|one| one.name.clone()).collect();
     let shifted: Vec<(usize, Vec<Vec<[f64; 2]>>)> = all
         .iter()
         .enumerate()
@@ -377,11 +344,7 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
     let series: Vec<&[[f64; 2]]> = lines().map(Vec::as_slice).collect();
     let over_time = Panel::around([LEFT, TOP, RIGHT, BOTTOM], [-LEAD_S, last], &series);
     let mut svg = Svg::new(WIDTH);
-    title(
-        &mut svg,
-        "Force over time",
-        &format!("from when {}", align.word()),
-    );
+    title(&mut svg, "Force over time", &format!("from when {}", align.word()));
     let name = format!("time since {} (s)", align.word());
     over_time.axes(&mut svg, [&name, "force (N)"], look());
     for (index, lines) in &shifted {

@@ -48,10 +48,7 @@ struct Words {
 
 impl Words {
     fn of(family: &dyn Family) -> Self {
-        Self {
-            equation: family.equation(),
-            cannot_represent: family.cannot_represent(),
-        }
+        Self { equation: family.equation(), cannot_represent: family.cannot_represent() }
     }
 }
 

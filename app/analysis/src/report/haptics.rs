@@ -20,14 +20,8 @@ use palpate_runner::haptics::timing::Spread;
 #[must_use]
 pub fn check_text(checked: &Checked) -> String {
     let body = &checked.body;
-    let [tau_eps, mu1, mu2, mu3, tau_sig] = [
-        body.tau_eps,
-        body.mu[0],
-        body.mu[1],
-        body.mu[2],
-        body.tau_sig,
-    ]
-    .map(plain);
+    let [tau_eps, mu1, mu2, mu3, tau_sig] =
+        [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig].map(plain);
     let mut lines = vec![format!(
         "body: tau_eps {tau_eps} s, mu1 {mu1} N/mm, mu2 {mu2} N/mm^2, mu3 {mu3} N/mm^3, tau_sig {tau_sig} N*s/mm^2"
     )];
@@ -70,14 +64,12 @@ pub fn tried_text(tried: &Tried) -> String {
 pub fn why_less(flags: Flags, missed: u64) -> Vec<String> {
     let bounds = [Flags::FORCE_MAX, Flags::SLEW].map(|bound| bound.when(flags.has(bound)));
     let causes = std::iter::once(flags.less_force()).chain(bounds);
-    let mut causes: Vec<String> = causes
-        .flat_map(|flags| flags.sentences().map(str::to_owned))
-        .collect();
+    let mut causes: Vec<String> =
+        causes.flat_map(|flags| flags.sentences().map(str::to_owned)).collect();
     if missed > 0 {
         let ticks = if missed == 1 { "tick" } else { "ticks" };
-        causes.push(format!(
-            "the loop was late: {missed} {ticks} passed without it; the force held"
-        ));
+        causes
+            .push(format!("the loop was late: {missed} {ticks} passed without it; the force held"));
     }
     causes
 }
@@ -171,10 +163,7 @@ fn table(loops: &[Paced]) -> Vec<String> {
         "rate", "busy", "late (us)", "period (us)", "work (us)", "overruns", "missed"
     )];
     let heads = "p50    p99   p99.9  max";
-    lines.push(format!(
-        "{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}",
-        "Hz", ""
-    ));
+    lines.push(format!("{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}", "Hz", ""));
     for one in loops {
         let kept = &one.kept;
         lines.push(format!(
@@ -249,17 +238,9 @@ fn fits_beside_the_body(followed: &Followed) -> String {
     let row = |name: &str, value: f64, unit: &str| {
         let measured = cell(&followed.fit, name);
         let commanded = cell(&followed.fit_commanded, name);
-        [name, &plain(value), &commanded, &measured, unit]
-            .map(str::to_owned)
-            .into()
+        [name, &plain(value), &commanded, &measured, unit].map(str::to_owned).into()
     };
-    let heads = [
-        "",
-        "body",
-        "fit of the commanded",
-        "fit of the measured force",
-        "",
-    ];
+    let heads = ["", "body", "fit of the commanded", "fit of the measured force", ""];
     in_columns(&[
         heads.map(str::to_owned).into(),
         row("tau_eps", body.tau_eps, "s"),
@@ -286,11 +267,7 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
         followed.peak_commanded_n, followed.peak_measured_n
     );
     title(&mut svg, source, &line);
-    let upper = Panel::around(
-        [LEFT, 66.0, RIGHT, 360.0],
-        [0.0, last],
-        &[&commanded, &measured],
-    );
+    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], [0.0, last], &[&commanded, &measured]);
     upper.axes(&mut svg, ["", "force (N)"], look());
     // Wide under narrow, so that both are seen where they agree.
     upper.line(&mut svg, &measured, LIGHT.series, 2.6);
@@ -312,19 +289,9 @@ pub fn follow_table(followed: &Followed) -> String {
     let mut table = "time_s,depth_mm,force_n,commanded_n,torque_nmm,bias_v,phase\n".to_owned();
     let ramp = followed.settings.ramp();
     for one in &followed.samples {
-        let numbers = [
-            one.t.0,
-            one.depth.0,
-            one.measured.0,
-            one.commanded.0,
-            one.torque,
-            one.bias.0,
-        ];
-        let phase = if one.t <= ramp {
-            Phase::Ramp
-        } else {
-            Phase::Hold
-        };
+        let numbers =
+            [one.t.0, one.depth.0, one.measured.0, one.commanded.0, one.torque, one.bias.0];
+        let phase = if one.t <= ramp { Phase::Ramp } else { Phase::Hold };
         table.push_str(&numbers.map(|value| value.to_string()).join(","));
         table.push_str(&format!(",{}\n", phase.name()));
     }
@@ -344,16 +311,8 @@ mod tests {
         assert!(why_less(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
         let all = why_less(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
         assert_eq!(all.len(), 4);
-        for words in [
-            "no contact",
-            "after the start",
-            "at its limit",
-            "1 tick passed",
-        ] {
-            assert!(
-                all.iter().any(|one| one.contains(words)),
-                "{words}: {all:?}"
-            );
+        for words in ["no contact", "after the start", "at its limit", "1 tick passed"] {
+            assert!(all.iter().any(|one| one.contains(words)), "{words}: {all:?}");
         }
     }
 

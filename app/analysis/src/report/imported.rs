@@ -5,10 +5,8 @@ use palpate_sessions::Imported;
 /// One line for each thing that was taken for something, with the option that says it otherwise.
 pub fn lines(imported: &Imported, rows: &str) -> Vec<String> {
     let line = |what: &str, text: &str| format!("  {what:<13} {text}");
-    let mut lines = vec![line(
-        "file",
-        &format!("{} bytes, CRC-32 {}", imported.bytes, imported.checksum),
-    )];
+    let mut lines =
+        vec![line("file", &format!("{} bytes, CRC-32 {}", imported.bytes, imported.checksum))];
     if !imported.part.is_empty() {
         lines.push(line("part", &format!("{} (--part NAME)", imported.part)));
     }

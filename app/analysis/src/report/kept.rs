@@ -65,9 +65,7 @@ pub fn change(change: &ForceChange) -> String {
 #[must_use]
 pub fn deed(what: &Analysed) -> String {
     match what {
-        Analysed::Fit {
-            based_on, results, ..
-        } => {
+        Analysed::Fit { based_on, results, .. } => {
             let family = results["name"].as_str().or(results["model"].as_str());
             let family = family.unwrap_or("a model").to_owned();
             match based_on {
@@ -75,10 +73,7 @@ pub fn deed(what: &Analysed) -> String {
                 None => family,
             }
         }
-        Analysed::Recalibration {
-            calibration,
-            results,
-        } => {
+        Analysed::Recalibration { calibration, results } => {
             let name = calibration["name"].as_str().unwrap_or("another");
             match ForceChange::deserialize(results) {
                 Ok(found) => format!("calibration {name}: {}", change(&found)),
@@ -109,12 +104,7 @@ pub fn fit_lines(one: &Analysis) -> Vec<String> {
 #[must_use]
 pub fn withdrawn(analyses: &Analyses, name: &str) -> Option<String> {
     let by = analyses.withdrawal(name)?;
-    Some(format!(
-        "withdrawn by {} at {}: {}",
-        by.by,
-        super::said::at(&by.at),
-        by.reason
-    ))
+    Some(format!("withdrawn by {} at {}: {}", by.by, super::said::at(&by.at), by.reason))
 }
 
 #[cfg(test)]
@@ -142,15 +132,9 @@ mod tests {
 
     #[test]
     fn deeds_are_told() {
-        let mask = Analysed::Mask {
-            left_out_s: vec![[1.0, 2.5], [3.0, 4.0]],
-        };
+        let mask = Analysed::Mask { left_out_s: vec![[1.0, 2.5], [3.0, 4.0]] };
         assert_eq!(deed(&mask), "left out: 1 to 2.5 s, 3 to 4 s");
-        let change = ForceChange {
-            samples: 7,
-            peak_after_n: Some(2.0),
-            ..ForceChange::default()
-        };
+        let change = ForceChange { samples: 7, peak_after_n: Some(2.0), ..ForceChange::default() };
         let other = Analysed::Recalibration {
             calibration: json!({"name": "June"}),
             results: serde_json::to_value(change).unwrap(),

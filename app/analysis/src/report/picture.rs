@@ -65,20 +65,11 @@ fn curves(
     let pairs = || samples.iter().zip(&modelled);
     // A force that is not known leaves nothing over.
     let known = || pairs().filter(|(one, _)| one.is_measured());
-    let measured = thin(
-        known().map(|(one, _)| [one.t.0 - start, one.force.0]),
-        columns,
-    );
+    let measured = thin(known().map(|(one, _)| [one.t.0 - start, one.force.0]), columns);
     let fitted = thin(pairs().map(|(one, fit)| [one.t.0 - start, fit.0]), columns);
-    let residual = thin(
-        known().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]),
-        columns,
-    );
-    title(
-        svg,
-        source,
-        &format!("{}; {}", report.model, quality(report)),
-    );
+    let residual =
+        thin(known().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]), columns);
+    title(svg, source, &format!("{}; {}", report.model, quality(report)));
     let band = Band::around(&fitted, uncertainty);
     let [above, below] = band.edges();
     let inside = [&measured, &fitted, above, below];
@@ -99,10 +90,8 @@ fn curves(
 #[must_use]
 pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
-    let depth = thin(
-        samples.iter().map(|one| [one.t.0 - start, one.depth.0]),
-        (RIGHT - LEFT) as usize,
-    );
+    let depth =
+        thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), (RIGHT - LEFT) as usize);
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, source, "not fitted");
     let panel = Panel::around([LEFT, 66.0, RIGHT, 360.0], span(samples), &[&depth]);
@@ -121,25 +110,18 @@ pub(super) fn span(samples: &[FitSample]) -> [f64; 2] {
 }
 
 pub(super) fn look() -> Look {
-    Look {
-        text: LIGHT.text_quiet,
-        grid: LIGHT.line,
-    }
+    Look { text: LIGHT.text_quiet, grid: LIGHT.line }
 }
 
 pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
-    let ink = Ink {
-        size: 18.0,
-        ..Ink::plain(LIGHT.text)
-    };
+    let ink = Ink { size: 18.0, ..Ink::plain(LIGHT.text) };
     svg.text([LEFT, 28.0], ink, source);
     svg.text([LEFT, 50.0], Ink::plain(LIGHT.text_quiet), line);
 }
 
 pub(super) fn legend(svg: &mut Svg) {
-    for (i, (name, color)) in [("measured", LIGHT.series), ("fitted", LIGHT.limit)]
-        .into_iter()
-        .enumerate()
+    for (i, (name, color)) in
+        [("measured", LIGHT.series), ("fitted", LIGHT.limit)].into_iter().enumerate()
     {
         let x = RIGHT - 190.0 + 100.0 * i as f64;
         svg.line(&[[x, 46.0], [x + 24.0, 46.0]], color, 2.5);
@@ -151,12 +133,7 @@ pub(super) fn legend(svg: &mut Svg) {
 pub(super) fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
     let places = [LEFT, 180.0, 420.0, 540.0];
     let quiet = Ink::plain(LIGHT.text_quiet);
-    let heads = [
-        "parameter",
-        "value ± standard error",
-        "unit",
-        "95 % interval",
-    ];
+    let heads = ["parameter", "value ± standard error", "unit", "95 % interval"];
     for (x, head) in places.into_iter().zip(heads) {
         svg.text([x, y], quiet, head);
     }
@@ -246,11 +223,7 @@ mod tests {
         assert_eq!(banded.matches("<polygon").count(), 2);
         // Three curves of at most two points a pixel, and nothing that is not a number.
         assert!(!picture.contains("NaN") && !picture.contains("inf"));
-        assert!(
-            picture.len() < 3 * 2 * 860 * 14 + 20_000,
-            "{}",
-            picture.len()
-        );
+        assert!(picture.len() < 3 * 2 * 860 * 14 + 20_000, "{}", picture.len());
         let sizes = picture.split("font-size=\"").skip(1);
         for size in sizes.filter_map(|rest| rest.split('"').next()) {
             assert!(size.parse::<f64>().unwrap() >= 12.0, "{size}");
@@ -262,9 +235,7 @@ mod tests {
         let mut samples = record(|_, force| force);
         samples.truncate(1300);
         samples[7].force = Newtons(f64::NAN);
-        let refusal = fit(&samples, &FitOptions::default())
-            .unwrap_err()
-            .to_string();
+        let refusal = fit(&samples, &FitOptions::default()).unwrap_err().to_string();
         let picture = of_refusal("ramp", &samples, &refusal);
         assert!(picture.contains(&wrap(&refusal, LETTERS)[0]), "{refusal}");
         assert!(picture.contains("depth (mm)") && !picture.contains("NaN\""));

@@ -31,14 +31,9 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
     let (unit, axis) = unit_of(end);
     let series = |value: &dyn Fn(&OutlinePoint) -> f64| -> Vec<[f64; 2]> {
         let points = outline.iter();
-        points
-            .map(|point| [point.t.0 / unit, value(point)])
-            .collect()
+        points.map(|point| [point.t.0 / unit, value(point)]).collect()
     };
-    let speed: Vec<[f64; 2]> = speeds(outline)
-        .into_iter()
-        .map(|[t, v]| [t / unit, v])
-        .collect();
+    let speed: Vec<[f64; 2]> = speeds(outline).into_iter().map(|[t, v]| [t / unit, v]).collect();
     let edges = [0, 1].map(|edge: usize| series(&|point| point.force_band()[edge].0));
     let fastest = limits.and_then(|limits| in_sight(limits.speed.0, &speed));
     let strongest = limits.and_then(|limits| in_sight(limits.force.0, &edges[1]));
@@ -55,37 +50,16 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
     let force = series(&|point| point.force.0);
     [
         plot("Depth as planned", "depth (mm)", Ink::Series, depth, None),
-        plot(
-            "Speed as planned",
-            "speed (mm/s)",
-            Ink::Series,
-            speed,
-            fastest,
-        ),
+        plot("Speed as planned", "speed (mm/s)", Ink::Series, speed, fastest),
         Plot {
-            bands: vec![Band {
-                name: String::new(),
-                ink: Ink::Limit,
-                edges,
-            }],
-            ..plot(
-                "Force as expected",
-                "force (N)",
-                Ink::Limit,
-                force,
-                strongest,
-            )
+            bands: vec![Band { name: String::new(), ink: Ink::Limit, edges }],
+            ..plot("Force as expected", "force (N)", Ink::Limit, force, strongest)
         },
     ]
 }
 
 fn level(at: f64) -> Level {
-    Level {
-        name: "limit".to_owned(),
-        at,
-        ink: Ink::Alarm,
-        is_dashed: false,
-    }
+    Level { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
 /// For what a course is expected.
@@ -106,11 +80,7 @@ pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
 
 /// Seconds or minutes for a time of so many seconds, and the name of the axis.
 fn unit_of(end: f64) -> (f64, &'static str) {
-    if end > SECONDS_MAX {
-        (60.0, "expected time (min)")
-    } else {
-        (1.0, "expected time (s)")
-    }
+    if end > SECONDS_MAX { (60.0, "expected time (min)") } else { (1.0, "expected time (s)") }
 }
 
 /// Left edge of the bars, behind the names of the phases.
@@ -144,11 +114,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     let (top, look): (f64, Look) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;
     // The rows are drawn here; the panel has the time.
-    let panel = Panel::around(
-        [BARS_LEFT, top, RIGHT, bottom],
-        [0.0, end.max(1e-3) / unit],
-        &[],
-    );
+    let panel = Panel::around([BARS_LEFT, top, RIGHT, bottom], [0.0, end.max(1e-3) / unit], &[]);
     panel.time_axis(&mut svg, axis, look);
     for (row, phase) in phases.iter().enumerate() {
         let above = top + ROW * row as f64;
@@ -167,10 +133,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
 
 /// A limit that belongs into the picture of a curve.
 fn in_sight(limit: f64, points: &[[f64; 2]]) -> Option<f64> {
-    let most = points
-        .iter()
-        .map(|point| point[1].abs())
-        .fold(0.0, f64::max);
+    let most = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
     (most > LIMIT_IN_SIGHT * limit).then_some(limit)
 }
 
@@ -204,10 +167,7 @@ mod tests {
             phase: Phase::Ramp,
         };
         let outline = [at(0.0, 0.0), at(40.0, 30.0), at(40.0, 30.0), at(90.0, 30.0)];
-        assert_eq!(
-            speeds(&outline),
-            [[0.0, 0.75], [40.0, 0.75], [40.0, 0.0], [90.0, 0.0]]
-        );
+        assert_eq!(speeds(&outline), [[0.0, 0.75], [40.0, 0.75], [40.0, 0.0], [90.0, 0.0]]);
     }
 
     #[test]

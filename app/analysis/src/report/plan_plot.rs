@@ -22,10 +22,7 @@ pub fn picture(report: &PlanReport) -> String {
     let plots = plots(report);
     let step = LEFT + PLOT[0] + RIGHT;
     let mut svg = Svg::new(step * plots.len() as f64);
-    let head = TextInk {
-        size: 16.0,
-        ..TextInk::plain(LIGHT.text)
-    };
+    let head = TextInk { size: 16.0, ..TextInk::plain(LIGHT.text) };
     svg.text([LEFT, 28.0], head, &heading(report));
     for (index, plot) in plots.iter().enumerate() {
         let left = LEFT + step * index as f64;
@@ -117,10 +114,7 @@ fn plot(title: &str, x: &str, curves: &[Curve], k: usize, mark: Option<[f64; 2]>
     let y = Axis::logarithmic("95 % interval (%)");
     let plot = Plot::new(title, Axis::logarithmic(x), y).with(lines.chain(mark));
     let is_told = plot.series.iter().any(|one| !one.points.is_empty());
-    Plot {
-        remark: (!is_told).then(|| "cannot be told".to_owned()),
-        ..plot
-    }
+    Plot { remark: (!is_told).then(|| "cannot be told".to_owned()), ..plot }
 }
 
 fn points(curve: &Curve, k: usize) -> Vec<[f64; 2]> {

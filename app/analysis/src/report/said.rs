@@ -22,14 +22,9 @@ pub fn change(change: &Change) -> String {
             format!("tags {}", signs.collect::<Vec<_>>().join(" "))
         }
         Change::Review { decision, .. } => format!("review, {}", decision.word()),
-        Change::Contact {
-            number,
-            position_mm,
-            was_mm,
-        } => format!(
-            "contact {number} at {:.3} mm instead of {:.3} mm",
-            position_mm.0, was_mm.0
-        ),
+        Change::Contact { number, position_mm, was_mm } => {
+            format!("contact {number} at {:.3} mm instead of {:.3} mm", position_mm.0, was_mm.0)
+        }
     }
 }
 
@@ -38,10 +33,7 @@ pub fn change(change: &Change) -> String {
 pub fn review(review: &Review) -> String {
     let stands = match review.changed.as_slice() {
         [] => "everything is as it was seen".to_owned(),
-        changed => format!(
-            "but {} changed since; it is to be reviewed again",
-            changed.join(", ")
-        ),
+        changed => format!("but {} changed since; it is to be reviewed again", changed.join(", ")),
     };
     let decision = review.decision.word();
     format!("{decision} by {}, {stands}", review.by)
@@ -80,12 +72,12 @@ pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
 /// How the signal was taken, line by line.
 #[must_use]
 pub fn signal(signal: &SignalFacts) -> [String; 3] {
-    let range = signal.range_v.map_or(String::new(), |[low, high]| {
-        format!(", range {low:.3} to {high:.3} V")
-    });
-    let count = signal.resolution_v.map_or(String::new(), |volts| {
-        format!(", one count {:.3} mV", volts * 1e3)
-    });
+    let range = signal
+        .range_v
+        .map_or(String::new(), |[low, high]| format!(", range {low:.3} to {high:.3} V"));
+    let count = signal
+        .resolution_v
+        .map_or(String::new(), |volts| format!(", one count {:.3} mV", volts * 1e3));
     [
         format!("{:.2} Hz{range}{count}", signal.sample_rate_hz),
         format!("filter {}", signal.filter),

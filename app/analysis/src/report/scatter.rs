@@ -52,17 +52,14 @@ impl Scatter<'_> {
         });
         Plot {
             levels: level.into_iter().collect(),
-            ..Plot::new(
-                "",
-                Axis::logarithmic(self.axes[0]),
-                Axis::logarithmic(self.axes[1]),
+            ..Plot::new("", Axis::logarithmic(self.axes[0]), Axis::logarithmic(self.axes[1])).with(
+                [
+                    Series::line("", Ink::Quiet, 1.0, points(&best)),
+                    Series::rings("", Ink::Text, 7.0, points(&chosen)),
+                    Series::dots("", Ink::Series, 3.5, points(&full)).labelled(labels(&full)),
+                    Series::rings("", Ink::Series, 3.5, points(&hollow)).labelled(labels(&hollow)),
+                ],
             )
-            .with([
-                Series::line("", Ink::Quiet, 1.0, points(&best)),
-                Series::rings("", Ink::Text, 7.0, points(&chosen)),
-                Series::dots("", Ink::Series, 3.5, points(&full)).labelled(labels(&full)),
-                Series::rings("", Ink::Series, 3.5, points(&hollow)).labelled(labels(&hollow)),
-            ])
         }
     }
 }
@@ -90,10 +87,7 @@ mod tests {
         let points: Vec<usize> = plot.series.iter().map(|one| one.points.len()).collect();
         assert_eq!(points, [2, 1, 2, 1]);
         assert_eq!(plot.series[3].points, [[5.0, 0.4]]);
-        let all = Scatter {
-            has_front: false,
-            ..scatter
-        };
+        let all = Scatter { has_front: false, ..scatter };
         assert_eq!(all.plot().series[2].points.len(), 3);
     }
 }

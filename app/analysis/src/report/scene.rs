@@ -70,10 +70,8 @@ pub fn plan_text(plan: &ScenePlan) -> String {
 pub fn bench_text(bench: &Bench) -> String {
     let star = |is_on: &bool| if *is_on { "*" } else { " " };
     let machine = &bench.machine;
-    let mut lines = vec![format!(
-        "{}, {} cores, {} build",
-        machine.cpu, machine.cores, machine.profile
-    )];
+    let mut lines =
+        vec![format!("{}, {} cores, {} build", machine.cpu, machine.cores, machine.profile)];
     lines.push("mesh: nodes a side, largest error of shape, time of a tick".to_owned());
     for (mesh, is_on) in bench.curves.meshes.iter().zip(&bench.meshes_on_front) {
         lines.push(format!(

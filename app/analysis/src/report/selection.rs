@@ -8,9 +8,8 @@ use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
 pub fn whole(selection: &Selection) -> String {
     let mut parts = vec![records(selection), in_columns(&table(selection))];
     let refused = selection.refused.iter();
-    let refused: Vec<String> = refused
-        .map(|one| format!("{} is left out: {}", one.family, one.reason))
-        .collect();
+    let refused: Vec<String> =
+        refused.map(|one| format!("{} is left out: {}", one.family, one.reason)).collect();
     if !refused.is_empty() {
         parts.push(refused.join("\n"));
     }
@@ -27,10 +26,7 @@ pub fn whole(selection: &Selection) -> String {
     }
     let ladder = ladder(selection);
     if ladder.len() > 1 {
-        parts.push(format!(
-            "What each extra term buys:\n{}",
-            in_columns(&ladder)
-        ));
+        parts.push(format!("What each extra term buys:\n{}", in_columns(&ladder)));
     }
     parts.push(tested(selection));
     parts.push(selection.verdict.sentences.join("\n"));
@@ -81,8 +77,7 @@ fn row(one: &Candidate) -> Vec<String> {
         one.free.to_string(),
         milli(one.rms_n),
         milli(one.worst_n),
-        one.aicc_above
-            .map_or_else(none, |value| format!("{value:.1}")),
+        one.aicc_above.map_or_else(none, |value| format!("{value:.1}")),
         format!("{:.1}", one.bic_above),
         prediction.map_or_else(none, |known| match known.std_error_n {
             Some(error) => format!("{} ± {}", milli(known.rms_n), milli(error)),
@@ -92,10 +87,7 @@ fn row(one: &Candidate) -> Vec<String> {
         one.cost.states.to_string(),
         one.cost.operations.to_string(),
     ];
-    cells.extend(
-        one.is_within
-            .map(|yes| if yes { "yes" } else { "no" }.to_owned()),
-    );
+    cells.extend(one.is_within.map(|yes| if yes { "yes" } else { "no" }.to_owned()));
     cells
 }
 
@@ -122,10 +114,7 @@ pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
 /// What was held out, and what the numbers count.
 #[must_use]
 pub fn tested(selection: &Selection) -> String {
-    let known = selection
-        .candidates
-        .iter()
-        .find_map(|one| one.prediction.as_ref());
+    let known = selection.candidates.iter().find_map(|one| one.prediction.as_ref());
     let what = known.map_or_else(
         || "Nothing was held out: errors are those of the fit itself.".to_owned(),
         |prediction| {
@@ -149,9 +138,9 @@ pub fn tested(selection: &Selection) -> String {
             )
         },
     );
-    let tolerance = selection.tolerance_n.map_or(String::new(), |tolerance| {
-        format!(" Tolerance: {} mN.", digits(1e3 * tolerance))
-    });
+    let tolerance = selection
+        .tolerance_n
+        .map_or(String::new(), |tolerance| format!(" Tolerance: {} mN.", digits(1e3 * tolerance)));
     format!(
         "{what}{tolerance} Criteria count {:.0} independent of {} samples.",
         selection.effective_samples, selection.samples

@@ -22,21 +22,15 @@ pub fn plot(selection: &Selection) -> Plot {
         true => one.prediction.as_ref().map(|known| known.rms_n),
         false => Some(one.rms_n),
     };
-    let drawn: Vec<(&Candidate, f64)> = selection
-        .candidates
-        .iter()
-        .filter_map(|one| Some((one, 1e3 * error(one)?)))
-        .collect();
+    let drawn: Vec<(&Candidate, f64)> =
+        selection.candidates.iter().filter_map(|one| Some((one, 1e3 * error(one)?))).collect();
     let marks: Vec<Mark> = drawn
         .iter()
         .map(|(one, error)| Mark {
             at: [one.cost.operations as f64, *error],
             label: [
                 one.family.clone(),
-                format!(
-                    "{}\n{error:.3} mN\n{} operations",
-                    one.family, one.cost.operations
-                ),
+                format!("{}\n{error:.3} mN\n{} operations", one.family, one.cost.operations),
             ],
         })
         .collect();
@@ -48,19 +42,14 @@ pub fn plot(selection: &Selection) -> Plot {
         axes: ["operations an evaluation", name],
         marks: &marks,
         has_front: true,
-        chosen: drawn
-            .iter()
-            .position(|(one, _)| is_chosen(selection, &one.family)),
+        chosen: drawn.iter().position(|(one, _)| is_chosen(selection, &one.family)),
         level: selection.tolerance_n.map(|tolerance| 1e3 * tolerance),
     };
     let title = match selection.is_predicted {
         true => "Error of prediction over cost",
         false => "Error of the fit over cost",
     };
-    Plot {
-        title: title.to_owned(),
-        ..scatter.plot()
-    }
+    Plot { title: title.to_owned(), ..scatter.plot() }
 }
 
 /// The same as SVG, under the verdict.
@@ -74,9 +63,5 @@ pub fn of_selection(selection: &Selection) -> String {
         svg.text(at, Ink::plain(LIGHT.text), line);
     }
     plot(selection).draw(&mut svg, PLACE, AxisNames::Both);
-    svg.finish(
-        HEIGHT,
-        LIGHT.canvas,
-        "Error of model families over their cost",
-    )
+    svg.finish(HEIGHT, LIGHT.canvas, "Error of model families over their cost")
 }

@@ -31,10 +31,7 @@ pub fn fidelity_text(
         gap if gap > GAP_USUAL_S => format!(", at most {:.1} ms apart", gap * 1e3),
         _ => String::new(),
     };
-    lines.push(format!(
-        "samples    {}, {} missing, {late}{apart}",
-        found.samples, found.dropped
-    ));
+    lines.push(format!("samples    {}, {} missing, {late}{apart}", found.samples, found.dropped));
     let time = &found.time_use;
     let whole = time.total_s().max(f64::MIN_POSITIVE);
     let parts = [
@@ -46,12 +43,7 @@ pub fn fidelity_text(
     let parts =
         parts.map(|(name, secs)| format!("{name} {secs:.1} s ({:.0} %)", 100.0 * secs / whole));
     lines.push(format!("time       {}", parts.join(", ")));
-    lines.extend(
-        found
-            .remarks
-            .iter()
-            .map(|remark| format!("remark     {remark}")),
-    );
+    lines.extend(found.remarks.iter().map(|remark| format!("remark     {remark}")));
     let missed = found.missed().count();
     lines.push(match (found.targets.len(), missed) {
         (0, _) => "targets    none: no step with a target was completed".into(),
@@ -65,9 +57,7 @@ pub fn fidelity_text(
 }
 
 fn table(targets: &[Achieved]) -> String {
-    let head = [
-        "step", "", "cycle", "quantity", "target", "achieved", "error", "",
-    ];
+    let head = ["step", "", "cycle", "quantity", "target", "achieved", "error", ""];
     let mut rows = vec![head.map(String::from).to_vec()];
     rows.extend(targets.iter().map(|one| {
         let cycle = match one.cycle {

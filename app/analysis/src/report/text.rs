@@ -70,12 +70,7 @@ pub fn typeset(unit: &str) -> String {
 /// How well the model explains the record.
 #[must_use]
 pub fn quality(report: &FitReport) -> String {
-    format!(
-        "R² {:.6}, rmse {:.3} mN, {} samples",
-        report.r2,
-        report.rmse_n * 1e3,
-        report.samples
-    )
+    format!("R² {:.6}, rmse {:.3} mN, {} samples", report.r2, report.rmse_n * 1e3, report.samples)
 }
 
 /// A whole report: model, parameters, quality, then every sentence.
@@ -99,10 +94,8 @@ pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
             "" => String::new(),
             ends => format!("95 % {ends}"),
         };
-        let line = format!(
-            "  {:<10} {:<width$}  {:<8} {interval}",
-            text.name, text.value, text.unit
-        );
+        let line =
+            format!("  {:<10} {:<width$}  {:<8} {interval}", text.name, text.value, text.unit);
         line.trim_end().to_owned()
     };
     texts.iter().map(line).collect()
@@ -112,9 +105,7 @@ pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
 #[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
-    let first = letters
-        .next()
-        .map(|letter| letter.to_uppercase().to_string());
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str()
 }
 
@@ -124,9 +115,7 @@ pub fn in_columns(lines: &[Vec<String>]) -> String {
     let columns = lines.first().map_or(0, Vec::len);
     let letters = |text: &String| text.chars().count();
     let width = |column: usize| {
-        let whole = lines
-            .iter()
-            .filter(|line| column == 0 || line.len() == columns);
+        let whole = lines.iter().filter(|line| column == 0 || line.len() == columns);
         whole.filter_map(|line| line.get(column)).map(letters).max()
     };
     let widths: Vec<usize> = (0..columns).filter_map(width).collect();
@@ -165,10 +154,7 @@ mod tests {
             (parameter(None, false), "1.500 not identified", ""),
         ] {
             let text = ParameterText::of(&parameter);
-            assert_eq!(
-                (text.value.as_str(), text.interval.as_str()),
-                (value, interval)
-            );
+            assert_eq!((text.value.as_str(), text.interval.as_str()), (value, interval));
             assert_eq!(text.unit, "N·s/mm²");
         }
     }

@@ -57,10 +57,7 @@ impl Wanted {
     /// Ramp and hold of a session that may have been rejected.
     #[must_use]
     pub fn whatever_it_is_worth() -> Self {
-        Self {
-            is_rejected_included: true,
-            ..Self::default()
-        }
+        Self { is_rejected_included: true, ..Self::default() }
     }
 }
 
@@ -77,10 +74,7 @@ impl Stretch {
 
 impl From<Stretch> for Wanted {
     fn from(stretch: Stretch) -> Self {
-        Self {
-            stretch,
-            is_rejected_included: false,
-        }
+        Self { stretch, is_rejected_included: false }
     }
 }
 
@@ -145,15 +139,10 @@ pub fn read_analysed(
     wanted: impl Into<Wanted>,
     analysis: Option<&str>,
 ) -> Result<FitSource, SourceError> {
-    let Wanted {
-        stretch,
-        is_rejected_included,
-    } = wanted.into();
+    let Wanted { stretch, is_rejected_included } = wanted.into();
     if !is_session(path) {
         if let Some(name) = analysis {
-            return Err(SourceError::TableAnalysis {
-                name: name.to_owned(),
-            });
+            return Err(SourceError::TableAnalysis { name: name.to_owned() });
         }
         let table = read_table(path, columns)?;
         return Ok(FitSource {
@@ -165,13 +154,9 @@ pub fn read_analysed(
             calibration: None,
         });
     }
-    let Opened {
-        edited, left_out_s, ..
-    } = analysed::open(path, analysis)?;
+    let Opened { edited, left_out_s, .. } = analysed::open(path, analysis)?;
     if let (Some(reason), false) = (edited.rejection(), is_rejected_included) {
-        return Err(SourceError::Rejected {
-            reason: reason.to_owned(),
-        });
+        return Err(SourceError::Rejected { reason: reason.to_owned() });
     }
     of_session(edited.session, stretch, &left_out_s)
 }
@@ -228,10 +213,8 @@ fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
 pub(super) fn table_of_imported(session: &Session) -> Table {
     let mut table = Table::default();
     for row in &session.rows {
-        let is_taken = matches!(
-            row.phase,
-            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
-        );
+        let is_taken =
+            matches!(row.phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
         let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else {
             continue;
         };
@@ -245,19 +228,14 @@ pub(super) fn table_of_imported(session: &Session) -> Table {
 
 /// The calibration in a session's manifest.
 pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
-    serde_json::from_value(session.manifest.calibration.clone()).map_err(|err| {
-        SourceError::Calibration {
-            detail: err.to_string(),
-        }
-    })
+    serde_json::from_value(session.manifest.calibration.clone())
+        .map_err(|err| SourceError::Calibration { detail: err.to_string() })
 }
 
 /// The curve of that calibration.
 pub(super) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
     let curve = calibration_of(session)?.curve();
-    curve.map_err(|err| SourceError::Calibration {
-        detail: err.to_string(),
-    })
+    curve.map_err(|err| SourceError::Calibration { detail: err.to_string() })
 }
 
 /// What a fit takes of a session, each force weighted by what the signal's noise and the
@@ -297,11 +275,7 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
             sample.sigma = Newtons(f64::INFINITY);
         }
     }
-    if samples.is_empty() {
-        Err(SourceError::Empty)
-    } else {
-        Ok(samples)
-    }
+    if samples.is_empty() { Err(SourceError::Empty) } else { Ok(samples) }
 }
 
 fn is_fitted(row: &Row, stretch: Stretch) -> bool {
@@ -341,9 +315,7 @@ pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, S
         .map(|entry| match serde_json::from_value(entry.body.clone()) {
             Ok(effect) => Ok((entry.after_sample, effect)),
             // It might say that forces are not to be trusted.
-            Err(err) => Err(SourceError::Decision {
-                detail: err.to_string(),
-            }),
+            Err(err) => Err(SourceError::Decision { detail: err.to_string() }),
         })
         .collect()
 }
@@ -353,10 +325,7 @@ pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, S
 fn leave_out(left_out_s: &[[f64; 2]], offset: Seconds, samples: &mut [FitSample]) {
     for sample in samples {
         let at = offset.0 + sample.t.0;
-        if left_out_s
-            .iter()
-            .any(|[from, to]| (*from..=*to).contains(&at))
-        {
+        if left_out_s.iter().any(|[from, to]| (*from..=*to).contains(&at)) {
             sample.sigma = Newtons(f64::INFINITY);
         }
     }
@@ -373,10 +342,7 @@ fn since_first(session: &Session, stretch: Stretch) -> Seconds {
 
 /// Session time of the first sample that a fit takes.
 fn start_of(session: &Session) -> Seconds {
-    let first = session
-        .rows
-        .iter()
-        .find(|row| is_fitted(row, Stretch::RampHold));
+    let first = session.rows.iter().find(|row| is_fitted(row, Stretch::RampHold));
     first.map_or(Seconds(0.0), |row| row.host.seconds())
 }
 
@@ -418,19 +384,12 @@ mod tests {
         let whole = fit(&samples_of(&session, Stretch::RampHold).unwrap(), &options).unwrap();
         assert_eq!(whole.censored, 0);
         let adc = session.manifest.rig.as_ref().unwrap().adc.unwrap();
-        let hold = session
-            .rows
-            .iter_mut()
-            .filter(|row| row.phase == Phase::Hold);
+        let hold = session.rows.iter_mut().filter(|row| row.phase == Phase::Hold);
         let mut expected = 0;
         for (i, row) in hold.enumerate().filter(|(i, _)| i % 10 == 3) {
             // Both ends of the range, each with the force that its count would be.
             let is_low = i % 20 == 3;
-            row.counts = Some(if is_low {
-                adc.counts_min
-            } else {
-                adc.counts_max
-            });
+            row.counts = Some(if is_low { adc.counts_min } else { adc.counts_max });
             row.force = Some(if is_low { -9.0 } else { 90.0 });
             expected += 1;
         }
@@ -457,9 +416,8 @@ mod tests {
             forces.iter().map(sample).collect()
         };
         // Nine low ones in a row again and again, then ten.
-        let mut forces: Vec<f64> = (0..100)
-            .map(|i| if i % 10 == 0 { 0.08 } else { 0.02 })
-            .collect();
+        let mut forces: Vec<f64> =
+            (0..100).map(|i| if i % 10 == 0 { 0.08 } else { 0.02 }).collect();
         let found = |forces: &[f64], phase| lift_off(&vec![phase; forces.len()], &samples(forces));
         assert_eq!(found(&forces, Phase::Unload), None);
         forces.push(0.01);
@@ -472,11 +430,7 @@ mod tests {
     fn forces_after_an_interlock_do_not_count() {
         let mut session = recorded("ramp-hold-lab");
         let samples = samples_of(&session, Stretch::RampHold).unwrap();
-        let first = session
-            .rows
-            .iter()
-            .position(|row| is_fitted(row, Stretch::RampHold))
-            .unwrap();
+        let first = session.rows.iter().position(|row| is_fitted(row, Stretch::RampHold)).unwrap();
         let tripped = Effect::Record(Record::InterlockTripped {
             interlock: palpate_protocols::engine::Interlock::Signal,
             reason: "on purpose".into(),

@@ -71,9 +71,7 @@ const TARGETS: [Target; 5] = [
         body: ("fractional-12", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: true,
         comes_back: false,
-        families: &[
-            "prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6",
-        ],
+        families: &["prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6"],
         quick: 2,
     },
     Target {
@@ -111,12 +109,7 @@ fn come_back(path: &mut Vec<(Seconds, Depth)>) {
     let moved = |i: u32| THESIS_SPEED * interval * f64::from(i);
     path.extend(
         (1..)
-            .map(|i| {
-                (
-                    Seconds(start.0 + interval * f64::from(i)),
-                    Depth(deepest.0 - moved(i)),
-                )
-            })
+            .map(|i| (Seconds(start.0 + interval * f64::from(i)), Depth(deepest.0 - moved(i))))
             .take_while(|(_, depth)| depth.0 >= 0.0),
     );
 }
@@ -159,9 +152,7 @@ pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, Stri
 }
 
 fn along(model: &Model, path: &[(Seconds, Depth)]) -> Result<Vec<f64>, String> {
-    model
-        .along(path.iter().copied())
-        .map_err(|err| err.to_string())
+    model.along(path.iter().copied()).map_err(|err| err.to_string())
 }
 
 /// The member of a family nearest to forces along a path, by least squares.
@@ -179,12 +170,8 @@ fn fitted(key: &str, path: &[(Seconds, Depth)], forces: &[f64]) -> Result<Model,
         .collect();
     let options = FitOptions::by_key(key).map_err(|err| err.to_string())?;
     let mut options = options.at_rest();
-    let found = options
-        .fix("f_offset", 0.0)
-        .and_then(|()| fit(&samples, &options));
-    found
-        .map(|report| report.body)
-        .map_err(|err| format!("{key}: {err}"))
+    let found = options.fix("f_offset", 0.0).and_then(|()| fit(&samples, &options));
+    found.map(|report| report.body).map_err(|err| format!("{key}: {err}"))
 }
 
 /// One job a row: the steps of a body of that family at 1 kHz, its numbers of no consequence.
@@ -212,9 +199,7 @@ fn job<'a>(key: &str) -> Result<Job<'a>, String> {
         .map_err(|err| err.to_string())?
         .at_rest_from(Depth(0.0))
         .map_err(|err| err.to_string())?;
-    let depths: Vec<Depth> = (0..RUN)
-        .map(|i| Depth(30.0 * i as f64 / RUN as f64))
-        .collect();
+    let depths: Vec<Depth> = (0..RUN).map(|i| Depth(30.0 * i as f64 / RUN as f64)).collect();
     let mut body = start;
     Ok(Job {
         per_call: RUN as f64,

@@ -28,9 +28,8 @@ pub(super) fn rows(
         Extent::Full => &THINNED[..],
         Extent::Quick => &THINNED_QUICK,
     };
-    let recordings: Result<Vec<_>, String> = (first..first + count)
-        .map(|seed| recording(seed, NOISE, paths))
-        .collect();
+    let recordings: Result<Vec<_>, String> =
+        (first..first + count).map(|seed| recording(seed, NOISE, paths)).collect();
     let recordings = recordings?;
     let row = |&keep: &usize| {
         let (mut tau_square, mut force_square, mut samples) = (0.0, 0.0, 0);

@@ -8,9 +8,8 @@ use palpate_rheology::trade::{ForceError, IntegratorRow};
 use std::hint::black_box;
 
 /// Steps in ticks of 0.1 ms, up to where the conditionally stable ones have long stopped being so.
-const STEPS: [u64; 15] = [
-    1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000, 20_000, 50_000,
-];
+const STEPS: [u64; 15] =
+    [1, 2, 5, 10, 20, 50, 100, 200, 500, 1_000, 2_000, 5_000, 10_000, 20_000, 50_000];
 const STEPS_QUICK: [u64; 4] = [10, 100, 1_000, 50_000];
 /// Samples of a timed run: with their forces they stay in a first-level cache.
 const RUN: usize = 1024;
@@ -58,10 +57,7 @@ fn error<R: Real>(scheme: Scheme, step: u64, paths: &Paths) -> Result<ForceError
         scheme.respond(&body(), step as f64 / TICKS as f64, &depths, &mut forces)?;
         Ok::<f64, IntegratorError>(path.error_of(step, forces.into_iter().map(R::to_f64)))
     };
-    Ok(ForceError {
-        ramp_hold_n: on(&paths.ramp_hold)?,
-        poke_n: on(&paths.poke)?,
-    })
+    Ok(ForceError { ramp_hold_n: on(&paths.ramp_hold)?, poke_n: on(&paths.poke)? })
 }
 
 pub(super) fn jobs<'a>() -> Vec<Job<'a>> {
@@ -77,9 +73,7 @@ pub(super) fn job_of(row: &IntegratorRow) -> usize {
 }
 
 pub(super) fn job<'a, R: Real + 'a>(scheme: Scheme) -> Job<'a> {
-    let depths: Vec<R> = (0..RUN)
-        .map(|i| R::of(30.0 * i as f64 / RUN as f64))
-        .collect();
+    let depths: Vec<R> = (0..RUN).map(|i| R::of(30.0 * i as f64 / RUN as f64)).collect();
     let mut forces = Vec::with_capacity(RUN);
     Job {
         per_call: RUN as f64,

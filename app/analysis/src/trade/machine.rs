@@ -15,24 +15,16 @@ pub fn version() -> &'static str {
 pub fn this_machine() -> Machine {
     let described = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     Machine {
-        cpu: cpu_name(&described)
-            .unwrap_or(std::env::consts::ARCH)
-            .into(),
+        cpu: cpu_name(&described).unwrap_or(std::env::consts::ARCH).into(),
         os: std::env::consts::OS.into(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
-        profile: if cfg!(debug_assertions) {
-            "debug".into()
-        } else {
-            "release".into()
-        },
+        profile: if cfg!(debug_assertions) { "debug".into() } else { "release".into() },
     }
 }
 
 /// The processor's name as Linux tells it; elsewhere there is no such text.
 fn cpu_name(described: &str) -> Option<&str> {
-    let line = described
-        .lines()
-        .find(|line| line.starts_with("model name"))?;
+    let line = described.lines().find(|line| line.starts_with("model name"))?;
     let name = line.split_once(':')?.1.trim();
     (!name.is_empty()).then_some(name)
 }

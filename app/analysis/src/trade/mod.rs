@@ -43,11 +43,7 @@ const TABLES: usize = 4;
 const SEEDS_FULL: [u64; 2] = [1, 8];
 const SEEDS_QUICK: [u64; 2] = [1, 2];
 /// What stands for a time that is not measured yet.
-const UNMEASURED: Cost = Cost {
-    ns: 0.0,
-    spread: 0.0,
-    halves: 0.0,
-};
+const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
 
 /// All rows, computed, timed and marked; none if `progress` ended it.
 pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {

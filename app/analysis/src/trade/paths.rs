@@ -25,13 +25,8 @@ pub(super) struct Path {
 /// The protocol of the thesis: 0.75 mm/s to 30 mm, a hold of 50 s.
 const RAMP_HOLD: &[(u64, f64)] = &[(0, 0.0), (40 * TICKS, 30.0), (90 * TICKS, 30.0)];
 /// A poke: 100 mm/s to 10 mm, up again after a second, and the time it takes to fade.
-const POKE: &[(u64, f64)] = &[
-    (0, 0.0),
-    (TICKS / 10, 10.0),
-    (TICKS, 10.0),
-    (TICKS + TICKS / 10, 0.0),
-    (10 * TICKS, 0.0),
-];
+const POKE: &[(u64, f64)] =
+    &[(0, 0.0), (TICKS / 10, 10.0), (TICKS, 10.0), (TICKS + TICKS / 10, 0.0), (10 * TICKS, 0.0)];
 
 pub(super) struct Paths {
     pub ramp_hold: Path,
@@ -53,10 +48,7 @@ impl Paths {
     }
 
     pub fn peak(&self) -> ForceError {
-        ForceError {
-            ramp_hold_n: peak(&self.ramp_hold.exact),
-            poke_n: peak(&self.poke.exact),
-        }
+        ForceError { ramp_hold_n: peak(&self.ramp_hold.exact), poke_n: peak(&self.poke.exact) }
     }
 }
 
@@ -67,11 +59,7 @@ pub(super) fn peak(forces: &[f64]) -> f64 {
 
 impl Path {
     fn new(corners: &'static [(u64, f64)], every: u64) -> Result<Self, String> {
-        let mut path = Self {
-            corners,
-            every,
-            exact: Vec::new(),
-        };
+        let mut path = Self { corners, every, exact: Vec::new() };
         let mut reference =
             Reference::new(&[body().term()], Depth(0.0)).map_err(|err| err.to_string())?;
         let dt = Seconds(every as f64 / TICKS as f64);
@@ -108,19 +96,14 @@ impl Path {
     /// Depths in mm, `step` ticks apart.
     pub fn depths(&self, step: u64) -> impl Iterator<Item = f64> {
         let end = self.end() as i64;
-        self.ticks(step)
-            .take_while(move |tick| *tick <= end)
-            .map(|tick| self.depth(tick))
+        self.ticks(step).take_while(move |tick| *tick <= end).map(|tick| self.depth(tick))
     }
 
     /// Time and depth at the moments of comparison.
     pub fn checkpoints(&self) -> impl Iterator<Item = (Seconds, Depth)> {
         (0..=self.end() / self.every).map(|i| {
             let tick = i * self.every;
-            (
-                Seconds(tick as f64 / TICKS as f64),
-                Depth(self.depth(tick as i64)),
-            )
+            (Seconds(tick as f64 / TICKS as f64), Depth(self.depth(tick as i64)))
         })
     }
 
@@ -142,9 +125,7 @@ impl Path {
 
 /// The largest difference of two lists of forces.
 pub(super) fn difference(one: &[f64], other: &[f64]) -> f64 {
-    one.iter()
-        .zip(other)
-        .fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()))
+    one.iter().zip(other).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()))
 }
 
 #[cfg(test)]

@@ -33,21 +33,14 @@ struct Point {
 
 impl Point {
     fn new(cost: f64, error: f64, front: bool) -> Self {
-        Self {
-            at: [cost, error.max(LEAST)],
-            front,
-        }
+        Self { at: [cost, error.max(LEAST)], front }
     }
 }
 
 impl Group {
     /// A front through points that have their names elsewhere.
     fn nameless(points: Vec<Point>) -> Self {
-        Self {
-            name: String::new(),
-            ink: Ink::Series,
-            points,
-        }
+        Self { name: String::new(), ink: Ink::Series, points }
     }
 
     /// Its name at the end of a thin line through all, a line through what nothing undercuts, and the points.
@@ -76,10 +69,7 @@ impl Group {
 #[must_use]
 pub fn svg(curves: &TradeCurves) -> String {
     let mut svg = Svg::new(WIDTH);
-    let heading = TextInk {
-        size: 16.0,
-        ..TextInk::plain(LIGHT.text)
-    };
+    let heading = TextInk { size: 16.0, ..TextInk::plain(LIGHT.text) };
     let title = format!("Error against time on {}", curves.machine.words());
     svg.text([LEFT, 28.0], heading, &title);
     let legend = "line: nothing is cheaper and more exact; blue: f64, orange: f32";
@@ -91,16 +81,8 @@ pub fn svg(curves: &TradeCurves) -> String {
             ["ns per second of simulated time", force],
             integrators(curves),
         ),
-        (
-            "families by terms",
-            ["ns per step", force],
-            families(curves),
-        ),
-        (
-            "the fit by samples per second",
-            ["ns per fit", "error of tau"],
-            fits(curves),
-        ),
+        ("families by terms", ["ns per step", force], families(curves)),
+        ("the fit by samples per second", ["ns per fit", "error of tau"], fits(curves)),
     ];
     let mut top = 48.0 + ABOVE;
     for (title, axes, series) in tables {

@@ -40,10 +40,7 @@ const CUTS: [(Option<u32>, f64); 8] = [
 const STEPS: [f64; 5] = [0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3];
 
 /// The poke that forces are compared on: 10 mm and back in 2 s.
-const POKE: HandPoke = HandPoke {
-    depth: 10.0,
-    duration: 2.0,
-};
+const POKE: HandPoke = HandPoke { depth: 10.0, duration: 2.0 };
 
 /// Largest force along it, of the body of the source thesis; a scene's tolerance of force is meant at it.
 pub const SCENE_PEAK: Newtons = Newtons(2.19);
@@ -138,12 +135,7 @@ pub fn measure_scene(
         for step_s in STEPS {
             // Where a scheme is unstable it has no place in the picture.
             if let Ok([error_n, _]) = POKE.force_error::<3>(&body, scheme, step_s) {
-                curves.steps.push(StepPoint {
-                    scheme,
-                    step_s,
-                    error_n,
-                    cost_us: 0.0,
-                });
+                curves.steps.push(StepPoint { scheme, step_s, error_n, cost_us: 0.0 });
             }
         }
         jobs.push(integrators::job::<f64>(scheme));
@@ -209,10 +201,7 @@ mod tests {
         assert!(curves.cuts[0].error_mm < 1e-13, "{:?}", curves.cuts[0]);
         assert_eq!(curves.cuts[0].cost_share, 1.0);
         assert!(curves.cuts.iter().skip(1).all(|cut| cut.error_mm <= 5.0));
-        let exact = curves
-            .steps
-            .iter()
-            .filter(|one| one.scheme == Scheme::Exact);
+        let exact = curves.steps.iter().filter(|one| one.scheme == Scheme::Exact);
         assert_eq!(exact.count(), STEPS.len());
         let body = ModifiedKelvin::THESIS.into();
         let [_, peak] = POKE.force_error::<3>(&body, Scheme::Exact, 1e-3).unwrap();
@@ -225,9 +214,8 @@ mod tests {
         };
         let chosen = plan(&needs, &curves, 1.0).unwrap();
         assert_eq!(chosen.mesh.nodes, 51);
-        let ended = measure_scene(Extent::Quick, &|_: usize, _: usize, _: &str| {
-            ControlFlow::Break(())
-        });
+        let ended =
+            measure_scene(Extent::Quick, &|_: usize, _: usize, _: &str| ControlFlow::Break(()));
         assert!(ended.unwrap().is_none());
     }
 }

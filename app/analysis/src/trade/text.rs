@@ -121,13 +121,8 @@ fn families(out: &mut String, curves: &TradeCurves) {
             let _ = writeln!(out, "for the {target}");
         }
         let error = digits(100.0 * row.error_n / row.peak_n);
-        let _ = writeln!(
-            out,
-            "  {:32}{} {error:>10} {}",
-            row.family,
-            cost(&row.cost),
-            star(row.front)
-        );
+        let _ =
+            writeln!(out, "  {:32}{} {error:>10} {}", row.family, cost(&row.cost), star(row.front));
     }
 }
 
@@ -187,9 +182,9 @@ pub fn terms(recommendation: &Recommendation) -> String {
 pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
     let words = |advice: &Advice| match advice {
         Advice::Use(choice) => {
-            let share = choice.share_of_period.map_or(String::new(), |share| {
-                format!(", {} of each period", percent(share))
-            });
+            let share = choice
+                .share_of_period
+                .map_or(String::new(), |share| format!(", {} of each period", percent(share)));
             format!(
                 "{}: errs by {} of the peak force{share}",
                 choice.setting,
@@ -205,10 +200,7 @@ pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
         .chain(families)
         .chain([
             ("recording to fit".to_owned(), words(&recommendation.fit)),
-            (
-                "bank of the live fit".to_owned(),
-                words(&recommendation.live),
-            ),
+            ("bank of the live fit".to_owned(), words(&recommendation.live)),
         ])
         .collect()
 }
@@ -221,11 +213,7 @@ mod tests {
     fn numbers_have_two_digits() {
         let texts = [0.0, 0.0123, 1.0, 12.3, 999.0, 1e-9].map(digits);
         assert_eq!(texts, ["0", "0.012", "1.0", "12", "999", "1.0e-9"]);
-        let half = Cost {
-            ns: 1500.0,
-            spread: 0.5,
-            halves: 0.0,
-        };
+        let half = Cost { ns: 1500.0, spread: 0.5, halves: 0.0 };
         assert_eq!(cost(&half), "   1.50 us     50 %");
     }
 }

@@ -79,11 +79,7 @@ fn cost(rounds: &[f64]) -> Cost {
     let ns = even.min(odd);
     let mut sorted = rounds.to_vec();
     sorted.sort_by(f64::total_cmp);
-    Cost {
-        ns,
-        spread: sorted[sorted.len() / 2] / ns - 1.0,
-        halves: even.max(odd) / ns - 1.0,
-    }
+    Cost { ns, spread: sorted[sorted.len() / 2] / ns - 1.0, halves: even.max(odd) / ns - 1.0 }
 }
 
 #[cfg(test)]

@@ -113,12 +113,7 @@ pub(super) fn import(args: &ImportArgs, output: &Output) -> Result<(), Failure> 
     let library = library_folder().map_err(Failure::usage)?;
     let kept = shelf::save(&library, &document(args)?).map_err(failure)?;
     let source = Source::kept(&kept);
-    super::tell(
-        "calibration import",
-        &source,
-        args.picture.as_deref(),
-        output,
-    )
+    super::tell("calibration import", &source, args.picture.as_deref(), output)
 }
 
 pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Failure> {
@@ -146,11 +141,7 @@ fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
     } else {
         let table = read_weights(&args.file).map_err(Failure::usage)?;
         let file = args.file.file_name().unwrap_or_default().to_string_lossy();
-        Calibration {
-            taken_at: Some(now()),
-            source: format!("imported from {file}"),
-            ..table
-        }
+        Calibration { taken_at: Some(now()), source: format!("imported from {file}"), ..table }
     };
     let word = |to: &mut String, from: &Option<String>| {
         if let Some(from) = from {
@@ -169,14 +160,10 @@ fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
     new.zero_after = args.zero_after.map(Volts).or(new.zero_after);
     new.valid_days = args.valid_days.or(new.valid_days);
     if new.name.trim().is_empty() {
-        return Err(Failure::usage(
-            "the calibration has no name; give one with --name",
-        ));
+        return Err(Failure::usage("the calibration has no name; give one with --name"));
     }
     if let Some(tolerance) = args.tolerance {
-        new = new
-            .with_stacked_weights(tolerance)
-            .map_err(Failure::usage)?;
+        new = new.with_stacked_weights(tolerance).map_err(Failure::usage)?;
     }
     let default = (!is_document).then_some(CurveChoice::Best);
     if let Some(choice) = args.curve.or(default) {

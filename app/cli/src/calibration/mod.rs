@@ -93,14 +93,12 @@ fn list(output: &Output) -> Result<(), Failure> {
         calibrations: shelf.kept.iter().map(entry).collect(),
         unreadable,
     };
-    output.answer("calibration list", &found, || {
-        match found.calibrations.is_empty() {
-            true => format!(
-                "{}; store one with 'palpate calibration import'",
-                report::list(&found.calibrations, &found.folder)
-            ),
-            false => report::list(&found.calibrations, &found.folder),
-        }
+    output.answer("calibration list", &found, || match found.calibrations.is_empty() {
+        true => format!(
+            "{}; store one with 'palpate calibration import'",
+            report::list(&found.calibrations, &found.folder)
+        ),
+        false => report::list(&found.calibrations, &found.folder),
     });
     Ok(())
 }
@@ -136,9 +134,7 @@ fn tell(
         age_days: source.age_days,
         ..Bench::default()
     });
-    new_file::write("picture", picture, || {
-        report::picture(&source.calibration, &told)
-    })?;
+    new_file::write("picture", picture, || report::picture(&source.calibration, &told))?;
     let object = ShowReport {
         id: source.id.as_deref(),
         file: source.file.as_ref(),

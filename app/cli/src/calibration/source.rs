@@ -43,21 +43,12 @@ impl Source {
     }
 
     fn new(id: Option<String>, file: Option<PathBuf>, calibration: Calibration) -> Self {
-        Self {
-            age_days: shelf::age_days(&calibration, wall_now().into()),
-            id,
-            file,
-            calibration,
-        }
+        Self { age_days: shelf::age_days(&calibration, wall_now().into()), id, file, calibration }
     }
 
     /// What speaks against using it on a rig.
     pub fn doubts(&self, rig: &str) -> Vec<String> {
-        self.calibration.doubts(&Bench {
-            rig,
-            age_days: self.age_days,
-            ..Bench::default()
-        })
+        self.calibration.doubts(&Bench { rig, age_days: self.age_days, ..Bench::default() })
     }
 }
 

@@ -186,15 +186,11 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let corrected = compliance.as_ref().map_or(String::new(), |id| {
             format!(", depths corrected with {id} beside the raw ones")
         });
-        let every = selection.every.map_or(String::new(), |every| {
-            format!(", every {every}th of those selected")
-        });
+        let every = selection
+            .every
+            .map_or(String::new(), |every| format!(", every {every}th of those selected"));
         let what = args.mcap_full.as_ref().map_or("rows", |_| "messages");
-        format!(
-            "{} {what} written to {}{every}{corrected}",
-            written.rows,
-            written.path.display()
-        )
+        format!("{} {what} written to {}{every}{corrected}", written.rows, written.path.display())
     });
     Ok(())
 }

@@ -93,10 +93,9 @@ pub(super) fn run(
                         notes: &notes,
                         compliance: compliance.as_ref(),
                     }),
-                    Err(Untold::Rejected(reason)) => output.object(&RejectedLine {
-                        source,
-                        rejected: reason,
-                    }),
+                    Err(Untold::Rejected(reason)) => {
+                        output.object(&RejectedLine { source, rejected: reason })
+                    }
                     Err(Untold::Failed(failure)) => output.object(&FailedLine {
                         source,
                         error: failure.sentence(),

@@ -16,9 +16,9 @@ pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
         Some(repeats) if repeats < REPEATS_MIN => Err(Failure::usage(format!(
             "--bootstrap {repeats} is too few for a 95 % interval; ask for at least {REPEATS_MIN}"
         ))),
-        None if args.seed.is_some() => Err(Failure::usage(
-            "--seed is for --bootstrap; ask for that too, or leave it out",
-        )),
+        None if args.seed.is_some() => {
+            Err(Failure::usage("--seed is for --bootstrap; ask for that too, or leave it out"))
+        }
         _ => Ok(()),
     }
 }
@@ -47,9 +47,7 @@ pub(super) fn show(bar: &Option<Bar>, done: usize) {
 /// Lines for people, in the digits of the report.
 pub(super) fn lines(found: &Intervals, report: &FitReport) -> Vec<String> {
     let line = |name: &str, ends: [Option<f64>; 2]| {
-        let known = report
-            .parameter(name)
-            .and_then(|known| Some((known.value, known.std_error?)));
+        let known = report.parameter(name).and_then(|known| Some((known.value, known.std_error?)));
         let text = match (ends, known) {
             ([Some(low), Some(high)], Some((value, error))) => interval([low, high], value, error),
             _ => {

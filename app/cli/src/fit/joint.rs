@@ -75,11 +75,7 @@ fn whole(report: &JointReport, beside: &[Beside<'_>], with_energy: bool) -> Stri
     };
     let mut lines = Vec::new();
     if let Some(first) = report.records.first() {
-        lines.push(format!(
-            "{}, {} records together",
-            first.report.model,
-            report.records.len()
-        ));
+        lines.push(format!("{}, {} records together", first.report.model, report.records.len()));
         lines.extend(part(first, true));
     }
     for (named, beside) in report.records.iter().zip(beside) {
@@ -91,12 +87,7 @@ fn whole(report: &JointReport, beside: &[Beside<'_>], with_energy: bool) -> Stri
         }
         let found = intervals::lines(beside.intervals, &named.report);
         lines.extend(found.into_iter().map(|line| format!("  {line}")));
-        lines.extend(
-            named
-                .report
-                .sentences()
-                .map(|sentence| format!("  - {sentence}")),
-        );
+        lines.extend(named.report.sentences().map(|sentence| format!("  - {sentence}")));
     }
     lines.join("\n")
 }

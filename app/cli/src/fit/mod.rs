@@ -172,9 +172,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
     // Its own name only: a picture travels, and folders are nobody else's business.
-    let short = source
-        .file_name()
-        .map_or(name.clone(), |name| name.to_string_lossy().into());
+    let short = source.file_name().map_or(name.clone(), |name| name.to_string_lossy().into());
     let report = match &fitted.result {
         Ok(report) => report,
         Err(refusal) => {
@@ -232,10 +230,7 @@ fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
         None => FitOptions::default(),
     };
     let names = args.free.iter().map(|name| name.trim());
-    let held = args
-        .fixed
-        .iter()
-        .filter_map(|pair| pair.split('=').next().map(str::trim));
+    let held = args.fixed.iter().filter_map(|pair| pair.split('=').next().map(str::trim));
     let mut names: Vec<&str> = names.chain(held).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {

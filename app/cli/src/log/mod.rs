@@ -15,9 +15,7 @@ use tracing_subscriber::layer::SubscriberExt;
 
 /// What is logged unless `RUST_LOG` says otherwise: what palpate does, and what libraries warn of.
 fn usual() -> Targets {
-    Targets::new()
-        .with_default(LevelFilter::WARN)
-        .with_target("palpate", LevelFilter::INFO)
+    Targets::new().with_default(LevelFilter::WARN).with_target("palpate", LevelFilter::INFO)
 }
 
 /// Begins to log; `is_verbose` shows every line on standard error as well. Nothing can go wrong here that would keep

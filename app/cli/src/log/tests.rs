@@ -108,10 +108,7 @@ fn settings() -> StandSettings {
         acceleration: MmPerS2(50.0),
         unseen: RigDescription::UNSEEN_USUAL,
         is_upwards: false,
-        gauge: GaugeSettings {
-            capacity: Newtons(25.0),
-            ..GaugeSettings::default()
-        },
+        gauge: GaugeSettings { capacity: Newtons(25.0), ..GaugeSettings::default() },
     }
 }
 
@@ -151,10 +148,7 @@ fn child(case: &str) {
         let writes = seen.writes.lock().unwrap();
         writes.iter().any(|(bytes, _)| bytes.ends_with(what))
     };
-    until(
-        || is_written(b"d").then_some(()),
-        || "the stand does not move".into(),
-    );
+    until(|| is_written(b"d").then_some(()), || "the stand does not move".into());
     let is_runner = case == "runner";
     let (wakes, told) = (Mutex::new(0), Arc::clone(&seen));
     let wake = move || {
@@ -183,10 +177,7 @@ fn child(case: &str) {
     };
     until(is_told, || "the panic is not logged".into());
     for (bytes, is_told) in seen.writes.lock().unwrap().iter() {
-        println!(
-            "WROTE {} {is_told}",
-            String::from_utf8_lossy(bytes).escape_default()
-        );
+        println!("WROTE {} {is_told}", String::from_utf8_lossy(bytes).escape_default());
     }
     drop(runner);
 }
@@ -195,11 +186,7 @@ fn child(case: &str) {
 fn panics(case: &str) -> (Vec<(String, bool)>, String) {
     let home = tempfile::tempdir().unwrap();
     let output = Command::new(std::env::current_exe().unwrap())
-        .args([
-            "log::tests::a_panic_stops_the_rig_before_it_is_logged",
-            "--exact",
-            "--nocapture",
-        ])
+        .args(["log::tests::a_panic_stops_the_rig_before_it_is_logged", "--exact", "--nocapture"])
         .env(CASE, case)
         .env("PALPATE_HOME", home.path())
         .env_remove("RUST_LOG")
@@ -209,18 +196,12 @@ fn panics(case: &str) -> (Vec<(String, bool)>, String) {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     let writes = said.lines().filter_map(|line| line.split_once("WROTE "));
     let writes = writes.filter_map(|(_, write)| write.rsplit_once(' '));
-    let writes: Vec<_> = writes
-        .map(|(bytes, is_told)| (bytes.to_owned(), is_told == "true"))
-        .collect();
+    let writes: Vec<_> =
+        writes.map(|(bytes, is_told)| (bytes.to_owned(), is_told == "true")).collect();
     let log = log_files(&home.path().join("log"));
-    let log = log
-        .first()
-        .map(|path| std::fs::read_to_string(path).unwrap());
+    let log = log.first().map(|path| std::fs::read_to_string(path).unwrap());
     let errors = String::from_utf8_lossy(&output.stderr);
-    (
-        writes,
-        log.unwrap_or_else(|| panic!("no log: {said}{errors}")),
-    )
+    (writes, log.unwrap_or_else(|| panic!("no log: {said}{errors}")))
 }
 
 #[test]
@@ -228,31 +209,15 @@ fn a_panic_stops_the_rig_before_it_is_logged() {
     if let Ok(case) = std::env::var(CASE) {
         return child(&case);
     }
-    for (case, thread) in [
-        ("elsewhere", "elsewhere"),
-        ("runner", "runner"),
-        ("link", "stand"),
-    ] {
+    for (case, thread) in [("elsewhere", "elsewhere"), ("runner", "runner"), ("link", "stand")] {
         let (writes, log) = panics(case);
-        let after = writes
-            .iter()
-            .skip_while(|(bytes, _)| bytes != "panic")
-            .skip(1);
+        let after = writes.iter().skip_while(|(bytes, _)| bytes != "panic").skip(1);
         let mut stops = after.filter(|(bytes, _)| bytes.ends_with('s'));
         let first = stops.next();
-        assert!(
-            matches!(first, Some((_, false))),
-            "{case}: {writes:?}\n{log}"
-        );
-        let panicked = log
-            .lines()
-            .find(|line| line.contains("panicked at"))
-            .unwrap();
+        assert!(matches!(first, Some((_, false))), "{case}: {writes:?}\n{log}");
+        let panicked = log.lines().find(|line| line.contains("panicked at")).unwrap();
         assert!(panicked.contains("log/tests.rs"), "{case}: {log}");
-        assert!(
-            log.contains(WORDS) && log.starts_with("palpate "),
-            "{case}: {log}"
-        );
+        assert!(log.contains(WORDS) && log.starts_with("palpate "), "{case}: {log}");
         assert!(log.contains(thread), "{case}: {log}");
     }
 }

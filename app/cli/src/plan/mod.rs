@@ -81,10 +81,7 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.picture {
         palpate_sessions::atomic::replace(file, plan_plot::picture(&report).as_bytes()).map_err(
             |err| {
-                Failure::failed(format!(
-                    "the picture cannot be written: {err}, {}",
-                    file.display()
-                ))
+                Failure::failed(format!("the picture cannot be written: {err}, {}", file.display()))
             },
         )?;
     }
@@ -153,8 +150,5 @@ fn memory(text: &str) -> Result<Memory, Failure> {
         )));
     };
     let sd_mn: f64 = sd_mn;
-    Ok(Memory {
-        sd: Newtons(sd_mn * 1e-3),
-        time: Seconds(secs),
-    })
+    Ok(Memory { sd: Newtons(sd_mn * 1e-3), time: Seconds(secs) })
 }

@@ -26,21 +26,12 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
     let body: Vec<String> = (0..values.len())
         .map(|k| {
             let value: f64 = format!("{:.3e}", values[k]).parse().unwrap_or(values[k]);
-            format!(
-                "{} {} {}",
-                PARAMETER_NAMES[k],
-                plain(value),
-                PARAMETER_UNITS[k]
-            )
+            format!("{} {} {}", PARAMETER_NAMES[k], plain(value), PARAMETER_UNITS[k])
         })
         .collect();
     let noise = &report.noise;
     let slow = noise.memory.map_or(String::new(), |memory| {
-        format!(
-            ", and {} mN that lasts {} s",
-            plain(memory.sd.0 * 1e3),
-            plain(memory.time.0)
-        )
+        format!(", and {} mN that lasts {} s", plain(memory.sd.0 * 1e3), plain(memory.time.0))
     });
     let wanted: Vec<String> = report
         .targets
@@ -66,20 +57,11 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
 }
 
 fn proposals(report: &PlanReport) -> Vec<String> {
-    let titles: Vec<String> = report
-        .proposals
-        .iter()
-        .map(|offer| title(&offer.proposal.family))
-        .collect();
+    let titles: Vec<String> =
+        report.proposals.iter().map(|offer| title(&offer.proposal.family)).collect();
     let width = titles.iter().map(String::len).max().unwrap_or(0);
-    let names: String = PARAMETER_NAMES
-        .iter()
-        .map(|name| format!("{name:>9}"))
-        .collect();
-    let mut lines = vec![format!(
-        "   {:width$} {:>8}{names}{:>8}",
-        "", "time", "peak"
-    )];
+    let names: String = PARAMETER_NAMES.iter().map(|name| format!("{name:>9}")).collect();
+    let mut lines = vec![format!("   {:width$} {:>8}{names}{:>8}", "", "time", "peak")];
     for (index, (offer, title)) in report.proposals.iter().zip(&titles).enumerate() {
         let expected = &offer.proposal.expected;
         let percents: String = expected
@@ -117,37 +99,26 @@ fn how(offer: &Offer) -> Vec<String> {
     let Some(secs) = offer.run_s else {
         return vec!["   there is no command for this yet".into()];
     };
-    let mut lines: Vec<String> = offer
-        .commands
-        .iter()
-        .map(|command| format!("   {command}"))
-        .collect();
+    let mut lines: Vec<String> =
+        offer.commands.iter().map(|command| format!("   {command}")).collect();
     let asks = offer.acknowledgements.iter();
     lines.extend(asks.map(|ask| format!("   with --acknowledge, because {ask}")));
-    lines.push(format!(
-        "   about {secs:.0} s in all, with homing and finding contact"
-    ));
+    lines.push(format!("   about {secs:.0} s in all, with homing and finding contact"));
     lines
 }
 
 fn title(family: &Family) -> String {
     match family {
-        Family::RampHold { speed, hold } => format!(
-            "ramp and hold: {} mm/s, {} s",
-            plain(speed.0),
-            plain(hold.0)
-        ),
+        Family::RampHold { speed, hold } => {
+            format!("ramp and hold: {} mm/s, {} s", plain(speed.0), plain(hold.0))
+        }
         Family::TwoSpeeds { speeds, hold, .. } => format!(
             "two speeds: {} and {} mm/s, {} s each",
             plain(speeds[0].0),
             plain(speeds[1].0),
             plain(hold.0)
         ),
-        Family::Cycles {
-            speed,
-            between,
-            count,
-        } => format!(
+        Family::Cycles { speed, between, count } => format!(
             "{count} cycle{}: {} mm/s, {} to {} mm",
             if *count == 1 { "" } else { "s" },
             plain(speed.0),
@@ -159,19 +130,14 @@ fn title(family: &Family) -> String {
 
 fn tables(report: &PlanReport) -> Vec<String> {
     let wanted = report.targets[0].parameter;
-    let k = PARAMETER_NAMES
-        .iter()
-        .position(|name| *name == wanted)
-        .unwrap_or(0);
+    let k = PARAMETER_NAMES.iter().position(|name| *name == wanted).unwrap_or(0);
     let curves = &report.curves;
     let easy = |curve: &Curve| -> Vec<usize> {
         let all = 0..curve.x.len();
         all.filter(|i| SHOWN.contains(&(i % 10))).collect()
     };
     let counts = |_: &Curve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
-    let mut lines = vec![format!(
-        "{wanted} in % (95 % interval), ramp and hold, against the hold"
-    )];
+    let mut lines = vec![format!("{wanted} in % (95 % interval), ramp and hold, against the hold")];
     lines.extend(table("hold s", &curves.hold, k, easy));
     let [top, bottom] = curves.between;
     lines.push(format!(
@@ -206,10 +172,7 @@ fn table(
     let heads = shown.iter().map(|&i| plain(first.x[i])).collect();
     let mut lines = vec![cells(head.to_owned(), heads)];
     for curve in curves {
-        let values = shown
-            .iter()
-            .map(|&i| percent(curve.percent[i][parameter]))
-            .collect();
+        let values = shown.iter().map(|&i| percent(curve.percent[i][parameter])).collect();
         lines.push(cells(format!("{} mm/s", plain(curve.speed.0)), values));
     }
     lines
@@ -230,9 +193,6 @@ mod tests {
     #[test]
     fn what_is_no_knowledge_is_a_dash() {
         assert_eq!(percent(Some(0.324_98)), "0.325");
-        assert_eq!(
-            (percent(None), percent(Some(2e4))),
-            ("-".into(), "-".into())
-        );
+        assert_eq!((percent(None), percent(Some(2e4))), ("-".into(), "-".into()));
     }
 }

@@ -59,9 +59,7 @@ pub(super) fn tell(programme: &mut Programme, how: &HowArgs) -> Result<(), Failu
         ("indenter", indenter),
     ];
     for (key, value) in labels.into_iter().filter(|(_, value)| !value.is_empty()) {
-        programme
-            .tell(key, value)
-            .map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
+        programme.tell(key, value).map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
     }
     for text in &how.about {
         pair_of(text)
@@ -92,12 +90,8 @@ pub(super) fn ask(file: &Path, programme: &Programme) -> Result<(), Failure> {
 /// Everything that can be said of a programme file before it runs, in order of lines.
 pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> {
     let text = read(Path::new(file)).map_err(Failure::usage)?;
-    let mut report = FileReport {
-        file: file.to_owned(),
-        name: None,
-        problems: Vec::new(),
-        expected_s: None,
-    };
+    let mut report =
+        FileReport { file: file.to_owned(), name: None, problems: Vec::new(), expected_s: None };
     let programme = match parse(Path::new(file), &text) {
         Ok(programme) => programme,
         Err(err) => {
@@ -204,21 +198,15 @@ impl<'a> Ahead<'a> {
 }
 
 pub(super) fn contents(programme: &Programme, foreseen: &Ahead<'_>) -> String {
-    let mut lines = vec![
-        ["task", "times", "min", "at most", "peak N", "protocol"]
-            .map(str::to_owned)
-            .to_vec(),
-    ];
+    let mut lines =
+        vec![["task", "times", "min", "at most", "peak N", "protocol"].map(str::to_owned).to_vec()];
     for (task, ahead) in programme.tasks.iter().zip(&foreseen.tasks) {
         lines.push(vec![
             task.name.clone(),
             task.repeats.to_string(),
             format!("{:.1}", ahead.expected_s / 60.0),
             format!("{:.1}", ahead.longest_s / 60.0),
-            format!(
-                "{:.1} to {:.1}",
-                ahead.force_band_n[0], ahead.force_band_n[1]
-            ),
+            format!("{:.1} to {:.1}", ahead.force_band_n[0], ahead.force_band_n[1]),
             task.protocol.title.clone(),
         ]);
     }

@@ -50,9 +50,7 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     if !values.is_empty() {
-        return Err(Failure::usage(
-            "a programme sets its values itself; change them in its file",
-        ));
+        return Err(Failure::usage("a programme sets its values itself; change them in its file"));
     }
     let text = read(file).map_err(Failure::usage)?;
     let mut programme = parse(file, &text).map_err(|err| refusal(file, &err))?;
@@ -100,11 +98,7 @@ pub(super) fn run(
         }
     };
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
-    let answers = if is_virtual {
-        Answers::Confirm
-    } else {
-        Answers::Operator
-    };
+    let answers = if is_virtual { Answers::Confirm } else { Answers::Operator };
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
         // A full channel already says what this would say.
@@ -225,6 +219,5 @@ fn leave(
         lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
         lines.join("\n")
     });
-    page.loss()
-        .map_or(Ok(()), |loss| Err(Failure::failed(loss)))
+    page.loss().map_or(Ok(()), |loss| Err(Failure::failed(loss)))
 }

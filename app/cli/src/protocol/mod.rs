@@ -152,17 +152,11 @@ pub(super) fn sound(
 ) -> Result<(Protocol, palpate_protocols::file::Written, Preview), Failure> {
     let text = protocol_text(name)?;
     let Checked { plan, problems } = check_on(&text, values, bench)?;
-    let errors: Vec<&Problem> = problems
-        .iter()
-        .filter(|problem| problem.is_error())
-        .collect();
+    let errors: Vec<&Problem> = problems.iter().filter(|problem| problem.is_error()).collect();
     if let Some(first) = errors.first() {
         let more = match errors.len() {
             1 => String::new(),
-            count => format!(
-                "; and {} more: see 'palpate protocol check {name}'",
-                count - 1
-            ),
+            count => format!("; and {} more: see 'palpate protocol check {name}'", count - 1),
         };
         return Err(Failure::usage(format!("{name}, {first}{more}")));
     }
@@ -213,10 +207,8 @@ impl<'a> Head<'a> {
 }
 
 fn list(output: &Output) -> Result<(), Failure> {
-    let protocols: Result<Vec<Protocol>, Failure> = BUILT_IN
-        .iter()
-        .map(|(name, text)| read(name, text))
-        .collect();
+    let protocols: Result<Vec<Protocol>, Failure> =
+        BUILT_IN.iter().map(|(name, text)| read(name, text)).collect();
     let protocols = protocols?;
     let heads: Vec<Head<'_>> = protocols.iter().map(Head::of).collect();
     let object = serde_json::json!({ "protocols": heads });
@@ -253,24 +245,13 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
             continue;
         }
         let text = text_of(file)?;
-        let checked = check(
-            &text,
-            &nothing,
-            bench.rig.description(),
-            &bench.limits,
-            &curve,
-        );
+        let checked = check(&text, &nothing, bench.rig.description(), &bench.limits, &curve);
         wrong += usize::from(!checked.is_sound());
         let (name, expected_s) = match checked.plan {
             Some((protocol, _, preview)) => (Some(protocol.name), Some(preview.expected.0)),
             None => (None, None),
         };
-        files.push(FileReport {
-            file: file.clone(),
-            name,
-            problems: checked.problems,
-            expected_s,
-        });
+        files.push(FileReport { file: file.clone(), name, problems: checked.problems, expected_s });
     }
     let object = serde_json::json!({ "files": files,
         "seconds": watch.seconds(),
@@ -278,9 +259,7 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     output.answer("protocol check", &object, || text::check(&files));
     match wrong {
         0 => Ok(()),
-        1 => Err(Failure::usage(
-            "one file cannot run as it is; correct what is listed",
-        )),
+        1 => Err(Failure::usage("one file cannot run as it is; correct what is listed")),
         _ => Err(Failure::usage(format!(
             "{wrong} files cannot run as they are; correct what is listed"
         ))),
@@ -337,31 +316,17 @@ fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure> {
         sound(&args.protocol, &args.values.values(), &bench, output)?;
     let plan = &written.plan;
     let nothing = BTreeMap::new();
-    let after = |index: usize| {
-        preview.steps[..=index]
-            .iter()
-            .map(|step| step.expected.0)
-            .sum()
-    };
+    let after = |index: usize| preview.steps[..=index].iter().map(|step| step.expected.0).sum();
     let report = PreviewReport {
         protocol: Head::of(&protocol),
-        values: plan
-            .source
-            .as_ref()
-            .map_or(&nothing, |source| &source.values),
+        values: plan.source.as_ref().map_or(&nothing, |source| &source.values),
         checkpoints: plan
             .checkpoints_from(0)
-            .map(|(step_index, name)| Checkpoint {
-                name,
-                step_index,
-                after_s: after(step_index),
-            })
+            .map(|(step_index, name)| Checkpoint { name, step_index, after_s: after(step_index) })
             .collect(),
         preview: &preview,
     };
-    output.answer("protocol preview", &report, || {
-        text::preview(&protocol, &written, &preview)
-    });
+    output.answer("protocol preview", &report, || text::preview(&protocol, &written, &preview));
     new_file::write("plot", args.plot.as_deref(), || {
         // What presses on nothing has no course of depth and force.
         if preview.force_band[1].0 <= 0.0 {

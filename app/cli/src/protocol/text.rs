@@ -52,11 +52,7 @@ pub(super) fn steps(written: &Written) -> String {
 }
 
 fn cycle(cycle: u32) -> String {
-    if cycle > 0 {
-        cycle.to_string()
-    } else {
-        String::new()
-    }
+    if cycle > 0 { cycle.to_string() } else { String::new() }
 }
 
 pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview) -> String {
@@ -75,11 +71,8 @@ pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview)
         } else {
             format!("~{:.0} s", step.expected.0)
         };
-        let longest = if step.is_exact {
-            String::new()
-        } else {
-            format!("{:.0} s", step.longest.0)
-        };
+        let longest =
+            if step.is_exact { String::new() } else { format!("{:.0} s", step.longest.0) };
         let row = format!(
             "{:>5}  {:<13} {time:>12} {longest:>12}  {:>5}  {}",
             index + 1,
@@ -90,22 +83,14 @@ pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview)
         lines.push(row.trim_end().to_owned());
     }
     if written.plan.steps.len() > STEPS_MAX {
-        lines.push(format!(
-            "       and {} steps more",
-            written.plan.steps.len() - STEPS_MAX
-        ));
+        lines.push(format!("       and {} steps more", written.plan.steps.len() - STEPS_MAX));
     }
     lines.push(String::new());
     lines.push(format!(
         "total {}, at most {}; of it {:.3} s are known to the sample",
         clock(preview.expected.0),
         clock(preview.longest.0),
-        preview
-            .steps
-            .iter()
-            .filter(|step| step.is_exact)
-            .map(|step| step.expected.0)
-            .sum::<f64>()
+        preview.steps.iter().filter(|step| step.is_exact).map(|step| step.expected.0).sum::<f64>()
     ));
     lines.push(format!(
         "peak force {:.1} to {:.1}; up to {:.1} MB",
@@ -116,12 +101,7 @@ pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview)
     if !protocol.ask.is_empty() {
         lines.push(format!("asks for {}", protocol.ask.join(", ")));
     }
-    lines.extend(
-        preview
-            .acknowledgements
-            .iter()
-            .map(|line| format!("to acknowledge: {line}")),
-    );
+    lines.extend(preview.acknowledgements.iter().map(|line| format!("to acknowledge: {line}")));
     lines.extend(preview.notes.iter().map(|line| format!("note: {line}")));
     if !protocol.parameters.is_empty() {
         lines.push(String::new());

@@ -29,9 +29,8 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
         by_session.entry(key).or_default().push(claim);
     }
     let named = named(sessions)?;
-    if let Some((path, id)) = named
-        .iter()
-        .find(|(_, id)| by_session.keys().all(|(known, _)| known != id))
+    if let Some((path, id)) =
+        named.iter().find(|(_, id)| by_session.keys().all(|(known, _)| known != id))
     {
         return Err(Failure::usage(format!(
             "the page does not describe {}, which is session {id}; name those that it describes",

@@ -16,10 +16,7 @@ pub(super) fn run(
     new_file::check("figure", Some(to))?;
     let ending = dossier::Ending::of(to).map_err(Failure::usage)?;
     let window = window(args)?;
-    let wanted = Wanted {
-        session: session.to_path_buf(),
-        analysis: args.analysis.clone(),
-    };
+    let wanted = Wanted { session: session.to_path_buf(), analysis: args.analysis.clone() };
     let drawing = dossier::figure(&wanted, args.of.into(), window);
     let drawing = drawing.map_err(super::super::source_failure)?;
     let drawing = drawing.map_err(Failure::failed)?;

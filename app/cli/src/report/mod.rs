@@ -162,10 +162,7 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
     let wanted: Vec<Wanted> = args
         .sessions
         .iter()
-        .map(|session| Wanted {
-            session: session.clone(),
-            analysis: args.analysis.clone(),
-        })
+        .map(|session| Wanted { session: session.clone(), analysis: args.analysis.clone() })
         .collect();
     let made = dossier::made(wall_now().into());
     let page = dossier::write(&wanted, args.align.into(), &made, &output.count_bar(0));

@@ -205,13 +205,7 @@ pub(super) fn carry_out(
         leader: led.as_ref().map(|led| led.leader.clone()),
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
-    let preview = preview(
-        &request.plan,
-        bench.rig.description(),
-        &request.limits,
-        &curve,
-        false,
-    );
+    let preview = preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
     if how.preview {
         output.result(&preview, || preview_text(&preview));
         return match preview.refusals.first() {
@@ -220,11 +214,8 @@ pub(super) fn carry_out(
         };
     }
     if let Err(reason) = preview.verdict(how.acknowledge) {
-        let hint = if preview.refusals.is_empty() {
-            "; add --acknowledge to accept this"
-        } else {
-            ""
-        };
+        let hint =
+            if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
     match &gate {
@@ -288,10 +279,7 @@ pub(super) fn labels(args: &HowArgs) -> Result<Labels, Failure> {
     let mut labels = Labels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
-        indenter: args
-            .indenter
-            .clone()
-            .unwrap_or_else(|| USUAL_INDENTER.to_owned()),
+        indenter: args.indenter.clone().unwrap_or_else(|| USUAL_INDENTER.to_owned()),
         about: About::default(),
     };
     super::tell(&mut labels, &args.about)?;
@@ -348,18 +336,7 @@ fn watch(
 
 fn progress_text(view: &RunView) -> String {
     let left = view.time_left.0.round() as u64;
-    let force = view
-        .derived
-        .force
-        .map_or(String::new(), |force| format!("  {force:.3}"));
-    let depth = view
-        .derived
-        .depth
-        .map_or(String::new(), |depth| format!("  {depth:.2}"));
-    format!(
-        "{}{force}{depth}  {:02}:{:02} left",
-        view.phase,
-        left / 60,
-        left % 60
-    )
+    let force = view.derived.force.map_or(String::new(), |force| format!("  {force:.3}"));
+    let depth = view.derived.depth.map_or(String::new(), |depth| format!("  {depth:.2}"));
+    format!("{}{force}{depth}  {:02}:{:02} left", view.phase, left / 60, left % 60)
 }

@@ -75,9 +75,7 @@ pub(super) fn report(view: &RunView, led: Option<&Led>, output: &Output) -> Resu
             "the computer did not keep up: the run took {late:.1} s longer than its session time"
         ));
     }
-    output.answer(led.map_or("run", |led| led.command), &report, || {
-        run_text(&report)
-    });
+    output.answer(led.map_or("run", |led| led.command), &report, || run_text(&report));
     if let (Some(reason), Some(left)) = (&view.log_error, &left) {
         return Err(Failure::failed(not_kept(reason, left, &report)));
     }
@@ -104,10 +102,7 @@ fn not_kept(reason: &str, left: &Patient, report: &RunReport) -> String {
     let lost = match left.health {
         Health::Healthy => format!("all {of} samples are there all the same"),
         Health::Interrupted => format!("the last {lost} of {of} samples are lost"),
-        _ => format!(
-            "{lost} of {of} samples are lost: {}",
-            left.findings.join("; ")
-        ),
+        _ => format!("{lost} of {of} samples are lost: {}", left.findings.join("; ")),
     };
     let way = match left.health {
         Health::Healthy => format!("look with 'palpate doctor {folder}' before you use them"),
@@ -144,10 +139,7 @@ fn run_text(report: &RunReport) -> String {
             report.session.display()
         ));
         lines.extend(parameter_lines(&live.parameters));
-        let reasons = live
-            .verdicts
-            .iter()
-            .filter_map(|verdict| verdict.reason.as_ref());
+        let reasons = live.verdicts.iter().filter_map(|verdict| verdict.reason.as_ref());
         lines.extend(reasons.map(|reason| format!("  {reason}")));
     }
     lines.join("\n")
@@ -174,18 +166,8 @@ pub(super) fn preview_text(preview: &Preview) -> String {
         preview.force_band[1],
         preview.storage_bytes as f64 * 1e-6
     ));
-    lines.extend(
-        preview
-            .refusals
-            .iter()
-            .map(|line| format!("refused: {line}")),
-    );
-    lines.extend(
-        preview
-            .acknowledgements
-            .iter()
-            .map(|line| format!("to acknowledge: {line}")),
-    );
+    lines.extend(preview.refusals.iter().map(|line| format!("refused: {line}")));
+    lines.extend(preview.acknowledgements.iter().map(|line| format!("to acknowledge: {line}")));
     lines.extend(preview.notes.iter().map(|line| format!("note: {line}")));
     lines.join("\n")
 }

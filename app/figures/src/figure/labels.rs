@@ -39,9 +39,7 @@ pub(super) fn beside(
         };
         (top..bottom).contains(&at[1])
             && !labels.iter().any(|label| covers(label, -LABEL, LABEL))
-            && !points
-                .iter()
-                .any(|point| covers(&[point[0], point[1] + 0.35 * FONT], -SIZE, LABEL))
+            && !points.iter().any(|point| covers(&[point[0], point[1] + 0.35 * FONT], -SIZE, LABEL))
     };
     let beside = |lines: f64| [x + 12.0, y + 0.35 * FONT + lines * FONT];
     // Each line farther is tried above and below; a dozen points never need more.

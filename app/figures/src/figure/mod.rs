@@ -88,37 +88,25 @@ impl Axis {
     /// An even axis of this name.
     #[must_use]
     pub fn linear(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            ..Self::default()
-        }
+        Self { name: name.to_owned(), ..Self::default() }
     }
 
     /// A logarithmic axis of this name.
     #[must_use]
     pub fn logarithmic(name: &str) -> Self {
-        Self {
-            scale: Scale::Logarithmic,
-            ..Self::linear(name)
-        }
+        Self { scale: Scale::Logarithmic, ..Self::linear(name) }
     }
 
     /// From one number to another.
     #[must_use]
     pub fn over(self, range: [f64; 2]) -> Self {
-        Self {
-            range: Some(range),
-            ..self
-        }
+        Self { range: Some(range), ..self }
     }
 
     /// With these numbers seen in any case.
     #[must_use]
     pub fn seeing(self, seen: &[f64]) -> Self {
-        Self {
-            seen: seen.to_vec(),
-            ..self
-        }
+        Self { seen: seen.to_vec(), ..self }
     }
 }
 
@@ -174,52 +162,33 @@ impl Series {
     /// A whole line.
     #[must_use]
     pub fn line(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line {
-            width,
-            is_dashed: false,
-        };
+        let shape = Shape::Line { width, is_dashed: false };
         Self::new(name, ink, shape, points)
     }
 
     /// A dashed line.
     #[must_use]
     pub fn dashed(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line {
-            width,
-            is_dashed: true,
-        };
+        let shape = Shape::Line { width, is_dashed: true };
         Self::new(name, ink, shape, points)
     }
 
     /// Filled dots.
     #[must_use]
     pub fn dots(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Dots {
-            radius,
-            is_filled: true,
-        };
+        let shape = Shape::Dots { radius, is_filled: true };
         Self::new(name, ink, shape, points)
     }
 
     /// Rings.
     #[must_use]
     pub fn rings(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Dots {
-            radius,
-            is_filled: false,
-        };
+        let shape = Shape::Dots { radius, is_filled: false };
         Self::new(name, ink, shape, points)
     }
 
     fn new(name: &str, ink: Ink, shape: Shape, points: Vec<[f64; 2]>) -> Self {
-        Self {
-            name: name.to_owned(),
-            ink,
-            opacity: 1.0,
-            shape,
-            points,
-            labels: Labels::None,
-        }
+        Self { name: name.to_owned(), ink, opacity: 1.0, shape, points, labels: Labels::None }
     }
 
     /// With something written at its points.
@@ -287,21 +256,13 @@ impl Plot {
     /// An empty plot of two axes.
     #[must_use]
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
-        Self {
-            title: title.to_owned(),
-            x,
-            y,
-            ..Self::default()
-        }
+        Self { title: title.to_owned(), x, y, ..Self::default() }
     }
 
     /// With these lines and dots.
     #[must_use]
     pub fn with(self, series: impl IntoIterator<Item = Series>) -> Self {
-        Self {
-            series: series.into_iter().collect(),
-            ..self
-        }
+        Self { series: series.into_iter().collect(), ..self }
     }
 
     /// Where a point lies on its axes.
@@ -337,10 +298,7 @@ mod tests {
     fn a_legend_names_each_thing_once_and_nothing_that_has_its_name_beside_it() {
         let line = |name: &str| Series::line(name, Ink::Series, 1.0, Vec::new());
         let plot = Plot {
-            stretches: vec![Stretch {
-                name: "flat".into(),
-                ends: [0.0, 1.0],
-            }],
+            stretches: vec![Stretch { name: "flat".into(), ends: [0.0, 1.0] }],
             ..Plot::default().with([
                 line("one"),
                 line(""),

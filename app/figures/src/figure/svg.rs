@@ -30,10 +30,7 @@ impl Plot {
             AxisNames::Both => self.x.name.as_str(),
             AxisNames::Upright => "",
         };
-        let look = Look {
-            text: LIGHT.text_quiet,
-            grid: LIGHT.line,
-        };
+        let look = Look { text: LIGHT.text_quiet, grid: LIGHT.line };
         let scales = [self.x.scale, self.y.scale].map(|scale| scale == Scale::Logarithmic);
         panel.scaled_axes(svg, [x_name, &self.y.name], scales, look);
         for band in &self.bands {
@@ -55,14 +52,10 @@ impl Plot {
 
     fn panel(&self, place: [f64; 4]) -> Panel {
         let points = self.series.iter().flat_map(|one| &one.points);
-        let edges = self
-            .bands
-            .iter()
-            .flat_map(|band| band.edges.iter().flatten());
+        let edges = self.bands.iter().flat_map(|band| band.edges.iter().flatten());
         let placed = points.chain(edges).map(|point| self.place(*point));
-        let placed: Vec<[f64; 2]> = placed
-            .filter(|point| point.iter().all(|value| value.is_finite()))
-            .collect();
+        let placed: Vec<[f64; 2]> =
+            placed.filter(|point| point.iter().all(|value| value.is_finite())).collect();
         let [left, right] = match (self.x.range, self.x.scale) {
             (Some(range), scale) => range.map(|x| scale.place(x)),
             (None, Scale::Logarithmic) => Panel::around_logarithms(place, &placed).x,
@@ -70,10 +63,8 @@ impl Plot {
                 let ends = |start: f64, of: fn(f64, f64) -> f64| {
                     placed.iter().map(|point| point[0]).fold(start, of)
                 };
-                let (low, high) = (
-                    ends(f64::INFINITY, f64::min),
-                    ends(f64::NEG_INFINITY, f64::max),
-                );
+                let (low, high) =
+                    (ends(f64::INFINITY, f64::min), ends(f64::NEG_INFINITY, f64::max));
                 if low < high { [low, high] } else { [0.0, 1.0] }
             }
         };
@@ -86,11 +77,7 @@ impl Plot {
             (None, Scale::Linear) => Panel::around(place, [left, right], &[&all]).y,
             (None, Scale::Logarithmic) => Panel::around_logarithms(place, &all).y,
         };
-        Panel {
-            place,
-            x: [left, right],
-            y,
-        }
+        Panel { place, x: [left, right], y }
     }
 
     fn placed(&self, panel: &Panel, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
@@ -195,30 +182,16 @@ mod tests {
         let y = Axis::linear("y (N)");
         let line = Series::line("rises", Ink::Series, 1.0, vec![[0.0, 0.0], [10.0, 1.0]]);
         let plot = Plot {
-            levels: vec![Level {
-                name: "most".into(),
-                at: 1.0,
-                ink: Ink::Limit,
-                is_dashed: true,
-            }],
+            levels: vec![Level { name: "most".into(), at: 1.0, ink: Ink::Limit, is_dashed: true }],
             ..Plot::new("", x, y).with([line.labelled(Labels::AtEnd)])
         };
         let text = drawn(&plot);
         // A margin of a twentieth of the height lies above and below.
         let low = 210.0 - 200.0 * 0.05 / 1.1;
         let high = 10.0 + 200.0 * 0.05 / 1.1;
-        assert!(
-            text.contains(&format!("points=\"50.0,{low:.1} 350.0,{high:.1}\"")),
-            "{text}"
-        );
-        assert!(
-            text.contains("stroke-dasharray") && text.contains(">most<"),
-            "{text}"
-        );
-        assert!(
-            text.contains(">rises<") && text.contains(">x (mm)<"),
-            "{text}"
-        );
+        assert!(text.contains(&format!("points=\"50.0,{low:.1} 350.0,{high:.1}\"")), "{text}");
+        assert!(text.contains("stroke-dasharray") && text.contains(">most<"), "{text}");
+        assert!(text.contains(">rises<") && text.contains(">x (mm)<"), "{text}");
     }
 
     #[test]
@@ -234,9 +207,6 @@ mod tests {
             "{wide}"
         );
         let narrow = axes([15.0, 60.0]);
-        assert!(
-            narrow.contains(">20<") && narrow.contains(">50<"),
-            "{narrow}"
-        );
+        assert!(narrow.contains(">20<") && narrow.contains(">50<"), "{narrow}");
     }
 }

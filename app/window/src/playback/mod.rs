@@ -152,14 +152,11 @@ impl eframe::App for PlaybackApp {
             .resizable(false)
             .frame(frame(ui, true))
             .show(ui, |ui| self.events.ui(ui, &self.snapshot, &mut commands));
-        Panel::bottom("transport")
-            .resizable(false)
-            .frame(frame(ui, false))
-            .show(ui, |ui| {
-                let run = self.snapshot.run.as_ref();
-                let shown = run.map_or(0.0, |run| run.now.seconds().0);
-                self.transport.ui(ui, shown);
-            });
+        Panel::bottom("transport").resizable(false).frame(frame(ui, false)).show(ui, |ui| {
+            let run = self.snapshot.run.as_ref();
+            let shown = run.map_or(0.0, |run| run.now.seconds().0);
+            self.transport.ui(ui, shown);
+        });
         Panel::right("results")
             .exact_size(RIGHT_WIDTH)
             .resizable(false)
@@ -170,9 +167,7 @@ impl eframe::App for PlaybackApp {
                     findings_ui(ui, &self.snapshot, Refit::NotYet, self.plots.loops());
                 });
             });
-        CentralPanel::default()
-            .frame(frame(ui, true))
-            .show(ui, |ui| self.plots_ui(ui));
+        CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots_ui(ui));
         // The only thing that the events ask for here.
         if commands.take().contains(&Command::SwitchTheme) {
             theme::switch(ui.ctx());

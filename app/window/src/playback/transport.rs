@@ -30,13 +30,7 @@ pub(super) struct Transport {
 impl Transport {
     /// Plays from the beginning of a session of so many seconds.
     pub fn new(end: f64, scale: TimeScale) -> Self {
-        Self {
-            end,
-            at: 0.0,
-            asked: None,
-            is_playing: true,
-            scale,
-        }
+        Self { end, at: 0.0, asked: None, is_playing: true, scale }
     }
 
     pub fn is_playing(&self) -> bool {
@@ -108,10 +102,7 @@ impl Transport {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             let text = if self.is_playing { "Pause" } else { "Play" };
-            if ui
-                .add(Button::new(text).min_size(vec2(64.0, 28.0)))
-                .on_hover_text("Space")
-                .clicked()
+            if ui.add(Button::new(text).min_size(vec2(64.0, 28.0))).on_hover_text("Space").clicked()
             {
                 self.toggle(shown);
             }

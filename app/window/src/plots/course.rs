@@ -10,10 +10,7 @@ use palpate_protocols::preview::OutlinePoint;
 /// Draws the curves in the space there is.
 pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let look = PlotLook {
-        link: Some("course"),
-        ..PlotLook::default()
-    };
+    let look = PlotLook { link: Some("course"), ..PlotLook::default() };
     let height = (ui.available_height() - 112.0) / 3.0;
     for plot in course(outline, Some(limits)) {
         ui.label(RichText::new(&plot.title).heading().strong());

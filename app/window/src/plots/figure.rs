@@ -37,9 +37,7 @@ pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook) {
             HoverPosition::Elsewhere { .. } => None,
         });
     if plot.x.scale == Scale::Logarithmic {
-        drawn = drawn
-            .x_grid_spacer(decades)
-            .x_axis_formatter(|mark, _| decade_text(mark));
+        drawn = drawn.x_grid_spacer(decades).x_axis_formatter(|mark, _| decade_text(mark));
     } else if let Some(steps) = look.steps_across {
         drawn = drawn.x_grid_spacer(move |input| round_marks(input, steps));
     }
@@ -80,9 +78,7 @@ fn readouts(plot: &Plot) -> Vec<(PlotPoint, String)> {
         _ => None,
     });
     let points = each.flatten();
-    points
-        .map(|(at, [_, words])| (plot.place(*at).into(), words.clone()))
-        .collect()
+    points.map(|(at, [_, words])| (plot.place(*at).into(), words.clone())).collect()
 }
 
 fn paint(plot_ui: &mut PlotUi<'_>, plot: &Plot, tokens: &Tokens) {
@@ -137,19 +133,14 @@ fn paint_series(
                 false => LineStyle::Solid,
             };
             // Bands of points that share a column would be drawn as wedges where there are few.
-            let line = Line::new(one.name.as_str(), points)
-                .id(id)
-                .allow_band(false);
+            let line = Line::new(one.name.as_str(), points).id(id).allow_band(false);
             plot_ui.line(line.color(ink).width(width as f32).style(style));
         }
         Shape::Dots { radius, is_filled } => {
             let dots = Points::new(one.name.as_str(), points).id(id);
             let is_told = one.labels != Labels::None || !one.name.is_empty();
             plot_ui.points(
-                dots.radius(radius as f32)
-                    .filled(is_filled)
-                    .color(ink)
-                    .allow_hover(is_told),
+                dots.radius(radius as f32).filled(is_filled).color(ink).allow_hover(is_told),
             );
         }
     }
@@ -164,12 +155,7 @@ fn decades(input: GridInput) -> Vec<GridMark> {
     // Labels of more than nine powers would touch each other.
     let step = ((high - low) / 9.0).ceil().max(1.0);
     let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    (first..=last)
-        .map(|i| GridMark {
-            value: i as f64 * step,
-            step_size: step,
-        })
-        .collect()
+    (first..=last).map(|i| GridMark { value: i as f64 * step, step_size: step }).collect()
 }
 
 /// The power of ten as people write it, with its sign in words where it is small.
@@ -190,14 +176,8 @@ mod tests {
     #[test]
     fn marks_stand_at_powers_of_ten() {
         let marks = |low, high| {
-            let input = GridInput {
-                bounds: (low, high),
-                base_step_size: 1.0,
-            };
-            decades(input)
-                .iter()
-                .map(|mark| mark.value)
-                .collect::<Vec<_>>()
+            let input = GridInput { bounds: (low, high), base_step_size: 1.0 };
+            decades(input).iter().map(|mark| mark.value).collect::<Vec<_>>()
         };
         assert_eq!(marks(-0.5, 2.2), [0.0, 1.0, 2.0]);
         assert_eq!(marks(-18.0, 0.0).len(), 10);
@@ -206,15 +186,7 @@ mod tests {
 
     #[test]
     fn powers_read_as_numbers_where_they_are_short() {
-        let text = |value| {
-            decade_text(GridMark {
-                value,
-                step_size: 1.0,
-            })
-        };
-        assert_eq!(
-            [-9.0, -2.0, 0.0, 3.0, 7.0].map(text),
-            ["1e-9", "0.01", "1", "1000", "1e7"]
-        );
+        let text = |value| decade_text(GridMark { value, step_size: 1.0 });
+        assert_eq!([-9.0, -2.0, 0.0, 3.0, 7.0].map(text), ["1e-9", "0.01", "1", "1000", "1e7"]);
     }
 }

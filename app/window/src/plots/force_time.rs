@@ -27,10 +27,8 @@ pub fn head_ui(ui: &mut Ui, view: &mut TimeView, cache: &PlotCache) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Force over time").heading().strong());
-        ui.selectable_value(view, TimeView::Whole, "Whole run")
-            .place("Whole run");
-        ui.selectable_value(view, TimeView::FromRamp, "From ramp")
-            .place("From ramp");
+        ui.selectable_value(view, TimeView::Whole, "Whole run").place("Whole run");
+        ui.selectable_value(view, TimeView::FromRamp, "From ramp").place("From ramp");
         if let Some(remark) = cache.remark() {
             ui.label(RichText::new(remark).color(tokens.text_quiet).small());
         }
@@ -51,9 +49,7 @@ pub fn force_time_ui(
     force_max: Newtons,
 ) -> RangeInclusive<f64> {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let from = run
-        .filter(|_| view == TimeView::FromRamp)
-        .and_then(ramp_start);
+    let from = run.filter(|_| view == TimeView::FromRamp).and_then(ramp_start);
     let now = run.map_or(60.0, |run| run.now.seconds().0.max(1.0));
     let plot = quiet(ui, Plot::new("force_time"), tokens)
         .x_axis_label("session time (s)")
@@ -69,11 +65,7 @@ pub fn force_time_ui(
         }
         if let Some(run) = run {
             for (i, span) in phase_spans(run).enumerate() {
-                let fill = if i % 2 == 0 {
-                    Color32::TRANSPARENT
-                } else {
-                    tokens.phase_band
-                };
+                let fill = if i % 2 == 0 { Color32::TRANSPARENT } else { tokens.phase_band };
                 plot_ui.span(
                     Span::new(span.phase.name(), span.start..=span.end)
                         .fill(fill)
@@ -122,8 +114,5 @@ pub fn force_time_ui(
 
 /// Session time at which the ramp began.
 fn ramp_start(run: &RunView) -> Option<f64> {
-    run.phases
-        .iter()
-        .find(|(_, phase)| *phase == Phase::Ramp)
-        .map(|(start, _)| *start)
+    run.phases.iter().find(|(_, phase)| *phase == Phase::Ramp).map(|(start, _)| *start)
 }

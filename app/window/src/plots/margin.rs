@@ -50,11 +50,7 @@ pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
         for (ink, name) in inks(tokens).into_iter().zip(names) {
             legend_ui(ui, ink, name);
         }
-        legend_ui(
-            ui,
-            tokens.text,
-            &format!("the device has {:.2} N s/m", picture.has),
-        );
+        legend_ui(ui, tokens.text, &format!("the device has {:.2} N s/m", picture.has));
         if !picture.cycles.is_empty() {
             legend_ui(ui, tokens.line, "the model itself returns energy");
         }
@@ -79,11 +75,8 @@ fn inks(tokens: &Tokens) -> [Color32; 3] {
 
 fn part_ui(ui: &mut Ui, id: &str, picture: &MarginPicture<'_>, shown: RangeInclusive<f64>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let points: Vec<&MarginPoint> = picture
-        .curve
-        .iter()
-        .filter(|one| shown.contains(&one.depth))
-        .collect();
+    let points: Vec<&MarginPoint> =
+        picture.curve.iter().filter(|one| shown.contains(&one.depth)).collect();
     let most = points.iter().map(|one| one.delay).fold(0.0, f64::max);
     let plot = quiet(ui, Plot::new(id.to_owned()), tokens)
         .x_axis_label("depth (mm)")
@@ -143,10 +136,7 @@ mod tests {
 
     #[test]
     fn the_picture_is_cut_past_a_spike_at_the_surface_and_nowhere_else() {
-        let band = |from, to| DepthBand {
-            from: Depth(from),
-            to: Depth(to),
-        };
+        let band = |from, to| DepthBand { from: Depth(from), to: Depth(to) };
         assert_eq!(cut_at(&[band(0.0, 0.7)], 30.0), Some(1.4));
         assert_eq!(cut_at(&[band(0.0, 0.7)], 2.0), None);
         assert_eq!(cut_at(&[band(0.0, 30.0)], 30.0), None);

@@ -21,10 +21,7 @@ pub struct Span {
 
 impl Default for Span {
     fn default() -> Self {
-        Self {
-            whole: [0.0, 1.0],
-            part: None,
-        }
+        Self { whole: [0.0, 1.0], part: None }
     }
 }
 
@@ -109,10 +106,7 @@ pub struct Gesture {
 pub fn gesture(ui: &Ui, response: &Response) -> Gesture {
     let rect = response.rect;
     let size = [rect.width(), rect.height()].map(|side| f64::from(side.max(1.0)));
-    let mut found = Gesture {
-        zoom: 1.0,
-        ..Gesture::default()
-    };
+    let mut found = Gesture { zoom: 1.0, ..Gesture::default() };
     let place = response.hover_pos().or(response.interact_pointer_pos());
     if let Some(place) = place {
         let from = [place.x - rect.left(), rect.bottom() - place.y];

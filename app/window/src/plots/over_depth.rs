@@ -197,10 +197,8 @@ fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<Made>
         }
         let (found, samples) = reducer.finish();
         let point = |[px, py]: [f64; 2]| PlotPoint::new(x[0] + px / scale[0], y[0] + py / scale[1]);
-        let stretches: Vec<Vec<PlotPoint>> = found
-            .into_iter()
-            .map(|stretch| stretch.into_iter().map(point).collect())
-            .collect();
+        let stretches: Vec<Vec<PlotPoint>> =
+            found.into_iter().map(|stretch| stretch.into_iter().map(point).collect()).collect();
         lines.push(Reduced {
             id: source.id,
             points: stretches.iter().map(Vec::len).sum(),
@@ -208,11 +206,7 @@ fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<Made>
             samples,
         });
     }
-    Some(Made {
-        key,
-        lines,
-        picture,
-    })
+    Some(Made { key, lines, picture })
 }
 
 /// Lays what a line crosses over the picture.
@@ -266,10 +260,7 @@ pub fn over_depth_ui(
             for (number, stretch) in lines.stretches(layer.id).iter().enumerate() {
                 let line = Line::new(layer.name, PlotPoints::Borrowed(stretch));
                 plot_ui.line(
-                    line.id((layer.id, number))
-                        .color(layer.color)
-                        .width(1.2)
-                        .allow_hover(false),
+                    line.id((layer.id, number)).color(layer.color).width(1.2).allow_hover(false),
                 );
             }
         }
@@ -320,12 +311,7 @@ mod tests {
                 color: *color,
             })
             .collect();
-        let key = Key {
-            depth: KEY,
-            force: KEY,
-            pixels: [pixels; 2],
-            versions: Vec::new(),
-        };
+        let key = Key { depth: KEY, force: KEY, pixels: [pixels; 2], versions: Vec::new() };
         reduce(key, &sources, &AtomicBool::new(false)).unwrap()
     }
 
@@ -348,16 +334,10 @@ mod tests {
         let (front, back) = (Tokens::of(false).series, Tokens::of(false).limit);
         let mut picture = None;
         // Two pixels wide and three high; what is given begins below.
-        let coverage = |pixels: [u8; 6]| Coverage {
-            size: [2, 3],
-            pixels: pixels.to_vec(),
-        };
+        let coverage = |pixels: [u8; 6]| Coverage { size: [2, 3], pixels: pixels.to_vec() };
         paint(&mut picture, &coverage([255, 255, 0, 0, 0, 0]), back);
         paint(&mut picture, &coverage([255, 0, 0, 0, 0, 255]), front);
         let none = Color32::TRANSPARENT;
-        assert_eq!(
-            picture.unwrap().pixels,
-            [none, front, none, none, front, back]
-        );
+        assert_eq!(picture.unwrap().pixels, [none, front, none, none, front, back]);
     }
 }

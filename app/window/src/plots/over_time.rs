@@ -84,11 +84,7 @@ fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], toke
         let seen = to.min(shown[1]) - from.max(shown[0]);
         let has_name = seen > NAME_SHARE * (shown[1] - shown[0]);
         let name = if has_name { phase.name() } else { "" };
-        plot_ui.span(
-            Shade::new(name, *from..=*to)
-                .fill(fill)
-                .border_color(tokens.line),
-        );
+        plot_ui.span(Shade::new(name, *from..=*to).fill(fill).border_color(tokens.line));
     }
     for [from, to] in &setting.left_out {
         plot_ui.span(

@@ -69,10 +69,7 @@ impl Series {
                 return;
             };
             let half = BAND_SIGMAS * sigma.0;
-            for (edge, value) in self
-                .band
-                .iter_mut()
-                .zip([point.x, point.y - half, point.y + half])
+            for (edge, value) in self.band.iter_mut().zip([point.x, point.y - half, point.y + half])
             {
                 edge.push(value);
             }
@@ -134,10 +131,7 @@ impl PlotCache {
     /// A cache for forces read with this calibration.
     #[must_use]
     pub fn for_calibration(calibration: &Calibration) -> Self {
-        Self {
-            uncertainty: ForceUncertainty::of(calibration).ok(),
-            ..Self::default()
-        }
+        Self { uncertainty: ForceUncertainty::of(calibration).ok(), ..Self::default() }
     }
 
     /// Takes over a run's history, if it changed.
@@ -145,16 +139,8 @@ impl PlotCache {
         let Some(run) = run else {
             return;
         };
-        if !self
-            .trace
-            .as_ref()
-            .is_some_and(|trace| Arc::ptr_eq(trace, &run.trace))
-        {
-            let starts: &[_] = if run.cycles > 1 {
-                &run.cycle_starts
-            } else {
-                &[]
-            };
+        if !self.trace.as_ref().is_some_and(|trace| Arc::ptr_eq(trace, &run.trace)) {
+            let starts: &[_] = if run.cycles > 1 { &run.cycle_starts } else { &[] };
             self.convert(&run.trace, starts);
         }
     }
@@ -162,8 +148,7 @@ impl PlotCache {
     fn convert(&mut self, trace: &Arc<LiveTrace>, starts: &[(f64, u32)]) {
         let points = trace.points();
         self.force_time.set(&points, |point| [point.t, point.force]);
-        self.force_depth
-            .set(&points, |point| [point.depth, point.force]);
+        self.force_depth.set(&points, |point| [point.depth, point.force]);
         self.set_loops(&points, starts);
         self.force_time.set_band(self.uncertainty.as_ref());
         self.force_depth.set_band(self.uncertainty.as_ref());
@@ -177,9 +162,7 @@ impl PlotCache {
         let place = |t: f64| points.partition_point(|point| point.t < t);
         self.loops.clear();
         for (i, (start, cycle)) in starts.iter().enumerate() {
-            let end = starts
-                .get(i + 1)
-                .map_or(points.len(), |(end, _)| place(*end));
+            let end = starts.get(i + 1).map_or(points.len(), |(end, _)| place(*end));
             let own = &points[place(*start).min(end)..end];
             let mut series = Series::default();
             if starts.len() - i <= LOOPS_MAX {
@@ -212,9 +195,7 @@ impl PlotCache {
             return Some("too many gaps to draw; the session holds everything".into());
         }
         if self.loops.len() > LOOPS_MAX {
-            return Some(format!(
-                "over depth the newest {LOOPS_MAX} cycles are drawn"
-            ));
+            return Some(format!("over depth the newest {LOOPS_MAX} cycles are drawn"));
         }
         (self.samples_per_bucket > 1)
             .then(|| format!("thinned to min/max of {} samples", self.samples_per_bucket))
@@ -232,14 +213,11 @@ pub(super) struct PhaseSpan {
 /// Phases as stretches; the last one reaches until now.
 pub(super) fn phase_spans(run: &RunView) -> impl Iterator<Item = PhaseSpan> {
     let now = run.now.seconds().0;
-    run.phases
-        .iter()
-        .enumerate()
-        .map(move |(i, (start, phase))| PhaseSpan {
-            phase: *phase,
-            start: *start,
-            end: run.phases.get(i + 1).map_or(now, |(end, _)| *end),
-        })
+    run.phases.iter().enumerate().map(move |(i, (start, phase))| PhaseSpan {
+        phase: *phase,
+        start: *start,
+        end: run.phases.get(i + 1).map_or(now, |(end, _)| *end),
+    })
 }
 
 #[cfg(test)]
@@ -266,12 +244,7 @@ mod tests {
         assert_eq!(series.lengths(), [2, 2]);
         series.set(&trace, |point| [point.depth, point.force]);
         assert_eq!(series.lengths(), [1, 2]);
-        assert!(
-            series
-                .points
-                .iter()
-                .all(|point| point.x.is_finite() && point.y.is_finite())
-        );
+        assert!(series.points.iter().all(|point| point.x.is_finite() && point.y.is_finite()));
         assert_eq!(series.lines("force").count(), 2);
     }
 
@@ -296,10 +269,7 @@ mod tests {
         let thesis = Calibration::thesis();
         let mut cache = PlotCache::for_calibration(&thesis);
         cache.convert(&Arc::new(trace.clone()), &[]);
-        let sigma = ForceUncertainty::of(&thesis)
-            .unwrap()
-            .sigma(Newtons(4.0))
-            .unwrap();
+        let sigma = ForceUncertainty::of(&thesis).unwrap().sigma(Newtons(4.0)).unwrap();
         let [x, low, high] = &cache.force_time.band;
         assert_eq!((x.len(), x[4]), (10, 4.0));
         assert!((high[4] - low[4] - 4.0 * sigma.0).abs() < 1e-12);
@@ -322,20 +292,13 @@ mod tests {
         }
         let mut cache = PlotCache::default();
         cache.convert(&Arc::new(trace), &[(0.0, 1), (10.0, 2), (20.0, 3)]);
-        let peaks: Vec<f64> = cache
-            .loops()
-            .iter()
-            .map(|one| one.peak.unwrap().force)
-            .collect();
+        let peaks: Vec<f64> = cache.loops().iter().map(|one| one.peak.unwrap().force).collect();
         assert_eq!(peaks, [9.0, 8.9, 8.8]);
         assert!(cache.loops().iter().all(|one| one.series.lengths() == [10]));
         let starts: Vec<(f64, u32)> = (0..30).map(|i| (f64::from(i), i + 1)).collect();
         let trace = cache.trace.clone().unwrap();
         cache.convert(&trace, &starts);
-        assert_eq!(
-            (cache.loops().len(), cache.drawn_loops().len()),
-            (30, LOOPS_MAX)
-        );
+        assert_eq!((cache.loops().len(), cache.drawn_loops().len()), (30, LOOPS_MAX));
         assert!(cache.remark().unwrap().contains("newest 24"));
     }
 
@@ -350,12 +313,7 @@ mod tests {
             trace.push(Seconds(f64::from(i)), Depth(0.0), Newtons(1.0));
         }
         cache.convert(&Arc::new(trace), &[]);
-        assert!(
-            cache
-                .remark()
-                .unwrap()
-                .starts_with("thinned to min/max of ")
-        );
+        assert!(cache.remark().unwrap().starts_with("thinned to min/max of "));
         assert_eq!(cache.conversions, 2);
     }
 }

@@ -19,12 +19,8 @@ pub fn residual_ui(ui: &mut Ui, exact: &ExactFit, shown: RangeInclusive<f64>) {
         .auto_bounds(Vec2b::new(false, true));
     plot.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(shown);
-        plot_ui.hline(
-            HLine::new("zero", 0.0)
-                .color(tokens.text_quiet)
-                .width(1.0)
-                .allow_hover(false),
-        );
+        plot_ui
+            .hline(HLine::new("zero", 0.0).color(tokens.text_quiet).width(1.0).allow_hover(false));
         plot_ui.line(
             Line::new("residual", PlotPoints::Borrowed(&exact.residual))
                 .color(tokens.series)

@@ -128,21 +128,14 @@ mod tests {
         let mut track = Track::default();
         track.push(Arc::new(Segment::new(times, &[values.collect()])));
         let mut stretches = Stretches::default();
-        let mut wanted = Wanted {
-            window: [-1.0, 4.0],
-            pixels: 100.0,
-            shift: 1.0,
-            version: 1,
-        };
+        let mut wanted = Wanted { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
         for _ in 0..3 {
             stretches.update(&track, 0, wanted);
         }
         assert_eq!((stretches.found, stretches.y()), (1, Some([1.0, 9.0])));
         assert!(stretches.drawn().points <= 202 && stretches.drawn().samples_per_column == 64);
-        let ends: Vec<[f64; 2]> = stretches
-            .pieces()
-            .map(|piece| [piece[0].x, piece[piece.len() - 1].x])
-            .collect();
+        let ends: Vec<[f64; 2]> =
+            stretches.pieces().map(|piece| [piece[0].x, piece[piece.len() - 1].x]).collect();
         assert_eq!(ends.len(), 2);
         // The first and the last sample, on the axis that begins where it was told to.
         assert_eq!((ends[0][0], ends[1][1]), (-1.0, 4999.0 * 1e-3 - 1.0));

@@ -77,11 +77,7 @@ pub(crate) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     (first..=last)
         .map(|i| GridMark {
             value: i as f64 * minor,
-            step_size: if i % MINOR_PER_MAJOR as i64 == 0 {
-                major
-            } else {
-                minor
-            },
+            step_size: if i % MINOR_PER_MAJOR as i64 == 0 { major } else { minor },
         })
         .collect()
 }
@@ -98,25 +94,16 @@ mod tests {
 
     #[test]
     fn steps_are_round_and_never_too_small() {
-        for (least, step) in [
-            (17.8, 20.0),
-            (0.1, 0.1),
-            (3.4, 5.0),
-            (6.0, 10.0),
-            (1e-5, 1e-5),
-        ] {
+        for (least, step) in [(17.8, 20.0), (0.1, 0.1), (3.4, 5.0), (6.0, 10.0), (1e-5, 1e-5)] {
             assert!((round_up(least) / step - 1.0).abs() < 1e-9, "{least}");
         }
     }
 
     #[test]
     fn labels_show_the_decimals_of_their_step() {
-        for (value, step_size, text) in [
-            (-0.5, 0.5, "-0.5"),
-            (20.0, 10.0, "20"),
-            (0.04, 0.02, "0.04"),
-            (1e4, 5e3, "10000"),
-        ] {
+        for (value, step_size, text) in
+            [(-0.5, 0.5, "-0.5"), (20.0, 10.0, "20"), (0.04, 0.02, "0.04"), (1e4, 5e3, "10000")]
+        {
             assert_eq!(mark_text(GridMark { value, step_size }), text);
         }
     }
@@ -124,10 +111,7 @@ mod tests {
     #[test]
     fn a_run_is_labelled_at_round_seconds() {
         let marks = |low: f64, high: f64| {
-            let input = GridInput {
-                bounds: (low, high),
-                base_step_size: 1.0,
-            };
+            let input = GridInput { bounds: (low, high), base_step_size: 1.0 };
             round_marks(input, STEPS_ACROSS)
         };
         let labelled: Vec<f64> = marks(-1.6, 158.0)

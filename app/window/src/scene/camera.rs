@@ -230,11 +230,9 @@ mod tests {
         camera.orbit(2.0, -0.2);
         camera.zoom(1.4);
         let lens = camera.lens(picture());
-        for (at, z) in [
-            (pos2(100.0, 200.0), 0.0),
-            (pos2(300.0, 150.0), -4.0),
-            (pos2(210.0, 300.0), 2.0),
-        ] {
+        for (at, z) in
+            [(pos2(100.0, 200.0), 0.0), (pos2(300.0, 150.0), -4.0), (pos2(210.0, 300.0), 2.0)]
+        {
             let [x, y] = lens.pick(at, z).unwrap();
             assert!(lens.see([x, y, z]).unwrap().at.distance(at) < 1e-2);
         }

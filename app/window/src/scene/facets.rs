@@ -87,21 +87,13 @@ impl Lattice {
         let seen = (side_points / CELL_POINTS).max(8.0) as usize;
         let tool = tool.unwrap_or_default();
         let pick = |count, keep: u16| drawn(count, most.min(seen), usize::from(keep));
-        Self {
-            columns: pick(grid.columns(), tool.column),
-            rows: pick(grid.rows(), tool.row),
-        }
+        Self { columns: pick(grid.columns(), tool.column), rows: pick(grid.rows(), tool.row) }
     }
 
     fn nodes(&self) -> impl Iterator<Item = Node> {
-        let node = |row: usize, column: usize| Node {
-            column: column as u16,
-            row: row as u16,
-        };
+        let node = |row: usize, column: usize| Node { column: column as u16, row: row as u16 };
         let columns = &self.columns;
-        self.rows
-            .iter()
-            .flat_map(move |&row| columns.iter().map(move |&column| node(row, column)))
+        self.rows.iter().flat_map(move |&row| columns.iter().map(move |&column| node(row, column)))
     }
 }
 
@@ -138,10 +130,7 @@ pub fn facets(
         seen.push(one);
     }
     let place = |nodes: &[usize]| -> Vec<f64> {
-        nodes
-            .iter()
-            .map(|&node| node as f64 * grid.spacing())
-            .collect()
+        nodes.iter().map(|&node| node as f64 * grid.spacing()).collect()
     };
     let [eye_x, eye_y, _] = lens.eye();
     let columns = far_to_near(&place(&lattice.columns), eye_x);
@@ -164,11 +153,7 @@ pub fn facets(
             }
         }
     }
-    Facets {
-        mesh,
-        every: (grid.columns() - 1).div_ceil(lattice.columns.len() - 1),
-        deepest,
-    }
+    Facets { mesh, every: (grid.columns() - 1).div_ceil(lattice.columns.len() - 1), deepest }
 }
 
 /// A thin line as two triangles, so that cells drawn later hide it.
@@ -176,11 +161,7 @@ fn line(mesh: &mut Mesh, [from, to]: [Pos2; 2], ink: Color32) {
     let aside = (to - from).normalized().rot90() * LINE;
     let first = mesh.vertices.len() as u32;
     for pos in [from - aside, from + aside, to + aside, to - aside] {
-        mesh.vertices.push(Vertex {
-            pos,
-            uv: WHITE_UV,
-            color: ink,
-        });
+        mesh.vertices.push(Vertex { pos, uv: WHITE_UV, color: ink });
     }
     let add = [0, 1, 2, 0, 2, 3].map(|step| first + step);
     mesh.indices.extend(add);
@@ -196,10 +177,7 @@ mod tests {
         Rect::from_min_max(pos2(0.0, 0.0), pos2(800.0, 600.0))
     }
 
-    const LOOK: Look = Look {
-        deepest: 5.0,
-        lines: None,
-    };
+    const LOOK: Look = Look { deepest: 5.0, lines: None };
 
     #[test]
     fn colours_end_at_a_round_depth() {
@@ -260,10 +238,7 @@ mod tests {
             let far = |cell: usize| (cell as f64 + 0.5 - eye).abs();
             for (place, &cell) in order.iter().enumerate() {
                 for &later in &order[place + 1..] {
-                    assert!(
-                        side(later) != side(cell) || far(later) < far(cell),
-                        "{eye} {order:?}"
-                    );
+                    assert!(side(later) != side(cell) || far(later) < far(cell), "{eye} {order:?}");
                 }
             }
         }
@@ -295,12 +270,8 @@ mod tests {
             });
             turns.iter().all(|&turn| turn >= 0.0) || turns.iter().all(|&turn| turn <= 0.0)
         };
-        let covering: Vec<&[u32]> = drawn
-            .mesh
-            .indices
-            .chunks(3)
-            .filter(|triangle| covers(triangle))
-            .collect();
+        let covering: Vec<&[u32]> =
+            drawn.mesh.indices.chunks(3).filter(|triangle| covers(triangle)).collect();
         assert!(covering.len() > 1, "the wall hides something there");
         let rows = |triangle: &[u32]| triangle.iter().map(|one| one / 21).max();
         assert_eq!(rows(covering[covering.len() - 1]), Some(10));
@@ -312,10 +283,7 @@ mod tests {
         let grid = Grid::new(1001, 1001, 0.1).unwrap();
         let rest = vec![0.0; grid.nodes()];
         let mut heights = rest.clone();
-        let tool = Node {
-            column: 333,
-            row: 501,
-        };
+        let tool = Node { column: 333, row: 501 };
         heights[grid.index(tool)] = -3.0;
         let now = Heights::new(grid, &heights).unwrap();
         let lens = Camera::of(grid.extent()).lens(picture());
@@ -323,10 +291,7 @@ mod tests {
         assert!(drawn.every > 1);
         assert!(drawn.mesh.vertices.len() <= (CELLS_MAX + 3).pow(2));
         assert!((drawn.deepest - 3.0).abs() < 1e-12);
-        let lines = Look {
-            lines: Some(Color32::BLACK),
-            ..LOOK
-        };
+        let lines = Look { lines: Some(Color32::BLACK), ..LOOK };
         let lined = facets(now, &rest, &lens, lines, 800.0, Some(tool));
         assert!(lined.every > drawn.every);
         assert!(lined.mesh.indices.len() <= (CELLS_MAX / 2 + 2).pow(2) * 30);

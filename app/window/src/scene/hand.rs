@@ -23,10 +23,7 @@ impl Hand {
     /// Above the middle of a surface of these lengths in mm.
     #[must_use]
     pub fn above(extent: [f64; 2]) -> Self {
-        Self {
-            at: [extent[0] / 2.0, extent[1] / 2.0, ABOVE],
-            extent,
-        }
+        Self { at: [extent[0] / 2.0, extent[1] / 2.0, ABOVE], extent }
     }
 
     /// Where, in mm.

@@ -98,12 +98,7 @@ impl SceneView {
             self.paint(&painter, ui, rect, shown);
             if response.has_focus() {
                 let focus = Stroke::new(1.5, Tokens::of(ui.visuals().dark_mode).focus);
-                painter.rect_stroke(
-                    rect.shrink(1.0),
-                    2.0,
-                    focus,
-                    eframe::egui::StrokeKind::Inside,
-                );
+                painter.rect_stroke(rect.shrink(1.0), 2.0, focus, eframe::egui::StrokeKind::Inside);
             }
         }
         response
@@ -117,8 +112,7 @@ impl SceneView {
         let turns = [PointerButton::Secondary, PointerButton::Middle];
         if turns.iter().any(|&button| response.dragged_by(button)) {
             let by = response.drag_delta();
-            self.camera
-                .orbit(-ORBIT[0] * f64::from(by.x), ORBIT[0] * f64::from(by.y));
+            self.camera.orbit(-ORBIT[0] * f64::from(by.x), ORBIT[0] * f64::from(by.y));
         }
         let pointer = response.hover_pos().or(response.interact_pointer_pos());
         // A pointer that rests leaves the hand to the keys.
@@ -156,12 +150,11 @@ impl SceneView {
         ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
         let pressed: Vec<(Key, bool)> = ui.input(|input| {
             let keys = input.events.iter().filter_map(|event| match event {
-                Event::Key {
-                    key,
-                    pressed: true,
-                    modifiers,
-                    ..
-                } if !modifiers.command && !modifiers.alt => Some((*key, modifiers.shift)),
+                Event::Key { key, pressed: true, modifiers, .. }
+                    if !modifiers.command && !modifiers.alt =>
+                {
+                    Some((*key, modifiers.shift))
+                }
                 _ => None,
             });
             keys.collect()
@@ -190,9 +183,7 @@ impl SceneView {
         let look = Look {
             deepest: colour_depth(self.deepest),
             // White in both themes: the colours before which they stand are the same.
-            lines: self
-                .has_lines
-                .then_some(tokens.on_alarm.gamma_multiply(0.5)),
+            lines: self.has_lines.then_some(tokens.on_alarm.gamma_multiply(0.5)),
         };
         let [x, y, _] = shown.contact.unwrap_or(shown.device);
         let tool = shown.now.grid().nearest(x, y);
@@ -203,12 +194,7 @@ impl SceneView {
         stylus_shape(painter, &lens, shown, size, tokens);
         if let Some(seen) = shown.contact.and_then(|contact| lens.see(contact)) {
             let radius = (CONTACT * size * lens.points_per_mm(seen.distance)) as f32;
-            painter.circle(
-                seen.at,
-                radius.max(3.0),
-                tokens.canvas,
-                Stroke::new(1.5, tokens.text),
-            );
+            painter.circle(seen.at, radius.max(3.0), tokens.canvas, Stroke::new(1.5, tokens.text));
         }
         force_shape(painter, &lens, shown, size, tokens, &font);
         bar_shape(painter, rect, look.deepest, tokens, &font);
@@ -237,20 +223,11 @@ fn stylus_shape(painter: &Painter, lens: &Lens, shown: &Shown, size: f64, tokens
         top.at - aside * wide,
     ];
     let edge = Stroke::new(1.0, tokens.canvas);
-    painter.add(Shape::convex_polygon(
-        corners.to_vec(),
-        tokens.active_fill,
-        edge,
-    ));
+    painter.add(Shape::convex_polygon(corners.to_vec(), tokens.active_fill, edge));
     painter.circle(top.at, wide, tokens.active_fill, edge);
     let middle = along(shown.device, length, 0.6 * STYLUS * size);
     if let Some(seen) = lens.see(along(middle, button, 0.012 * size)) {
-        painter.circle(
-            seen.at,
-            thick(0.005, seen.distance),
-            tokens.canvas,
-            Stroke::NONE,
-        );
+        painter.circle(seen.at, thick(0.005, seen.distance), tokens.canvas, Stroke::NONE);
     }
 }
 
@@ -314,11 +291,7 @@ fn bar_shape(painter: &Painter, rect: Rect, deepest: f64, tokens: &Tokens, font:
     );
     for share in [0.0_f32, 0.5, 1.0] {
         let at = pos2(top.x + wide + 6.0, top.y + share * high);
-        text(
-            at,
-            Align2::LEFT_CENTER,
-            format!("{}", f64::from(share) * deepest),
-        );
+        text(at, Align2::LEFT_CENTER, format!("{}", f64::from(share) * deepest));
     }
 }
 
@@ -363,22 +336,11 @@ mod tests {
     }
 
     fn button(pos: Pos2, button: PointerButton, pressed: bool) -> Event {
-        Event::PointerButton {
-            pos,
-            button,
-            pressed,
-            modifiers: Modifiers::NONE,
-        }
+        Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE }
     }
 
     fn key(key: Key, modifiers: Modifiers) -> Event {
-        Event::Key {
-            key,
-            physical_key: None,
-            pressed: true,
-            repeat: false,
-            modifiers,
-        }
+        Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }
     }
 
     #[test]
@@ -391,22 +353,12 @@ mod tests {
         let picked = view.camera.lens(rect).pick(at, 0.0).unwrap();
         assert!((view.hand().at()[0] - picked[0]).abs() < 1e-9);
         let before = view.camera;
-        frame(
-            &ctx,
-            &mut view,
-            0.2,
-            vec![button(at, PointerButton::Primary, true)],
-        );
+        frame(&ctx, &mut view, 0.2, vec![button(at, PointerButton::Primary, true)]);
         for step in 3..8 {
             frame(&ctx, &mut view, f64::from(step) * 0.1, Vec::new());
         }
         assert!(view.hand().at()[2] < -0.2, "{:?}", view.hand());
-        frame(
-            &ctx,
-            &mut view,
-            0.8,
-            vec![button(at, PointerButton::Primary, false)],
-        );
+        frame(&ctx, &mut view, 0.8, vec![button(at, PointerButton::Primary, false)]);
         assert!(view.hand().at()[2] > 0.0, "{:?}", view.hand());
         assert_eq!(view.camera, before);
     }
@@ -416,21 +368,11 @@ mod tests {
         let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
         let at = pos2(420.0, 330.0);
         frame(&ctx, &mut view, 0.0, vec![Event::PointerMoved(at)]);
-        frame(
-            &ctx,
-            &mut view,
-            0.1,
-            vec![button(at, PointerButton::Secondary, true)],
-        );
+        frame(&ctx, &mut view, 0.1, vec![button(at, PointerButton::Secondary, true)]);
         let before = view.camera;
         let to = at + vec2(90.0, 0.0);
         frame(&ctx, &mut view, 0.2, vec![Event::PointerMoved(to)]);
-        frame(
-            &ctx,
-            &mut view,
-            0.3,
-            vec![button(to, PointerButton::Secondary, false)],
-        );
+        frame(&ctx, &mut view, 0.3, vec![button(to, PointerButton::Secondary, false)]);
         assert_ne!(view.camera, before);
         assert!(view.hand().at()[2] > 0.0);
     }
@@ -447,20 +389,10 @@ mod tests {
         frame(&ctx, &mut view, 0.2, down());
         assert!(view.hand().at()[2] < start.at()[2]);
         let camera = view.camera;
-        frame(
-            &ctx,
-            &mut view,
-            0.3,
-            vec![key(Key::ArrowLeft, Modifiers::NONE)],
-        );
+        frame(&ctx, &mut view, 0.3, vec![key(Key::ArrowLeft, Modifiers::NONE)]);
         assert_eq!(view.camera, camera);
         assert_ne!(view.hand().at()[0], start.at()[0]);
-        let response = frame(
-            &ctx,
-            &mut view,
-            0.4,
-            vec![key(Key::ArrowUp, Modifiers::SHIFT)],
-        );
+        let response = frame(&ctx, &mut view, 0.4, vec![key(Key::ArrowUp, Modifiers::SHIFT)]);
         assert_ne!(view.camera, camera);
         assert!(response.has_focus(), "arrows stay in the picture");
         frame(&ctx, &mut view, 0.5, vec![key(Key::Plus, Modifiers::NONE)]);

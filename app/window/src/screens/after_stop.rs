@@ -30,10 +30,7 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
 fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     let button = |text: &'static str| Button::new(text).min_size(vec2(112.0, 28.0));
     ui.horizontal(|ui| {
-        if ui
-            .add_enabled(run.can_retract.is_ok(), button("Retract  F8"))
-            .clicked()
-        {
+        if ui.add_enabled(run.can_retract.is_ok(), button("Retract  F8")).clicked() {
             commands.push(Command::Retract);
         }
         if ui.add(button("Close session")).clicked() {
@@ -48,11 +45,7 @@ fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
 
 fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink = if is_planned(outcome.ending) {
-        tokens.text
-    } else {
-        tokens.alarm_text
-    };
+    let ink = if is_planned(outcome.ending) { tokens.text } else { tokens.alarm_text };
     let text = format!("{}: {}", outcome.ending, outcome.reason);
     ui.add(Label::new(RichText::new(text).color(ink)).wrap());
 }

@@ -24,24 +24,15 @@ impl Approach {
         self.update(&run.approach);
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.label(
-            RichText::new("Force over position while the surface is searched")
-                .heading()
-                .strong(),
+            RichText::new("Force over position while the surface is searched").heading().strong(),
         );
         for line in words(run) {
             ui.label(line);
         }
-        let touches: Vec<[f64; 2]> = run
-            .touches
-            .iter()
-            .map(|touch| [touch.position.0, touch.force.0])
-            .collect();
+        let touches: Vec<[f64; 2]> =
+            run.touches.iter().map(|touch| [touch.position.0, touch.force.0]).collect();
         let from = touches.iter().map(|touch| touch[0]).reduce(f64::min);
-        let end = self
-            .points
-            .iter()
-            .map(|point| point.x)
-            .fold(f64::NEG_INFINITY, f64::max);
+        let end = self.points.iter().map(|point| point.x).fold(f64::NEG_INFINITY, f64::max);
         quiet(ui, Plot::new("approach"), tokens)
             .x_axis_label("position from home (mm)")
             .y_axis_label("force above tare (N)")
@@ -64,20 +55,14 @@ impl Approach {
                 );
                 if let Some(contact) = run.contact {
                     plot_ui.vline(
-                        VLine::new("contact", contact.position.0)
-                            .color(tokens.limit)
-                            .width(1.5),
+                        VLine::new("contact", contact.position.0).color(tokens.limit).width(1.5),
                     );
                 }
             });
     }
 
     fn update(&mut self, trace: &Arc<LiveTrace>) {
-        if self
-            .trace
-            .as_ref()
-            .is_some_and(|old| Arc::ptr_eq(old, trace))
-        {
+        if self.trace.as_ref().is_some_and(|old| Arc::ptr_eq(old, trace)) {
             return;
         }
         self.points = trace
@@ -96,10 +81,7 @@ fn words(run: &RunView) -> Vec<String> {
         .touches
         .iter()
         .map(|touch| {
-            format!(
-                "pass {} felt {:.3} at {:.3}",
-                touch.pass, touch.force, touch.position
-            )
+            format!("pass {} felt {:.3} at {:.3}", touch.pass, touch.force, touch.position)
         })
         .collect();
     words.push(match run.contact {

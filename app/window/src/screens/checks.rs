@@ -92,11 +92,7 @@ impl Screen for ChecksScreen {
             None => return quiet_ui(ui, "reading the library"),
         };
         if checks.is_empty() {
-            ui.label(
-                RichText::new("No daily check of this rig yet")
-                    .heading()
-                    .strong(),
-            );
+            ui.label(RichText::new("No daily check of this rig yet").heading().strong());
             let words = format!(
                 "Run '{HOW}' once a day before the first specimen; then how far zero and weight drift stands here."
             );
@@ -176,9 +172,7 @@ fn days(check: &PastCheck) -> f64 {
 
 /// A moment by this computer's calendar.
 fn time_text(at: DateTime<Utc>) -> String {
-    at.with_timezone(&Local)
-        .format("%Y-%m-%d %H:%M")
-        .to_string()
+    at.with_timezone(&Local).format("%Y-%m-%d %H:%M").to_string()
 }
 
 /// The day of a place on the time axis.
@@ -190,10 +184,8 @@ fn day_text(days: f64) -> String {
 /// Draws how far one reading of each check was off, between what was allowed.
 fn deviations_ui(ui: &mut Ui, head: &'static str, checks: &[PastCheck], measured: Measured) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let known: Vec<(f64, Deviation)> = checks
-        .iter()
-        .filter_map(|one| Some((days(one), measured(one)?)))
-        .collect();
+    let known: Vec<(f64, Deviation)> =
+        checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
     let line = |of: fn(&Deviation) -> f64| -> PlotPoints<'_> {
         known.iter().map(|(at, one)| [*at, of(one)]).collect()
     };
@@ -212,10 +204,9 @@ fn deviations_ui(ui: &mut Ui, head: &'static str, checks: &[PastCheck], measured
         _ => plot,
     };
     plot.show(ui, |plot_ui| {
-        for (name, points) in [
-            ("allowed", line(|one| one.limit)),
-            ("allowed below", line(|one| -one.limit)),
-        ] {
+        for (name, points) in
+            [("allowed", line(|one| one.limit)), ("allowed below", line(|one| -one.limit))]
+        {
             let limit = Line::new(name, points).color(tokens.limit);
             plot_ui.line(limit.style(LineStyle::dashed_dense()).width(1.5));
         }
@@ -224,9 +215,8 @@ fn deviations_ui(ui: &mut Ui, head: &'static str, checks: &[PastCheck], measured
             ("within", true, MarkerShape::Circle, tokens.series),
             ("beyond", false, MarkerShape::Cross, tokens.alarm_text),
         ] {
-            let points = known
-                .iter()
-                .filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
+            let points =
+                known.iter().filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
             let points: PlotPoints<'_> = points.map(|(at, one)| [*at, one.newtons]).collect();
             let points = Points::new(name, points).shape(shape);
             plot_ui.points(points.radius(4.0).color(ink));

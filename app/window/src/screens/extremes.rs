@@ -24,10 +24,8 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 };
 
 /// How much is run, in words.
-const EXTENTS: [(Extent, &str); 2] = [
-    (Extent::Quick, "corners: seconds"),
-    (Extent::Whole, "everything: minutes"),
-];
+const EXTENTS: [(Extent, &str); 2] =
+    [(Extent::Quick, "corners: seconds"), (Extent::Whole, "everything: minutes")];
 
 /// What was found.
 pub struct Found {
@@ -47,12 +45,7 @@ pub struct ExtremesScreen {
 
 impl Default for ExtremesScreen {
     fn default() -> Self {
-        Self {
-            extent: Extent::Quick,
-            group: None,
-            verdict: None,
-            task: Task::default(),
-        }
+        Self { extent: Extent::Quick, group: None, verdict: None, task: Task::default() }
     }
 }
 
@@ -80,14 +73,11 @@ impl Screen for ExtremesScreen {
         if let Some(Ok(found)) = self.task.answer() {
             section_ui(ui, "Shown");
             let groups = found.groups.iter().map(|one| (Some(one.group), one.group));
-            let groups: Vec<_> = std::iter::once((None, "all groups"))
-                .chain(groups)
-                .collect();
+            let groups: Vec<_> = std::iter::once((None, "all groups")).chain(groups).collect();
             choice_ui(ui, "group", &mut self.group, &groups);
             let verdicts = VERDICTS.iter().map(|one| (Some(*one), one.word()));
-            let verdicts: Vec<_> = std::iter::once((None, "all verdicts"))
-                .chain(verdicts)
-                .collect();
+            let verdicts: Vec<_> =
+                std::iter::once((None, "all verdicts")).chain(verdicts).collect();
             choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
         }
     }
@@ -134,10 +124,7 @@ impl Screen for ExtremesScreen {
         };
         let wrong: usize = found.groups.iter().map(|one| one.counts[3]).sum();
         let (text, ink) = match wrong {
-            0 => (
-                "every case is right or refused with its reason".to_owned(),
-                tokens.text,
-            ),
+            0 => ("every case is right or refused with its reason".to_owned(), tokens.text),
             1 => ("1 case is wrong".to_owned(), tokens.alarm_text),
             many => (format!("{many} cases are wrong"), tokens.alarm_text),
         };
@@ -168,10 +155,7 @@ impl Screen for ExtremesScreen {
         self.task.start("extremes", ctx, move |progress| {
             let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
             let rows = rows.ok_or("ended before it was done")?;
-            Ok(Found {
-                groups: summary(&rows),
-                rows,
-            })
+            Ok(Found { groups: summary(&rows), rows })
         });
     }
 
@@ -190,8 +174,7 @@ fn table_row(row: &Row) -> TableRow {
             row.subject.clone(),
             row.case.clone(),
             row.verdict.word().to_owned(),
-            row.relative_error
-                .map_or_else(|| "-".to_owned(), |error| format!("{error:.1e}")),
+            row.relative_error.map_or_else(|| "-".to_owned(), |error| format!("{error:.1e}")),
             format!("{:.0e}", row.tolerance),
             row.group.to_owned(),
         ],

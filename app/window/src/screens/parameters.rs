@@ -53,11 +53,8 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
 
 /// What the numbers are worth, and what their errors leave out.
 fn worth(live: &LiveEstimate) -> [String; 2] {
-    let residual = format!(
-        "weighted residual {:.1} mN, {} samples",
-        live.rmse_weighted_n * 1e3,
-        live.samples
-    );
+    let residual =
+        format!("weighted residual {:.1} mN, {} samples", live.rmse_weighted_n * 1e3, live.samples);
     let alone = "± is statistical; the exact fit adds the calibration's".to_owned();
     [residual, alone]
 }
@@ -73,10 +70,7 @@ pub(super) fn tight(ui: &mut Ui, rows: impl FnOnce(&mut Ui)) {
 
 /// What the live fit says of a parameter that it cannot identify yet.
 fn reason<'a>(live: &'a LiveEstimate, name: &str) -> Option<&'a str> {
-    let verdict = live
-        .verdicts
-        .iter()
-        .find(|verdict| verdict.parameter == name)?;
+    let verdict = live.verdicts.iter().find(|verdict| verdict.parameter == name)?;
     verdict.reason.as_deref()
 }
 
@@ -94,11 +88,7 @@ fn row_ui(
         });
         cell(ui, 166.0, |ui| {
             let text = value_text(parameter);
-            let ink = if is_known(parameter) {
-                tokens.text
-            } else {
-                tokens.text_quiet
-            };
+            let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
             let label = ui.label(RichText::new(text).monospace().color(ink));
             if let Some(reason) = reason {
                 label.on_hover_text(reason);
@@ -188,10 +178,7 @@ mod tests {
     fn what_is_not_identified_is_never_shown_as_a_number() {
         assert_eq!(value_text(None), "not yet");
         assert_eq!(value_text(Some(&parameter("mu1", None))), "not yet");
-        assert_eq!(
-            value_text(Some(&parameter("mu1", Some(0.1)))),
-            "1.50 ± 0.10"
-        );
+        assert_eq!(value_text(Some(&parameter("mu1", Some(0.1)))), "1.50 ± 0.10");
     }
 
     #[test]
@@ -211,16 +198,11 @@ mod tests {
     fn the_remark_names_what_is_missing_and_why() {
         let early = remark(Phase::Contact, &[]).unwrap();
         assert!(early.contains("none known") && early.contains("not indented"));
-        let mut known: Vec<Parameter> = SHOWN
-            .iter()
-            .map(|(name, _)| parameter(name, Some(0.1)))
-            .collect();
+        let mut known: Vec<Parameter> =
+            SHOWN.iter().map(|(name, _)| parameter(name, Some(0.1))).collect();
         assert_eq!(remark(Phase::Hold, &known), None);
         known[4].std_error = None;
         let text = remark(Phase::Ramp, &known).unwrap();
-        assert!(
-            text.contains("tau_sig not yet") && text.contains("ramp"),
-            "{text}"
-        );
+        assert!(text.contains("tau_sig not yet") && text.contains("ramp"), "{text}");
     }
 }

@@ -28,20 +28,15 @@ pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     }
     let warnings = checked.warnings.iter().map(ToString::to_string);
     for note in warnings.chain(preview.notes.iter().cloned()) {
-        ui.label(
-            RichText::new(format!("Note: {note}"))
-                .color(tokens.text_quiet)
-                .small(),
-        );
+        ui.label(RichText::new(format!("Note: {note}")).color(tokens.text_quiet).small());
     }
 }
 
 /// Draws what the preview asks to acknowledge, with the box to tick; nothing if it asks nothing.
 pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let warnings = form.checked().map_or(Vec::new(), |checked| {
-        checked.preview.acknowledgements.clone()
-    });
+    let warnings =
+        form.checked().map_or(Vec::new(), |checked| checked.preview.acknowledgements.clone());
     if warnings.is_empty() {
         return;
     }
@@ -58,23 +53,12 @@ fn numbers_ui(ui: &mut Ui, preview: &Preview) {
     fact_ui(
         ui,
         "duration",
-        format!(
-            "{} expected, {} at most",
-            clock(preview.expected.0),
-            clock(preview.longest.0)
-        ),
+        format!("{} expected, {} at most", clock(preview.expected.0), clock(preview.longest.0)),
     );
     fact_ui(
         ui,
         "peak force",
-        format!(
-            "{:.1} to {:.1} expected",
-            preview.force_band[0], preview.force_band[1]
-        ),
+        format!("{:.1} to {:.1} expected", preview.force_band[0], preview.force_band[1]),
     );
-    fact_ui(
-        ui,
-        "storage",
-        format!("up to {:.1} MB", preview.storage_bytes as f64 * 1e-6),
-    );
+    fact_ui(ui, "storage", format!("up to {:.1} MB", preview.storage_bytes as f64 * 1e-6));
 }

@@ -68,11 +68,8 @@ fn head_ui(ui: &mut Ui, form: &ProtocolForm, facts: &ProtocolFacts<'_>, commands
     };
     section_ui(ui, &title);
     if let Ok(protocol) = &form.protocol {
-        let about = RichText::new(&protocol.about)
-            .color(tokens.text_quiet)
-            .small();
-        ui.add(Label::new(about).wrap())
-            .on_hover_text(&protocol.source);
+        let about = RichText::new(&protocol.about).color(tokens.text_quiet).small();
+        ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
     }
     let button = Button::new("Change protocol...");
     if ui.add_enabled(!facts.is_busy, button).clicked() {
@@ -102,11 +99,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
                 input.desired_width(76.0).align(Align2::RIGHT_CENTER)
             };
             let is_left_out = field.parameter.default.what == What::None;
-            let input = if is_left_out {
-                input.hint_text("none")
-            } else {
-                input
-            };
+            let input = if is_left_out { input.hint_text("none") } else { input };
             let input = ui
                 .add(input)
                 .labelled_by(label.id)
@@ -139,13 +132,11 @@ fn more_told_ui(ui: &mut Ui, told: &mut [ToldField]) {
         0 => "More about specimen, probe and series".into(),
         count => format!("More about specimen, probe and series ({count} told)"),
     };
-    CollapsingHeader::new(title)
-        .id_salt("more_told")
-        .show(ui, |ui| {
-            for field in told.iter_mut().filter(|one| !is_shown(one)) {
-                one_told_ui(ui, field);
-            }
-        });
+    CollapsingHeader::new(title).id_salt("more_told").show(ui, |ui| {
+        for field in told.iter_mut().filter(|one| !is_shown(one)) {
+            one_told_ui(ui, field);
+        }
+    });
 }
 
 fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
@@ -157,17 +148,12 @@ fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
             ui.label(field.key.name)
         };
         let width = ui.available_width() - 10.0;
-        let input = TextEdit::singleline(&mut field.text)
-            .desired_width(width)
-            .char_limit(200);
+        let input = TextEdit::singleline(&mut field.text).desired_width(width).char_limit(200);
         let input = match field.is_asked {
             true => input.hint_text("asked for"),
             false => input,
         };
-        ui.add(input)
-            .labelled_by(label.id)
-            .place(field.key.name)
-            .on_hover_text(field.key.meaning);
+        ui.add(input).labelled_by(label.id).place(field.key.name).on_hover_text(field.key.meaning);
     });
     if let Some(reason) = &field.error {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());

@@ -80,9 +80,7 @@ fn refit_ui(ui: &mut Ui, refit: Refit<'_>) {
 
 fn facts_ui(ui: &mut Ui, run: &RunView) {
     let not_yet = || "not yet".to_string();
-    let peak = run
-        .force_peak
-        .map_or_else(not_yet, |peak| format!("{peak:.3}"));
+    let peak = run.force_peak.map_or_else(not_yet, |peak| format!("{peak:.3}"));
     fact_ui(ui, "peak force", peak);
     let contact = run.contact.map_or_else(not_yet, |contact| {
         format!("{:.3} ± {:.3} mm", contact.position.0, contact.std_error_mm)
@@ -96,11 +94,7 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
     });
     fact_ui(ui, "tare", tare);
     fact_ui(ui, "samples", run.samples.to_string());
-    fact_ui(
-        ui,
-        "saved",
-        format!("through {:.1} s", run.saved_through.seconds().0),
-    );
+    fact_ui(ui, "saved", format!("through {:.1} s", run.saved_through.seconds().0));
 }
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
@@ -130,10 +124,8 @@ fn cycles_ui(ui: &mut Ui, loops: &[CycleLoop]) {
 fn steps_ui(ui: &mut Ui, run: &RunView) {
     ui.spacing_mut().item_spacing.y = 2.0;
     let is_running = run.outcome.is_none() && run.holding.is_none();
-    let is_complete = run
-        .outcome
-        .as_ref()
-        .is_some_and(|outcome| outcome.ending == EndingKind::Finish);
+    let is_complete =
+        run.outcome.as_ref().is_some_and(|outcome| outcome.ending == EndingKind::Finish);
     for (i, step) in run.steps.iter().enumerate() {
         let state = StepState::of(i, run.step_index, is_running, is_complete);
         step_ui(ui, step.phase.name(), step.expected.0, state);

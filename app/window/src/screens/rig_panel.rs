@@ -14,12 +14,8 @@ pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Co
     let rig = &snapshot.rig;
     section_ui(ui, &format!("Rig {}", rig.description.name));
     fact_ui(ui, "identity", &rig.description.identity);
-    let settings: Vec<String> = rig
-        .description
-        .settings
-        .iter()
-        .map(|(name, value)| format!("{name} {value}"))
-        .collect();
+    let settings: Vec<String> =
+        rig.description.settings.iter().map(|(name, value)| format!("{name} {value}")).collect();
     if !settings.is_empty() {
         fact_ui(ui, "settings", settings.join(", "));
     }
@@ -43,16 +39,10 @@ fn link_ui(ui: &mut Ui, rig: &RigView) {
 }
 
 fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {
-    let counts = reading
-        .counts
-        .map_or(String::new(), |counts| format!("  ({counts} counts)"));
+    let counts = reading.counts.map_or(String::new(), |counts| format!("  ({counts} counts)"));
     fact_ui(ui, "signal", format!("{:.4}{counts}", reading.volts));
     let position = position_from_pulses(reading.pulses, rig.description.mm_per_pulse);
-    let place = if rig.is_homed {
-        format!("{position:.3} from home")
-    } else {
-        "not homed".into()
-    };
+    let place = if rig.is_homed { format!("{position:.3} from home") } else { "not homed".into() };
     fact_ui(ui, "position", place);
     fact_ui(ui, "counter", format!("{} pulses", reading.pulses));
     fact_ui(ui, "axis", axis_words(reading.status));
@@ -60,15 +50,8 @@ fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {
 
 /// The axis in words.
 fn axis_words(status: AxisStatus) -> String {
-    let motor = if status.has(AxisStatus::MOTOR_ON) {
-        "motor on"
-    } else {
-        "motor off"
-    };
-    let motion = match (
-        status.has(AxisStatus::MOVING),
-        status.has(AxisStatus::STOPPING),
-    ) {
+    let motor = if status.has(AxisStatus::MOTOR_ON) { "motor on" } else { "motor off" };
+    let motion = match (status.has(AxisStatus::MOVING), status.has(AxisStatus::STOPPING)) {
         (true, true) => "braking",
         (true, false) => "moving",
         _ => "at rest",

@@ -123,11 +123,7 @@ impl RunScreen {
         };
         // The chart over time carries the limits and phases, so it gets the larger half.
         let height = (ui.available_height() - 30.0) * 0.56;
-        let below = if exact.is_some() {
-            RESIDUAL_HEIGHT
-        } else {
-            0.0
-        };
+        let below = if exact.is_some() { RESIDUAL_HEIGHT } else { 0.0 };
         let mut shown = 0.0..=1.0;
         ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
             shown = force_time_ui(ui, run, &self.plots, exact, self.time_view, limit);
@@ -180,13 +176,10 @@ impl Screen for RunScreen {
                 start_ui(ui, &mut workbench.form, &facts, commands);
             });
         CentralPanel::no_frame().show(ui, |ui| {
-            ScrollArea::vertical()
-                .id_salt("rig_and_protocol")
-                .auto_shrink(false)
-                .show(ui, |ui| {
-                    protocol_ui(ui, &mut workbench.form, &facts, commands);
-                    rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
-                });
+            ScrollArea::vertical().id_salt("rig_and_protocol").auto_shrink(false).show(ui, |ui| {
+                protocol_ui(ui, &mut workbench.form, &facts, commands);
+                rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
+            });
         });
     }
 
@@ -308,11 +301,7 @@ impl Screen for RunScreen {
             let words = format!("Protocol {name}");
             Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone())
         }));
-        actions.push(Action::new(
-            "Open a protocol file",
-            "",
-            Command::Choose(Ask::Protocol),
-        ));
+        actions.push(Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)));
         actions
     }
 }

@@ -48,11 +48,7 @@ pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mu
             if !is_offered(view, run) {
                 continue;
             }
-            if ui
-                .selectable_label(shown == view, name)
-                .place(name)
-                .clicked()
-            {
+            if ui.selectable_label(shown == view, name).place(name).clicked() {
                 commands.push(Command::View(view));
             }
         }
@@ -123,14 +119,10 @@ impl Chooser {
         let work = move || {
             let text = match read_if_present(&path) {
                 Ok(Some(text)) => Ok(text),
-                Ok(None) => Err(format!(
-                    "there is no file {}; choose another",
-                    path.display()
-                )),
-                Err(err) => Err(format!(
-                    "{} cannot be read ({err}); give a text file",
-                    path.display()
-                )),
+                Ok(None) => Err(format!("there is no file {}; choose another", path.display())),
+                Err(err) => {
+                    Err(format!("{} cannot be read ({err}); give a text file", path.display()))
+                }
             };
             (path, text)
         };
@@ -154,26 +146,23 @@ impl Chooser {
         if facts.is_busy {
             ui.label("A run is in progress; another protocol can be chosen when it has ended.");
         }
-        ScrollArea::vertical()
-            .id_salt("protocols")
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                if facts.is_busy {
-                    ui.disable();
-                }
-                self.file_ui(ui, facts.is_dialog_open, commands);
-                if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
-                    mistakes_ui(ui, file, form);
-                }
-                ui.add_space(8.0);
-                ui.label(RichText::new("Built-in protocols").heading().strong());
-                for protocol in &self.built_in {
-                    let chosen = form.protocol.as_ref().ok();
-                    let is_chosen = form.file.is_none()
-                        && chosen.is_some_and(|chosen| chosen.name == protocol.name);
-                    protocol_ui(ui, protocol, is_chosen, commands);
-                }
-            });
+        ScrollArea::vertical().id_salt("protocols").auto_shrink(false).show(ui, |ui| {
+            if facts.is_busy {
+                ui.disable();
+            }
+            self.file_ui(ui, facts.is_dialog_open, commands);
+            if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
+                mistakes_ui(ui, file, form);
+            }
+            ui.add_space(8.0);
+            ui.label(RichText::new("Built-in protocols").heading().strong());
+            for protocol in &self.built_in {
+                let chosen = form.protocol.as_ref().ok();
+                let is_chosen = form.file.is_none()
+                    && chosen.is_some_and(|chosen| chosen.name == protocol.name);
+                protocol_ui(ui, protocol, is_chosen, commands);
+            }
+        });
     }
 
     fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut Commands) {
@@ -220,8 +209,7 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
         commands.push(Command::TakeProtocol(name));
     }
     let about = RichText::new(&protocol.about).color(tokens.text_quiet);
-    ui.add(Label::new(about).wrap())
-        .on_hover_text(&protocol.source);
+    ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
 }
 
 /// Draws what the plan is expected to do.

@@ -128,10 +128,7 @@ impl Screens {
     #[must_use]
     pub fn open(workbench: &Workbench, name: &str) -> Self {
         let all = SCREENS.iter().map(|one| (one.name, (one.open)(workbench)));
-        let mut screens = Self {
-            all: all.collect(),
-            shown: 0,
-        };
+        let mut screens = Self { all: all.collect(), shown: 0 };
         screens.show(super::run::SCREEN.name);
         screens.show(name);
         screens

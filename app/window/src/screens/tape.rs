@@ -132,10 +132,9 @@ impl TapePanel {
             None => {}
         }
         text_row(ui, "replay", "the folder of a recording", &mut self.from);
-        self.dialog
-            .button_ui(ui, "Choose a recording...", |dialog| {
-                dialog.set_title("Folder of a recording").pick_folder()
-            });
+        self.dialog.button_ui(ui, "Choose a recording...", |dialog| {
+            dialog.set_title("Folder of a recording").pick_folder()
+        });
         let may = match (is_running || self.ending.is_busy(), self.from.trim()) {
             (true, _) => Err("the loop runs".to_owned()),
             (false, "") => Err("name the folder of a recording first".to_owned()),

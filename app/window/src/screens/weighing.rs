@@ -33,21 +33,13 @@ pub fn weighing_ui(
         false => Err("the run does not go on".into()),
     };
     ui.horizontal(|ui| {
-        if reason_button(
-            ui,
-            "Read the last weight again",
-            vec2(190.0, 28.0),
-            &verdict,
-        ) {
+        if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
             commands.push(Command::Wish(Wish::Redo));
         }
     });
     ui.add_space(4.0);
-    let rows: Vec<Row> = run
-        .to_weigh
-        .iter()
-        .map(|planned| row(planned, run, next, &bench.curve))
-        .collect();
+    let rows: Vec<Row> =
+        run.to_weigh.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
     let columns = [
         Column::numbers("pass", 34.0),
         Column::words("masses go", 66.0),
@@ -91,11 +83,7 @@ fn now_ui(
                 expected
             )
         }
-        None => format!(
-            "{} of {} readings taken",
-            run.weighed.len(),
-            run.to_weigh.len()
-        ),
+        None => format!("{} of {} readings taken", run.weighed.len(), run.to_weigh.len()),
     };
     ui.label(RichText::new(place).heading().strong());
     ui.horizontal(|ui| {
@@ -146,10 +134,7 @@ fn steady_words(settling: &SettlingNow) -> String {
 }
 
 fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> Row {
-    let taken = run
-        .weighed
-        .iter()
-        .find(|one| one.step_index == planned.step_index);
+    let taken = run.weighed.iter().find(|one| one.step_index == planned.step_index);
     let is_next = next == Some(planned);
     let expected = curve.volts_from_newtons(newtons_of(planned.mass_g));
     let apart = taken.map(|one| Apart::of(one, curve));
@@ -159,12 +144,8 @@ fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) 
         planned.mass_g.to_string(),
         format!("{:.4}", expected.0),
         taken.map_or_else(String::new, |one| format!("{:.4}", one.volts().0)),
-        apart
-            .as_ref()
-            .map_or_else(String::new, |apart| format!("{:+.1}", apart.mv)),
-        apart
-            .as_ref()
-            .map_or_else(String::new, |apart| format!("{:+.3}", apart.newtons)),
+        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.1}", apart.mv)),
+        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.3}", apart.newtons)),
         match (taken, is_next) {
             (Some(_), _) => "read".into(),
             (None, true) => "now".into(),
@@ -200,27 +181,17 @@ impl Apart {
 
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let words = format!(
-        "Force by the calibration in use ({}) less the weight's",
-        bench.calibration.name
-    );
+    let words =
+        format!("Force by the calibration in use ({}) less the weight's", bench.calibration.name);
     ui.label(RichText::new(words).strong());
-    let heaviest = run
-        .to_weigh
-        .iter()
-        .map(|one| one.mass_g)
-        .fold(0.0, f64::max);
+    let heaviest = run.to_weigh.iter().map(|one| one.mass_g).fold(0.0, f64::max);
     quiet(ui, Plot::new("weighing residuals"), tokens)
         .x_axis_label("weight (N)")
         .y_axis_label("apart (N)")
         .include_x(0.0)
         .include_x(newtons_of(heaviest).0)
         .show(ui, |plot_ui| {
-            plot_ui.hline(
-                HLine::new("none", 0.0)
-                    .color(tokens.line)
-                    .allow_hover(false),
-            );
+            plot_ui.hline(HLine::new("none", 0.0).color(tokens.line).allow_hover(false));
             for (name, direction, shape) in [
                 ("masses go up", Direction::Loading, MarkerShape::Up),
                 ("masses go down", Direction::Unloading, MarkerShape::Down),
@@ -229,12 +200,7 @@ fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
                     .weighed
                     .iter()
                     .filter(|one| one.direction == direction)
-                    .map(|one| {
-                        [
-                            newtons_of(one.mass_g()).0,
-                            Apart::of(one, &bench.curve).newtons,
-                        ]
-                    })
+                    .map(|one| [newtons_of(one.mass_g()).0, Apart::of(one, &bench.curve).newtons])
                     .collect();
                 plot_ui.points(
                     Points::new(name, PlotPoints::from(points))

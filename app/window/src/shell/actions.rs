@@ -64,11 +64,7 @@ impl WorkbenchApp {
             true => Ok(()),
             false => Err("no tour is under way".to_owned()),
         };
-        actions.push(Action::new(
-            "Light or dark screen",
-            "",
-            Command::SwitchTheme,
-        ));
+        actions.push(Action::new("Light or dark screen", "", Command::SwitchTheme));
         for (name, keys, size) in [
             ("Larger text", "Ctrl++", TextSize::Larger),
             ("Smaller text", "Ctrl+-", TextSize::Smaller),

@@ -47,11 +47,7 @@ pub struct Activity {
 
 impl Activity {
     fn new(word: impl Into<String>, shape: Shape, tone: Tone) -> Self {
-        Self {
-            word: word.into(),
-            shape,
-            tone,
-        }
+        Self { word: word.into(), shape, tone }
     }
 }
 

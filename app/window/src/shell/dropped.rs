@@ -11,12 +11,10 @@ use std::path::{Path, PathBuf};
 pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
     let (protocols, others): (Vec<_>, Vec<_>) =
         paths.into_iter().partition(|path| ends(path, "toml"));
-    let (tables, folders): (Vec<_>, Vec<_>) = others
-        .into_iter()
-        .partition(|path| path.is_file() && !ends(path, "mcap"));
-    let (recordings, sessions): (Vec<_>, Vec<_>) = folders
-        .into_iter()
-        .partition(|path| path.join(TICKS).is_file());
+    let (tables, folders): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|path| path.is_file() && !ends(path, "mcap"));
+    let (recordings, sessions): (Vec<_>, Vec<_>) =
+        folders.into_iter().partition(|path| path.join(TICKS).is_file());
     match protocols.into_iter().next() {
         Some(path) if shown == scene::SCREEN.name => {
             commands.push(Command::Chosen(Ask::Scene, path));
@@ -41,9 +39,7 @@ pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
         });
     }
     if !sessions.is_empty() {
-        commands.push(Command::Review(
-            sessions.into_iter().map(session_of).collect(),
-        ));
+        commands.push(Command::Review(sessions.into_iter().map(session_of).collect()));
     }
 }
 
@@ -92,14 +88,8 @@ mod tests {
                 review.clone(),
             ]
         );
-        assert_eq!(
-            dropped(&all, "Models")[2..],
-            [Command::Chosen(Ask::Table, table), review]
-        );
-        assert_eq!(
-            dropped(&[&protocol], "Scene"),
-            [Command::Chosen(Ask::Scene, protocol)]
-        );
+        assert_eq!(dropped(&all, "Models")[2..], [Command::Chosen(Ask::Table, table), review]);
+        assert_eq!(dropped(&[&protocol], "Scene"), [Command::Chosen(Ask::Scene, protocol)]);
         // Ticks of no known loop are told to be so on the scene's screen.
         let ticks = at("ticks");
         std::fs::create_dir(&ticks).unwrap();

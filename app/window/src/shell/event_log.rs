@@ -15,14 +15,9 @@ pub struct EventLog {
 impl EventLog {
     /// Draws the log in the space there is.
     pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
-        let events = snapshot
-            .run
-            .as_ref()
-            .map_or(&[][..], |run| run.events.as_slice());
-        let shown: Vec<&LogLine> = events
-            .iter()
-            .filter(|line| is_shown(line, &self.filter))
-            .collect();
+        let events = snapshot.run.as_ref().map_or(&[][..], |run| run.events.as_slice());
+        let shown: Vec<&LogLine> =
+            events.iter().filter(|line| is_shown(line, &self.filter)).collect();
         self.head_ui(ui, &shown, commands);
         let tokens = Tokens::of(ui.visuals().dark_mode);
         if shown.is_empty() {
@@ -41,11 +36,7 @@ impl EventLog {
             .stick_to_bottom(true)
             .show_rows(ui, height, shown.len(), |ui, rows| {
                 for line in &shown[rows] {
-                    let ink = if line.is_alarm {
-                        tokens.alarm_text
-                    } else {
-                        tokens.text
-                    };
+                    let ink = if line.is_alarm { tokens.alarm_text } else { tokens.text };
                     let text = RichText::new(line_text(line)).monospace().color(ink);
                     ui.add(Label::new(text).truncate());
                 }
@@ -57,23 +48,15 @@ impl EventLog {
             ui.label(RichText::new("Events").heading().strong());
             ui.add_space(8.0);
             let label = ui.label("filter");
-            ui.add(
-                TextEdit::singleline(&mut self.filter)
-                    .desired_width(160.0)
-                    .char_limit(100),
-            )
-            .labelled_by(label.id)
-            .place("filter of the events");
+            ui.add(TextEdit::singleline(&mut self.filter).desired_width(160.0).char_limit(100))
+                .labelled_by(label.id)
+                .place("filter of the events");
             if ui.button("Copy").clicked() {
                 let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
                 ui.ctx().copy_text(lines.join("\n"));
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let name = if ui.visuals().dark_mode {
-                    "Light screen"
-                } else {
-                    "Dark screen"
-                };
+                let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
                 if ui.button(name).clicked() {
                     commands.push(Command::SwitchTheme);
                 }

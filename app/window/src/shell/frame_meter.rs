@@ -185,10 +185,7 @@ mod tests {
     #[test]
     fn the_report_holds_what_was_measured() {
         let folder = std::env::temp_dir().join(format!("palpate-meter-{}", std::process::id()));
-        let mut meter = FrameMeter {
-            report_path: Some(folder.clone()),
-            ..FrameMeter::default()
-        };
+        let mut meter = FrameMeter { report_path: Some(folder.clone()), ..FrameMeter::default() };
         for last in [None, Some(0.5), Some(0.004), Some(0.002), Some(0.003)] {
             meter.begin(last);
             meter.end();

@@ -68,11 +68,7 @@ mod tests {
         events: Vec<Event>,
         ways: [bool; 2],
     ) -> Duration {
-        let input = RawInput {
-            time: Some(time),
-            events,
-            ..RawInput::default()
-        };
+        let input = RawInput { time: Some(time), events, ..RawInput::default() };
         let [is_moving, is_watched] = ways;
         let mut output = ctx.run_ui(input, |ui| pace.next(ui.ctx(), is_moving, is_watched));
         output.textures_delta.clear();
@@ -84,13 +80,7 @@ mod tests {
         let (ctx, mut pace) = (Context::default(), FramePace::default());
         // The first frames of egui ask for more themselves.
         for step in 0..4 {
-            next(
-                &mut pace,
-                &ctx,
-                0.1 * f64::from(step),
-                Vec::new(),
-                [false; 2],
-            );
+            next(&mut pace, &ctx, 0.1 * f64::from(step), Vec::new(), [false; 2]);
         }
         assert!(next(&mut pace, &ctx, 1.0, Vec::new(), [false; 2]) <= RESTING);
         let unused = next(&mut pace, &ctx, 10.0, Vec::new(), [false; 2]);

@@ -24,12 +24,7 @@ impl Action {
     /// One that is always possible.
     #[must_use]
     pub fn new(name: impl Into<String>, keys: &str, command: Command) -> Self {
-        Self {
-            name: name.into(),
-            keys: keys.into(),
-            command,
-            verdict: Ok(()),
-        }
+        Self { name: name.into(), keys: keys.into(), command, verdict: Ok(()) }
     }
 
     /// The same, if this allows it.
@@ -52,11 +47,7 @@ impl Palette {
     /// Opens it empty, or closes it.
     pub fn toggle(&mut self) {
         let is_open = !self.is_open;
-        *self = Self {
-            is_open,
-            is_fresh: is_open,
-            ..Self::default()
-        };
+        *self = Self { is_open, is_fresh: is_open, ..Self::default() };
     }
 
     /// Closes it.
@@ -120,10 +111,8 @@ impl Palette {
                 self.is_open = false;
             }
         });
-        let found: Vec<&Action> = actions
-            .iter()
-            .filter(|one| is_found(&one.name, &self.typed))
-            .collect();
+        let found: Vec<&Action> =
+            actions.iter().filter(|one| is_found(&one.name, &self.typed)).collect();
         let last = found.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(moved).min(last);
         ui.add_space(4.0);

@@ -8,11 +8,7 @@ use eframe::egui::{Frame, Margin, Panel, ScrollArea, Stroke, Ui};
 pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     Frame::new()
-        .fill(if is_canvas {
-            tokens.canvas
-        } else {
-            tokens.panel
-        })
+        .fill(if is_canvas { tokens.canvas } else { tokens.panel })
         .inner_margin(Margin::symmetric(8, 6))
         .stroke(Stroke::NONE)
 }
@@ -24,10 +20,7 @@ pub(crate) fn side_ui(ui: &mut Ui, sizes: &mut Sizes, edge: Edge, content: impl 
         _ => Panel::right("right"),
     };
     let scrolled = |ui: &mut Ui| {
-        ScrollArea::vertical()
-            .id_salt("side")
-            .auto_shrink(false)
-            .show(ui, content);
+        ScrollArea::vertical().id_salt("side").auto_shrink(false).show(ui, content);
     };
     let panel = sizes.of(edge, panel).frame(frame(ui, false));
     let shown = panel.show(ui, scrolled);

@@ -46,18 +46,11 @@ impl Wish {
             (Self::Pause, _) => Ok(Operator::Pause),
             (Self::PauseAfter, PauseView::Pending { .. }) => refuse("a pause is asked for already"),
             (Self::PauseAfter, _) => match &run.next_checkpoint {
-                Some((step_index, _)) => Ok(Operator::PauseAfter {
-                    step_index: *step_index,
-                }),
+                Some((step_index, _)) => Ok(Operator::PauseAfter { step_index: *step_index }),
                 None => refuse("no checkpoint is ahead"),
             },
             (Self::Resume, PauseView::None) => refuse("the run is not paused"),
-            (
-                Self::Resume,
-                PauseView::Paused {
-                    no_resume: Some(why),
-                },
-            ) => refuse(why),
+            (Self::Resume, PauseView::Paused { no_resume: Some(why) }) => refuse(why),
             (Self::Resume, _) => Ok(Operator::Resume),
             (Self::Finish, _) if is_paused => Ok(Operator::Finish),
             (Self::Finish, _) => refuse("pause first"),
@@ -116,15 +109,10 @@ fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
         true => "Mark  F3",
         false => "Note  F3",
     };
-    if ui
-        .add(Button::new(name).min_size(vec2(74.0, 28.0)))
-        .clicked()
-    {
+    if ui.add(Button::new(name).min_size(vec2(74.0, 28.0))).clicked() {
         commands.push(Command::NoteTyped);
     }
-    let input = TextEdit::singleline(note)
-        .desired_width(180.0)
-        .char_limit(NOTE_MAX);
+    let input = TextEdit::singleline(note).desired_width(180.0).char_limit(NOTE_MAX);
     // Drawn from the right, so the label comes after its field.
     let input = ui.add(input).place("note");
     let label = ui.label("note");
@@ -154,17 +142,14 @@ fn pause_words(run: &RunView) -> String {
         PauseView::Paused { no_resume: None } => {
             "Paused. Resume goes on; finish early leaves out the rest and retracts.".into()
         }
-        PauseView::Paused {
-            no_resume: Some(why),
-        } => format!("Paused. No resume: {why}. Finish early keeps the data and retracts."),
+        PauseView::Paused { no_resume: Some(why) } => {
+            format!("Paused. No resume: {why}. Finish early keeps the data and retracts.")
+        }
         PauseView::Pending { step_index } => match &run.next_checkpoint {
             Some((index, name)) if *index == step_index => {
                 format!("Will pause {name}; resume takes that back.")
             }
-            _ => format!(
-                "Will pause behind step {}; resume takes that back.",
-                step_index + 1
-            ),
+            _ => format!("Will pause behind step {}; resume takes that back.", step_index + 1),
         },
         PauseView::None if run.next_checkpoint.is_none() => {
             "Running. No checkpoint is ahead; resume and finish early need a pause first.".into()

@@ -126,19 +126,12 @@ fn shown(ui: &Ui, edge: Edge, near: Rect, grip: &Response) {
         return;
     }
     let (icon, line) = match edge {
-        Edge::Log => (
-            CursorIcon::ResizeVertical,
-            [near.left_center(), near.right_center()],
-        ),
-        _ => (
-            CursorIcon::ResizeHorizontal,
-            [near.center_top(), near.center_bottom()],
-        ),
+        Edge::Log => (CursorIcon::ResizeVertical, [near.left_center(), near.right_center()]),
+        _ => (CursorIcon::ResizeHorizontal, [near.center_top(), near.center_bottom()]),
     };
     ui.ctx().set_cursor_icon(icon);
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.painter()
-        .line_segment(line, Stroke::new(2.0, tokens.text_quiet));
+    ui.painter().line_segment(line, Stroke::new(2.0, tokens.text_quiet));
 }
 
 #[cfg(test)]

@@ -26,10 +26,7 @@ pub fn top_bar_ui(ui: &mut Ui, snapshot: &Snapshot, activity: &Activity, specime
         run_ui(ui, snapshot.run.as_ref(), specimen);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let stop = stop_ui(ui, is_motion_possible(snapshot));
-            let buttons = StopButtons {
-                stop,
-                halt: halt_ui(ui),
-            };
+            let buttons = StopButtons { stop, halt: halt_ui(ui) };
             ui.data_mut(|data| data.insert_temp(Id::unique("stop buttons"), buttons));
             numbers_ui(ui, snapshot);
         });
@@ -66,9 +63,7 @@ fn stop_ui(ui: &mut Ui, is_motion_possible: bool) -> Id {
     } else {
         Button::new(text).fill(tokens.control)
     };
-    let button = button
-        .stroke(Stroke::new(2.0, tokens.alarm_fill))
-        .min_size(vec2(176.0, HEIGHT));
+    let button = button.stroke(Stroke::new(2.0, tokens.alarm_fill)).min_size(vec2(176.0, HEIGHT));
     ui.add(button).id
 }
 
@@ -111,11 +106,7 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
 fn run_line(run: &RunView) -> String {
     let step = match run.cycle_starts.last() {
         Some((_, cycle)) if run.cycles > 1 => format!("cycle {cycle} of {}", run.cycles),
-        _ => format!(
-            "step {} of {}",
-            (run.step_index + 1).min(run.steps.len()),
-            run.steps.len()
-        ),
+        _ => format!("step {} of {}", (run.step_index + 1).min(run.steps.len()), run.steps.len()),
     };
     match (&run.outcome, &run.holding) {
         (Some(outcome), _) => format!("{} after {}", outcome.ending, clock(run.now.seconds().0)),
@@ -127,23 +118,15 @@ fn run_line(run: &RunView) -> String {
 /// Force, depth, position and velocity, right to left.
 pub fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
     let derived = run_in_progress(snapshot).map(|run| run.derived);
-    let at_rest = snapshot
-        .rig
-        .reading
-        .filter(|_| snapshot.rig.is_homed)
-        .map(|reading| {
-            position_from_pulses(reading.pulses, snapshot.rig.description.mm_per_pulse).0
-        });
+    let at_rest = snapshot.rig.reading.filter(|_| snapshot.rig.is_homed).map(|reading| {
+        position_from_pulses(reading.pulses, snapshot.rig.description.mm_per_pulse).0
+    });
     let position = match derived {
         Some(derived) if snapshot.rig.is_homed => Some(derived.position.0),
         _ => at_rest,
     };
-    let depth = derived
-        .and_then(|derived| derived.depth)
-        .map(|depth| depth.0);
-    let force = derived
-        .and_then(|derived| derived.force)
-        .map(|force| force.0);
+    let depth = derived.and_then(|derived| derived.depth).map(|depth| depth.0);
+    let force = derived.and_then(|derived| derived.force).map(|force| force.0);
     let velocity = derived.map(|derived| derived.velocity.0);
     number_ui(ui, "velocity v", "mm/s", number(velocity, 2), 110.0);
     number_ui(ui, "position x", "mm", number(position, 3), 118.0);
@@ -156,15 +139,8 @@ fn number(value: Option<f64>, decimals: usize) -> String {
     match value {
         Some(value) if value.is_finite() => {
             let text = format!("{value:.decimals$}");
-            let is_zero = text
-                .trim_start_matches('-')
-                .chars()
-                .all(|c| matches!(c, '0' | '.'));
-            if is_zero {
-                format!("{:.decimals$}", 0.0)
-            } else {
-                text
-            }
+            let is_zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
+            if is_zero { format!("{:.decimals$}", 0.0) } else { text }
         }
         _ => "--".into(),
     }

@@ -79,11 +79,7 @@ impl Tour {
                 ui.horizontal(|ui| {
                     let place = format!("Tour {} of {}", at + 1, STOPS.len());
                     ui.label(RichText::new(place).strong());
-                    let name = if at + 1 == STOPS.len() {
-                        "Done with the tour"
-                    } else {
-                        "Next"
-                    };
+                    let name = if at + 1 == STOPS.len() { "Done with the tour" } else { "Next" };
                     if ui.button(name).clicked() {
                         commands.push(Command::TourNext);
                     }

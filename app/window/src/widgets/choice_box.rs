@@ -36,9 +36,8 @@ pub fn choice_box_ui(
                     ui.close();
                 }
                 if choices.len() > MANY {
-                    let field = TextEdit::singleline(narrow)
-                        .char_limit(80)
-                        .hint_text("narrow the list");
+                    let field =
+                        TextEdit::singleline(narrow).char_limit(80).hint_text("narrow the list");
                     ui.add(field).accessible_name(format!("narrow {name}"));
                 }
                 let wanted = narrow.to_lowercase();
@@ -47,10 +46,11 @@ pub fn choice_box_ui(
                     .filter(|one| choices.len() <= MANY || one.to_lowercase().contains(&wanted))
                     .collect();
                 let height = ui.spacing().interact_size.y;
-                ScrollArea::vertical()
-                    .id_salt(("choices", name))
-                    .max_height(LIST)
-                    .show_rows(ui, height, shown.len(), |ui, rows| {
+                ScrollArea::vertical().id_salt(("choices", name)).max_height(LIST).show_rows(
+                    ui,
+                    height,
+                    shown.len(),
+                    |ui, rows| {
                         for one in &shown[rows] {
                             let is_chosen = chosen.as_ref() == Some(*one);
                             if ui.selectable_label(is_chosen, one.as_str()).clicked() {
@@ -59,7 +59,8 @@ pub fn choice_box_ui(
                                 ui.close();
                             }
                         }
-                    });
+                    },
+                );
             })
             .response
             .labelled_by(label.id)

@@ -37,20 +37,13 @@ impl Cell {
     /// A plain text.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
-        Self {
-            text: text.into(),
-            ..Self::default()
-        }
+        Self { text: text.into(), ..Self::default() }
     }
 
     /// A shape and its word.
     #[must_use]
     pub fn marked(mark: Mark, text: impl Into<String>, tone: Tone) -> Self {
-        Self {
-            mark: Some(mark),
-            text: text.into(),
-            tone,
-        }
+        Self { mark: Some(mark), text: text.into(), tone }
     }
 }
 
@@ -129,39 +122,29 @@ impl ChoiceTable<'_> {
         let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
         let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
         let id = ui.make_persistent_id((self.name, "table"));
-        ScrollArea::horizontal()
-            .id_salt((self.name, "across"))
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                let width = width.max(ui.available_width());
-                ui.set_min_width(width);
-                ui.spacing_mut().item_spacing = Vec2::ZERO;
-                self.heads_ui(ui, width, &mut acts);
-                ui.separator();
-                let body = ui.interact(
-                    ui.available_rect_before_wrap(),
-                    id,
-                    Sense::focusable_noninteractive(),
-                );
-                body.widget_info(|| WidgetInfo::labeled(Role::ListBox, true, self.name));
-                if body.has_focus() {
-                    let tokens = Tokens::of(ui.visuals().dark_mode);
-                    let stroke = Stroke::new(1.0, tokens.focus);
-                    ui.painter()
-                        .rect_stroke(body.rect, 0.0, stroke, StrokeKind::Inside);
-                    // Up and down are the table's, not the way to another control.
-                    let filter = EventFilter {
-                        vertical_arrows: true,
-                        ..EventFilter::default()
-                    };
-                    ui.memory_mut(|memory| memory.set_focus_lock_filter(id, filter));
-                }
-                let is_free = ui.memory(|memory| memory.focused().is_none());
-                if (body.has_focus() || is_free) && !Popup::is_any_open(ui.ctx()) {
-                    self.keys(ui, scrolled, &mut acts);
-                }
-                shown = self.body_ui(ui, width, id, scrolled, &mut acts);
-            });
+        ScrollArea::horizontal().id_salt((self.name, "across")).auto_shrink(false).show(ui, |ui| {
+            let width = width.max(ui.available_width());
+            ui.set_min_width(width);
+            ui.spacing_mut().item_spacing = Vec2::ZERO;
+            self.heads_ui(ui, width, &mut acts);
+            ui.separator();
+            let body =
+                ui.interact(ui.available_rect_before_wrap(), id, Sense::focusable_noninteractive());
+            body.widget_info(|| WidgetInfo::labeled(Role::ListBox, true, self.name));
+            if body.has_focus() {
+                let tokens = Tokens::of(ui.visuals().dark_mode);
+                let stroke = Stroke::new(1.0, tokens.focus);
+                ui.painter().rect_stroke(body.rect, 0.0, stroke, StrokeKind::Inside);
+                // Up and down are the table's, not the way to another control.
+                let filter = EventFilter { vertical_arrows: true, ..EventFilter::default() };
+                ui.memory_mut(|memory| memory.set_focus_lock_filter(id, filter));
+            }
+            let is_free = ui.memory(|memory| memory.focused().is_none());
+            if (body.has_focus() || is_free) && !Popup::is_any_open(ui.ctx()) {
+                self.keys(ui, scrolled, &mut acts);
+            }
+            shown = self.body_ui(ui, width, id, scrolled, &mut acts);
+        });
         (acts, shown)
     }
 
@@ -169,9 +152,7 @@ impl ChoiceTable<'_> {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
         row_ui(ui, &columns, width, |ui, index, column| {
-            let text = eframe::egui::RichText::new(&column.head)
-                .color(tokens.text_quiet)
-                .small();
+            let text = eframe::egui::RichText::new(&column.head).color(tokens.text_quiet).small();
             if !self.heads[index].can_sort {
                 ui.add(eframe::egui::Label::new(text).truncate());
                 return;
@@ -184,10 +165,7 @@ impl ChoiceTable<'_> {
                 mark_at(ui.painter(), mark, place, tokens.text_quiet);
             }
             let head = head.accessible_name(format!("sort by {}", column.head));
-            if head
-                .on_hover_text("sort; once more for the other way round")
-                .clicked()
-            {
+            if head.on_hover_text("sort; once more for the other way round").clicked() {
                 acts.push(Act::Sort(index));
             }
         });
@@ -201,9 +179,7 @@ impl ChoiceTable<'_> {
         scrolled: &mut Scrolled,
         acts: &mut Vec<Act>,
     ) -> Range<usize> {
-        let mut area = ScrollArea::vertical()
-            .id_salt((self.name, "rows"))
-            .auto_shrink(false);
+        let mut area = ScrollArea::vertical().id_salt((self.name, "rows")).auto_shrink(false);
         if let Some(offset) = scrolled.wanted.take() {
             area = area.vertical_scroll_offset(offset);
         }

@@ -15,11 +15,7 @@ pub fn fact_ui(ui: &mut Ui, name: &str, value: impl Into<String>) {
             ui.set_min_width(NAME_WIDTH);
             ui.label(RichText::new(name).color(tokens.text_quiet));
         });
-        ui.add(
-            Label::new(RichText::new(value))
-                .wrap()
-                .sense(Sense::empty()),
-        );
+        ui.add(Label::new(RichText::new(value)).wrap().sense(Sense::empty()));
     });
 }
 

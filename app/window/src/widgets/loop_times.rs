@@ -9,22 +9,16 @@ use palpate_runner::haptics::timing::Kept;
 /// Draws overruns, and the percentiles of period, lateness and work.
 pub fn loop_times_ui(ui: &mut Ui, kept: &Kept) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    fact_ui(
-        ui,
-        "overruns",
-        format!("{}; {} ticks missed", kept.overruns, kept.missed),
-    );
+    fact_ui(ui, "overruns", format!("{}; {} ticks missed", kept.overruns, kept.missed));
     let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
     Grid::new("loop_times").striped(true).show(ui, |ui| {
         for head in ["in µs", "p50", "p99", "p99.9", "max"] {
             ui.label(RichText::new(head).color(tokens.text_quiet).small());
         }
         ui.end_row();
-        for (name, spread) in [
-            ("period", &kept.period),
-            ("late", &kept.late),
-            ("compute", &kept.work),
-        ] {
+        for (name, spread) in
+            [("period", &kept.period), ("late", &kept.late), ("compute", &kept.work)]
+        {
             ui.label(name);
             for time in [spread.p50, spread.p99, spread.p99_9, spread.max] {
                 ui.label(micros(time));

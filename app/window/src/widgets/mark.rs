@@ -57,13 +57,7 @@ pub fn mark_at(painter: &Painter, mark: Mark, center: Pos2, ink: Color32) {
             painter.text(center, Align2::CENTER_CENTER, "?", font, ink);
         }
         Mark::Again => {
-            painter.add(line(&[
-                (-0.9, -0.3),
-                (-0.9, 0.9),
-                (0.9, 0.9),
-                (0.9, -0.5),
-                (0.0, -0.5),
-            ]));
+            painter.add(line(&[(-0.9, -0.3), (-0.9, 0.9), (0.9, 0.9), (0.9, -0.5), (0.0, -0.5)]));
             painter.add(area(&[(0.2, -1.2), (0.2, 0.2), (-0.7, -0.5)]));
         }
         Mark::Diamond => {

@@ -16,10 +16,7 @@ pub struct ModelChoice {
 
 impl Default for ModelChoice {
     fn default() -> Self {
-        Self {
-            keys: families::all().iter().map(|one| one.key()).collect(),
-            family: None,
-        }
+        Self { keys: families::all().iter().map(|one| one.key()).collect(), family: None }
     }
 }
 

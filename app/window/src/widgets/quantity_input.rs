@@ -18,10 +18,7 @@ impl QuantityField {
     /// A field that holds a number.
     #[must_use]
     pub fn new(value: f64) -> Self {
-        Self {
-            text: value.to_string(),
-            value: Ok(value),
-        }
+        Self { text: value.to_string(), value: Ok(value) }
     }
 
     /// Reads the text again and checks the number.
@@ -38,12 +35,10 @@ fn parse(text: &str) -> Result<f64, String> {
     }
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ if text.contains(',') => Err(format!(
-            "'{text}' is not a number; write it with a point, like 0.75"
-        )),
-        _ => Err(format!(
-            "'{text}' is not a finite number; write it like 0.75"
-        )),
+        _ if text.contains(',') => {
+            Err(format!("'{text}' is not a number; write it with a point, like 0.75"))
+        }
+        _ => Err(format!("'{text}' is not a finite number; write it like 0.75")),
     }
 }
 
@@ -110,13 +105,7 @@ mod tests {
     fn a_failed_check_replaces_the_value() {
         let mut field = QuantityField::new(0.75);
         field.text = "99".into();
-        field.check(|value| {
-            if value > 15.0 {
-                Err("too fast".into())
-            } else {
-                Ok(())
-            }
-        });
+        field.check(|value| if value > 15.0 { Err("too fast".into()) } else { Ok(()) });
         assert_eq!(field.value, Err("too fast".into()));
     }
 }

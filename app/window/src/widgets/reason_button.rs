@@ -14,9 +14,7 @@ pub fn reason_button(
 ) -> bool {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let is_pressed = steady(ui, text, |ui| {
-        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size))
-            .place(text)
-            .clicked()
+        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size)).place(text).clicked()
     });
     if let Err(reason) = verdict {
         let reason = RichText::new(reason).color(tokens.text_quiet).small();

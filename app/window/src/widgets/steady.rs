@@ -8,8 +8,7 @@ use eframe::egui::{AsIdSalt, Ui, UiBuilder};
 /// lost, and the keyboard's place with it. The name is to be the only one of its kind in this part of the panel.
 pub fn steady<R>(ui: &mut Ui, name: impl AsIdSalt, control: impl FnOnce(&mut Ui) -> R) -> R {
     let own = ui.scope_id().with(("steady", name));
-    ui.scope_builder(UiBuilder::new().scope_id(own), control)
-        .inner
+    ui.scope_builder(UiBuilder::new().scope_id(own), control).inner
 }
 
 #[cfg(test)]

@@ -50,28 +50,12 @@ pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
         WidgetInfo::labeled(Role::Label, true, format!("Step {name}: {}", state.word()))
     });
     let painter = ui.painter();
-    let ink = if state == StepState::Now {
-        tokens.text
-    } else {
-        tokens.text_quiet
-    };
+    let ink = if state == StepState::Now { tokens.text } else { tokens.text_quiet };
     let y = rect.center().y;
     mark(ui, state, rect.left() + 8.0, y, ink);
     let font = FontId::proportional(13.5);
-    painter.text(
-        pos2(rect.left() + 24.0, y),
-        Align2::LEFT_CENTER,
-        name,
-        font.clone(),
-        ink,
-    );
-    painter.text(
-        pos2(rect.left() + 110.0, y),
-        Align2::LEFT_CENTER,
-        state.word(),
-        font,
-        ink,
-    );
+    painter.text(pos2(rect.left() + 24.0, y), Align2::LEFT_CENTER, name, font.clone(), ink);
+    painter.text(pos2(rect.left() + 110.0, y), Align2::LEFT_CENTER, state.word(), font, ink);
     painter.text(
         pos2(rect.right() - 2.0, y),
         Align2::RIGHT_CENTER,
@@ -86,19 +70,11 @@ fn mark(ui: &Ui, state: StepState, x: f32, y: f32, ink: Color32) {
     let center = pos2(x, y);
     match state {
         StepState::Done => {
-            let tick = vec![
-                pos2(x - 5.0, y),
-                pos2(x - 1.5, y + 4.0),
-                pos2(x + 5.0, y - 4.5),
-            ];
+            let tick = vec![pos2(x - 5.0, y), pos2(x - 1.5, y + 4.0), pos2(x + 5.0, y - 4.5)];
             painter.add(Shape::line(tick, Stroke::new(2.0, ink)));
         }
         StepState::Now => {
-            let corners = vec![
-                pos2(x - 4.0, y - 5.5),
-                pos2(x + 6.0, y),
-                pos2(x - 4.0, y + 5.5),
-            ];
+            let corners = vec![pos2(x - 4.0, y - 5.5), pos2(x + 6.0, y), pos2(x - 4.0, y + 5.5)];
             painter.add(Shape::convex_polygon(corners, ink, Stroke::NONE));
         }
         StepState::Next => {
@@ -125,10 +101,7 @@ mod tests {
             (3, 2, false, false, StepState::Skipped),
             (6, 6, false, true, StepState::Done),
         ] {
-            assert_eq!(
-                StepState::of(index, current, is_running, is_complete),
-                state
-            );
+            assert_eq!(StepState::of(index, current, is_running, is_complete), state);
         }
     }
 }

@@ -24,21 +24,13 @@ impl Column {
     /// A column of words.
     #[must_use]
     pub fn words(head: &str, width: f32) -> Self {
-        Self {
-            head: head.to_owned(),
-            width,
-            is_number: false,
-        }
+        Self { head: head.to_owned(), width, is_number: false }
     }
 
     /// A column of numbers.
     #[must_use]
     pub fn numbers(head: &str, width: f32) -> Self {
-        Self {
-            head: head.to_owned(),
-            width,
-            is_number: true,
-        }
+        Self { head: head.to_owned(), width, is_number: true }
     }
 }
 
@@ -71,49 +63,48 @@ pub struct Row {
 pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
-    ScrollArea::horizontal()
-        .id_salt((name, "across"))
-        .auto_shrink(false)
-        .show(ui, |ui| {
-            ui.set_min_width(width);
-            ui.spacing_mut().item_spacing = Vec2::ZERO;
-            let columns: Vec<&Column> = columns.iter().collect();
-            row_ui(ui, &columns, width, |ui, _, column| {
-                let text = RichText::new(&column.head).color(tokens.text_quiet).small();
-                ui.add(Label::new(text).truncate());
-            });
-            ui.separator();
-            ScrollArea::vertical()
-                .id_salt((name, "rows"))
-                .auto_shrink(false)
-                .show_rows(ui, ROW, rows.len(), |ui, shown| {
-                    for row in &rows[shown] {
-                        let ink = match row.look {
-                            RowLook::Plain | RowLook::Marked => tokens.text,
-                            RowLook::Quiet => tokens.text_quiet,
-                            RowLook::Alarm => tokens.alarm_text,
-                        };
-                        let rect = row_ui(ui, &columns, width, |ui, index, _| {
-                            let Some(cell) = row.cells.get(index) else {
-                                return;
-                            };
-                            let mut text = RichText::new(cell).color(ink);
-                            if row.look == RowLook::Marked {
-                                text = text.strong();
-                            }
-                            ui.add(Label::new(text).truncate());
-                        });
-                        if row.look == RowLook::Marked {
-                            let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
-                            ui.painter().rect_filled(mark, 0.0, tokens.text);
-                        }
-                        if let Some(hint) = &row.hint {
-                            let id = ui.scope_id().with((name, &row.cells));
-                            ui.interact(rect, id, Sense::hover()).on_hover_text(hint);
-                        }
-                    }
-                });
+    ScrollArea::horizontal().id_salt((name, "across")).auto_shrink(false).show(ui, |ui| {
+        ui.set_min_width(width);
+        ui.spacing_mut().item_spacing = Vec2::ZERO;
+        let columns: Vec<&Column> = columns.iter().collect();
+        row_ui(ui, &columns, width, |ui, _, column| {
+            let text = RichText::new(&column.head).color(tokens.text_quiet).small();
+            ui.add(Label::new(text).truncate());
         });
+        ui.separator();
+        ScrollArea::vertical().id_salt((name, "rows")).auto_shrink(false).show_rows(
+            ui,
+            ROW,
+            rows.len(),
+            |ui, shown| {
+                for row in &rows[shown] {
+                    let ink = match row.look {
+                        RowLook::Plain | RowLook::Marked => tokens.text,
+                        RowLook::Quiet => tokens.text_quiet,
+                        RowLook::Alarm => tokens.alarm_text,
+                    };
+                    let rect = row_ui(ui, &columns, width, |ui, index, _| {
+                        let Some(cell) = row.cells.get(index) else {
+                            return;
+                        };
+                        let mut text = RichText::new(cell).color(ink);
+                        if row.look == RowLook::Marked {
+                            text = text.strong();
+                        }
+                        ui.add(Label::new(text).truncate());
+                    });
+                    if row.look == RowLook::Marked {
+                        let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
+                        ui.painter().rect_filled(mark, 0.0, tokens.text);
+                    }
+                    if let Some(hint) = &row.hint {
+                        let id = ui.scope_id().with((name, &row.cells));
+                        ui.interact(rect, id, Sense::hover()).on_hover_text(hint);
+                    }
+                }
+            },
+        );
+    });
 }
 
 /// One line of cells; returns where it stands.

@@ -48,8 +48,7 @@ pub fn standing_ui(ui: &mut Ui, standing: &Standing, cancel: &str) -> bool {
 }
 
 fn cancel_ui(ui: &mut Ui, text: &str) -> bool {
-    ui.add(Button::new(text).min_size(vec2(84.0, 26.0)))
-        .clicked()
+    ui.add(Button::new(text).min_size(vec2(84.0, 26.0))).clicked()
 }
 
 fn bar_ui(ui: &mut Ui, standing: &Standing) {

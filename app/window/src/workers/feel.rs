@@ -38,10 +38,7 @@ impl Feel {
         let (lead, first) = (device.lead(), device.live().clone());
         let last = first.last;
         let period = settings.system.law.period;
-        let device = TapedLed {
-            led: device,
-            recorder,
-        };
+        let device = TapedLed { led: device, recorder };
         let beat = Beat::start(device, period, first)
             .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
         Ok(Self {

@@ -69,11 +69,8 @@ impl Refitter {
         self.asked = folder.map(|folder| (folder.clone(), Stopwatch::start()));
         if let Some(folder) = folder.cloned() {
             let wake = ctx.clone();
-            let started = self.job.start(
-                "fit",
-                move || exact(&folder),
-                move || wake.request_repaint(),
-            );
+            let started =
+                self.job.start("fit", move || exact(&folder), move || wake.request_repaint());
             if let Err(err) = started {
                 self.answer = Some(Err(format!("the exact fit cannot be started: {err}")));
             }

@@ -16,12 +16,7 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
     /// Nothing asked yet. The threads have this name and do this work.
     #[must_use]
     pub fn new(name: &'static str, work: fn(&Q) -> Result<A, String>) -> Self {
-        Self {
-            name,
-            work,
-            job: Job::default(),
-            next: None,
-        }
+        Self { name, work, job: Job::default(), next: None }
     }
 
     /// Asks, in the place of what was asked and not begun.
@@ -44,11 +39,8 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
             return;
         };
         let (work, wake) = (self.work, ctx.clone());
-        let started = self.job.start(
-            self.name,
-            move || work(&question),
-            move || wake.request_repaint(),
-        );
+        let started =
+            self.job.start(self.name, move || work(&question), move || wake.request_repaint());
         if started.is_err() {
             // No thread is to be had now; the next poll tells.
             ctx.request_repaint();

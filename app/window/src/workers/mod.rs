@@ -45,16 +45,14 @@ impl<T: Send + 'static> Job<T> {
         }
         let (sender, receiver) = sync_channel(1);
         let span = tracing::info_span!("worker", name);
-        std::thread::Builder::new()
-            .name(name.into())
-            .spawn(move || {
-                let _in = span.entered();
-                tracing::debug!("started");
-                // Nobody may wait any more when the window has closed.
-                let _ = sender.try_send(work());
-                tracing::debug!("ended");
-                done();
-            })?;
+        std::thread::Builder::new().name(name.into()).spawn(move || {
+            let _in = span.entered();
+            tracing::debug!("started");
+            // Nobody may wait any more when the window has closed.
+            let _ = sender.try_send(work());
+            tracing::debug!("ended");
+            done();
+        })?;
         self.answer = Some(receiver);
         Ok(())
     }
@@ -108,8 +106,7 @@ mod tests {
     #[test]
     fn a_job_that_dies_does_not_stay_busy() {
         let mut job: Job<u32> = Job::default();
-        job.start("test-job", || panic!("on purpose"), || {})
-            .unwrap();
+        job.start("test-job", || panic!("on purpose"), || {}).unwrap();
         let is_idle = || {
             let is_idle = !job.is_busy();
             assert_eq!(job.poll(), None);

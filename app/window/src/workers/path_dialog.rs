@@ -32,10 +32,7 @@ pub struct Dialog<T> {
 
 impl<T> Default for Dialog<T> {
     fn default() -> Self {
-        Self {
-            job: Job::default(),
-            refusal: None,
-        }
+        Self { job: Job::default(), refusal: None }
     }
 }
 
@@ -54,9 +51,7 @@ impl<T: Send + 'static> Dialog<T> {
     ) -> Result<(), String> {
         let ctx = ctx.clone();
         let pick = move || pick(FileDialog::new());
-        let opened = self
-            .job
-            .start("dialog", pick, move || ctx.request_repaint());
+        let opened = self.job.start("dialog", pick, move || ctx.request_repaint());
         opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
 

@@ -32,10 +32,7 @@ impl PlayerThread {
         let Some(first) = player.snapshot(0) else {
             return Err("the session has no beginning".into());
         };
-        let desk = Arc::new(Desk {
-            wanted: Mutex::new(None),
-            shown: Mutex::new(Arc::new(first)),
-        });
+        let desk = Arc::new(Desk { wanted: Mutex::new(None), shown: Mutex::new(Arc::new(first)) });
         let (bell, rung) = sync_channel(1);
         let own = Arc::clone(&desk);
         std::thread::Builder::new()

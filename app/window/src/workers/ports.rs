@@ -19,19 +19,13 @@ impl Ports {
     /// None is known yet.
     #[must_use]
     pub fn new(list: ListPorts) -> Self {
-        Self {
-            list,
-            job: Job::default(),
-            found: None,
-        }
+        Self { list, job: Job::default(), found: None }
     }
 
     /// Lists the ports anew.
     pub fn refresh(&mut self, ctx: &Context) {
         let ctx = ctx.clone();
-        let started = self
-            .job
-            .start("serial-ports", self.list, move || ctx.request_repaint());
+        let started = self.job.start("serial-ports", self.list, move || ctx.request_repaint());
         if let Err(err) = started {
             self.found = Some(Err(format!("the serial ports cannot be listed: {err}")));
         }

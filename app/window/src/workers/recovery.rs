@@ -18,9 +18,7 @@ impl Recovery {
     pub fn start(&mut self, library: PathBuf, ctx: &Context) {
         let wake = ctx.clone();
         let work = move || recover_library(&library, env!("CARGO_PKG_VERSION"), wall_now().into());
-        let started = self
-            .job
-            .start("recovery", work, move || wake.request_repaint());
+        let started = self.job.start("recovery", work, move || wake.request_repaint());
         if let Err(err) = started {
             self.told = vec![format!(
                 "interrupted sessions cannot be looked for ({err}); 'palpate doctor' does"

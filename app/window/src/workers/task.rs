@@ -29,12 +29,7 @@ pub struct Task<T> {
 
 impl<T> Default for Task<T> {
     fn default() -> Self {
-        Self {
-            job: Job::default(),
-            progress: Arc::default(),
-            since: None,
-            answer: None,
-        }
+        Self { job: Job::default(), progress: Arc::default(), since: None, answer: None }
     }
 }
 

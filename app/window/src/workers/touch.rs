@@ -133,12 +133,7 @@ pub fn ahead(
             return Err("ended before it was done".into());
         }
     }
-    Ok(Ahead {
-        settings,
-        path,
-        deepest,
-        trail,
-    })
+    Ok(Ahead { settings, path, deepest, trail })
 }
 
 /// A scene that runs or ran, and what was seen of it.
@@ -193,8 +188,7 @@ impl Touch {
             let heights = frame.heights.iter().copied().map(f64::from);
             self.moment.heights.extend(heights);
             self.moment.rest.resize(frame.heights.len(), 0.0);
-            self.trail
-                .push_back(TouchPoint::of(&frame.tick, &self.settings));
+            self.trail.push_back(TouchPoint::of(&frame.tick, &self.settings));
         }
         let period = self.settings.period;
         let now = period.time_of(self.moment.tick.tick).seconds().0;
@@ -207,10 +201,8 @@ impl Touch {
             return Ok(());
         }
         self.live = None;
-        Err(
-            "the scene ended unexpectedly; start it again, and report it if it happens twice"
-                .into(),
-        )
+        Err("the scene ended unexpectedly; start it again, and report it if it happens twice"
+            .into())
     }
 
     /// Whether it ticks.
@@ -275,20 +267,12 @@ mod tests {
 
     #[test]
     fn a_poke_computed_ahead_is_as_deep_as_the_hand_goes_and_ends_above() {
-        let settings = SceneSettings {
-            nodes: 41,
-            max_shear_mm: 1.5,
-            ..SceneSettings::default()
-        };
+        let settings = SceneSettings { nodes: 41, max_shear_mm: 1.5, ..SceneSettings::default() };
         let poke = || ahead(settings, ScenePath::Poke, &mut |_| true).unwrap();
         let one = poke();
         let deepest = &one.deepest.tick;
         // The hand goes 8 mm deep; the force holds the stylus back.
-        assert!(
-            deepest.depth > 4.0 && deepest.depth <= 8.2,
-            "{}",
-            deepest.depth
-        );
+        assert!(deepest.depth > 4.0 && deepest.depth <= 8.2, "{}", deepest.depth);
         let low = one.deepest.heights.iter().copied().fold(0.0, f64::min);
         assert!((low + deepest.depth).abs() < 0.5, "{low}");
         assert!(force_of(deepest) > 0.1);

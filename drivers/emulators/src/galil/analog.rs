@@ -15,10 +15,7 @@ pub struct Analog {
 impl Analog {
     /// All inputs at +-10 V, range 2, the first setting of `AQ`.
     pub fn new(bits: u32) -> Self {
-        Self {
-            bits,
-            ranges: [2; INPUTS],
-        }
+        Self { bits, ranges: [2; INPUTS] }
     }
 
     /// `_AQn`; inputs count from 0 here.
@@ -94,14 +91,9 @@ mod tests {
     #[test]
     fn ranges_that_are_none_are_refused() {
         let mut analog = Analog::new(16);
-        for (input, range) in [
-            (0.0, 2.0),
-            (9.0, 2.0),
-            (1.0, 5.0),
-            (1.0, 0.0),
-            (2.0, -2.0),
-            (1.0, 1.5),
-        ] {
+        for (input, range) in
+            [(0.0, 2.0), (9.0, 2.0), (1.0, 5.0), (1.0, 0.0), (2.0, -2.0), (1.0, 1.5)]
+        {
             assert_eq!(analog.set_range(input, range), Err(ErrorCode::OUT_OF_RANGE));
         }
         assert_eq!(analog.set_range(1.0, -2.0), Ok(()));

@@ -131,11 +131,7 @@ impl Axis {
             filtered: 0.0,
             encoder: 0.0,
             stop_code: 1,
-            inputs: Inputs {
-                forward: true,
-                reverse: true,
-                home: true,
-            },
+            inputs: Inputs { forward: true, reverse: true, home: true },
         }
     }
 
@@ -155,20 +151,12 @@ impl Axis {
 
     /// `TD`: pulses given, or on a servo the auxiliary encoder, which nothing is connected to.
     pub fn pulses(&self) -> f64 {
-        if self.is_stepper() {
-            (self.filtered + NEAR).floor()
-        } else {
-            0.0
-        }
+        if self.is_stepper() { (self.filtered + NEAR).floor() } else { 0.0 }
     }
 
     /// `TP`: the encoder. A servo here follows its command without error.
     pub fn told_position(&self) -> f64 {
-        if self.is_stepper() {
-            self.encoder
-        } else {
-            self.reference()
-        }
+        if self.is_stepper() { self.encoder } else { self.reference() }
     }
 
     /// `_BG`: whether the profile is under way. It ends before the filter has given its last pulses.
@@ -212,10 +200,7 @@ impl Axis {
 
     /// Whether a place is beyond the software limit in a direction: "activated at n + 1" (`FL`).
     fn is_beyond(&self, side: f64) -> bool {
-        let (forward, reverse) = (
-            self.get(Setting::ForwardLimit),
-            self.get(Setting::ReverseLimit),
-        );
+        let (forward, reverse) = (self.get(Setting::ForwardLimit), self.get(Setting::ReverseLimit));
         if side > 0.0 {
             forward < NO_LIMIT && self.profile.place > forward
         } else {
@@ -233,11 +218,7 @@ impl Axis {
         }
         let home = self.inputs.home;
         // "-1 configures HM to drive the motor in the forward direction when the input is low" (`CN`).
-        let edge_side = if home == (polarity.home > 0.0) {
-            1.0
-        } else {
-            -1.0
-        };
+        let edge_side = if home == (polarity.home > 0.0) { 1.0 } else { -1.0 };
         let (motion, side) = match self.prepared {
             Prepared::Target(target) => (Motion::Target(target), target - self.profile.place),
             Prepared::Relative(way) => {
@@ -249,11 +230,7 @@ impl Axis {
             }
             Prepared::Jog(speed) => (Motion::Jog(speed), speed),
             Prepared::Edge { is_homing } => {
-                let motion = Motion::Edge {
-                    side: edge_side,
-                    was: home,
-                    is_homing,
-                };
+                let motion = Motion::Edge { side: edge_side, was: home, is_homing };
                 (motion, edge_side)
             }
         };
@@ -278,10 +255,7 @@ impl Axis {
     pub fn abort(&mut self, code: u8) {
         if self.is_running() {
             self.motion = Motion::Rest;
-            self.profile = Profile {
-                place: self.reference(),
-                velocity: 0.0,
-            };
+            self.profile = Profile { place: self.reference(), velocity: 0.0 };
             self.stop_code = code;
         }
     }
@@ -314,42 +288,22 @@ impl Axis {
                     self.end(code);
                 }
             }
-            Motion::Edge {
-                side,
-                was,
-                is_homing,
-            } => {
+            Motion::Edge { side, was, is_homing } => {
                 self.profile.jog(side * speed, ac, dc, dt);
                 if self.inputs.home != was {
                     if is_homing {
-                        self.motion = Motion::Back {
-                            side: -side,
-                            until: was,
-                            is_braked: false,
-                        };
+                        self.motion = Motion::Back { side: -side, until: was, is_braked: false };
                     } else {
                         self.stop(Setting::Deceleration, 9);
                     }
                 }
             }
-            Motion::Back {
-                side,
-                until,
-                is_braked,
-            } => {
+            Motion::Back { side, until, is_braked } => {
                 // 256 counts/s (DMC-18x2 command reference, `HM`, the second stage), `HV` where it is set.
-                let slow = if is_braked {
-                    self.get(Setting::HomeSpeed)
-                } else {
-                    0.0
-                };
+                let slow = if is_braked { self.get(Setting::HomeSpeed) } else { 0.0 };
                 self.profile.jog(side * slow, ac, dc, dt);
                 let is_braked = is_braked || self.profile.velocity == 0.0;
-                self.motion = Motion::Back {
-                    side,
-                    until,
-                    is_braked,
-                };
+                self.motion = Motion::Back { side, until, is_braked };
                 if is_braked && self.inputs.home == until {
                     self.abort(10);
                     return Some(Event::Homed);
@@ -398,8 +352,6 @@ impl Axis {
             // No latch is armed or has occurred.
             (true, 0),
         ];
-        bits.into_iter()
-            .filter(|(is_set, _)| *is_set)
-            .fold(0, |byte, (_, bit)| byte | 1 << bit)
+        bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |byte, (_, bit)| byte | 1 << bit)
     }
 }

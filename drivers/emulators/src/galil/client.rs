@@ -61,19 +61,12 @@ pub struct Client {
 impl Client {
     /// Somebody who has just connected.
     pub fn opened(has_echo: bool) -> Self {
-        Self {
-            is_open: true,
-            has_echo,
-            ..Self::default()
-        }
+        Self { is_open: true, has_echo, ..Self::default() }
     }
 
     /// Somebody whose connection the controller has just closed.
     pub fn hung_up() -> Self {
-        Self {
-            is_hung_up: true,
-            ..Self::default()
-        }
+        Self { is_hung_up: true, ..Self::default() }
     }
 
     /// Queues bytes to be sent; a client that does not read loses what is too much.

@@ -22,13 +22,7 @@ pub struct SampleClock {
 impl SampleClock {
     /// A clock that starts now, its crystal fast by so many parts in a million.
     pub fn new(now: Nanos, ppm: f64) -> Self {
-        Self {
-            tm: 1000.0,
-            stretch: 1.0 / (1.0 + 1e-6 * ppm),
-            base: now,
-            since_base: 0,
-            count: 0,
-        }
+        Self { tm: 1000.0, stretch: 1.0 / (1.0 + 1e-6 * ppm), base: now, since_base: 0, count: 0 }
     }
 
     /// `TM`.

@@ -169,19 +169,15 @@ impl GalilEmulator {
 
     /// A list of axes such as `AC`; no list is all of them.
     pub(super) fn axis_list(&self, arguments: &str) -> Result<Vec<usize>, ErrorCode> {
-        let letters: Vec<char> = arguments
-            .chars()
-            .filter(|letter| !matches!(letter, ' ' | ','))
-            .collect();
+        let letters: Vec<char> =
+            arguments.chars().filter(|letter| !matches!(letter, ' ' | ',')).collect();
         if letters.is_empty() || letters == ['*'] {
             return Ok((0..self.axes.len()).collect());
         }
         letters
             .into_iter()
             .map(|letter| {
-                axis_of(letter)
-                    .filter(|axis| *axis < self.axes.len())
-                    .ok_or(ErrorCode::OPERAND)
+                axis_of(letter).filter(|axis| *axis < self.axes.len()).ok_or(ErrorCode::OPERAND)
             })
             .collect()
     }
@@ -191,10 +187,8 @@ impl GalilEmulator {
         for (axis, argument) in self.axis_arguments(arguments)? {
             match argument {
                 Argument::Query => {
-                    let format = super::Format {
-                        decimals: setting.decimals(),
-                        ..self.position_format
-                    };
+                    let format =
+                        super::Format { decimals: setting.decimals(), ..self.position_format };
                     told.push(format.write(self.axes[axis].settings.get(setting)));
                 }
                 Argument::Number(value) => {
@@ -218,11 +212,7 @@ impl GalilEmulator {
 
 /// Answers of several axes in one line, parted by commas; each begins with its sign's place.
 pub fn listed(told: Vec<String>) -> Answer {
-    if told.is_empty() {
-        Answer::Done
-    } else {
-        Answer::Text(told.join(","))
-    }
+    if told.is_empty() { Answer::Done } else { Answer::Text(told.join(",")) }
 }
 
 /// Fields parted by commas that stand in no brackets or parentheses.
@@ -256,7 +246,5 @@ fn is_axis_command(name: &str) -> bool {
 
 /// Whether a name before `[` begins with the letters of a command that takes arrays.
 fn is_word(name: &str) -> bool {
-    ["QU", "QD", "DM", "DA", "RA"]
-        .iter()
-        .any(|word| name.starts_with(word))
+    ["QU", "QD", "DM", "DA", "RA"].iter().any(|word| name.starts_with(word))
 }

@@ -56,11 +56,7 @@ impl Contour {
 
     /// `CM`.
     pub fn begin(&mut self, axes: Vec<usize>) {
-        *self = Self {
-            axes,
-            interval: f64::NAN,
-            ..Self::default()
-        };
+        *self = Self { axes, interval: f64::NAN, ..Self::default() };
     }
 
     /// `DT`.
@@ -90,10 +86,7 @@ impl Contour {
             return Err(ErrorCode::CONTOUR_RANGE);
         }
         let samples = if n == 0.0 { 0 } else { 1 << n as u32 };
-        self.buffer.push_back(Segment {
-            increments,
-            samples,
-        });
+        self.buffer.push_back(Segment { increments, samples });
         Ok(())
     }
 
@@ -118,18 +111,11 @@ impl Contour {
             return Step::Idle;
         };
         if segment.samples == 0 {
-            *self = Self {
-                done: self.done,
-                ..Self::default()
-            };
+            *self = Self { done: self.done, ..Self::default() };
             return Step::End;
         }
         let share = 1.0 / f64::from(segment.samples);
-        let by = segment
-            .increments
-            .iter()
-            .map(|counts| counts * share)
-            .collect();
+        let by = segment.increments.iter().map(|counts| counts * share).collect();
         *over += 1;
         if *over == segment.samples {
             self.current = None;
@@ -162,16 +148,7 @@ mod tests {
         let by = |counts: f64| Step::By(vec![counts]);
         assert_eq!(
             steps,
-            [
-                by(2.0),
-                by(2.0),
-                by(2.0),
-                by(2.0),
-                by(-2.0),
-                by(-2.0),
-                Step::End,
-                Step::Idle
-            ]
+            [by(2.0), by(2.0), by(2.0), by(2.0), by(-2.0), by(-2.0), Step::End, Step::Idle]
         );
         assert!(!contour.is_on());
     }

@@ -40,11 +40,7 @@ const fn axis_length(model: GalilModel) -> usize {
 /// `QZ`: axes, bytes of the general block, of the coordinate block, of an axis.
 pub fn lengths(model: GalilModel) -> String {
     let (general, coordinate) = if model.is_21x3() { (24, 16) } else { (52, 26) };
-    format!(
-        "{}, {general}, {coordinate}, {}",
-        model.axes(),
-        axis_length(model)
-    )
+    format!("{}, {general}, {coordinate}, {}", model.axes(), axis_length(model))
 }
 
 /// One record: every block is present. `analog` holds the 16-bit reading that goes with an axis.
@@ -165,16 +161,10 @@ mod tests {
         axes[1].settings.set(Setting::Speed, 50.0);
         axes[1].stop_code = 0;
         axes[0].filtered = 77.0;
-        let general = General {
-            sample: 65_536 + 258,
-            error: 6,
-            threads: 5,
-            ..General::default()
-        };
-        for (model, head, length, analog, error) in [
-            (GalilModel::Dmc4143, 82, 36, 28, 50),
-            (GalilModel::Dmc2143, 44, 28, 26, 26),
-        ] {
+        let general = General { sample: 65_536 + 258, error: 6, threads: 5, ..General::default() };
+        for (model, head, length, analog, error) in
+            [(GalilModel::Dmc4143, 82, 36, 28, 50), (GalilModel::Dmc2143, 44, 28, 26, 26)]
+        {
             let bytes = record(model, &general, &axes, &[0x1234, 0xfffe]);
             assert_eq!(u16_at(&bytes, 4), 258);
             assert_eq!(bytes[error], 6);

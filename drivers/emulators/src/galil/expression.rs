@@ -32,11 +32,7 @@ pub struct Cursor<'a> {
 impl<'a> Cursor<'a> {
     /// At the start of a text.
     pub fn new(text: &'a str) -> Self {
-        Self {
-            text,
-            at: 0,
-            depth: 0,
-        }
+        Self { text, at: 0, depth: 0 }
     }
 
     /// The character here, blanks skipped.
@@ -179,19 +175,12 @@ impl<'a> Cursor<'a> {
             return Err(error);
         }
         let value = self.expression(scope)?;
-        if self.take(b']') {
-            Ok(value)
-        } else {
-            Err(ErrorCode::BRACKETS)
-        }
+        if self.take(b']') { Ok(value) } else { Err(ErrorCode::BRACKETS) }
     }
 
     fn number(&mut self) -> Result<f64, ErrorCode> {
         let digits = self.take_while(|byte| byte.is_ascii_digit() || byte == b'.');
-        digits
-            .parse()
-            .map(held)
-            .map_err(|_| ErrorCode::NOT_A_NUMBER)
+        digits.parse().map(held).map_err(|_| ErrorCode::NOT_A_NUMBER)
     }
 
     /// What is left.
@@ -284,27 +273,15 @@ mod tests {
         }
 
         fn element(&self, name: &str, index: f64) -> Result<f64, ErrorCode> {
-            if name == "d" {
-                Ok(10.0 * index)
-            } else {
-                Err(ErrorCode::NO_ARRAY)
-            }
+            if name == "d" { Ok(10.0 * index) } else { Err(ErrorCode::NO_ARRAY) }
         }
 
         fn operand(&self, name: &str) -> Result<f64, ErrorCode> {
-            if name == "TPA" {
-                Ok(7.0)
-            } else {
-                Err(ErrorCode::BAD_RESPONSE)
-            }
+            if name == "TPA" { Ok(7.0) } else { Err(ErrorCode::BAD_RESPONSE) }
         }
 
         fn function(&self, name: &str, argument: f64) -> Result<f64, ErrorCode> {
-            if name == "ABS" {
-                Ok(argument.abs())
-            } else {
-                Err(ErrorCode::BAD_FUNCTION)
-            }
+            if name == "ABS" { Ok(argument.abs()) } else { Err(ErrorCode::BAD_FUNCTION) }
         }
     }
 

@@ -29,12 +29,7 @@ pub struct Format {
 impl Format {
     /// Decimal without leading zeros.
     pub const fn decimal(whole: usize, decimals: usize) -> Self {
-        Self {
-            whole,
-            decimals,
-            has_zeros: false,
-            is_hex: false,
-        }
+        Self { whole, decimals, has_zeros: false, is_hex: false }
     }
 
     /// Reads the argument of `PF` and `VF`, such as 10.4 or -8.4: negative is hexadecimal.
@@ -94,10 +89,7 @@ mod tests {
         let pf = Format::decimal(10, 0);
         assert_eq!(pf.write(1234.0), " 1234");
         // DMC-1700/1800 user manual, page 84: `TP X` with leading zeros.
-        let zeros = Format {
-            has_zeros: true,
-            ..pf
-        };
+        let zeros = Format { has_zeros: true, ..pf };
         assert_eq!(zeros.write(0.0), " 0000000000");
         assert_eq!(Format::decimal(3, 2).write(12_345.0), " 999.99");
         assert_eq!(Format::from_number(-4.2, false).write(255.5), "$00FF.80");

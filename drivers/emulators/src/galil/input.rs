@@ -87,10 +87,7 @@ mod tests {
     }
 
     fn whole(texts: &[&str]) -> Vec<Statement> {
-        texts
-            .iter()
-            .map(|text| Statement::Whole((*text).to_owned()))
-            .collect()
+        texts.iter().map(|text| Statement::Whole((*text).to_owned())).collect()
     }
 
     #[test]

@@ -19,9 +19,7 @@ pub struct Memory {
 pub fn is_name(text: &str) -> bool {
     text.len() <= NAME_MAX
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
-        && text
-            .bytes()
-            .all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+        && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
 impl Memory {
@@ -76,8 +74,7 @@ impl Memory {
         if length > (self.free(model) + old) as f64 {
             return Err(ErrorCode::ARRAY_SPACE);
         }
-        self.arrays
-            .insert(name.to_owned(), vec![0.0; length as usize]);
+        self.arrays.insert(name.to_owned(), vec![0.0; length as usize]);
         Ok(())
     }
 
@@ -107,18 +104,12 @@ impl Memory {
 
     /// An array.
     pub fn array(&self, name: &str) -> Result<&[f64], ErrorCode> {
-        self.arrays
-            .get(name)
-            .map(Vec::as_slice)
-            .ok_or(ErrorCode::NO_ARRAY)
+        self.arrays.get(name).map(Vec::as_slice).ok_or(ErrorCode::NO_ARRAY)
     }
 
     /// An array to be written.
     pub fn array_mut(&mut self, name: &str) -> Result<&mut [f64], ErrorCode> {
-        self.arrays
-            .get_mut(name)
-            .map(Vec::as_mut_slice)
-            .ok_or(ErrorCode::NO_ARRAY)
+        self.arrays.get_mut(name).map(Vec::as_mut_slice).ok_or(ErrorCode::NO_ARRAY)
     }
 
     /// An element; index -1 is the length.
@@ -157,19 +148,13 @@ mod tests {
         let mut memory = Memory::default();
         assert_eq!(memory.dimension("a", 8000.0, model), Ok(()));
         assert_eq!(memory.dimension("b", 8000.0, model), Ok(()));
-        assert_eq!(
-            memory.dimension("c", 1.0, model),
-            Err(ErrorCode::ARRAY_SPACE)
-        );
+        assert_eq!(memory.dimension("c", 1.0, model), Err(ErrorCode::ARRAY_SPACE));
         assert_eq!(memory.dimension("b", 7999.0, model), Ok(()));
         assert_eq!(memory.free(model), 1);
         assert_eq!(memory.element("a", -1.0), Ok(8000.0));
         assert_eq!(memory.element("a", 8000.0), Err(ErrorCode::ARRAY_INDEX));
         assert_eq!(memory.set("a", 1.0, model), Err(ErrorCode::VARIABLE));
-        assert_eq!(
-            memory.set("ninechars", 1.0, model),
-            Err(ErrorCode::VARIABLE)
-        );
+        assert_eq!(memory.set("ninechars", 1.0, model), Err(ErrorCode::VARIABLE));
         for at in 0..model.variables() {
             assert_eq!(memory.set(&format!("v{at}"), 1.0, model), Ok(()));
         }

@@ -90,11 +90,7 @@ impl GalilEmulator {
             }
         }
         self.write_newest(&mut newest, form, &mut text);
-        Ok(if is_open {
-            Answer::Open(text)
-        } else {
-            Answer::Text(text)
-        })
+        Ok(if is_open { Answer::Open(text) } else { Answer::Text(text) })
     }
 
     fn write_newest(&self, newest: &mut Option<f64>, form: Form, text: &mut String) {
@@ -119,15 +115,9 @@ fn brace(word: &str) -> Result<Brace, ErrorCode> {
         Ok(Format::decimal(whole, decimals))
     };
     Ok(match kind {
-        'F' => Brace::Number(Format {
-            has_zeros: true,
-            ..size()?
-        }),
+        'F' => Brace::Number(Format { has_zeros: true, ..size()? }),
         'Z' => Brace::Number(size()?),
-        '$' => Brace::Number(Format {
-            is_hex: true,
-            ..size()?
-        }),
+        '$' => Brace::Number(Format { is_hex: true, ..size()? }),
         'S' if rest.is_empty() => Brace::Characters(6),
         'S' => {
             let count = size()?.whole;

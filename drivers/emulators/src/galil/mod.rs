@@ -161,10 +161,7 @@ impl GalilEmulator {
             plant,
             clock,
             axes: Vec::new(),
-            polarity: Polarity {
-                limit: -1.0,
-                home: -1.0,
-            },
+            polarity: Polarity { limit: -1.0, home: -1.0 },
             other_inputs: [-1.0, 0.0, 0.0],
             memory: Memory::default(),
             recorder: Recorder::default(),
@@ -197,16 +194,12 @@ impl GalilEmulator {
     /// All that a reset forgets. The slide stays where it stands, at zero counts.
     fn initialise(&mut self) {
         if let Some(slide) = self.axes.first() {
-            self.plant
-                .shift(slide.filtered * palpate_drivers::sim::MM_PER_PULSE);
+            self.plant.shift(slide.filtered * palpate_drivers::sim::MM_PER_PULSE);
         }
         let axes = self.settings.model.axes();
         self.clock = SampleClock::new(self.now, self.settings.clock_ppm);
         self.axes = (0..axes).map(|axis| Axis::new(axis == 0)).collect();
-        self.polarity = Polarity {
-            limit: -1.0,
-            home: -1.0,
-        };
+        self.polarity = Polarity { limit: -1.0, home: -1.0 };
         self.other_inputs = [-1.0, 0.0, 0.0];
         self.memory = Memory::default();
         self.recorder = Recorder::default();
@@ -310,16 +303,11 @@ impl Device for GalilEmulator {
     }
 
     fn transmit(&mut self, channel: usize) -> Vec<u8> {
-        self.clients
-            .get_mut(channel)
-            .map(Client::take_out)
-            .unwrap_or_default()
+        self.clients.get_mut(channel).map(Client::take_out).unwrap_or_default()
     }
 
     fn take_hang_up(&mut self, channel: usize) -> bool {
-        self.clients
-            .get_mut(channel)
-            .is_some_and(|client| std::mem::take(&mut client.is_hung_up))
+        self.clients.get_mut(channel).is_some_and(|client| std::mem::take(&mut client.is_hung_up))
     }
 
     fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {

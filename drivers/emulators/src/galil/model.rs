@@ -70,11 +70,7 @@ impl GalilModel {
     /// Largest acceleration in counts/s^2.
     #[must_use]
     pub const fn acceleration_max(self) -> f64 {
-        if self.is_21x3() {
-            67_107_840.0
-        } else {
-            1_073_740_800.0
-        }
+        if self.is_21x3() { 67_107_840.0 } else { 1_073_740_800.0 }
     }
 
     /// Threads of application programs.

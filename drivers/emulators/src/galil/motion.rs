@@ -133,10 +133,7 @@ impl GalilEmulator {
         let format = match word {
             "TT" => Format::decimal(10, 4),
             // Stop codes and switch bytes have three digits.
-            "SC" | "TS" => Format {
-                whole: 3,
-                ..self.position_format
-            },
+            "SC" | "TS" => Format { whole: 3, ..self.position_format },
             _ => self.position_format,
         };
         let told = self

@@ -27,19 +27,13 @@ impl Profile {
         // (v + w) dt / 2 + w^2 / (2 dc) = left, for w.
         let room = left - 0.5 * v * dt;
         let half = 0.5 * dc * dt;
-        let stoppable = if room > 0.0 {
-            (half * half + 2.0 * dc * room).sqrt() - half
-        } else {
-            0.0
-        };
+        let stoppable =
+            if room > 0.0 { (half * half + 2.0 * dc * room).sqrt() - half } else { 0.0 };
         let w = (v + ac * dt).min(speed.max(v - dc * dt)).min(stoppable);
         let step = 0.5 * (v + w) * dt;
         // Less than this is rounding: places stay below 2^31 counts.
         if step >= left - 1e-6 || left < 1e-6 {
-            *self = Self {
-                place: target,
-                velocity: 0.0,
-            };
+            *self = Self { place: target, velocity: 0.0 };
             return true;
         }
         self.place += side * step;

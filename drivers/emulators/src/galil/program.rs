@@ -59,12 +59,7 @@ impl Thread {
 
     /// Starts at a line.
     pub fn start(&mut self, line: usize, now: u64) {
-        *self = Self {
-            is_running: true,
-            at: (line, 0),
-            since: now,
-            ..Self::idle()
-        };
+        *self = Self { is_running: true, at: (line, 0), since: now, ..Self::idle() };
     }
 
     /// `JS`, and the automatic subroutines.
@@ -143,9 +138,7 @@ impl Program {
 
     /// The line of a label, given without `#`.
     pub fn find(&self, label: &str) -> Option<usize> {
-        self.labels()
-            .find(|(name, _)| *name == label)
-            .map(|(_, at)| at)
+        self.labels().find(|(name, _)| *name == label).map(|(_, at)| at)
     }
 
     /// The statement at a place and the place behind it, empty lines skipped; `None` behind the end.
@@ -218,8 +211,7 @@ fn split(line: &str) -> Vec<String> {
 
 /// Whether a statement begins with a command, and not with a name that begins like it.
 fn is_word(text: &str, word: &str) -> bool {
-    text.strip_prefix(word)
-        .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+    text.strip_prefix(word).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
 }
 
 #[cfg(test)]
@@ -239,10 +231,7 @@ mod tests {
         assert_eq!(program.fetch((0, 2)), Some(("MG \"x;y\"", (0, 3))));
         assert_eq!(program.fetch((0, 3)), Some(("#B", (2, 1))));
         assert_eq!(program.fetch((3, 1)), None);
-        assert_eq!(
-            self::program(&["#A", "#A"]).unwrap_err(),
-            ErrorCode::DUPLICATE_LABEL
-        );
+        assert_eq!(self::program(&["#A", "#A"]).unwrap_err(), ErrorCode::DUPLICATE_LABEL);
         assert_eq!(check_line(&"a".repeat(81)), Err(ErrorCode::DOWNLOAD));
         assert_eq!(check_line("#"), Err(ErrorCode::DUPLICATE_LABEL));
     }

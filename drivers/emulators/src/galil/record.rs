@@ -94,11 +94,7 @@ impl Recorder {
         if wanted.abs() > shortest as f64 {
             return Err(ErrorCode::TOO_MANY_ELEMENTS);
         }
-        self.length = if wanted == 0.0 {
-            shortest
-        } else {
-            wanted.abs() as usize
-        };
+        self.length = if wanted == 0.0 { shortest } else { wanted.abs() as usize };
         self.interval = 1 << n as u32;
         self.is_circular = wanted < 0.0;
         self.next = 0;
@@ -131,9 +127,7 @@ mod tests {
     fn ready() -> Recorder {
         let mut recorder = Recorder::default();
         recorder.set_arrays(vec!["a".into(), "b".into()]).unwrap();
-        recorder
-            .set_sources(vec![Source::Time, Source::Analog(0)])
-            .unwrap();
+        recorder.set_sources(vec![Source::Time, Source::Analog(0)]).unwrap();
         recorder
     }
 
@@ -141,9 +135,7 @@ mod tests {
     fn every_second_sample_until_it_is_full() {
         let mut recorder = ready();
         recorder.start(1.0, None, 5, 1000).unwrap();
-        let due: Vec<_> = (1001..1100)
-            .filter_map(|now| Some((now, recorder.due(now)?)))
-            .collect();
+        let due: Vec<_> = (1001..1100).filter_map(|now| Some((now, recorder.due(now)?))).collect();
         assert_eq!(due, [(1002, 0), (1004, 1), (1006, 2), (1008, 3), (1010, 4)]);
         assert!(!recorder.is_running());
         assert_eq!(recorder.next, 5);
@@ -167,14 +159,8 @@ mod tests {
         let mut recorder = Recorder::default();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
         recorder = ready();
-        assert_eq!(
-            recorder.start(9.0, None, 5, 0),
-            Err(ErrorCode::OUT_OF_RANGE)
-        );
-        assert_eq!(
-            recorder.start(1.0, Some(6.0), 5, 0),
-            Err(ErrorCode::TOO_MANY_ELEMENTS)
-        );
+        assert_eq!(recorder.start(9.0, None, 5, 0), Err(ErrorCode::OUT_OF_RANGE));
+        assert_eq!(recorder.start(1.0, Some(6.0), 5, 0), Err(ErrorCode::TOO_MANY_ELEMENTS));
         recorder.set_sources(vec![Source::Time]).unwrap();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
     }

@@ -152,11 +152,7 @@ impl GalilEmulator {
         if length < 0.0 {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let samples = if is_samples {
-            length
-        } else {
-            samples_of(length, self.clock.tm())
-        };
+        let samples = if is_samples { length } else { samples_of(length, self.clock.tm()) };
         // A cast saturates; 2^31 samples are 24 days.
         self.threads[index].wait = Wait::Until(since + samples.ceil() as u64);
         Ok(())

@@ -76,11 +76,8 @@ impl GalilEmulator {
 
     fn contour_sample(&mut self, dt: f64) {
         // A stop, a limit or an abort takes an axis out of the mode, and with it the mode ends.
-        let is_left = self
-            .contour
-            .axes
-            .iter()
-            .any(|axis| self.axes[*axis].motion != Motion::Contour);
+        let is_left =
+            self.contour.axes.iter().any(|axis| self.axes[*axis].motion != Motion::Contour);
         if is_left {
             for axis in self.contour.axes.clone() {
                 self.axes[axis].stop(Setting::Deceleration, 51);
@@ -141,11 +138,7 @@ impl GalilEmulator {
 
     /// Signal at an analog input: the load cell's at the first, nothing at others.
     pub(super) fn input_volts(&self, input: usize) -> f64 {
-        if input == 0 {
-            self.plant.volts().0
-        } else {
-            0.0
-        }
+        if input == 0 { self.plant.volts().0 } else { 0.0 }
     }
 
     /// `QR`.

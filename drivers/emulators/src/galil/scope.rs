@@ -101,13 +101,9 @@ impl GalilEmulator {
     fn told_numbered(&self, word: [u8; 2], number: usize) -> Result<f64, ErrorCode> {
         let thread = || self.threads.get(number).ok_or(ErrorCode::OUT_OF_RANGE);
         match &word {
-            b"XQ" => thread().map(|thread| {
-                if thread.is_running {
-                    thread.at.0 as f64
-                } else {
-                    -1.0
-                }
-            }),
+            b"XQ" => {
+                thread().map(|thread| if thread.is_running { thread.at.0 as f64 } else { -1.0 })
+            }
             b"HX" => thread().map(|thread| truth(thread.is_running)),
             b"ED" if number == 1 => Ok(self.error_at.1 as f64),
             b"AQ" => {
@@ -149,9 +145,7 @@ impl GalilEmulator {
 
     /// Another controller has another number.
     pub(super) fn serial_number(&self) -> u32 {
-        self.settings
-            .serial_number
-            .wrapping_add(u32::from(self.is_wrong))
+        self.settings.serial_number.wrapping_add(u32::from(self.is_wrong))
     }
 
     /// Volts of an analog input, counted from 1.
@@ -189,10 +183,9 @@ impl Scope for GalilEmulator {
         }
         let mut letters = rest.chars();
         match (letters.next(), letters.next()) {
-            (None, _) => self
-                .told_plain(word)
-                .or_else(|| self.told(word, 0))
-                .ok_or(ErrorCode::BAD_RESPONSE),
+            (None, _) => {
+                self.told_plain(word).or_else(|| self.told(word, 0)).ok_or(ErrorCode::BAD_RESPONSE)
+            }
             // The coordinate systems never run.
             (Some('S' | 'T'), None) if &word == b"BG" => Ok(0.0),
             (Some(letter), None) => axis_of(letter)

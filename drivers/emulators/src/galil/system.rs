@@ -18,11 +18,7 @@ const PUSH_MIN: f64 = 2.0;
 impl GalilEmulator {
     /// What `^R^V` answers.
     pub(super) fn revision(&self) -> &'static str {
-        if self.is_wrong {
-            "RIO47120 Rev 1.1b"
-        } else {
-            self.settings.model.revision()
-        }
+        if self.is_wrong { "RIO47120 Rev 1.1b" } else { self.settings.model.revision() }
     }
 
     /// All commands that are about no axis and move no data.
@@ -38,10 +34,7 @@ impl GalilEmulator {
             "TB" | "TI" => {
                 let letters = [word.as_bytes()[0], word.as_bytes()[1]];
                 let value = self.told_plain(letters).unwrap_or(0.0);
-                let format = Format {
-                    whole: 3,
-                    ..self.position_format
-                };
+                let format = Format { whole: 3, ..self.position_format };
                 return Ok(Answer::Text(format.write(value)));
             }
             "ID" => return Ok(Answer::Text(self.identity())),
@@ -137,9 +130,7 @@ impl GalilEmulator {
         };
         let code = std::mem::replace(&mut self.error, ErrorCode(0));
         let text = if has_text { code.text() } else { "" };
-        Ok(Answer::Text(
-            format!("{} {text}", code.0).trim_end().to_owned(),
-        ))
+        Ok(Answer::Text(format!("{} {text}", code.0).trim_end().to_owned()))
     }
 
     /// Of this form on 41x3 and 40x0 boards; the words are this emulator's.
@@ -238,12 +229,7 @@ impl GalilEmulator {
 
     fn configure_inputs(&mut self, arguments: &str) -> Result<(), ErrorCode> {
         let numbers = self.numbers(arguments)?;
-        if numbers.len() > 5
-            || numbers
-                .iter()
-                .flatten()
-                .any(|n| ![-1.0, 0.0, 1.0].contains(n))
-        {
+        if numbers.len() > 5 || numbers.iter().flatten().any(|n| ![-1.0, 0.0, 1.0].contains(n)) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
         for (at, number) in numbers.into_iter().enumerate() {
@@ -326,9 +312,7 @@ impl GalilEmulator {
         };
         let which: Vec<usize> = match who.trim().as_bytes() {
             b"S" => asking.into_iter().collect(),
-            b"T" | b"N" => (0..self.clients.len())
-                .filter(|at| Some(*at) != asking)
-                .collect(),
+            b"T" | b"N" => (0..self.clients.len()).filter(|at| Some(*at) != asking).collect(),
             [letter @ b'A'..=b'H'] => vec![usize::from(letter - b'A')],
             _ => return Err(ErrorCode::OPERAND),
         };

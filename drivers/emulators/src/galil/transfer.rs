@@ -54,8 +54,7 @@ impl GalilEmulator {
             let (name, rest) = field.split_once('[').ok_or(ErrorCode::BRACKETS)?;
             let length = rest.strip_suffix(']').ok_or(ErrorCode::BRACKETS)?;
             let length = evaluate(length, self)?.trunc();
-            self.memory
-                .dimension(name.trim(), length, self.settings.model)?;
+            self.memory.dimension(name.trim(), length, self.settings.model)?;
         }
         Ok(Answer::Done)
     }
@@ -77,20 +76,14 @@ impl GalilEmulator {
     }
 
     fn list_arrays(&self) -> Answer {
-        let lines: Vec<String> = self
-            .memory
-            .arrays()
-            .map(|(name, length)| format!("{name}[{length}]"))
-            .collect();
+        let lines: Vec<String> =
+            self.memory.arrays().map(|(name, length)| format!("{name}[{length}]")).collect();
         lines_or_nothing(&lines)
     }
 
     fn list_labels(&self) -> Answer {
-        let lines: Vec<String> = self
-            .program
-            .labels()
-            .map(|(name, line)| format!("#{name}={line}"))
-            .collect();
+        let lines: Vec<String> =
+            self.program.labels().map(|(name, line)| format!("#{name}={line}")).collect();
         lines_or_nothing(&lines)
     }
 
@@ -108,10 +101,8 @@ impl GalilEmulator {
 
     /// `RD _AFX,_TDA`.
     fn record_sources(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
-        let sources: Result<Vec<Source>, ErrorCode> = fields(arguments)
-            .into_iter()
-            .map(|field| self.source(field))
-            .collect();
+        let sources: Result<Vec<Source>, ErrorCode> =
+            fields(arguments).into_iter().map(|field| self.source(field)).collect();
         self.recorder.set_sources(sources?)?;
         Ok(Answer::Done)
     }
@@ -223,13 +214,8 @@ impl GalilEmulator {
             return Err(ErrorCode::NOT_IN_PROGRAM);
         };
         let (name, next, end, _) = self.range_of(arguments)?;
-        self.clients[channel].mode = Mode::Values {
-            name,
-            next,
-            end,
-            value: Vec::new(),
-            is_wrong: false,
-        };
+        self.clients[channel].mode =
+            Mode::Values { name, next, end, value: Vec::new(), is_wrong: false };
         Ok(Answer::Silent)
     }
 
@@ -240,10 +226,7 @@ impl GalilEmulator {
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        self.clients[channel].mode = Mode::Program {
-            lines: Vec::new(),
-            line: Vec::new(),
-        };
+        self.clients[channel].mode = Mode::Program { lines: Vec::new(), line: Vec::new() };
         Ok(Answer::Silent)
     }
 
@@ -298,14 +281,7 @@ impl GalilEmulator {
     /// A byte of an array's values, which a comma or a carriage return ends.
     pub(super) fn take_value(&mut self, channel: usize, byte: u8) {
         let client = &mut self.clients[channel];
-        let Mode::Values {
-            name,
-            next,
-            end,
-            value,
-            is_wrong,
-        } = &mut client.mode
-        else {
+        let Mode::Values { name, next, end, value, is_wrong } = &mut client.mode else {
             return;
         };
         let is_end = ends_download(byte);
@@ -356,10 +332,7 @@ impl GalilEmulator {
         if number < 0.0 {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let thread = self
-            .threads
-            .get_mut(number as usize)
-            .ok_or(ErrorCode::OUT_OF_RANGE)?;
+        let thread = self.threads.get_mut(number as usize).ok_or(ErrorCode::OUT_OF_RANGE)?;
         if thread.is_running {
             return Err(ErrorCode::STRAND_BUSY);
         }
@@ -383,9 +356,5 @@ impl GalilEmulator {
 }
 
 fn lines_or_nothing(lines: &[String]) -> Answer {
-    if lines.is_empty() {
-        Answer::Done
-    } else {
-        Answer::Text(lines.join("\r\n"))
-    }
+    if lines.is_empty() { Answer::Done } else { Answer::Text(lines.join("\r\n")) }
 }

@@ -41,14 +41,8 @@ const FACTORY: [(u16, f64); 34] = [
 ];
 
 /// What the slide of this bench needs: a motor that stays on, steps, speed, acceleration and travel.
-const SLIDE: [(u16, f64); 6] = [
-    (1, 255.0),
-    (23, 1.0),
-    (100, 400.0),
-    (110, 1500.0),
-    (120, 60.0),
-    (130, 150.0),
-];
+const SLIDE: [(u16, f64); 6] =
+    [(1, 255.0), (23, 1.0), (100, 400.0), (110, 1500.0), (120, 60.0), (130, 150.0)];
 
 /// All settings.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -115,11 +109,7 @@ impl Eeprom {
         }
         // Positions are steps a millimetre; the rest of the whole numbers are bytes.
         let is_whole = number < 11 || matches!(number, 13 | 20..=23 | 32);
-        let value = if is_whole {
-            value.trunc().min(255.0)
-        } else {
-            value
-        };
+        let value = if is_whole { value.trunc().min(255.0) } else { value };
         self.values.insert(number, value);
         Ok(())
     }
@@ -147,10 +137,7 @@ mod tests {
     #[test]
     fn the_listing_is_that_of_the_manual() {
         let listing = Eeprom::factory().listing();
-        assert!(
-            listing.starts_with("$0=10\r\n$1=25\r\n$2=0\r\n"),
-            "{listing}"
-        );
+        assert!(listing.starts_with("$0=10\r\n$1=25\r\n$2=0\r\n"), "{listing}");
         assert!(listing.contains("$10=1\r\n$11=0.010\r\n$12=0.002\r\n$13=0\r\n$20=0\r\n"));
         assert!(listing.ends_with("$130=200.000\r\n$131=200.000\r\n$132=200.000\r\n"));
     }

@@ -157,12 +157,7 @@ pub fn parse(
             _ => take_value(&mut words, letter, value)?,
         }
     }
-    let line = Line {
-        block,
-        before: modes,
-        is_jog,
-        here,
-    };
+    let line = Line { block, before: modes, is_jog, here };
     finish(line, *offsets, words, flow)
 }
 
@@ -183,10 +178,7 @@ mod tests {
     use super::*;
 
     fn jog(line: &str) -> Result<Parsed, u8> {
-        let offsets = Offsets {
-            shift: [2.0, 0.0, 0.0],
-            ..Offsets::default()
-        };
+        let offsets = Offsets { shift: [2.0, 0.0, 0.0], ..Offsets::default() };
         parse(line, Modes::default(), true, [1.0, 0.0, 0.0], &offsets)
     }
 

@@ -38,9 +38,7 @@ impl Grbl {
             Phase::PullOff | Phase::Leave => (-towards, self.eeprom.get(25), pull_off),
             Phase::Locate => (towards, self.eeprom.get(24), LOCATE * pull_off),
         };
-        let from = *homing
-            .from
-            .get_or_insert(self.steps[0] as f64 / self.steps_per_mm(0));
+        let from = *homing.from.get_or_insert(self.steps[0] as f64 / self.steps_per_mm(0));
         let is_closed = self.is_limit();
         let is_search = matches!(homing.phase, Phase::Seek | Phase::Locate);
         if is_search && is_closed {
@@ -66,10 +64,7 @@ impl Grbl {
     }
 
     fn next(&mut self, phase: Phase) {
-        self.homing = Some(Homing {
-            phase,
-            ..Homing::default()
-        });
+        self.homing = Some(Homing { phase, ..Homing::default() });
     }
 
     fn fail(&mut self, code: u8) {
@@ -80,11 +75,7 @@ impl Grbl {
 
     /// Machine zero is at the end of the travel that has the greater coordinate (limits.c).
     fn homed(&mut self, is_negative: bool, pull_off: f64) {
-        let mm = if is_negative {
-            pull_off - self.eeprom.get(130)
-        } else {
-            -pull_off
-        };
+        let mm = if is_negative { pull_off - self.eeprom.get(130) } else { -pull_off };
         let steps = (mm * self.steps_per_mm(0)).round() as i64;
         self.shift += (self.steps[0] - steps) as f64 * self.settings.mm_per_step;
         self.steps[0] = steps;

@@ -196,11 +196,7 @@ impl Grbl {
             (motion.to[axis] * scale).round() / scale
         });
         let limits = self.limits();
-        let feed = if motion.kind == 0 {
-            f64::INFINITY
-        } else {
-            motion.feed.max(FEED_MIN)
-        };
+        let feed = if motion.kind == 0 { f64::INFINITY } else { motion.feed.max(FEED_MIN) };
         self.planner.push(to, feed / 60.0, &limits);
         if motion.is_jog && self.state == State::Idle && !self.planner.is_idle() {
             self.state = State::Jog;

@@ -16,12 +16,7 @@ pub fn finish(
     mut words: Words,
     flow: Flow,
 ) -> Result<Parsed, u8> {
-    let Line {
-        mut block,
-        before,
-        is_jog,
-        here,
-    } = line;
+    let Line { mut block, before, is_jog, here } = line;
     let scale = if block.is_inch { MM_PER_INCH } else { 1.0 };
     let axes = words.axes().map(|value| value.map(|value| value * scale));
     if axes.iter().any(Option::is_some) {
@@ -112,14 +107,7 @@ fn non_modal(
     target: Place,
 ) -> Result<(Option<Motion>, Option<Motion>), u8> {
     let has_axes = axes.iter().any(Option::is_some);
-    let rapid = |to| {
-        Some(Motion {
-            kind: 0,
-            to,
-            feed: block.feed,
-            is_jog: false,
-        })
-    };
+    let rapid = |to| Some(Motion { kind: 0, to, feed: block.feed, is_jog: false });
     let mut ways = (None, None);
     match words.non_modal {
         10 => store(offsets, words, axes, block, here)?,
@@ -176,11 +164,7 @@ fn motion(
     }
     let way = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
     let length = way.sum::<f64>().sqrt();
-    let share = if block.is_inverse && !is_jog {
-        length
-    } else {
-        1.0
-    };
+    let share = if block.is_inverse && !is_jog { length } else { 1.0 };
     Ok(has_axes.then_some(Motion {
         kind: block.motion,
         to: target,
@@ -193,11 +177,7 @@ fn motion(
 fn refuse_leftovers(words: &mut Words, is_jog: bool) -> Result<(), u8> {
     let of_axes = words.axes_for.is_some();
     let used = [("NF", true), ("ST", !is_jog), ("XYZ", of_axes)];
-    for letter in used
-        .iter()
-        .filter(|(_, is)| *is)
-        .flat_map(|(all, _)| all.chars())
-    {
+    for letter in used.iter().filter(|(_, is)| *is).flat_map(|(all, _)| all.chars()) {
         words.take(letter);
     }
     if words.values.iter().any(Option::is_some) {
@@ -221,11 +201,7 @@ fn feed(
     }
     if block.is_inverse {
         let needs_it = is_motion && !matches!(block.motion, 0 | 80);
-        return if needs_it && given.is_none() {
-            Err(22)
-        } else {
-            Ok(given.unwrap_or(0.0))
-        };
+        return if needs_it && given.is_none() { Err(22) } else { Ok(given.unwrap_or(0.0)) };
     }
     Ok(match given {
         Some(feed) => feed * scale,

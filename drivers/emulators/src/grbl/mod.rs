@@ -172,19 +172,12 @@ impl Grbl {
     fn limits(&self) -> [(f64, f64); AXES] {
         std::array::from_fn(|axis| {
             let axis = axis as u16;
-            (
-                self.eeprom.get(110 + axis) / 60.0,
-                self.eeprom.get(120 + axis),
-            )
+            (self.eeprom.get(110 + axis) / 60.0, self.eeprom.get(120 + axis))
         })
     }
 
     fn is_limit(&self) -> bool {
-        let Switches {
-            is_home,
-            is_forward,
-            is_reverse,
-        } = self.switches;
+        let Switches { is_home, is_forward, is_reverse } = self.switches;
         match self.settings.home {
             HomeWiring::Limit => is_home || is_reverse || is_forward,
             HomeWiring::Probe => is_reverse || is_forward,

@@ -67,11 +67,7 @@ impl Planner {
     /// At rest at a place.
     #[must_use]
     pub fn at(place: Place) -> Self {
-        Self {
-            place,
-            end: place,
-            ..Self::default()
-        }
+        Self { place, end: place, ..Self::default() }
     }
 
     /// Where the newest block ends.
@@ -100,11 +96,7 @@ impl Planner {
 
     /// Adds a way; nothing where there is none. `limits` gives speed and acceleration of each axis.
     pub fn push(&mut self, to: Place, speed: f64, limits: &[(f64, f64); AXES]) {
-        let way: Vec<f64> = to
-            .iter()
-            .zip(self.end)
-            .map(|(to, from)| to - from)
-            .collect();
+        let way: Vec<f64> = to.iter().zip(self.end).map(|(to, from)| to - from).collect();
         let length = way.iter().map(|way| way * way).sum::<f64>().sqrt();
         if length < TINY {
             return;
@@ -128,14 +120,7 @@ impl Planner {
             self.left = length;
         }
         self.end = to;
-        self.blocks.push_back(Block {
-            to,
-            unit,
-            length,
-            speed,
-            acceleration,
-            entry,
-        });
+        self.blocks.push_back(Block { to, unit, length, speed, acceleration, entry });
     }
 
     /// Brakes, and keeps what is left of the blocks.
@@ -219,10 +204,7 @@ impl Planner {
                 self.speed = 0.0;
             }
         }
-        self.ahead.push_back(Point {
-            place: self.place,
-            speed: self.speed,
-        });
+        self.ahead.push_back(Point { place: self.place, speed: self.speed });
     }
 }
 
@@ -255,10 +237,7 @@ mod tests {
             for (at, point) in points.iter().enumerate() {
                 let place = exact.position(Seconds((at + 1) as f64 * STEP)).0;
                 // A corner of the trapezoid within a step costs that step's change of speed.
-                assert!(
-                    (point.place[0] - place).abs() < 1e-3,
-                    "{pieces}, {at}: {point:?} {place}"
-                );
+                assert!((point.place[0] - place).abs() < 1e-3, "{pieces}, {at}: {point:?} {place}");
             }
             assert_eq!(points.last().unwrap().place[0], 30.0);
             assert!(planner.is_idle() && planner.free() == BLOCKS_MAX);
@@ -274,9 +253,8 @@ mod tests {
             planner.advance();
         }
         planner.push([6.0, 0.0, 0.0], 9.0, &LIMITS);
-        let slowest = (0..60)
-            .filter_map(|_| planner.advance())
-            .fold(9.0, |slow: f64, p| slow.min(p.speed));
+        let slowest =
+            (0..60).filter_map(|_| planner.advance()).fold(9.0, |slow: f64, p| slow.min(p.speed));
         assert!((2.0..8.5).contains(&slowest), "{slowest}");
         assert_eq!(run(&mut planner).last().unwrap().place[0], 6.0);
     }

@@ -24,11 +24,7 @@ impl Grbl {
                 self.state = State::Hold;
                 self.planner.hold();
             }
-            0x84 if matches!(
-                self.state,
-                State::Run | State::Idle | State::Hold | State::Jog
-            ) =>
-            {
+            0x84 if matches!(self.state, State::Run | State::Idle | State::Hold | State::Jog) => {
                 self.say("[MSG:Check Door]\r\n");
                 self.is_cancelling = self.state == State::Jog;
                 self.state = State::Door;

@@ -47,11 +47,7 @@ impl Grbl {
             State::Check => "Check",
             State::Sleep => "Sleep",
         };
-        let inch = if self.eeprom.flag(13) {
-            1.0 / 25.4
-        } else {
-            1.0
-        };
+        let inch = if self.eeprom.flag(13) { 1.0 / 25.4 } else { 1.0 };
         let scaled = |place: Place| place.map(|mm| mm * inch);
         let mask = self.eeprom.get(10) as u32;
         let here = self.machine();
@@ -64,18 +60,9 @@ impl Grbl {
         };
         // Writing to a String cannot fail.
         if mask & 2 != 0 {
-            let _ = write!(
-                text,
-                "|Bf:{},{}",
-                self.planner.free(),
-                RX_MAX - self.rx.len()
-            );
+            let _ = write!(text, "|Bf:{},{}", self.planner.free(), RX_MAX - self.rx.len());
         }
-        let spindle = if self.modes.spindle == 5 {
-            0.0
-        } else {
-            self.modes.spindle_speed
-        };
+        let spindle = if self.modes.spindle == 5 { 0.0 } else { self.modes.spindle_speed };
         let _ = write!(text, "|FS:{:.0},{spindle:.0}", self.speed * 60.0 * inch);
         if self.is_probe() || self.is_limit() || self.is_hold_pressed {
             text.push_str("|Pn:");
@@ -125,18 +112,12 @@ impl Grbl {
 
     pub(super) fn say_probe(&mut self) {
         let (place, is_found) = self.probed;
-        self.say(&format!(
-            "[PRB:{}:{}]\r\n",
-            list(&place),
-            u8::from(is_found)
-        ));
+        self.say(&format!("[PRB:{}:{}]\r\n", list(&place), u8::from(is_found)));
     }
 
     pub(super) fn say_offsets(&mut self) {
         let offsets = self.offsets;
-        let names = [
-            "G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92",
-        ];
+        let names = ["G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92"];
         let shift = [offsets.shift];
         let places = offsets.systems.iter().chain(&offsets.stored).chain(&shift);
         for (name, place) in names.iter().zip(places) {
@@ -163,11 +144,7 @@ impl Grbl {
     }
 
     pub(super) fn say_build(&mut self) {
-        let version = if self.is_wrong {
-            "0.9j.20160303"
-        } else {
-            "1.1h.20190830"
-        };
+        let version = if self.is_wrong { "0.9j.20160303" } else { "1.1h.20190830" };
         let info = self.eeprom.build_info.clone();
         self.say(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
     }

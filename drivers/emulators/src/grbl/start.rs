@@ -8,11 +8,7 @@ impl Grbl {
     /// Its supply has come, or the converter has reset it: the position is forgotten (main.c).
     pub(super) fn power_up(&mut self) {
         self.steps = [0; AXES];
-        self.state = if self.eeprom.flag(22) {
-            State::Alarm
-        } else {
-            State::Idle
-        };
+        self.state = if self.eeprom.flag(22) { State::Alarm } else { State::Idle };
         self.say_hello();
     }
 

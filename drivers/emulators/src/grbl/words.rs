@@ -197,10 +197,7 @@ pub fn take_value(words: &mut Words, letter: char, value: f64) -> Result<(), u8>
     if letter == 'T' && value > 255.0 {
         return Err(38);
     }
-    if words.values[letter as usize - 'A' as usize]
-        .replace(value)
-        .is_some()
-    {
+    if words.values[letter as usize - 'A' as usize].replace(value).is_some() {
         return Err(25);
     }
     if value < 0.0 && matches!(letter, 'F' | 'N' | 'P' | 'S' | 'T') {

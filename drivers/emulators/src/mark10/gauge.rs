@@ -156,23 +156,11 @@ impl EmulatedGauge {
         let decimals = (-step.log10()).ceil().clamp(0.0, 5.0) as usize;
         let rounded = (newtons / STEP).round() * STEP / unit.newtons();
         let sign = if self.set.is_inverted { -1.0 } else { 1.0 };
-        let signed = if self.set.is_unsigned {
-            rounded.abs()
-        } else {
-            sign * rounded
-        };
+        let signed = if self.set.is_unsigned { rounded.abs() } else { sign * rounded };
         let text = format!("{signed:.decimals$}");
         let is_zero = text.bytes().all(|b| !(b'1'..=b'9').contains(&b));
-        let text = if is_zero {
-            text.trim_start_matches('-').to_owned()
-        } else {
-            text
-        };
-        if self.set.is_full {
-            format!("{text} {}", unit.name())
-        } else {
-            text
-        }
+        let text = if is_zero { text.trim_start_matches('-').to_owned() } else { text };
+        if self.set.is_full { format!("{text} {}", unit.name()) } else { text }
     }
 
     fn list(&self) -> String {

@@ -135,11 +135,8 @@ impl EmulatedStand {
     }
 
     fn length(&self, mm: f64) -> String {
-        let (value, decimals, unit) = if self.is_inches {
-            (mm / INCH, 3, "in")
-        } else {
-            (mm, 2, "mm")
-        };
+        let (value, decimals, unit) =
+            if self.is_inches { (mm / INCH, 3, "in") } else { (mm, 2, "mm") };
         let text = format!("{value:.decimals$} {unit}");
         match text.strip_prefix('-') {
             Some(rest) if rest.starts_with("0.00 ") || rest.starts_with("0.000 ") => rest.into(),
@@ -241,10 +238,7 @@ impl EmulatedStand {
                 self.say(&force);
             }
             b'e' | b'f' | b'g' | b'h' => {
-                self.number = Some(Number {
-                    letter: byte,
-                    text: String::new(),
-                });
+                self.number = Some(Number { letter: byte, text: String::new() });
             }
             _ if self.settings.is_without_control => {}
             _ => self.control(byte),
@@ -296,11 +290,8 @@ impl EmulatedStand {
 
     /// How far it may still go, in mm, in the direction of `way`.
     fn room(&self, way: f64) -> f64 {
-        let is_switched = if way > 0.0 {
-            self.plant.is_reverse_limit()
-        } else {
-            self.plant.is_forward_limit()
-        };
+        let is_switched =
+            if way > 0.0 { self.plant.is_reverse_limit() } else { self.plant.is_forward_limit() };
         if is_switched {
             return 0.0;
         }
@@ -312,11 +303,7 @@ impl EmulatedStand {
     }
 
     fn move_on(&mut self, dt: f64) {
-        let way = if self.velocity == 0.0 {
-            self.way
-        } else {
-            self.velocity.signum()
-        };
+        let way = if self.velocity == 0.0 { self.way } else { self.velocity.signum() };
         if way == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
             return;
         }
@@ -324,11 +311,7 @@ impl EmulatedStand {
         // The fastest speed from which it comes to rest in the room there is; steps of dt make it a little less.
         let brake = ACCELERATION * dt;
         let end_speed = (brake * brake / 4.0 + 2.0 * ACCELERATION * room).sqrt() - brake / 2.0;
-        let wanted = if self.way == way {
-            (self.speed / 60.0).min(end_speed)
-        } else {
-            0.0
-        };
+        let wanted = if self.way == way { (self.speed / 60.0).min(end_speed) } else { 0.0 };
         let speed = self.velocity.abs();
         let speed = if wanted > speed {
             (speed + brake).min(wanted)
@@ -387,10 +370,7 @@ impl Device for EmulatedStand {
             let dt = STEP.0 as f64 * 1e-9;
             self.move_on(dt);
             self.plant.advance(-self.position, Seconds(dt));
-            let felt = Felt {
-                volts: self.plant.volts(),
-                force: self.plant.on_cell(),
-            };
+            let felt = Felt { volts: self.plant.volts(), force: self.plant.on_cell() };
             self.gauge.advance(self.now, felt);
             self.pass_on();
         }

@@ -70,10 +70,7 @@ impl Session {
     /// third `?` as the stop that asks for least, and only then given up.
     fn on_refused_stop(&mut self, now: Nanos, halting: Halting) {
         let refusals = halting.refusals + 1;
-        let again = Asked::Stop(Halting {
-            refusals,
-            ..halting
-        });
+        let again = Asked::Stop(Halting { refusals, ..halting });
         match refusals {
             0..REFUSALS_MAX => self.urge(halting.command, again),
             REFUSALS_MAX => self.urge(RigCommand::Halt, again),
@@ -124,8 +121,7 @@ impl Session {
         match recording.look(look, sent, marked) {
             Ok(()) => {
                 self.stats.lost = recording.lost;
-                self.timing
-                    .push(look.time as u64, self.pace.tick, sent, now);
+                self.timing.push(look.time as u64, self.pace.tick, sent, now);
                 self.fetch(now);
             }
             Err(_) => self.end_recording(now, sent, &look, marked == Some(true)),
@@ -141,9 +137,7 @@ impl Session {
         if !self.is_reset {
             let detail =
                 "the controller has stopped recording, and samples were lost; open the rig again";
-            let fault = Fault::CommandRefused {
-                detail: detail.into(),
-            };
+            let fault = Fault::CommandRefused { detail: detail.into() };
             self.report(now, RigEventBody::Fault(fault));
         }
     }
@@ -230,9 +224,7 @@ impl Session {
     /// A sine that cannot go on: the axis is stopped.
     pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
         self.urge(RigCommand::Stop, Asked::Stop(Halting::QUIET));
-        let fault = Fault::CommandRefused {
-            detail: format!("the sine was broken off: {why}"),
-        };
+        let fault = Fault::CommandRefused { detail: format!("the sine was broken off: {why}") };
         self.report_in_order(now, RigEventBody::Fault(fault));
     }
 

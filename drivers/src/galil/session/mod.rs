@@ -42,11 +42,7 @@ struct Halting {
 
 impl Halting {
     /// One that nobody waits for.
-    const QUIET: Self = Self {
-        number: None,
-        command: RigCommand::Stop,
-        refusals: 0,
-    };
+    const QUIET: Self = Self { number: None, command: RigCommand::Stop, refusals: 0 };
 }
 
 /// What a prompt still to come belongs to.
@@ -240,10 +236,8 @@ impl Dialogue for Session {
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let is_overdue = self
-            .expected
-            .front()
-            .is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
+        let is_overdue =
+            self.expected.front().is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
         if is_overdue && self.search.is_none() {
             self.lose_order(now);
         }
@@ -293,9 +287,6 @@ impl Dialogue for Session {
     }
 
     fn stats(&self) -> LinkStats {
-        LinkStats {
-            deviation_max: self.timing.deviation_max,
-            ..self.stats
-        }
+        LinkStats { deviation_max: self.timing.deviation_max, ..self.stats }
     }
 }

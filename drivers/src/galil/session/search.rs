@@ -58,11 +58,7 @@ impl Session {
         if self.sine.take().is_some() {
             self.end_sine(now, "answers were garbled; check the cable");
         }
-        self.search = Some(Search {
-            last_byte: now,
-            marker_at: None,
-            markers: 0,
-        });
+        self.search = Some(Search { last_byte: now, marker_at: None, markers: 0 });
     }
 
     pub(super) fn on_reply_while_searching(&mut self, now: Nanos, reply: &Reply) {
@@ -104,9 +100,6 @@ impl Session {
         self.expected.clear();
         // A number that no sample begins with, and another one each time.
         let number = 27_180 + search.markers;
-        Some(Outgoing {
-            text: format!("MG {number}\r"),
-            asked: vec![Asked::Marker(number)],
-        })
+        Some(Outgoing { text: format!("MG {number}\r"), asked: vec![Asked::Marker(number)] })
     }
 }

@@ -36,11 +36,7 @@ impl Session {
         self.sine = None;
         self.drop_motions(now, OVERTAKEN);
         let number = self.answers.owe();
-        let halting = Halting {
-            number: Some(number),
-            command,
-            refusals: 0,
-        };
+        let halting = Halting { number: Some(number), command, refusals: 0 };
         self.urge(command, Asked::Stop(halting));
     }
 
@@ -125,10 +121,9 @@ impl Session {
                     self.acknowledge(now, number, made);
                 }
             }
-            Next::AskWhy => self.lines.push_back(Outgoing {
-                text: "TC1\r".into(),
-                asked: vec![Asked::Why],
-            }),
+            Next::AskWhy => {
+                self.lines.push_back(Outgoing { text: "TC1\r".into(), asked: vec![Asked::Why] })
+            }
             Next::Refused(why) => {
                 if let Some((number, _)) = self.order.take() {
                     self.refuse(now, number, why);
@@ -139,19 +134,14 @@ impl Session {
 
     pub(super) fn samples_in_flight(&self) -> usize {
         let is_sample = |asked: &Asked| matches!(asked, Asked::Sample | Asked::Marked(_));
-        self.expected
-            .iter()
-            .filter(|(asked, _)| is_sample(asked))
-            .count()
+        self.expected.iter().filter(|(asked, _)| is_sample(asked)).count()
     }
 
     pub(super) fn is_renewal_due(&self, now: Nanos) -> bool {
         let is_attended = now.since(self.attended) < ATTENDED_MAX;
         self.has_watchdog
             && is_attended
-            && self
-                .renewed_at
-                .is_none_or(|at| now.since(at) >= watchdog::RENEW)
+            && self.renewed_at.is_none_or(|at| now.since(at) >= watchdog::RENEW)
     }
 
     pub(super) fn next_line(&mut self, now: Nanos) -> Option<Outgoing> {
@@ -180,10 +170,8 @@ impl Session {
             return Some(Outgoing { text, asked });
         }
         // Answers of an order that a stop has ended may still be on their way.
-        let has_answers_to_come = self
-            .expected
-            .iter()
-            .any(|(asked, _)| matches!(asked, Asked::Part | Asked::Why));
+        let has_answers_to_come =
+            self.expected.iter().any(|(asked, _)| matches!(asked, Asked::Part | Asked::Why));
         if self.order.is_none()
             && !has_answers_to_come
             && let Some((number, command)) = self.orders.pop_front()
@@ -201,9 +189,7 @@ impl Session {
             Some(_) => return self.take_beginning(now),
             None => {}
         }
-        let is_due = self
-            .asked_at
-            .is_none_or(|at| now.since(at) >= self.pace.every);
+        let is_due = self.asked_at.is_none_or(|at| now.since(at) >= self.pace.every);
         if let Some(line) = self.fetches.pop_front() {
             return Some(line);
         }
@@ -234,10 +220,7 @@ impl Session {
                 self.confirm_later(*halting);
             }
         }
-        Some(Outgoing {
-            asked: Vec::new(),
-            ..line
-        })
+        Some(Outgoing { asked: Vec::new(), ..line })
     }
 
     /// The part of an order that begins something.

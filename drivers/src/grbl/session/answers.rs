@@ -121,10 +121,9 @@ impl Session {
             State::Idle => self.on_idle(now, asked, steps),
             State::Jog => self.on_jog(now, asked, steps),
             State::Alarm if self.locked.is_some() => {}
-            State::Alarm => self.lock_with(
-                now,
-                "it is locked; look at the axis, then open the rig again",
-            ),
+            State::Alarm => {
+                self.lock_with(now, "it is locked; look at the axis, then open the rig again")
+            }
             other => {
                 let why = format!(
                     "it is in state {other:?}, which palpate never asks for; press reset and open the rig again"

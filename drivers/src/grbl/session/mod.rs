@@ -161,11 +161,9 @@ impl Session {
                 self.acknowledge(now, number, command);
             }
             RigCommand::MoveTo(wanted) => self.begin_move(now, number, wanted),
-            RigCommand::Oscillate(_) => self.refuse(
-                now,
-                number,
-                "Grbl makes no sines; choose a protocol of ramps",
-            ),
+            RigCommand::Oscillate(_) => {
+                self.refuse(now, number, "Grbl makes no sines; choose a protocol of ramps")
+            }
             RigCommand::Stop | RigCommand::Halt => self.stop(now, command),
         }
     }
@@ -225,21 +223,13 @@ impl Session {
         };
         let is_inwards = !self.is_outwards(motion);
         let is_ending = motion.is_all_sent()
-            && motion
-                .started
-                .is_some_and(|started| now >= started + motion.duration());
-        if motion.cancelled.is_some() || is_inwards || is_ending {
-            POLL_CLOSELY
-        } else {
-            POLL
-        }
+            && motion.started.is_some_and(|started| now >= started + motion.duration());
+        if motion.cancelled.is_some() || is_inwards || is_ending { POLL_CLOSELY } else { POLL }
     }
 
     fn take_query(&mut self, now: Nanos) -> Option<Vec<u8>> {
         let is_free = self.asked.is_none_or(|asked| now.since(asked) > REPORT_MAX);
-        let is_due = self
-            .polled
-            .is_none_or(|at| now.since(at) >= self.poll_every(now));
+        let is_due = self.polled.is_none_or(|at| now.since(at) >= self.poll_every(now));
         if !is_free || !is_due {
             return None;
         }
@@ -255,10 +245,7 @@ impl Session {
         }
         let axis = self.settings.axis;
         let steps_per_mm = self.facts.steps_per_mm;
-        let motion = self
-            .motion
-            .as_mut()
-            .filter(|motion| motion.cancelled.is_none())?;
+        let motion = self.motion.as_mut().filter(|motion| motion.cancelled.is_none())?;
         let end = motion.next_chunk(now, self.settings.mm_per_pulse)?;
         let feed = motion.feed * self.pace.feed();
         let line = protocol::jog(axis, end as f64 / steps_per_mm, feed);

@@ -97,8 +97,7 @@ impl Session {
                 let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
                 let from = sign * motion.from as f64;
                 // It may have begun; nobody has said so.
-                self.track()
-                    .moves(written.min(now), from, given, pulses_per_mm);
+                self.track().moves(written.min(now), from, given, pulses_per_mm);
             }
             _ => {}
         }
@@ -110,11 +109,7 @@ impl Session {
         self.urgent.push_front(vec![RESET]);
         self.leave(now);
         self.open = None;
-        self.halt = Some(Halt {
-            owed: vec![(number, command)],
-            begun: now,
-            written: now,
-        });
+        self.halt = Some(Halt { owed: vec![(number, command)], begun: now, written: now });
         self.locked = Some(
             "it was cut short by a reset and its position is lost; open the rig again and home it"
                 .into(),
@@ -162,11 +157,7 @@ impl Session {
                     "its answer was lost, so the axis was stopped; check the cable",
                 );
                 self.cancel(now);
-            } else if self
-                .motion
-                .as_ref()
-                .is_some_and(|motion| motion.cancelled.is_none())
-            {
+            } else if self.motion.as_ref().is_some_and(|motion| motion.cancelled.is_none()) {
                 self.fault(
                     now,
                     "an answer was lost in a motion, so the axis is stopped; check the cable",
@@ -199,10 +190,7 @@ impl Session {
             Some(_) => {}
             None if is_wanted => self.cancel(now),
             None if is_unattended => {
-                self.end(
-                    now,
-                    "nobody took samples for half a second, so the axis is stopped",
-                );
+                self.end(now, "nobody took samples for half a second, so the axis is stopped");
             }
             None => {}
         }

@@ -32,11 +32,7 @@ impl GaugeScale {
         let per_count = like.unit.newtons() * like.number.step();
         // Saturates for a capacity beyond all counts.
         let counts_max = (RANGE * capacity.0 / per_count).round() as i32;
-        Self {
-            unit: like.unit,
-            decimals: like.number.decimals,
-            counts_max,
-        }
+        Self { unit: like.unit, decimals: like.number.decimals, counts_max }
     }
 
     /// Volts of one count: one volt a newton.
@@ -116,10 +112,7 @@ mod tests {
     use crate::mark10::protocol::Decimal;
 
     fn dialogue() -> GaugeDialogue {
-        let like = Reading {
-            number: Decimal::parse("0.000").unwrap(),
-            unit: ForceUnit::Newton,
-        };
+        let like = Reading { number: Decimal::parse("0.000").unwrap(), unit: ForceUnit::Newton };
         GaugeDialogue::new(GaugeScale::new(like, Newtons(25.0)), 250.0, Nanos::ZERO)
     }
 
@@ -136,10 +129,7 @@ mod tests {
 
     #[test]
     fn pounds_are_converted() {
-        let like = Reading {
-            number: Decimal::parse("-18.78").unwrap(),
-            unit: ForceUnit::Pound,
-        };
+        let like = Reading { number: Decimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
         let scale = GaugeScale::new(like, Newtons(500.0));
         let mut dialogue = GaugeDialogue::new(scale, 10.0, Nanos::ZERO);
         dialogue.received(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");
@@ -151,15 +141,7 @@ mod tests {
     #[test]
     fn other_units_other_digits_and_rubbish_are_counted() {
         let mut dialogue = dialogue();
-        for line in [
-            "4.285 mN",
-            "4.28 N",
-            "4285 N",
-            "4.285N",
-            "*10",
-            "RS",
-            "4.2\u{7f}5 N",
-        ] {
+        for line in ["4.285 mN", "4.28 N", "4285 N", "4.285N", "*10", "RS", "4.2\u{7f}5 N"] {
             dialogue.received(Nanos(5), format!("{line}\r\n").as_bytes());
         }
         assert_eq!((dialogue.take_sample(), dialogue.garbled()), (None, 7));
@@ -168,13 +150,9 @@ mod tests {
     #[test]
     fn beyond_its_range_it_reads_the_end_of_it() {
         let mut dialogue = dialogue();
-        dialogue.received(
-            Nanos(1),
-            b"-20.000 N\r\nOVER\r\nOVER\r\n27.500 N\r\n3.000 N\r\n",
-        );
-        let counts: Vec<i32> = std::iter::from_fn(|| dialogue.take_sample())
-            .map(|sample| sample.counts)
-            .collect();
+        dialogue.received(Nanos(1), b"-20.000 N\r\nOVER\r\nOVER\r\n27.500 N\r\n3.000 N\r\n");
+        let counts: Vec<i32> =
+            std::iter::from_fn(|| dialogue.take_sample()).map(|sample| sample.counts).collect();
         assert_eq!(counts, [-20_000, -27_500, -27_500, 27_500, 3_000]);
         assert!(dialogue.take_trouble().unwrap().contains("beyond"));
         assert_eq!(dialogue.take_trouble(), None);

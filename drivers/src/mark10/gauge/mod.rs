@@ -59,8 +59,7 @@ impl GaugeSettings {
     /// gauge's filters are mostly stronger than its noise.
     #[must_use]
     pub fn noise_expected(&self, step: Volts) -> Volts {
-        self.noise
-            .map_or(Volts(step.0 / 12.0_f64.sqrt()), |noise| Volts(noise.0))
+        self.noise.map_or(Volts(step.0 / 12.0_f64.sqrt()), |noise| Volts(noise.0))
     }
 }
 

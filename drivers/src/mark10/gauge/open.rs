@@ -78,14 +78,10 @@ pub(crate) fn check(settings: &GaugeSettings) -> Result<(), DeviceError> {
         )));
     }
     if settings.filter.is_some_and(|n| n > FILTER_MAX) {
-        return Err(unfit(format!(
-            "its filter goes from 0 to {FILTER_MAX}: 2^n samples"
-        )));
+        return Err(unfit(format!("its filter goes from 0 to {FILTER_MAX}: 2^n samples")));
     }
     if !(settings.capacity.0 > 0.0 && settings.capacity.0 < 1e6) {
-        return Err(unfit(
-            "its capacity must be above 0 N, as on its label".into(),
-        ));
+        return Err(unfit("its capacity must be above 0 N, as on its label".into()));
     }
     Ok(())
 }
@@ -114,19 +110,13 @@ fn quieten(console: &mut TextConsole<'_>) -> Result<GaugeList, DeviceError> {
                 .into(),
         ));
     }
-    if lines
-        .iter()
-        .any(|line| matches!(line, GaugeLine::Reading(_)))
-    {
+    if lines.iter().any(|line| matches!(line, GaugeLine::Reading(_))) {
         return Err(unfit(
             "it sends readings and hears nothing; check its cable and whether its menu listens to USB or RS-232"
                 .into(),
         ));
     }
-    Err(DeviceError::Other {
-        device: DEVICE,
-        found: stranger(&console.heard),
-    })
+    Err(DeviceError::Other { device: DEVICE, found: stranger(&console.heard) })
 }
 
 /// Model and serial number, where it tells them (`RN`, `RM`, `RS`; Series 5 user's guide, page 19).
@@ -182,12 +172,9 @@ fn set_up(
 /// What a gauge is told before it is read: each is silent when it is done.
 pub(crate) fn commands(settings: &GaugeSettings) -> Vec<String> {
     let polarity = format!("IPOL{}", u8::from(settings.is_reversed));
-    let mut commands: Vec<String> = ["N", "CUR", "FULL", &polarity, "OPOL0", "AOFF0"]
-        .map(str::to_owned)
-        .into();
-    let filters = settings
-        .filter
-        .map(|n| [format!("FLTC{n}"), format!("FLTP{n}")]);
+    let mut commands: Vec<String> =
+        ["N", "CUR", "FULL", &polarity, "OPOL0", "AOFF0"].map(str::to_owned).into();
+    let filters = settings.filter.map(|n| [format!("FLTC{n}"), format!("FLTP{n}")]);
     commands.extend(filters.into_iter().flatten());
     commands
 }
@@ -266,23 +253,14 @@ fn measure(
         }
     }
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
-        return Err(unfit(format!(
-            "it sends no readings after AOUT{asked}; check its firmware"
-        )));
+        return Err(unfit(format!("it sends no readings after AOUT{asked}; check its firmware")));
     };
     let span = last.since(*first).0 as f64 * 1e-9;
     let measured = (times.len() - 1) as f64 / span;
     let is_other = times.len() >= 3 && (measured / asked - 1.0).abs() > RATE_OFF;
-    Ok(if is_other {
-        measured.round().max(1.0)
-    } else {
-        asked
-    })
+    Ok(if is_other { measured.round().max(1.0) } else { asked })
 }
 
 pub(crate) fn unfit(detail: String) -> DeviceError {
-    DeviceError::Unfit {
-        device: DEVICE,
-        detail,
-    }
+    DeviceError::Unfit { device: DEVICE, detail }
 }

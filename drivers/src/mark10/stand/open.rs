@@ -126,10 +126,7 @@ fn nobody(console: &TextConsole<'_>) -> DeviceError {
             "it does not give force and travel together; check the cable to its gauge and the travel option",
         );
     }
-    DeviceError::Other {
-        device: DEVICE,
-        found: stranger(&console.heard),
-    }
+    DeviceError::Other { device: DEVICE, found: stranger(&console.heard) }
 }
 
 /// The gauge's settings and, behind words, its serial number.
@@ -210,10 +207,7 @@ fn measure(
     console: &mut TextConsole<'_>,
     has_status: bool,
 ) -> Result<(LinkStats, Pace), DeviceError> {
-    let mut stats = LinkStats {
-        in_flight: 1,
-        ..LinkStats::default()
-    };
+    let mut stats = LinkStats { in_flight: 1, ..LinkStats::default() };
     for _ in 0..MEASURED {
         let start = console.now();
         if sample(console)?.is_none() {
@@ -258,8 +252,5 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
 }
 
 fn unfit(detail: &str) -> DeviceError {
-    DeviceError::Unfit {
-        device: DEVICE,
-        detail: detail.to_owned(),
-    }
+    DeviceError::Unfit { device: DEVICE, detail: detail.to_owned() }
 }

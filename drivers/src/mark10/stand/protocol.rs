@@ -19,9 +19,7 @@ const INCH: f64 = 25.4;
 /// `e0200.3`: the speed in tenths of mm/min; `None` when it has no such form.
 #[must_use]
 pub fn set_speed(tenths: i64) -> Option<String> {
-    (1..=SPEED_MAX)
-        .contains(&tenths)
-        .then(|| format!("e{:04}.{}", tenths / 10, tenths % 10))
+    (1..=SPEED_MAX).contains(&tenths).then(|| format!("e{:04}.{}", tenths / 10, tenths % 10))
 }
 
 /// `g-007.52` or `h010.70`: the lower or upper limit in hundredths of mm; `None` when it has no such form.
@@ -178,11 +176,7 @@ mod tests {
         };
         use Crosshead::{Down, Stopped, Up};
         for line in ["SLUL", "S L UL", "S,L,UL"] {
-            assert_eq!(
-                parsed(line),
-                Some((Stopped, Some(true), true, false)),
-                "{line}"
-            );
+            assert_eq!(parsed(line), Some((Stopped, Some(true), true, false)), "{line}");
         }
         assert_eq!(parsed("UL"), Some((Up, Some(true), false, false)));
         assert_eq!(parsed("DM"), Some((Down, Some(false), false, false)));

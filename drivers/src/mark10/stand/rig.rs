@@ -35,10 +35,7 @@ pub fn open(
     let device: Arc<str> = "stand".into();
     let connected = connect(link.as_mut(), clock, settings, &device)?;
     let session = StandSession::new(settings.clone(), &connected, clock());
-    let line_settings = LineSettings {
-        device,
-        farewell: STOP.into(),
-    };
+    let line_settings = LineSettings { device, farewell: STOP.into() };
     Ok(Opened {
         lines: vec![Line::start(link, session, clock, line_settings)?],
         description: connected.description,

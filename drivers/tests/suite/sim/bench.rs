@@ -64,10 +64,7 @@ fn specimens_are_numbered_and_number_zero_is_the_first() {
     assert_eq!(rig.truth().surface, first.base);
     for (specimen, as_before) in [(0, first), (3, third)] {
         rig.by_hand(HandAction::Mount { specimen });
-        assert_eq!(
-            (rig.truth().surface, rig.truth().body),
-            (as_before.surface, as_before.body)
-        );
+        assert_eq!((rig.truth().surface, rig.truth().body), (as_before.surface, as_before.body));
     }
 }
 
@@ -94,11 +91,7 @@ fn without_a_specimen_the_probe_meets_the_base_or_nothing() {
         let first = rig.truth().surface;
         assert!((base.distance_from(first) - thickness.parse::<f64>().unwrap()).abs() < 1e-12);
         rig.by_hand(HandAction::Unmount);
-        let end = if meets {
-            base.moved_by(0.02)
-        } else {
-            Position(150.0)
-        };
+        let end = if meets { base.moved_by(0.02) } else { Position(150.0) };
         let target = pulses_at(&rig, end);
         run_move(&mut rig, target, 12.0);
         let truth = rig.truth();
@@ -160,9 +153,7 @@ fn noise_of_the_ideal_cell_is_what_was_set() {
     });
     let expected = rig.description().noise_expected.0;
     assert!((expected - 0.15 * 0.005).abs() < 1e-15);
-    let volts: Vec<f64> = (0..10_000)
-        .map(|_| next_reading(&mut rig).1.volts.0)
-        .collect();
+    let volts: Vec<f64> = (0..10_000).map(|_| next_reading(&mut rig).1.volts.0).collect();
     let mean = volts.iter().sum::<f64>() / 1e4;
     let rms = (volts.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 1e4).sqrt();
     assert!((rms / expected - 1.0).abs() < 0.04, "{rms} V");

@@ -65,19 +65,13 @@ fn check(profile: SimProfile, kind: FaultKind, is_right: impl Fn(Reading, Readin
 #[test]
 fn without_a_script_it_is_the_rig_inside() {
     let mut rig = FaultyRig::new(sim(SimProfile::Lab), Vec::new(), 1);
-    assert_eq!(
-        events_with(&mut rig, &script(), END),
-        sound(SimProfile::Lab)
-    );
+    assert_eq!(events_with(&mut rig, &script(), END), sound(SimProfile::Lab));
     let mut boxed = FaultyRig::new(
         open("sim", &settings(SimProfile::Lab, 41, SimClock::Nominal)).unwrap(),
         Vec::new(),
         1,
     );
-    assert_eq!(
-        events_with(&mut boxed, &script(), END),
-        sound(SimProfile::Lab)
-    );
+    assert_eq!(events_with(&mut boxed, &script(), END), sound(SimProfile::Lab));
 }
 
 #[test]
@@ -98,9 +92,8 @@ fn signal_faults_change_the_signal_in_their_time() {
             });
         }
         check(profile, FaultKind::SignalJump(Volts(0.5)), |good, bad| {
-            let is_counted = bad
-                .counts
-                .is_none_or(|c| Volts(f64::from(c) * adc.volts_per_count) == bad.volts);
+            let is_counted =
+                bad.counts.is_none_or(|c| Volts(f64::from(c) * adc.volts_per_count) == bad.volts);
             // Rounded twice to half a count.
             same_axis(good, bad) && is_counted && (bad.volts.0 - good.volts.0 - 0.5).abs() < 4e-4
         });
@@ -112,21 +105,14 @@ fn signal_faults_change_the_signal_in_their_time() {
 
 #[test]
 fn a_stuck_signal_stays_at_its_first_value() {
-    let events = faulty(
-        SimProfile::Lab,
-        ScriptedFault::during(START, SPAN, FaultKind::Stuck),
-    );
+    let events = faulty(SimProfile::Lab, ScriptedFault::during(START, SPAN, FaultKind::Stuck));
     let stuck: Vec<Reading> = readings(&events)
         .into_iter()
         .filter(|(at, _)| is_inside(*at))
         .map(|(_, reading)| reading)
         .collect();
     let first = stuck[0];
-    assert!(
-        stuck
-            .iter()
-            .all(|r| (r.counts, r.volts) == (first.counts, first.volts))
-    );
+    assert!(stuck.iter().all(|r| (r.counts, r.volts) == (first.counts, first.volts)));
     assert!(stuck.last().unwrap().pulses > first.pulses + 10);
     let good = readings(&sound(SimProfile::Lab));
     assert!(good.iter().any(|(_, r)| *r == first));
@@ -138,9 +124,7 @@ fn added_noise_has_the_size_told() {
     let pairs = readings(&sound(SimProfile::Ideal))
         .into_iter()
         .zip(readings(&faulty(SimProfile::Ideal, fault)));
-    let added: Vec<f64> = pairs
-        .map(|((_, good), (_, bad))| bad.volts.0 - good.volts.0)
-        .collect();
+    let added: Vec<f64> = pairs.map(|((_, good), (_, bad))| bad.volts.0 - good.volts.0).collect();
     let rms = (added.iter().map(|v| v * v).sum::<f64>() / added.len() as f64).sqrt();
     // Four standard errors with about 300 samples.
     assert!((rms - 0.1).abs() < 0.017, "{rms}");
@@ -204,16 +188,10 @@ fn an_answer_to_a_late_report_does_not_act_in_the_past() {
 
 #[test]
 fn a_lost_link_says_so_once_and_then_nothing() {
-    let events = faulty(
-        SimProfile::Lab,
-        ScriptedFault::from(START, FaultKind::Disconnect),
-    );
+    let events = faulty(SimProfile::Lab, ScriptedFault::from(START, FaultKind::Disconnect));
     let last = events.last().unwrap();
     assert_eq!(last.at, START);
-    assert!(matches!(
-        last.body,
-        RigEventBody::Fault(Fault::LinkLost { .. })
-    ));
+    assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
     let fault = ScriptedFault::from(START, FaultKind::Disconnect);
     let mut rig = FaultyRig::new(sim(SimProfile::Lab), vec![fault], 1);
     events_with(&mut rig, &script(), START);
@@ -226,30 +204,18 @@ fn a_lost_link_says_so_once_and_then_nothing() {
 
 #[test]
 fn a_restarted_controller_has_lost_everything() {
-    for (kind, is_announced) in [
-        (FaultKind::Reset, true),
-        (FaultKind::UnannouncedReset, false),
-    ] {
+    for (kind, is_announced) in [(FaultKind::Reset, true), (FaultKind::UnannouncedReset, false)] {
         let fault = ScriptedFault::from(START, kind);
         let mut rig = FaultyRig::new(sim(SimProfile::Lab), vec![fault], 1);
         let events = events_with(&mut rig, &script(), END);
         let is_reset = |e: &RigEvent| e.body == RigEventBody::Fault(Fault::ControllerReset);
-        let resets: Vec<Nanos> = events
-            .iter()
-            .filter(|e| is_reset(e))
-            .map(|e| e.at)
-            .collect();
+        let resets: Vec<Nanos> = events.iter().filter(|e| is_reset(e)).map(|e| e.at).collect();
         assert_eq!(resets, if is_announced { vec![START] } else { vec![] });
         // Two commands, two answers: the double's own do not show.
-        let acks = events
-            .iter()
-            .filter(|e| matches!(e.body, RigEventBody::Ack(_)))
-            .count();
+        let acks = events.iter().filter(|e| matches!(e.body, RigEventBody::Ack(_))).count();
         assert_eq!(acks, 2);
-        let after: Vec<(Nanos, Reading)> = readings(&events)
-            .into_iter()
-            .filter(|(at, _)| *at >= START)
-            .collect();
+        let after: Vec<(Nanos, Reading)> =
+            readings(&events).into_iter().filter(|(at, _)| *at >= START).collect();
         assert_eq!((after[0].1.tick, after[0].1.pulses), (0, 0));
         assert!(after[0].0 < START + Nanos::from_millis(6));
         for (_, reading) in &after {

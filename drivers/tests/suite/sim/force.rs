@@ -33,10 +33,7 @@ fn force_settles_at_the_elastic_force_of_the_depth() {
         let settled = truth.body.elastic(depth).0;
         assert!((truth.force.0 - settled).abs() < 1e-9 * settled);
         let curve = rig.calibration().curve().unwrap();
-        let mean_volts = (0..4000)
-            .map(|_| next_reading(&mut rig).1.volts.0)
-            .sum::<f64>()
-            / 4000.0;
+        let mean_volts = (0..4000).map(|_| next_reading(&mut rig).1.volts.0).sum::<f64>() / 4000.0;
         let read = curve.newtons_from_volts(palpate_model::Volts(mean_volts)).0;
         let tolerance = match profile {
             // Four standard errors of 0.02 N over 4000 samples.
@@ -67,9 +64,7 @@ fn force_is_that_of_the_body_along_the_true_path() {
             }
             next_reading(&mut rig);
             let truth = rig.truth();
-            let body_force = state
-                .step(&body, truth.position.depth_from(surface), tick)
-                .0;
+            let body_force = state.step(&body, truth.position.depth_from(surface), tick).0;
             assert!((truth.force.0 - body_force.max(0.0)).abs() < 1e-12);
             lifted_off += u32::from(body_force < 0.0);
             largest = largest.max(truth.force.0);
@@ -82,9 +77,7 @@ fn force_is_that_of_the_body_along_the_true_path() {
 fn noise_at_rest_is_what_the_description_says() {
     for profile in [SimProfile::Lab, SimProfile::Ideal] {
         let mut rig = SimRig::new(settings(profile, 33, SimClock::Nominal));
-        let volts: Vec<f64> = (0..10_000)
-            .map(|_| next_reading(&mut rig).1.volts.0)
-            .collect();
+        let volts: Vec<f64> = (0..10_000).map(|_| next_reading(&mut rig).1.volts.0).collect();
         let mean = volts.iter().sum::<f64>() / 1e4;
         let rms = (volts.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 1e4).sqrt();
         let expected = rig.description().noise_expected.0;

@@ -9,12 +9,7 @@ use palpate_model::{MmPerS, MmPerS2, Nanos};
 pub const FOREVER: Nanos = Nanos(u64::MAX / 2);
 
 pub fn settings(profile: SimProfile, seed: u64, clock: SimClock) -> SimSettings {
-    SimSettings {
-        profile,
-        seed,
-        clock,
-        ..SimSettings::default()
-    }
+    SimSettings { profile, seed, clock, ..SimSettings::default() }
 }
 
 pub fn ideal(seed: u64) -> SimRig {
@@ -22,11 +17,7 @@ pub fn ideal(seed: u64) -> SimRig {
 }
 
 pub fn move_to(target_pulses: i64, speed: f64) -> RigCommand {
-    RigCommand::MoveTo(MoveTo {
-        target_pulses,
-        speed: MmPerS(speed),
-        acceleration: MmPerS2(61.44),
-    })
+    RigCommand::MoveTo(MoveTo { target_pulses, speed: MmPerS(speed), acceleration: MmPerS2(61.44) })
 }
 
 /// A sine of so many pulses of amplitude and ticks of period.
@@ -69,9 +60,7 @@ pub fn samples_to_rest<R: Rig>(rig: &mut R) -> Vec<Reading> {
     let mut samples: Vec<Reading> = Vec::new();
     loop {
         let (_, reading) = next_reading(rig);
-        let has_moved = samples
-            .iter()
-            .any(|earlier| earlier.status.has(AxisStatus::MOVING));
+        let has_moved = samples.iter().any(|earlier| earlier.status.has(AxisStatus::MOVING));
         samples.push(reading);
         if has_moved && !reading.status.has(AxisStatus::MOVING) {
             return samples;

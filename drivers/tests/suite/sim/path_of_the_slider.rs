@@ -105,9 +105,7 @@ fn send_one(rig: &mut SimRig, choices: &mut Choices, pulses: i64) {
             250 + choices.below(900) as u32,
             1 + choices.below(3) as u32,
         ),
-        _ => RigCommand::DefinePosition {
-            pulses: choices.below(20_001) as i64 - 10_000,
-        },
+        _ => RigCommand::DefinePosition { pulses: choices.below(20_001) as i64 - 10_000 },
     };
     rig.send(command);
 }
@@ -130,11 +128,7 @@ fn the_tracker_follows_random_moves_stops_and_halts() {
     assert!(all.oscillations > 200, "{} oscillations", all.oscillations);
     assert!(all.cut_short > 500, "{} stops and halts", all.cut_short);
     assert!(all.refusals > 100, "{} refusals", all.refusals);
-    assert!(
-        all.limits > 50,
-        "{} samples moving on a limit switch",
-        all.limits
-    );
+    assert!(all.limits > 50, "{} samples moving on a limit switch", all.limits);
 }
 
 #[test]
@@ -147,10 +141,8 @@ fn a_move_ends_on_its_target_and_reports_whole_pulses() {
     let true_position = rig.truth().position_counted().0;
     assert!((true_position - 1234.0 * 0.015).abs() < 1e-12);
     // Trapezoid: distance / speed + speed / acceleration, in whole ticks.
-    let moving = samples
-        .iter()
-        .filter(|sample| sample.status.has(AxisStatus::MOVING))
-        .count() as f64;
+    let moving =
+        samples.iter().filter(|sample| sample.status.has(AxisStatus::MOVING)).count() as f64;
     let expected = 1234.0 * 0.015 / 3.0 + 3.0 / 61.44;
     assert!((moving * 1e-3 - expected).abs() <= 1e-3, "{moving} ms");
     assert!(samples.is_sorted_by_key(|sample| sample.pulses));
@@ -167,10 +159,8 @@ fn a_stop_decelerates_and_rests_on_the_pulse_it_reports() {
     let before = rig.truth().position;
     rig.send(RigCommand::Stop);
     let samples = host::samples_to_rest(&mut rig);
-    let stopping = samples
-        .iter()
-        .filter(|sample| sample.status.has(AxisStatus::STOPPING))
-        .count() as f64;
+    let stopping =
+        samples.iter().filter(|sample| sample.status.has(AxisStatus::STOPPING)).count() as f64;
     // v / a.
     assert!((stopping * 1e-3 - 6.0 / 61.44).abs() <= 1e-3);
     let last = samples.last().unwrap();
@@ -181,10 +171,7 @@ fn a_stop_decelerates_and_rests_on_the_pulse_it_reports() {
     // 1.0 to 1.5 ms back, 0.5 ms forth, up to one tick of waiting; down to a whole pulse.
     let way = truth.position.distance_from(before);
     let braking = 36.0 / (2.0 * 61.44);
-    assert!(
-        way > braking - 0.015 && way < braking + 6.0 * 0.003,
-        "{way}"
-    );
+    assert!(way > braking - 0.015 && way < braking + 6.0 * 0.003, "{way}");
 }
 
 #[test]
@@ -254,15 +241,8 @@ fn a_sine_is_stopped_by_braking_and_halted_at_once() {
         assert!((truth.position_counted().0 - last.pulses as f64 * 0.015).abs() < 1e-12);
         // v^2 / 2a or nothing, the way made meanwhile, down to a whole pulse.
         let way = truth.position.distance_from(before);
-        let braking = if is_braking {
-            speed * speed / (2.0 * 61.44)
-        } else {
-            0.0
-        };
-        assert!(
-            way > braking - 0.02 && way < braking + speed * 0.003,
-            "{way}"
-        );
+        let braking = if is_braking { speed * speed / (2.0 * 61.44) } else { 0.0 };
+        assert!(way > braking - 0.02 && way < braking + speed * 0.003, "{way}");
         // The axis takes the next motion from there.
         answer_to(&mut rig, move_to(0, 3.0)).unwrap();
         assert_eq!(host::samples_to_rest(&mut rig).last().unwrap().pulses, 0);
@@ -306,10 +286,7 @@ fn refusals_say_why() {
     assert!(why(&mut rig, move_to(100, 1.0)).contains("motor off"));
     answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
     for speed in [0.0, 0.02, -1.0, 20.1, f64::NAN, f64::INFINITY] {
-        assert!(
-            why(&mut rig, move_to(100, speed)).contains("speed"),
-            "{speed}"
-        );
+        assert!(why(&mut rig, move_to(100, speed)).contains("speed"), "{speed}");
     }
     for target in [i64::MAX, i64::MIN, 1 << 32] {
         assert!(why(&mut rig, move_to(target, 1.0)).contains("out of range"));
@@ -344,13 +321,7 @@ fn a_flood_of_commands_is_refused_not_stored() {
         rig.send(RigCommand::EnableMotor);
     }
     let events = host::events_with(&mut rig, &[], palpate_model::Nanos::from_millis(50));
-    let acks = events
-        .iter()
-        .filter(|event| matches!(event.body, RigEventBody::Ack(_)))
-        .count();
-    let faults = events
-        .iter()
-        .filter(|event| matches!(event.body, RigEventBody::Fault(_)))
-        .count();
+    let acks = events.iter().filter(|event| matches!(event.body, RigEventBody::Ack(_))).count();
+    let faults = events.iter().filter(|event| matches!(event.body, RigEventBody::Fault(_))).count();
     assert_eq!((acks, faults), (64, 1));
 }

@@ -37,10 +37,7 @@ fn the_home_switch_closes_at_home_and_stops_nothing() {
     answer_to(&mut rig, move_to(-home - 60, 3.0)).unwrap();
     loop {
         let (_, reading) = next_reading(&mut rig);
-        assert_eq!(
-            reading.status.has(AxisStatus::HOME),
-            rig.truth().position.0 <= 0.0
-        );
+        assert_eq!(reading.status.has(AxisStatus::HOME), rig.truth().position.0 <= 0.0);
         assert!(!reading.status.has(AxisStatus::STOPPING));
         if !reading.status.has(AxisStatus::MOVING) && reading.pulses != 0 {
             assert_eq!(reading.pulses, -home - 60);
@@ -52,24 +49,17 @@ fn the_home_switch_closes_at_home_and_stops_nothing() {
 
 #[test]
 fn a_limit_switch_stops_the_axis_and_lets_it_go_back() {
-    for (target, limit, edge) in [
-        (-20_000, AxisStatus::REVERSE_LIMIT, -2.0),
-        (20_000, AxisStatus::FORWARD_LIMIT, 152.0),
-    ] {
+    for (target, limit, edge) in
+        [(-20_000, AxisStatus::REVERSE_LIMIT, -2.0), (20_000, AxisStatus::FORWARD_LIMIT, 152.0)]
+    {
         let mut rig = ideal(12);
         let samples = run_move(&mut rig, target, 18.0);
-        let first = samples
-            .iter()
-            .find(|sample| sample.status.has(AxisStatus::STOPPING))
-            .unwrap();
+        let first = samples.iter().find(|sample| sample.status.has(AxisStatus::STOPPING)).unwrap();
         assert!(first.status.has(limit) && first.status.has(AxisStatus::MOVING));
         let beyond = (rig.truth().position.0 - edge) * f64::from((target as i32).signum());
         // v^2 / 2a, at most one tick of travel before the switch is seen, at most a pulse down.
         let braking = 18.0 * 18.0 / (2.0 * 61.44);
-        assert!(
-            (braking - 0.016..braking + 18.0e-3 + 0.016).contains(&beyond),
-            "{beyond}"
-        );
+        assert!((braking - 0.016..braking + 18.0e-3 + 0.016).contains(&beyond), "{beyond}");
         let err = answer_to(&mut rig, move_to(target, 1.0)).unwrap_err();
         assert!(err.contains("limit switch"), "{err}");
         let back = samples.last().unwrap().pulses - i64::from((target as i32).signum()) * 2000;

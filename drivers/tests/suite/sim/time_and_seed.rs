@@ -89,10 +89,8 @@ fn ticks_are_one_apart_and_as_long_as_the_clock_says() {
         (SimClock::Nominal, "16000", 62_500),
         (SimClock::Galil, "20000", 48_800),
     ] {
-        let settings = SimSettings {
-            rate: rate.parse().unwrap(),
-            ..settings(SimProfile::Ideal, 25, clock)
-        };
+        let settings =
+            SimSettings { rate: rate.parse().unwrap(), ..settings(SimProfile::Ideal, 25, clock) };
         let mut rig = SimRig::new(settings);
         let tick_nanos = rig.description().tick_nanos;
         assert_eq!(tick_nanos, nanos);

@@ -47,11 +47,7 @@ pub(super) fn where_above(
         let begins = is_above(low);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if is_above(middle) == begins {
-                low = middle
-            } else {
-                high = middle
-            }
+            if is_above(middle) == begins { low = middle } else { high = middle }
         }
         Depth(high)
     };
@@ -62,10 +58,7 @@ pub(super) fn where_above(
         match (from, is_above(here)) {
             (None, true) => from = Some(crossing(before, here)),
             (Some(begun), false) => {
-                bands.push(DepthBand {
-                    from: begun,
-                    to: crossing(before, here),
-                });
+                bands.push(DepthBand { from: begun, to: crossing(before, here) });
                 from = None;
             }
             _ => {}

@@ -22,21 +22,13 @@ impl Linear {
         let x = depth.0.max(0.0);
         let powers = (1..=POWER_MAX).rev().zip(body.mu.iter().rev());
         let slope = powers.fold(0.0, |sum, (k, mu)| sum * x + k as f64 * mu);
-        Self {
-            stiffness: slope,
-            damping: body.tau_sig * x,
-            tau: body.tau_eps,
-        }
+        Self { stiffness: slope, damping: body.tau_sig * x, tau: body.tau_eps }
     }
 
     /// A spring without memory.
     #[must_use]
     pub fn spring(stiffness: f64) -> Self {
-        Self {
-            stiffness,
-            damping: 0.0,
-            tau: 0.0,
-        }
+        Self { stiffness, damping: 0.0, tau: 0.0 }
     }
 
     /// Damping in N s/mm that the lag alone takes, at any tick: `k0 tau - c0`.

@@ -140,10 +140,7 @@ impl Watch {
         let linear = Linear::of(&self.body, depth);
         let sampled = Sampled::of(&linear, self.scheme, self.period.seconds().0);
         let (needed, _) = criterion::needed(&sampled, self.device.delay_ticks.max(0.0));
-        Margin {
-            needed: needed + self.moving(speed),
-            ..self.at(depth, speed)
-        }
+        Margin { needed: needed + self.moving(speed), ..self.at(depth, speed) }
     }
 
     /// Damping that tick and delay ask for where the probe moves in, in N s/mm: the viscous term `tau_sig x x'` then
@@ -164,10 +161,7 @@ impl Watch {
     /// What can be said before play of a stroke to `deepest`, entered at up to `speed`.
     #[must_use]
     pub fn before_play(&self, deepest: Depth, speed: MmPerS) -> Verdict {
-        let all = || {
-            self.over(deepest, speed)
-                .chain(self.over(deepest, MmPerS(0.0)))
-        };
+        let all = || self.over(deepest, speed).chain(self.over(deepest, MmPerS(0.0)));
         let worst = |more: fn(&Margin, &Margin) -> bool| {
             all().fold(self.at(Depth(0.0), MmPerS(0.0)), |worst, one| {
                 if more(&one, &worst) { one } else { worst }
@@ -226,12 +220,7 @@ impl Verdict {
                 bands::words(&self.bands, self.deepest)
             ));
         }
-        let Margin {
-            depth,
-            friction_needed,
-            friction,
-            ..
-        } = self.loudest;
+        let Margin { depth, friction_needed, friction, .. } = self.loudest;
         all.push(if self.loudest.is_quiet() {
             format!("Friction of {friction:.3} keeps single encoder counts quiet.")
         } else {
@@ -255,13 +244,7 @@ impl Verdict {
     }
 
     fn damping_sentence(&self) -> String {
-        let Margin {
-            depth,
-            needed,
-            has,
-            cause,
-            ..
-        } = self.worst;
+        let Margin { depth, needed, has, cause, .. } = self.worst;
         // N s/mm as N s/m, which is what catalogues have.
         let (needed_si, has_si) = (needed * 1e3, has * 1e3);
         let Some(ratio) = self.ratio() else {

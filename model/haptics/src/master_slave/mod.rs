@@ -100,9 +100,7 @@ impl MasterSlave {
         let depth = Depth(0.0 - settings.surface_mm);
         let watch = settings.watch();
         let delay_ticks = settings.delay_ticks.round() as usize;
-        let controller = settings
-            .controller
-            .map(|one| ControllerSettings { delay_ticks, ..one });
+        let controller = settings.controller.map(|one| ControllerSettings { delay_ticks, ..one });
         let force_max = settings.guard.force_max.0;
         let thermal = settings.torque.motor.thermal.cold();
         Ok(Self {
@@ -131,10 +129,7 @@ impl MasterSlave {
     /// Everything after the last tick.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            checksum: self.snapshot.sum(),
-            ..self.snapshot
-        }
+        Snapshot { checksum: self.snapshot.sum(), ..self.snapshot }
     }
 
     /// Which way the master goes, for what helps against friction: slow motion has many ticks without a count, so that a
@@ -147,11 +142,7 @@ impl MasterSlave {
             self.still = self.still.saturating_add(elapsed);
         }
         let is_moving = self.still as f64 * self.watch.period.seconds().0 < HEADING_S;
-        MmPerS(if is_moving {
-            self.direction as f64
-        } else {
-            0.0
-        })
+        MmPerS(if is_moving { self.direction as f64 } else { 0.0 })
     }
 
     /// Leads the model straight from depth to depth through what was missed.
@@ -182,12 +173,8 @@ impl MasterSlave {
 
     /// What the passivity controller makes of the guarded force.
     fn damp(&mut self, guarded: Newtons, touch: &Touch) -> ControllerTick {
-        let mut damped = ControllerTick {
-            force: guarded,
-            damping: 0.0,
-            energy: 0.0,
-            flags: Flags::NONE,
-        };
+        let mut damped =
+            ControllerTick { force: guarded, damping: 0.0, energy: 0.0, flags: Flags::NONE };
         let Some(controller) = &mut self.controller else {
             return damped;
         };
@@ -238,13 +225,8 @@ impl MasterSlave {
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(master_mm, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
-        let touch = Touch {
-            is_touching,
-            is_on: input.is_on,
-            has_buzz: buzz.is_some(),
-            moved,
-            elapsed,
-        };
+        let touch =
+            Touch { is_touching, is_on: input.is_on, has_buzz: buzz.is_some(), moved, elapsed };
         let damped = self.damp(guarded.force, &touch);
         let force = damped.force.0;
         flags |= damped.flags;
@@ -283,11 +265,6 @@ impl MasterSlave {
             flags,
             checksum: 0,
         };
-        Output {
-            pulses: gear.pulses,
-            bias: torque.bias,
-            force: Newtons(force),
-            flags,
-        }
+        Output { pulses: gear.pulses, bias: torque.bias, force: Newtons(force), flags }
     }
 }

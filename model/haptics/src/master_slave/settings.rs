@@ -54,10 +54,7 @@ impl MasterSlaveSettings {
                 torque.motor.inertia_kg_mm2 / (radius * radius),
             )),
             buzz: None,
-            contact: ContactSettings {
-                on: Newtons(0.05),
-                off: Newtons(0.02),
-            },
+            contact: ContactSettings { on: Newtons(0.05), off: Newtons(0.02) },
             encoder: Encoder::default(),
             slave: SlaveDrive::default(),
             torque,
@@ -85,12 +82,7 @@ impl MasterSlaveSettings {
         ];
         for (name, value, unit, most) in device {
             if !(0.0..=most).contains(&value) {
-                return Err(MasterSlaveError::Device {
-                    name,
-                    value,
-                    unit,
-                    most,
-                });
+                return Err(MasterSlaveError::Device { name, value, unit, most });
             }
         }
         if !self.surface_mm.is_finite() {

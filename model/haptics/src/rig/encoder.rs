@@ -53,11 +53,7 @@ pub struct EncoderError {
 impl Default for Encoder {
     /// The source's catalogue: up to 1024 lines, times four, up to 100 kHz.
     fn default() -> Self {
-        Self {
-            lines: 1024,
-            quadrature: Quadrature::X4,
-            lines_per_s_max: 100e3,
-        }
+        Self { lines: 1024, quadrature: Quadrature::X4, lines_per_s_max: 100e3 }
     }
 }
 
@@ -67,10 +63,7 @@ impl Encoder {
         if self.lines > 0 && self.lines_per_s_max > 0.0 && self.lines_per_s_max.is_finite() {
             Ok(self)
         } else {
-            Err(EncoderError {
-                lines: self.lines,
-                rate: self.lines_per_s_max,
-            })
+            Err(EncoderError { lines: self.lines, rate: self.lines_per_s_max })
         }
     }
 
@@ -104,10 +97,7 @@ impl EncoderCounter {
     /// Before its first count.
     #[must_use]
     pub fn new(encoder: &Encoder, period: Period) -> Self {
-        Self {
-            per_tick_max: encoder.counts_per_s_max() * period.seconds().0,
-            last: None,
-        }
+        Self { per_tick_max: encoder.counts_per_s_max() * period.seconds().0, last: None }
     }
 
     /// Counts moved since the last call, `elapsed` ticks ago, and whether that is more than can be counted
@@ -116,10 +106,7 @@ impl EncoderCounter {
         let moved = counts.saturating_sub(self.last.unwrap_or(counts));
         self.last = Some(counts);
         let most = self.per_tick_max * elapsed.max(1) as f64;
-        (
-            moved,
-            Flags::COUNT_RATE.when(moved.unsigned_abs() as f64 > most),
-        )
+        (moved, Flags::COUNT_RATE.when(moved.unsigned_abs() as f64 > most))
     }
 }
 
@@ -130,10 +117,7 @@ mod tests {
     #[test]
     fn a_count_of_the_source_is_61_um_or_15() {
         let pinion = Pinion::default();
-        let one = Encoder {
-            quadrature: Quadrature::X1,
-            ..Encoder::default()
-        };
+        let one = Encoder { quadrature: Quadrature::X1, ..Encoder::default() };
         assert!((one.count_mm(&pinion) - 0.061_359_2).abs() < 1e-7);
         assert!((Encoder::default().count_mm(&pinion) - 0.015_339_8).abs() < 1e-7);
         assert!(Encoder { lines: 0, ..one }.checked().is_err());

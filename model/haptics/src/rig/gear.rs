@@ -72,10 +72,7 @@ impl Default for SlaveDrive {
     /// The source's slider: 0.015 mm a pulse. Its fastest rate is assumed: 40 kHz, 600 mm/s, beyond what a hand does on
     /// so short a stroke.
     fn default() -> Self {
-        Self {
-            mm_per_pulse: 0.015,
-            pulses_per_s_max: 40e3,
-        }
+        Self { mm_per_pulse: 0.015, pulses_per_s_max: 40e3 }
     }
 }
 
@@ -140,10 +137,7 @@ mod tests {
     fn the_ratio_is_the_source_s() {
         // G1: pi 20 / (0.015 N_R).
         for (quadrature, wanted) in [(Quadrature::X1, 4.0906), (Quadrature::X4, 1.02265)] {
-            let encoder = Encoder {
-                quadrature,
-                ..Encoder::default()
-            };
+            let encoder = Encoder { quadrature, ..Encoder::default() };
             let ratio = GearRatio::one_to_one(&Pinion::default(), &encoder, 0.015).unwrap();
             assert!((ratio.pulses_per_count() - wanted).abs() < 5e-5);
             let exact = std::f64::consts::PI * 20.0 / (0.015 * encoder.counts_per_rev());

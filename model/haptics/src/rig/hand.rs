@@ -56,32 +56,21 @@ impl HandPath {
                 let way = (speed * t.max(0.0)).min((to - from).abs());
                 from + way.copysign(to - from)
             }
-            Self::Sine {
-                middle,
-                amplitude,
-                hz,
-            } => middle - amplitude * (std::f64::consts::TAU * hz * t).cos(),
+            Self::Sine { middle, amplitude, hz } => {
+                middle - amplitude * (std::f64::consts::TAU * hz * t).cos()
+            }
         }
     }
 }
 
 impl Hand {
     /// No hand: the handle is let go.
-    pub const NONE: Self = Self {
-        mass_kg: 0.0,
-        stiffness: 0.0,
-        damping: 0.0,
-        path: HandPath::Still { at: 0.0 },
-    };
+    pub const NONE: Self =
+        Self { mass_kg: 0.0, stiffness: 0.0, damping: 0.0, path: HandPath::Still { at: 0.0 } };
 
     /// A firm grip.
     #[must_use]
     pub fn firm(path: HandPath) -> Self {
-        Self {
-            mass_kg: 0.2,
-            stiffness: 0.8,
-            damping: 0.012,
-            path,
-        }
+        Self { mass_kg: 0.2, stiffness: 0.8, damping: 0.012, path }
     }
 }

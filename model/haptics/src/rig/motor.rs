@@ -86,17 +86,11 @@ impl Motor {
             ("inertia", self.inertia_kg_mm2),
             ("continuous torque", self.continuous),
             ("largest voltage", self.volts_max),
-            (
-                "thermal resistance of the winding",
-                self.thermal.winding_case,
-            ),
+            ("thermal resistance of the winding", self.thermal.winding_case),
             ("thermal resistance of the case", self.thermal.case_air),
             ("time constant of the winding", self.thermal.winding_s),
             ("time constant of the case", self.thermal.case_s),
-            (
-                "heat that its winding stands",
-                self.thermal.winding_max_c - self.thermal.air_c,
-            ),
+            ("heat that its winding stands", self.thermal.winding_max_c - self.thermal.air_c),
         ];
         let least = [("inductance", self.inductance), ("friction", self.friction)];
         let bad = |value: f64| !(value.is_finite() && value >= 0.0);
@@ -184,10 +178,7 @@ mod tests {
         assert!((motor.voltage_damping(10.0) * 1e3 - 17.64).abs() < 0.005);
         // The torque for ever and the heat agree within what such lines are rounded to.
         let amps = motor.continuous / motor.torque_constant;
-        let hot = motor
-            .thermal
-            .settled(amps * amps * motor.resistance)
-            .winding_c;
+        let hot = motor.thermal.settled(amps * amps * motor.resistance).winding_c;
         assert!((60.0..125.0).contains(&hot), "{hot}");
         assert!(motor.origin.says().contains("scaled"));
     }

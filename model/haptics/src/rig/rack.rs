@@ -16,10 +16,7 @@ pub struct Pinion {
 impl Default for Pinion {
     /// The source's: 20 teeth of module 1, pitch diameter 20 mm.
     fn default() -> Self {
-        Self {
-            teeth: 20,
-            module_mm: 1.0,
-        }
+        Self { teeth: 20, module_mm: 1.0 }
     }
 }
 
@@ -110,16 +107,8 @@ impl Rack {
         let inert = self.mass / dt;
         let pushed = forces.motor + hand.stiffness * (place - self.x) + hand.damping * speed;
         let free = inert * v0 + pushed - drag * v0;
-        let holds = if v0 == 0.0 {
-            self.sticking
-        } else {
-            self.sliding
-        };
-        let friction = if free.abs() <= holds {
-            free
-        } else {
-            self.sliding.copysign(free)
-        };
+        let holds = if v0 == 0.0 { self.sticking } else { self.sliding };
+        let friction = if free.abs() <= holds { free } else { self.sliding.copysign(free) };
         let v1 = (free - friction) / (inert + drag);
         let mean = 0.5 * (v0 + v1);
         let moved = mean * dt;
@@ -136,12 +125,7 @@ impl Rack {
     /// What is missing in the balance of energies, in N mm, from a start at rest: rounding alone.
     #[must_use]
     pub fn residual(&self) -> f64 {
-        let RackEnergies {
-            motor,
-            hand,
-            damping,
-            friction,
-        } = self.energies;
+        let RackEnergies { motor, hand, damping, friction } = self.energies;
         motor + hand - damping - friction - self.kinetic()
     }
 }
@@ -153,12 +137,8 @@ mod tests {
 
     #[test]
     fn a_free_swing_keeps_its_energy_and_period() {
-        let hand = Hand {
-            mass_kg: 0.0,
-            stiffness: 0.5,
-            damping: 0.0,
-            path: HandPath::Still { at: 0.0 },
-        };
+        let hand =
+            Hand { mass_kg: 0.0, stiffness: 0.5, damping: 0.0, path: HandPath::Still { at: 0.0 } };
         let mut rack = Rack::new(0.115, 0.0, [0.0; 2], 3.0);
         // 9.95 Hz; in steps of 20 us.
         let omega = (0.5 / inertia(0.115)).sqrt();
@@ -175,10 +155,7 @@ mod tests {
     #[test]
     fn friction_holds_what_is_below_it_and_stops_what_slides() {
         let mut rack = Rack::new(0.1, 0.0, [0.8, 1.2], 0.0);
-        let push = |motor: f64| RackForces {
-            motor,
-            hand: [0.0; 2],
-        };
+        let push = |motor: f64| RackForces { motor, hand: [0.0; 2] };
         for _ in 0..1000 {
             rack.step(&push(1.19), &Hand::NONE, 1e-4);
         }

@@ -51,20 +51,14 @@ impl Thermal {
     /// Everything as warm as the air.
     #[must_use]
     pub fn cold(&self) -> ThermalState {
-        ThermalState {
-            winding_c: self.air_c,
-            case_c: self.air_c,
-        }
+        ThermalState { winding_c: self.air_c, case_c: self.air_c }
     }
 
     /// Where `watts` for ever would lead.
     #[must_use]
     pub fn settled(&self, watts: f64) -> ThermalState {
         let case_c = self.air_c + watts * self.case_air;
-        ThermalState {
-            winding_c: case_c + watts * self.winding_case,
-            case_c,
-        }
+        ThermalState { winding_c: case_c + watts * self.winding_case, case_c }
     }
 
     /// After `dt` s of `watts`: each node by its exact exponential with the other held, which is stable at
@@ -103,9 +97,6 @@ mod tests {
             state = thermal.after(state, watts, 1.0);
         }
         let settled = thermal.settled(watts);
-        assert!(
-            (state.winding_c - settled.winding_c).abs() < 1e-6,
-            "{state:?}"
-        );
+        assert!((state.winding_c - settled.winding_c).abs() < 1e-6, "{state:?}");
     }
 }

@@ -24,10 +24,7 @@ pub struct Hand6 {
 
 impl Hand6 {
     pub(super) fn is_finite(&self) -> bool {
-        self.at
-            .iter()
-            .chain(&self.turn)
-            .all(|part| part.is_finite())
+        self.at.iter().chain(&self.turn).all(|part| part.is_finite())
     }
 }
 
@@ -124,11 +121,7 @@ impl DeviceSettings {
         }
         for (name, value) in or_zero {
             if !(value >= 0.0 && value <= most) {
-                return Err(SceneError::Device {
-                    name,
-                    value,
-                    wanted: "from 0 to 1000000",
-                });
+                return Err(SceneError::Device { name, value, wanted: "from 0 to 1000000" });
             }
         }
         Ok(self)
@@ -180,14 +173,7 @@ impl SimulatedDevice {
     ) -> Result<Self, SceneError> {
         let settings = settings.checked()?;
         let mass_kg = settings.mass_kg + settings.hand_mass_kg;
-        let axis = |x| {
-            Rack::new(
-                mass_kg,
-                settings.damping_n_s_per_mm,
-                [settings.friction_n; 2],
-                x,
-            )
-        };
+        let axis = |x| Rack::new(mass_kg, settings.damping_n_s_per_mm, [settings.friction_n; 2], x);
         Ok(Self {
             settings,
             middle,
@@ -216,9 +202,7 @@ impl SimulatedDevice {
         let stepped = |value: f64, step: f64| (value / step).round() * step;
         Pose {
             at: self.axes.map(|axis| stepped(axis.x, self.settings.step_mm)),
-            turn: self
-                .turn
-                .map(|turn| stepped(turn, self.settings.turn_step_rad)),
+            turn: self.turn.map(|turn| stepped(turn, self.settings.turn_step_rad)),
         }
     }
 
@@ -280,10 +264,7 @@ impl SimulatedDevice {
         for axis in 0..3 {
             for part in 0..PARTS {
                 let place = self.aim[axis] + (f64::from(part) + 0.5) * dt * speed[axis];
-                let forces = RackForces {
-                    motor: force[axis],
-                    hand: [place, speed[axis]],
-                };
+                let forces = RackForces { motor: force[axis], hand: [place, speed[axis]] };
                 self.axes[axis].step(&forces, &grip, dt);
             }
             self.aim[axis] += share * way[axis];

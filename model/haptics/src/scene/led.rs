@@ -14,10 +14,7 @@ pub struct LedScene {
 impl LedScene {
     /// At rest, the stylus over the middle.
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
-        Ok(Self {
-            device: SimulatedDevice::of(&settings)?,
-            scene: Scene::new(settings)?,
-        })
+        Ok(Self { device: SimulatedDevice::of(&settings)?, scene: Scene::new(settings)? })
     }
 
     /// One tick, led by a hand.

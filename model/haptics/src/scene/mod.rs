@@ -101,10 +101,7 @@ impl Scene {
         let pose = SimulatedDevice::of(&settings)?.pose();
         let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
         let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
-        let law = LawSettings {
-            scheme: settings.scheme,
-            ..LawSettings::of(settings.body, period)
-        };
+        let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
         let heard = BuzzSettings::of(settings.device.step_mm);
         Ok(Self {
@@ -112,9 +109,7 @@ impl Scene {
             proxy: Proxy::new(settings.friction, f64::INFINITY)?,
             law: ForceLaw::new(law, Depth(below))?,
             guard: ForceGuard::new(&settings.guard, period),
-            controller: settings
-                .controller
-                .map(|one| PassivityController::new(&one, period)),
+            controller: settings.controller.map(|one| PassivityController::new(&one, period)),
             observer: PassivityObserver::default(),
             buzz: BuzzDetector::new(&heard, period, below),
             below,
@@ -247,11 +242,7 @@ impl Scene {
         let mut flags = Flags::NONE;
         let mut force = Newtons(0.0);
         for step in 1..=steps {
-            let depth = if step == steps {
-                self.below
-            } else {
-                before + way * step as f64
-            };
+            let depth = if step == steps { self.below } else { before + way * step as f64 };
             let one = self.law.tick(Depth(depth));
             flags |= one.flags;
             force = one.force;
@@ -271,18 +262,9 @@ impl Scene {
     /// The surface follows the stylus from the contact point down.
     fn press(&mut self, touch: &Touch) {
         let [x, y, z] = touch.point;
-        let contact = Contact {
-            x,
-            y,
-            z: z - touch.depth,
-            side: Side::Push,
-        };
+        let contact = Contact { x, y, z: z - touch.depth, side: Side::Push };
         let contacts = [contact];
-        let contacts = if touch.is_contact() {
-            &contacts[..]
-        } else {
-            &[]
-        };
+        let contacts = if touch.is_contact() { &contacts[..] } else { &[] };
         let told = self.surface.tick(contacts);
         self.dirty = told.dirty;
         self.moved = told.moved.moved;
@@ -297,11 +279,8 @@ impl Scene {
 
 /// FNV-1a over the bits of whole numbers instead of bytes.
 fn hash(heights: &[f64]) -> u64 {
-    let mix = |hash: u64, z: &f64| {
-        (hash ^ z.to_bits())
-            .wrapping_mul(0x0100_0000_01b3)
-            .rotate_left(23)
-    };
+    let mix =
+        |hash: u64, z: &f64| (hash ^ z.to_bits()).wrapping_mul(0x0100_0000_01b3).rotate_left(23);
     heights.iter().fold(0xcbf2_9ce4_8422_2325, mix)
 }
 

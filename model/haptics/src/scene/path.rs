@@ -84,10 +84,7 @@ impl ScenePath {
                 )
             }
         };
-        Hand6 {
-            at: [x + aside, y, above - depth],
-            turn: [0.0, -0.5 + lean, lean],
-        }
+        Hand6 { at: [x + aside, y, above - depth], turn: [0.0, -0.5 + lean, lean] }
     }
 }
 

@@ -33,10 +33,7 @@ pub(super) struct Stamps {
 
 impl Stamps {
     pub(super) fn new(nodes: usize) -> Self {
-        Self {
-            of: vec![0; nodes].into(),
-            pass: 0,
-        }
+        Self { of: vec![0; nodes].into(), pass: 0 }
     }
 
     /// A new pass, in which nothing moved yet.
@@ -84,10 +81,7 @@ pub(super) fn unmoved<const PULL: bool>(field: &HeightField, poke: Poke) -> Opti
     if beyond::<PULL>(field.now[node], poke.z) <= 0.0 {
         return Some(Moved::default());
     }
-    field.is_pinned(poke.node).then(|| Moved {
-        held: 1,
-        ..Moved::default()
-    })
+    field.is_pinned(poke.node).then(|| Moved { held: 1, ..Moved::default() })
 }
 
 impl Chain {
@@ -193,10 +187,7 @@ impl Chain {
 /// Notes in which rows a pass moved something, and how far nodes may now be.
 pub(super) fn finish<const PULL: bool>(field: &mut HeightField, z: f64, rows: [u16; 2]) {
     let whole = field.grid.whole();
-    field.displaced.widen(Rect {
-        rows: rows.map(u32::from),
-        ..whole
-    });
+    field.displaced.widen(Rect { rows: rows.map(u32::from), ..whole });
     field.displaced.tighten();
     reaches::<PULL>(field, z);
 }

@@ -42,20 +42,14 @@ pub struct CutError(pub f64);
 
 impl Cut {
     /// Nothing is left out.
-    pub const NONE: Self = Self {
-        range: u32::MAX,
-        threshold: 0.0,
-    };
+    pub const NONE: Self = Self { range: u32::MAX, threshold: 0.0 };
 
     /// No further than `range` steps (`None`: however far), nor where less than `threshold` mm.
     pub fn new(range: Option<u32>, threshold: f64) -> Result<Self, CutError> {
         if !(threshold >= 0.0 && threshold.is_finite()) {
             return Err(CutError(threshold));
         }
-        Ok(Self {
-            range: range.unwrap_or(u32::MAX),
-            threshold,
-        })
+        Ok(Self { range: range.unwrap_or(u32::MAX), threshold })
     }
 
     /// Most steps from a contact; `u32::MAX` where there is no end.
@@ -80,11 +74,8 @@ pub(super) struct Poke {
 }
 
 impl Poke {
-    pub(super) const NOWHERE: Self = Self {
-        node: Node { column: 0, row: 0 },
-        z: 0.0,
-        side: Side::Push,
-    };
+    pub(super) const NOWHERE: Self =
+        Self { node: Node { column: 0, row: 0 }, z: 0.0, side: Side::Push };
 }
 
 impl Contact {

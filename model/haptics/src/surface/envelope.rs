@@ -32,10 +32,7 @@ struct Cone {
     reach: usize,
 }
 
-const NO_CONE: Cone = Cone {
-    poke: Poke::NOWHERE,
-    reach: 0,
-};
+const NO_CONE: Cone = Cone { poke: Poke::NOWHERE, reach: 0 };
 
 /// What is made once.
 #[derive(Clone, Debug)]
@@ -50,10 +47,7 @@ impl Envelope {
     pub(super) fn new(grid: &Grid, shear: f64) -> Self {
         let last = grid.columns() - 1;
         let steps = (0..=2 * last).map(|index| index.abs_diff(last) as f64);
-        Self {
-            shear,
-            steps: steps.collect(),
-        }
+        Self { shear, steps: steps.collect() }
     }
 }
 
@@ -70,15 +64,7 @@ pub(super) fn tick(
     let mut count = 0;
     let mut touched = Rect::EMPTY;
     for &poke in pokes {
-        if let Some(cone) = cone(
-            field,
-            shape,
-            recovery,
-            cut,
-            poke,
-            &cones[..count],
-            &mut told,
-        ) {
+        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count], &mut told) {
             cones[count] = cone;
             count += 1;
             touched = touched.union(cone.rect(&field.grid));
@@ -109,13 +95,7 @@ pub(super) fn tick(
                     recovery.step_row(&mut now[span[0]..span[1]], &rest[span[0]..span[1]]);
                     span
                 } else {
-                    let mut work = Row {
-                        now,
-                        rest,
-                        row,
-                        ends: [border, columns - border],
-                        span,
-                    };
+                    let mut work = Row { now, rest, row, ends: [border, columns - border], span };
                     work.press_all(cones, shape, recovery, cut, &mut told);
                     work.span
                 };
@@ -165,10 +145,7 @@ fn cone(
     let steps = (furthest - cut.threshold()).max(0.0) / shape.shear + 1.0;
     let most = (field.grid.columns() + field.grid.rows()) as f64;
     let steps = if steps.is_nan() { 0.0 } else { steps.min(most) };
-    Some(Cone {
-        poke,
-        reach: (steps as usize).min(cut.range() as usize),
-    })
+    Some(Cone { poke, reach: (steps as usize).min(cut.range() as usize) })
 }
 
 impl Cone {
@@ -178,10 +155,7 @@ impl Cone {
             [at.saturating_sub(reach), (at + reach + 1).min(count)].map(|end| end as u32)
         };
         let Node { column, row } = self.poke.node;
-        Rect {
-            columns: side(column, grid.columns()),
-            rows: side(row, grid.rows()),
-        }
+        Rect { columns: side(column, grid.columns()), rows: side(row, grid.rows()) }
     }
 
     /// A height after this contact, and whether that moved it.
@@ -190,10 +164,7 @@ impl Cone {
         let (allowed, threshold) = if steps == 0 {
             (self.poke.z, 0.0)
         } else {
-            (
-                height::<PULL>(self.poke.z, f64::from(steps), shear),
-                cut.threshold(),
-            )
+            (height::<PULL>(self.poke.z, f64::from(steps), shear), cut.threshold())
         };
         let moves = beyond::<PULL>(z, allowed) > threshold;
         (if moves { allowed } else { z }, moves)
@@ -237,10 +208,8 @@ impl Row<'_> {
             let column = usize::from(cone.poke.node.column);
             let reach = cone.reach - away;
             let [start, end] = self.ends;
-            let mut reached = [
-                column.saturating_sub(reach).max(start),
-                (column + reach + 1).min(end),
-            ];
+            let mut reached =
+                [column.saturating_sub(reach).max(start), (column + reach + 1).min(end)];
             // Nodes beyond the reach are where a cone allows them, so that it may be laid over them as
             // well; but not beyond a range.
             let is_free = cone.reach < cut.range() as usize;

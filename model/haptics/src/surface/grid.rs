@@ -38,11 +38,7 @@ impl Grid {
         if !(1e-6..=1e3).contains(&spacing) {
             return Err(MeshError::Spacing(spacing));
         }
-        Ok(Self {
-            columns: wide,
-            rows: high,
-            spacing,
-        })
+        Ok(Self { columns: wide, rows: high, spacing })
     }
 
     /// Nodes along x.
@@ -96,19 +92,13 @@ impl Grid {
             // False for NaN and for both infinities.
             (step >= 0.0 && step < f64::from(count)).then_some(step as u16)
         };
-        Some(Node {
-            column: step(x, self.columns)?,
-            row: step(y, self.rows)?,
-        })
+        Some(Node { column: step(x, self.columns)?, row: step(y, self.rows)? })
     }
 
     /// All nodes.
     #[must_use]
     pub fn whole(&self) -> Rect {
-        Rect {
-            columns: [0, u32::from(self.columns)],
-            rows: [0, u32::from(self.rows)],
-        }
+        Rect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
     }
 
     /// The neighbours along the axes, those that there are.
@@ -145,10 +135,7 @@ pub struct Rect {
 
 impl Rect {
     /// No node.
-    pub const EMPTY: Self = Self {
-        columns: [0; 2],
-        rows: [0; 2],
-    };
+    pub const EMPTY: Self = Self { columns: [0; 2], rows: [0; 2] };
 
     /// Whether there is no node in it.
     #[must_use]
@@ -196,10 +183,7 @@ pub(super) struct Spans {
 
 impl Spans {
     pub(super) fn none(grid: &Grid) -> Self {
-        Self {
-            rows: vec![[0; 2]; grid.rows()].into(),
-            bounds: Rect::EMPTY,
-        }
+        Self { rows: vec![[0; 2]; grid.rows()].into(), bounds: Rect::EMPTY }
     }
 
     #[inline(always)]
@@ -244,10 +228,7 @@ impl Spans {
         for row in self.active_rows() {
             let [from, to] = self.rows[row].map(u32::from);
             let row = row as u32;
-            tight = tight.union(Rect {
-                columns: [from, to],
-                rows: [row, row + 1],
-            });
+            tight = tight.union(Rect { columns: [from, to], rows: [row, row + 1] });
         }
         self.bounds = tight;
     }

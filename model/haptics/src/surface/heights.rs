@@ -16,11 +16,7 @@ impl<'a> Heights<'a> {
         if of.len() == grid.nodes() {
             Ok(Self { grid, of })
         } else {
-            Err(MeshError::Count {
-                what: "heights",
-                given: of.len(),
-                nodes: grid.nodes(),
-            })
+            Err(MeshError::Count { what: "heights", given: of.len(), nodes: grid.nodes() })
         }
     }
 
@@ -59,12 +55,8 @@ impl<'a> Heights<'a> {
     #[must_use]
     pub fn shaded(&self, x: f64, y: f64) -> Option<[f64; 3]> {
         let (Node { column, row }, [u, v]) = self.cell(x, y)?;
-        let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, down)| {
-            self.normal(Node {
-                column: column + right,
-                row: row + down,
-            })
-        });
+        let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
+            .map(|(right, down)| self.normal(Node { column: column + right, row: row + down }));
         let mix = |axis: usize| {
             let near = a[axis] + u * (b[axis] - a[axis]);
             let far = c[axis] + u * (d[axis] - c[axis]);
@@ -81,10 +73,7 @@ impl<'a> Heights<'a> {
         let mut sum = [0.0; 3];
         for face_row in row.saturating_sub(1)..(row + 1).min(self.grid.rows() - 1) {
             for face_column in column.saturating_sub(1)..(column + 1).min(self.grid.columns() - 1) {
-                let corner = Node {
-                    column: face_column as u16,
-                    row: face_row as u16,
-                };
+                let corner = Node { column: face_column as u16, row: face_row as u16 };
                 let normal = face(self.corners(corner), self.grid.spacing());
                 sum = [0, 1, 2].map(|axis| sum[axis] + normal[axis]);
             }
@@ -114,12 +103,7 @@ impl<'a> Heights<'a> {
     fn corners(&self, first: Node) -> [f64; 4] {
         let at = self.grid.index(first);
         let below = at + self.grid.columns();
-        [
-            self.of[at],
-            self.of[at + 1],
-            self.of[below],
-            self.of[below + 1],
-        ]
+        [self.of[at], self.of[at + 1], self.of[below], self.of[below + 1]]
     }
 }
 

@@ -32,14 +32,8 @@ pub enum Pins {
 /// The parts of a ChainMail mesh that have no effect, and why: MinDist and MaxDist, how near and how far neighbours may be
 /// along an axis (Gibson, "3D ChainMail", Symposium on Interactive 3D Graphics 1997).
 pub const INERT: [(&str, &str); 2] = [
-    (
-        "MinDist",
-        "nodes move along z alone, so neighbours never come nearer along x or y",
-    ),
-    (
-        "MaxDist",
-        "nodes move along z alone, so neighbours never go further apart along x or y",
-    ),
+    ("MinDist", "nodes move along z alone, so neighbours never come nearer along x or y"),
+    ("MaxDist", "nodes move along z alone, so neighbours never go further apart along x or y"),
 ];
 
 /// A surface as heights over a grid.
@@ -70,11 +64,7 @@ impl HeightField {
         for (index, &height) in rest.iter().enumerate() {
             if height.is_nan() || height.abs() > HIGHEST_MM {
                 let (column, row) = (index % grid.columns(), index / grid.columns());
-                return Err(MeshError::Height {
-                    column,
-                    row,
-                    height,
-                });
+                return Err(MeshError::Height { column, row, height });
             }
         }
         let limits = match &shear {
@@ -88,10 +78,7 @@ impl HeightField {
             return Err(MeshError::Shear(bad));
         }
         let fold = |start: f64, pick: fn(f64, f64) -> f64| rest.iter().copied().fold(start, pick);
-        let rest_bounds = [
-            fold(f64::INFINITY, f64::min),
-            fold(f64::NEG_INFINITY, f64::max),
-        ];
+        let rest_bounds = [fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max)];
         let columns = grid.columns();
         let is_same = rest.chunks(columns).all(|row| row == &rest[..columns]);
         let rest_stride = if is_same { 0 } else { columns };
@@ -255,9 +242,5 @@ impl HeightField {
 
 fn counted(what: &'static str, given: usize, grid: &Grid) -> Result<(), MeshError> {
     let nodes = grid.nodes();
-    if given == nodes {
-        Ok(())
-    } else {
-        Err(MeshError::Count { what, given, nodes })
-    }
+    if given == nodes { Ok(()) } else { Err(MeshError::Count { what, given, nodes }) }
 }

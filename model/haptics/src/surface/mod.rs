@@ -142,18 +142,10 @@ impl Surface {
                 return Err(MethodError::Pins);
             }
             Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), uniform?)),
-            Method::Chain => Solver::Chain {
-                shear: uniform?,
-                chain: Chain::new(field.grid()),
-            },
+            Method::Chain => Solver::Chain { shear: uniform?, chain: Chain::new(field.grid()) },
             Method::Sorted => Solver::Sorted(Sorted::new(field.grid())),
         };
-        Ok(Self {
-            field,
-            solver,
-            recovery,
-            cut,
-        })
+        Ok(Self { field, solver, recovery, cut })
     }
 
     /// The field.
@@ -175,10 +167,7 @@ impl Surface {
 
     /// One tick of recovery, then the contacts one after the other.
     pub fn tick(&mut self, contacts: &[Contact]) -> Tick {
-        let mut told = Tick {
-            dirty: self.field.displaced.bounds(),
-            ..Tick::default()
-        };
+        let mut told = Tick { dirty: self.field.displaced.bounds(), ..Tick::default() };
         let mut recovery = self.recovery;
         let mut rest = contacts;
         loop {
@@ -206,9 +195,7 @@ impl Surface {
     }
 
     fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> Moved {
-        let Self {
-            field, solver, cut, ..
-        } = self;
+        let Self { field, solver, cut, .. } = self;
         if let Solver::Envelope(shape) = solver {
             return envelope::tick(field, shape, recovery, *cut, pokes);
         }

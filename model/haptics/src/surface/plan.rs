@@ -112,12 +112,8 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
             least(&forces)
         ),
     };
-    let nearest = nearest(
-        [&shapes, &forces],
-        [needs.shape_mm, force_n],
-        needs.budget_us,
-    )
-    .map(|[shape, force]| curves.planned(shape, force, slower));
+    let nearest = nearest([&shapes, &forces], [needs.shape_mm, force_n], needs.budget_us)
+        .map(|[shape, force]| curves.planned(shape, force, slower));
     let advice = match &nearest {
         Some(plan) => format!(
             "; within the budget, {} nodes a side and the family {} are off by {:.3} mm and {:.3} N",
@@ -125,10 +121,7 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
         ),
         None => "; nothing measured keeps to the budget: allow a tick more time".to_owned(),
     };
-    Err(NoPlan {
-        why: why + &advice,
-        nearest: nearest.map(Box::new),
-    })
+    Err(NoPlan { why: why + &advice, nearest: nearest.map(Box::new) })
 }
 
 /// The factor of cost after a tick of `plan`, made with the factor `slower`, took `measured_us`: with
@@ -136,11 +129,7 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
 #[must_use]
 pub fn slower(plan: &ScenePlan, slower: f64, measured_us: f64) -> f64 {
     let ratio = measured_us / plan.cost_us;
-    if ratio > 1.0 && ratio.is_finite() {
-        slower * ratio
-    } else {
-        slower
-    }
+    if ratio > 1.0 && ratio.is_finite() { slower * ratio } else { slower }
 }
 
 /// The cheapest within a tolerance; of equal ones the most exact.
@@ -213,13 +202,7 @@ impl SceneCurves {
 
     /// Part by part, what the most exact measured would be instead.
     fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<Dropped> {
-        let ScenePlan {
-            mesh,
-            cut,
-            step,
-            family,
-            ..
-        } = plan;
+        let ScenePlan { mesh, cut, step, family, .. } = plan;
         let finest = most_exact(&self.meshes, |point| (point.error_mm, point.cost_us));
         let widest = most_exact(&self.cuts, |point| (point.error_mm, point.cost_share));
         let shortest = most_exact(&self.steps, |point| (point.error_n, point.cost_us));
@@ -228,20 +211,12 @@ impl SceneCurves {
         let mut drop = |what: String, error: [f64; 2], unit, saved_us: f64| {
             // What is as exact as the most exact leaves nothing out.
             if error[0] > error[1] {
-                dropped.push(Dropped {
-                    what,
-                    error: error[0],
-                    unit,
-                    saved_us: slower * saved_us,
-                });
+                dropped.push(Dropped { what, error: error[0], unit, saved_us: slower * saved_us });
             }
         };
         if let Some(finest) = finest {
             drop(
-                format!(
-                    "a mesh of {} nodes a side; {} are used",
-                    finest.nodes, mesh.nodes
-                ),
+                format!("a mesh of {} nodes a side; {} are used", finest.nodes, mesh.nodes),
                 [mesh.error_mm, finest.error_mm],
                 "mm",
                 (finest.cost_us - mesh.cost_us) * cut.cost_share,

@@ -118,12 +118,7 @@ impl Proxy {
         if most_step.is_nan() || most_step <= 0.0 {
             return Err(ProxyError::Step(most_step));
         }
-        Ok(Self {
-            friction,
-            most_step,
-            at: None,
-            last: None,
-        })
+        Ok(Self { friction, most_step, at: None, last: None })
     }
 
     /// One tick: the device is at `device` (mm).
@@ -212,11 +207,7 @@ fn entry(surface: Heights, last: Option<[f64; 3]>, device: [f64; 3]) -> [f64; 2]
         }
     }
     let [x, y, _] = along(below);
-    if surface.at(x, y).is_some() {
-        [x, y]
-    } else {
-        straight
-    }
+    if surface.at(x, y).is_some() { [x, y] } else { straight }
 }
 
 /// The point of the surface that the contact would go to without friction: the device projected onto
@@ -248,11 +239,7 @@ fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Opti
     let way = minus(point, device);
     let depth = dot(way, normal);
     (depth > 0.0).then(|| Touch {
-        state: if slides {
-            TouchState::Slides
-        } else {
-            TouchState::Sticks
-        },
+        state: if slides { TouchState::Slides } else { TouchState::Sticks },
         point,
         depth,
         normal,

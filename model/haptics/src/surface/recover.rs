@@ -41,15 +41,9 @@ pub struct RecoveryError {
 impl Recovery {
     /// At rest again at once: every tick starts from the rest surface, so that the shape depends on
     /// this tick's contacts alone.
-    pub const ELASTIC: Self = Self {
-        share: 1.0,
-        creep: SETTLED_MM,
-    };
+    pub const ELASTIC: Self = Self { share: 1.0, creep: SETTLED_MM };
     /// Never.
-    pub const NONE: Self = Self {
-        share: 0.0,
-        creep: 0.0,
-    };
+    pub const NONE: Self = Self { share: 0.0, creep: 0.0 };
 
     /// With a time constant, such as the `tau_eps` of the force model, at a constant tick.
     pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, RecoveryError> {
@@ -59,10 +53,7 @@ impl Recovery {
         }
         // tau = 0 gives exp(-inf) = 0: elastic.
         let share = -(-tick / tau).exp_m1();
-        Ok(Self {
-            share,
-            creep: share * SETTLED_MM,
-        })
+        Ok(Self { share, creep: share * SETTLED_MM })
     }
 
     /// Share of the way to rest that a node goes in a tick.

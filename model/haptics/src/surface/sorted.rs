@@ -38,10 +38,7 @@ impl Candidate {
     /// Which node, and next to which.
     #[inline(always)]
     fn nodes(self) -> [Node; 2] {
-        [self.0 >> 32, self.0].map(|bits| Node {
-            row: (bits >> 16) as u16,
-            column: bits as u16,
-        })
+        [self.0 >> 32, self.0].map(|bits| Node { row: (bits >> 16) as u16, column: bits as u16 })
     }
 }
 

@@ -27,16 +27,8 @@ fn no_node_moves_twice_in_a_pass_and_the_queue_is_in_order_of_steps() {
         let poke = random_poke(&mut random, 31);
         let before = field.heights().to_vec();
         let told = chain.poke(&mut field, 0.25, Cut::NONE, poke);
-        let mut order: Vec<_> = chain
-            .order()
-            .iter()
-            .map(|node| field.grid.index(*node))
-            .collect();
-        assert!(
-            chain
-                .order()
-                .is_sorted_by_key(|node| node.steps_to(poke.node))
-        );
+        let mut order: Vec<_> = chain.order().iter().map(|node| field.grid.index(*node)).collect();
+        assert!(chain.order().is_sorted_by_key(|node| node.steps_to(poke.node)));
         assert_eq!(order.len(), told.moved);
         order.sort_unstable();
         assert!(order.windows(2).all(|pair| pair[0] != pair[1]));
@@ -83,10 +75,7 @@ fn meshes_that_cannot_be_are_refused_in_words() {
         refused(5, 5, f64::NAN),
         refused(5, 5, f64::INFINITY),
     ] {
-        assert!(
-            matches!(bad, MeshError::Size { .. } | MeshError::Spacing(_)),
-            "{bad:?}"
-        );
+        assert!(matches!(bad, MeshError::Size { .. } | MeshError::Spacing(_)), "{bad:?}");
     }
     let grid = Grid::new(3, 2, 1.0).unwrap();
     let made = |rest: &[f64], shear| HeightField::new(grid, rest.to_vec(), shear);
@@ -98,16 +87,9 @@ fn meshes_that_cannot_be_are_refused_in_words() {
     assert!(is_count(refused(&flat[1..], one(1.0)), 5));
     assert!(matches!(
         refused(&[0.0, 0.0, 0.0, 0.0, f64::NAN, 0.0], one(1.0)),
-        MeshError::Height {
-            column: 1,
-            row: 1,
-            ..
-        }
+        MeshError::Height { column: 1, row: 1, .. }
     ));
-    assert!(matches!(
-        refused(&[2e6; 6], one(1.0)),
-        MeshError::Height { height: 2e6, .. }
-    ));
+    assert!(matches!(refused(&[2e6; 6], one(1.0)), MeshError::Height { height: 2e6, .. }));
     for shear in [-1.0, f64::NAN] {
         let own = Shear::PerNode([1.0, 1.0, shear, 1.0, 1.0, 1.0].into());
         for refusal in [refused(&flat, one(shear)), refused(&flat, own)] {
@@ -117,12 +99,7 @@ fn meshes_that_cannot_be_are_refused_in_words() {
     assert!(is_count(refused(&flat, Shear::PerNode([1.0].into())), 1));
     assert_eq!(
         refused(&[0.0, 0.0, 1.5, 0.0, 0.0, 1.5], one(1.0)),
-        MeshError::Steep {
-            column: 1,
-            row: 0,
-            rise: 1.5,
-            limit: 1.0
-        }
+        MeshError::Steep { column: 1, row: 0, rise: 1.5, limit: 1.0 }
     );
     // Made to the limit with roundings: possible.
     let ramp: Vec<f64> = (0..6).map(|index| 0.1 * f64::from(index % 3)).collect();
@@ -137,15 +114,7 @@ fn a_surface_that_came_to_rest_reaches_no_further_than_a_new_one() {
     let recovery = Recovery::new(Seconds(1e-3), Seconds(1e-3)).unwrap();
     let mut used = Surface::new(field(41), Method::Envelope, recovery, Cut::NONE).unwrap();
     let at = |z, side| {
-        Contact::at(
-            &Grid::new(41, 41, 1.0).unwrap(),
-            Node {
-                column: 20,
-                row: 20,
-            },
-            z,
-            side,
-        )
+        Contact::at(&Grid::new(41, 41, 1.0).unwrap(), Node { column: 20, row: 20 }, z, side)
     };
     used.tick(&[at(5.0, Side::Pull)]);
     while !used.tick(&[]).dirty.is_empty() {}

@@ -98,20 +98,12 @@ impl PokeScene {
                 }
             }
         }
-        Ok(ShapeError {
-            l2_mm: (square / count.max(1) as f64).sqrt(),
-            linf_mm: linf,
-        })
+        Ok(ShapeError { l2_mm: (square / count.max(1) as f64).sqrt(), linf_mm: linf })
     }
 
     /// One poke of the surface at rest.
     fn poke(&self, field: &mut HeightField, cut: Cut, [x, y]: [f64; 2]) {
-        let contact = Contact {
-            x,
-            y,
-            z: (self.rest)(x, y) - self.depth,
-            side: Side::Push,
-        };
+        let contact = Contact { x, y, z: (self.rest)(x, y) - self.depth, side: Side::Push };
         let shear = self.slope * field.grid.spacing();
         let pokes = contact.poke(&field.grid).map(|(poke, _)| poke);
         let shape = Envelope::new(&field.grid, shear);

@@ -10,10 +10,7 @@ use palpate_model::random::SplitMix;
 const TICKS: u32 = 10_000_000;
 
 fn encoder(quadrature: Quadrature) -> Encoder {
-    Encoder {
-        quadrature,
-        ..Encoder::default()
-    }
+    Encoder { quadrature, ..Encoder::default() }
 }
 
 fn ratio(encoder: &Encoder) -> GearRatio {
@@ -50,15 +47,9 @@ fn the_slave_is_never_half_a_pulse_away_and_never_drifts() {
         gear.tick(0);
         let count_mm = encoder.count_mm(&Pinion::default());
         let (worst, home) = walk(count_mm, TICKS, |counts, _| gear.tick(counts).pulses);
-        println!(
-            "{quadrature:?}: at most {:.4} um away in {TICKS} ticks",
-            1e3 * worst
-        );
+        println!("{quadrature:?}: at most {:.4} um away in {TICKS} ticks", 1e3 * worst);
         // Half a pulse, and the rounding of positions of up to a few metres to a double.
-        assert!(
-            worst <= 0.0075 + 1e-11 && worst > 0.0074 && home == 0.0,
-            "{worst} {home}"
-        );
+        assert!(worst <= 0.0075 + 1e-11 && worst > 0.0074 && home == 0.0, "{worst} {home}");
     }
 }
 
@@ -69,9 +60,8 @@ fn rounding_every_tick_drifts() {
         let encoder = encoder(quadrature);
         let per_count = ratio(&encoder).pulses_per_count();
         let count_mm = encoder.count_mm(&Pinion::default());
-        let (worst, _) = walk(count_mm, 100_000, |_, moved| {
-            (moved as f64 * per_count).round() as i64
-        });
+        let (worst, _) =
+            walk(count_mm, 100_000, |_, moved| (moved as f64 * per_count).round() as i64);
         println!("{quadrature:?}: rounded tick by tick, {worst:.3} mm away");
         assert!(worst > 0.0075 * 10.0, "{worst}");
     }
@@ -81,10 +71,7 @@ fn rounding_every_tick_drifts() {
 #[test]
 fn reversals_lose_nothing_and_the_drive_s_limit_is_told() {
     let encoder = encoder(Quadrature::X4);
-    let drive = SlaveDrive {
-        pulses_per_s_max: 10e3,
-        ..SlaveDrive::default()
-    };
+    let drive = SlaveDrive { pulses_per_s_max: 10e3, ..SlaveDrive::default() };
     let ratio = ratio(&encoder);
     let mut gear = Gear::new(ratio, &drive, Period::MILLISECOND);
     gear.tick(5);
@@ -109,10 +96,7 @@ fn reversals_lose_nothing_and_the_drive_s_limit_is_told() {
     while gear.tick(counts).behind > 0 {
         ticks += 1;
     }
-    assert_eq!(
-        (gear.tick(counts).made, ticks),
-        (ratio.pulses(2000), (late - 1) / 10)
-    );
+    assert_eq!((gear.tick(counts).made, ticks), (ratio.pulses(2000), (late - 1) / 10));
     // The encoder has a limit of its own: 100 kHz of lines are 6.1 m/s, which no hand reaches, told all the same.
     let mut counter = EncoderCounter::new(&encoder, Period::MILLISECOND);
     counter.tick(0, 1);

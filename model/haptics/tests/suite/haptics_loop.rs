@@ -26,15 +26,8 @@ fn balanced(plant: &Plant, started_with: f64) {
     let put_in = all.motor + all.hand + started_with;
     let gone = all.damping + all.friction + plant.kinetic();
     let size = all.motor.abs() + all.hand.abs() + all.damping + gone.abs() + started_with;
-    assert!(
-        (put_in - gone).abs() <= 1e-11 * size,
-        "residual {:e} of {size:e} N mm",
-        put_in - gone
-    );
-    assert!(
-        all.damping >= 0.0 && all.friction >= -1e-9 * size,
-        "{all:?}"
-    );
+    assert!((put_in - gone).abs() <= 1e-11 * size, "residual {:e} of {size:e} N mm", put_in - gone);
+    assert!(all.damping >= 0.0 && all.friction >= -1e-9 * size, "{all:?}");
 }
 
 /// Runs `seconds` and gives back the plant and what `seen` kept.
@@ -77,23 +70,13 @@ fn stiffest(settings: &PlantSettings, guess: f64) -> f64 {
     let (mut low, mut high) = (0.5 * guess, 2.0 * guess);
     for _ in 0..16 {
         let middle = 0.5 * (low + high);
-        if calms(settings, middle, 2.0) {
-            low = middle
-        } else {
-            high = middle
-        }
+        if calms(settings, middle, 2.0) { low = middle } else { high = middle }
     }
     low
 }
 
 fn struck(us: u64, damping: f64, delay: usize) -> PlantSettings {
-    PlantSettings {
-        mass_kg: 0.115,
-        damping,
-        delay,
-        v: 10.0,
-        ..PlantSettings::bare(period(us))
-    }
+    PlantSettings { mass_kg: 0.115, damping, delay, v: 10.0, ..PlantSettings::bare(period(us)) }
 }
 
 /// L1: a spring is calm up to `2 b / T`, times little more: the passivity bound is on the safe side.
@@ -103,10 +86,7 @@ fn the_stiffest_spring_is_twice_damping_over_tick() {
         for damping in [0.5e-3, 2e-3, 17.6e-3] {
             let bound = 2.0 * damping / (us as f64 * 1e-6);
             let ratio = stiffest(&struck(us, damping, 0), bound) / bound;
-            println!(
-                "L1: {us} us, {} N s/m: {ratio:.4} of 2 b / T",
-                damping * 1e3
-            );
+            println!("L1: {us} us, {} N s/m: {ratio:.4} of 2 b / T", damping * 1e3);
             assert!((1.0..most).contains(&ratio), "{us} {damping}: {ratio}");
         }
     }
@@ -119,10 +99,7 @@ fn a_delay_takes_its_part() {
         for damping in [0.5e-3, 2e-3] {
             let bound = damping / (1e-3 * (0.5 + delay as f64));
             let ratio = stiffest(&struck(1000, damping, delay), bound) / bound;
-            println!(
-                "L2: {delay} ticks late, {} N s/m: {ratio:.4}",
-                damping * 1e3
-            );
+            println!("L2: {delay} ticks late, {} N s/m: {ratio:.4}", damping * 1e3);
             assert!((1.0..1.02).contains(&ratio), "{delay}: {ratio}");
         }
     }
@@ -130,17 +107,8 @@ fn a_delay_takes_its_part() {
 
 /// Swing in mm at the end, and whether it was ever called a buzz, of a wall that a hand without damping leans on.
 fn leaned_on(stiffness: f64, damping: f64, friction: f64, count_mm: f64) -> (f64, bool) {
-    let path = HandPath::RampHold {
-        from: 0.0,
-        to: 10.0,
-        speed: 50.0,
-    };
-    let hand = Hand {
-        mass_kg: 0.05,
-        stiffness: 0.2,
-        damping: 0.0,
-        path,
-    };
+    let path = HandPath::RampHold { from: 0.0, to: 10.0, speed: 50.0 };
+    let hand = Hand { mass_kg: 0.05, stiffness: 0.2, damping: 0.0, path };
     let settings = PlantSettings {
         mass_kg: 0.115,
         damping,
@@ -187,10 +155,7 @@ fn counts_swing_where_friction_is_below_half_a_count_of_stiffness() {
                 }
                 // Two counts must be passed, so that three are surely heard.
                 heard += usize::from(is_buzz);
-                assert!(
-                    is_buzz || swing < 3.0 * count,
-                    "{count} {friction} {stiffness}: {swing}"
-                );
+                assert!(is_buzz || swing < 3.0 * count, "{count} {friction} {stiffness}: {swing}");
                 assert!(!is_buzz || stiffness > bound);
             }
         }
@@ -226,21 +191,14 @@ fn without_damping_friction_holds_up_to_an_amplitude() {
         let (mut low, mut high) = (10.0, 2000.0);
         for _ in 0..16 {
             let middle = 0.5 * (low + high);
-            if grows(middle) {
-                high = middle
-            } else {
-                low = middle
-            }
+            if grows(middle) { high = middle } else { low = middle }
         }
         let wanted = 8.0 * friction / (std::f64::consts::PI * stiffness * 1e-3);
         println!(
             "L4: {stiffness} N/mm grows from {low:.1} mm/s on, {wanted:.1} by the balance of energies"
         );
         // The balance is of a sine; the first quarter of the swing has lost some speed already.
-        assert!(
-            (low / wanted - 1.0).abs() < 0.15,
-            "{stiffness}: {low} {wanted}"
-        );
+        assert!((low / wanted - 1.0).abs() < 0.15, "{stiffness}: {low} {wanted}");
     }
 }
 
@@ -259,9 +217,7 @@ fn swing_about(
         stiffness: hand_stiffness,
         damping: 0.0,
         // The spring holds the force of the body.
-        path: HandPath::Still {
-            at: depth + held / hand_stiffness,
-        },
+        path: HandPath::Still { at: depth + held / hand_stiffness },
     };
     let period = Period::MILLISECOND;
     let settings = PlantSettings {
@@ -322,18 +278,9 @@ fn the_margin_s_damping_is_enough_and_a_part_of_it_is_not() {
         };
         let needed = watch.exactly_at(Depth(depth), MmPerS(0.0)).needed;
         let mut grown = 0.0f64;
-        for (mass, stiffness) in [
-            (0.05, 0.2),
-            (0.2, 0.8),
-            (0.05, 3.0),
-            (2.0, 0.05),
-            (5.0, 0.01),
-        ] {
+        for (mass, stiffness) in [(0.05, 0.2), (0.2, 0.8), (0.05, 3.0), (2.0, 0.05), (5.0, 0.01)] {
             let (growth, least, start) = swing_about(depth, mass, stiffness, needed, delay);
-            assert!(
-                growth < 1.0,
-                "{depth} mm, hand {mass} kg {stiffness} N/mm: {growth}"
-            );
+            assert!(growth < 1.0, "{depth} mm, hand {mass} kg {stiffness} N/mm: {growth}");
             // Swings of 1 mm/s are small beside most depths, not quite beside 0.3 mm.
             assert!(
                 least > -0.02 * start,
@@ -351,21 +298,14 @@ fn the_margin_s_damping_is_enough_and_a_part_of_it_is_not() {
 
 /// Farthest place of a spring struck at 10 mm/s, in mm, with a controller or without.
 fn controlled(stiffness: f64, is_clamped: Option<bool>) -> (f64, f64) {
-    let settings = PlantSettings {
-        count_mm: FINE,
-        ..struck(1000, 2e-3, 0)
-    };
+    let settings = PlantSettings { count_mm: FINE, ..struck(1000, 2e-3, 0) };
     let controller = is_clamped.map(|is_clamped| ControllerSettings {
         is_clamped,
         force_max: Newtons(f64::MAX),
         ..ControllerSettings::of(0.115)
     });
-    let renderer = Renderer::new(
-        Rendered::Spring { stiffness },
-        &settings,
-        None,
-        controller.as_ref(),
-    );
+    let renderer =
+        Renderer::new(Rendered::Spring { stiffness }, &settings, None, controller.as_ref());
     let (mut farthest, mut last) = (0.0f64, 0.0f64);
     play(&settings, renderer, 3.0, |one| {
         farthest = farthest.max(one.x.abs());
@@ -391,10 +331,7 @@ fn the_clamped_controller_holds_and_the_unclamped_does_not() {
             1e3 * last
         );
         assert!(farthest < 0.085 && last < 2.0 * FINE);
-        assert!(
-            controlled(stiffness, Some(false)).0 >= 1e3,
-            "{stiffness} unclamped"
-        );
+        assert!(controlled(stiffness, Some(false)).0 >= 1e3, "{stiffness} unclamped");
     }
 }
 
@@ -402,19 +339,12 @@ fn the_clamped_controller_holds_and_the_unclamped_does_not() {
 #[test]
 fn what_the_model_returns_in_its_band_is_taken_back() {
     let owed = |is_controlled: bool| {
-        let path = HandPath::Sine {
-            middle: 0.5,
-            amplitude: 0.55,
-            hz: 0.25,
-        };
+        let path = HandPath::Sine { middle: 0.5, amplitude: 0.55, hz: 0.25 };
         let settings = PlantSettings {
             damping: 0.5e-3,
             count_mm: FINE / 16.0,
             x: -0.05,
-            hand: Hand {
-                stiffness: 3.0,
-                ..Hand::firm(path)
-            },
+            hand: Hand { stiffness: 3.0, ..Hand::firm(path) },
             ..PlantSettings::bare(Period::MILLISECOND)
         };
         let law = LawSettings::of::<3>(THESIS, Period::MILLISECOND);
@@ -441,11 +371,7 @@ fn a_hand_at_five_hertz_is_no_buzz() {
     for middle in [-5.0, 0.0, 5.0, 15.0] {
         for amplitude in [1.0, 4.0] {
             for is_wall in [true, false] {
-                let path = HandPath::Sine {
-                    middle,
-                    amplitude,
-                    hz: 5.0,
-                };
+                let path = HandPath::Sine { middle, amplitude, hz: 5.0 };
                 let settings = PlantSettings {
                     damping: 2e-3,
                     friction: [0.1; 2],
@@ -487,11 +413,7 @@ fn after_a_stall_the_force_ramps() {
                 lets_go_after: lets_go.then_some(Seconds(0.005)),
                 ..GuardSettings::default()
             };
-            let path = HandPath::RampHold {
-                from: 0.0,
-                to: 20.0,
-                speed: 30.0,
-            };
+            let path = HandPath::RampHold { from: 0.0, to: 20.0, speed: 30.0 };
             let settings = PlantSettings {
                 damping: 17.6e-3,
                 count_mm: FINE,
@@ -499,12 +421,8 @@ fn after_a_stall_the_force_ramps() {
                 ..PlantSettings::bare(Period::MILLISECOND)
             };
             let wall = Rendered::Wall { stiffness: 0.3 };
-            let mut renderer = Renderer::new(
-                wall,
-                &settings,
-                Some(&guard),
-                Some(&ControllerSettings::of(0.11)),
-            );
+            let mut renderer =
+                Renderer::new(wall, &settings, Some(&guard), Some(&ControllerSettings::of(0.11)));
             let mut plant = Plant::new(&settings);
             let (mut last, mut worst, mut full) = (0.0f64, 0.0f64, 0.0f64);
             let mut tick = 0;

@@ -39,10 +39,7 @@ fn known_walls() {
         assert!((needed / wanted - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
-    let damped = Linear {
-        damping: 3e-3,
-        ..spring
-    };
+    let damped = Linear { damping: 3e-3, ..spring };
     let wall = Sampled::of(&damped, Scheme::Exact, 1e-3);
     let (needed, th) = criterion::needed(&wall, 0.0);
     assert!((needed / 4e-3 - 1.0).abs() < 1e-12 && (th - std::f64::consts::PI).abs() < 1e-6);
@@ -61,28 +58,19 @@ fn two_ends_are_the_whole_criterion_without_delay() {
                 tau: 10f64.powf(1.5 * random.normal() - 1.0),
             };
             let tick = 10f64.powf(0.5 * random.normal() - 3.0);
-            if scheme
-                .stability_limit()
-                .is_some_and(|limit| tick / linear.tau >= limit)
-            {
+            if scheme.stability_limit().is_some_and(|limit| tick / linear.tau >= limit) {
                 continue;
             }
             let sampled = Sampled::of(&linear, scheme, tick);
             let ends = sampled.slow().max(sampled.fast());
             let (needed, _) = criterion::needed(&sampled, 0.0);
             let size = linear.stiffness * (tick + linear.tau) + linear.damping;
-            assert!(
-                (needed - ends).abs() < 1e-8 * size,
-                "{scheme:?} {linear:?}: {needed} {ends}"
-            );
+            assert!((needed - ends).abs() < 1e-8 * size, "{scheme:?} {linear:?}: {needed} {ends}");
             for th in [0.01, 0.3, 1.0, 2.0, 3.0] {
                 for delay in [0.0, 1.0, 3.5] {
                     let ours = criterion::needed_at(&sampled, delay, th);
                     let paper = as_written(&sampled, delay, th);
-                    assert!(
-                        (ours - paper).abs() < 1e-9 * size,
-                        "{scheme:?} {th}: {ours} {paper}"
-                    );
+                    assert!((ours - paper).abs() < 1e-9 * size, "{scheme:?} {th}: {ours} {paper}");
                 }
             }
         }
@@ -93,16 +81,10 @@ fn two_ends_are_the_whole_criterion_without_delay() {
 /// half a tick of `k0` more, and less at the fast end.
 #[test]
 fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
-    for (k0, c0, tau, tick) in [
-        (0.5, 0.02, 0.05, 1e-3),
-        (1.0, 0.5, 0.05, 2e-3),
-        (0.3, 3.0, 1.0, 5e-3),
-    ] {
-        let linear = Linear {
-            stiffness: k0,
-            damping: c0,
-            tau,
-        };
+    for (k0, c0, tau, tick) in
+        [(0.5, 0.02, 0.05, 1e-3), (1.0, 0.5, 0.05, 2e-3), (0.3, 3.0, 1.0, 5e-3)]
+    {
+        let linear = Linear { stiffness: k0, damping: c0, tau };
         let k_inf: f64 = c0 / tau;
         let exact = Sampled::of(&linear, Scheme::Exact, tick);
         let slow = k0 * tick / 2.0 + k0 * tau - c0;
@@ -152,10 +134,7 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
         let quick = watch.at(depth, MmPerS(0.0));
         let whole = watch.exactly_at(depth, MmPerS(0.0));
         let size = quick.needed.abs().max(1e-6);
-        assert!(
-            whole.needed <= quick.needed + 1e-3 * size,
-            "{watch:?} {quick:?} {whole:?}"
-        );
+        assert!(whole.needed <= quick.needed + 1e-3 * size, "{watch:?} {quick:?} {whole:?}");
         if watch.device.delay_ticks == 0.0 {
             let (needed, _) = criterion::needed(
                 &Sampled::of(
@@ -180,42 +159,22 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
 fn bands_where_energy_comes_back() {
     let deepest = Depth(30.0);
     let body = SeriesBody::from(THESIS).padded();
-    let [cycles] = active_cycles(&body, deepest)[..] else {
-        panic!("one band")
-    };
-    let [pokes] = active_pokes(&body, deepest)[..] else {
-        panic!("one band")
-    };
-    assert!(
-        (cycles.to.0 - 0.712).abs() < 5e-4 && cycles.from == Depth(0.0),
-        "{cycles:?}"
-    );
-    assert!(
-        (pokes.to.0 - 1.430).abs() < 5e-4 && pokes.from == Depth(0.0),
-        "{pokes:?}"
-    );
+    let [cycles] = active_cycles(&body, deepest)[..] else { panic!("one band") };
+    let [pokes] = active_pokes(&body, deepest)[..] else { panic!("one band") };
+    assert!((cycles.to.0 - 0.712).abs() < 5e-4 && cycles.from == Depth(0.0), "{cycles:?}");
+    assert!((pokes.to.0 - 1.430).abs() < 5e-4 && pokes.from == Depth(0.0), "{pokes:?}");
     let mut random = SplitMix::seeded(13);
     let mut compared = 0;
     for _ in 0..300 {
         let body = ModifiedKelvin {
             tau_eps: random.normal().abs() + 0.01,
-            mu: [
-                0.1 * random.normal(),
-                0.01 * random.normal(),
-                1e-3 * random.normal(),
-            ],
+            mu: [0.1 * random.normal(), 0.01 * random.normal(), 1e-3 * random.normal()],
             tau_sig: 0.1 * random.normal(),
         };
         let padded = SeriesBody::from(body).padded();
         for (ours, known) in [
-            (
-                active_cycles(&padded, deepest),
-                admissibility::active_cycles(&body),
-            ),
-            (
-                active_pokes(&padded, deepest),
-                admissibility::active_pokes(&body),
-            ),
+            (active_cycles(&padded, deepest), admissibility::active_cycles(&body)),
+            (active_pokes(&padded, deepest), admissibility::active_pokes(&body)),
         ] {
             let known: Vec<_> = known
                 .into_iter()
@@ -242,12 +201,8 @@ fn bands_where_energy_comes_back() {
 
 #[test]
 fn a_verdict_says_it_in_words() {
-    let device = Device {
-        damping: 0.0176,
-        friction: Newtons(0.81),
-        count_mm: 0.01534,
-        delay_ticks: 0.0,
-    };
+    let device =
+        Device { damping: 0.0176, friction: Newtons(0.81), count_mm: 0.01534, delay_ticks: 0.0 };
     let watch = |device| Watch {
         body: SeriesBody::from(THESIS).padded(),
         scheme: Scheme::Exact,
@@ -257,11 +212,7 @@ fn a_verdict_says_it_in_words() {
     // At the surface the lag alone asks for mu1 tau = 54.6 N s/m.
     let verdict = watch(device).before_play(Depth(30.0), MmPerS(0.0));
     assert_eq!(verdict.worst.cause, Cause::Lag);
-    assert!(
-        (verdict.worst.needed * 1e3 - 54.58).abs() < 0.05,
-        "{:?}",
-        verdict.worst
-    );
+    assert!((verdict.worst.needed * 1e3 - 54.58).abs() < 0.05, "{:?}", verdict.worst);
     assert!(!verdict.is_calm() && (verdict.ratio().expect("a need") - 0.322).abs() < 1e-3);
     let said = verdict.sentences();
     println!("{said:#?}");
@@ -270,33 +221,15 @@ fn a_verdict_says_it_in_words() {
         assert!(said[1..].iter().any(|one| one.contains(fact)), "{fact}");
     }
     // Enough of everything.
-    let calm = Device {
-        damping: 0.06,
-        ..device
-    };
+    let calm = Device { damping: 0.06, ..device };
     // Moving in at 100 mm/s, half a tick of tau_sig v = 6 N/mm is 3 N s/m more; at 500 mm/s 15.
-    assert!(
-        watch(calm)
-            .before_play(Depth(30.0), MmPerS(100.0))
-            .is_calm()
-    );
-    assert!(
-        !watch(calm)
-            .before_play(Depth(30.0), MmPerS(500.0))
-            .is_calm()
-    );
+    assert!(watch(calm).before_play(Depth(30.0), MmPerS(100.0)).is_calm());
+    assert!(!watch(calm).before_play(Depth(30.0), MmPerS(500.0)).is_calm());
     let verdict = watch(calm).before_play(Depth(30.0), MmPerS(0.0));
-    assert!(
-        verdict.is_calm() && verdict.bands.is_empty(),
-        "{:#?}",
-        verdict.sentences()
-    );
+    assert!(verdict.is_calm() && verdict.bands.is_empty(), "{:#?}", verdict.sentences());
     assert!(verdict.sentences()[0].contains("1.10"));
     // Without friction counts may swing.
-    let smooth = Device {
-        friction: Newtons(0.0),
-        ..calm
-    };
+    let smooth = Device { friction: Newtons(0.0), ..calm };
     let verdict = watch(smooth).before_play(Depth(30.0), MmPerS(0.0));
     assert!(!verdict.is_calm() && verdict.sentences()[1].contains("encoder count"));
 }

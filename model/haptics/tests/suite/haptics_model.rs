@@ -30,10 +30,7 @@ fn law(settings: LawSettings) -> ForceLaw {
 #[test]
 fn amplification_of_every_scheme() {
     fn alone<I: Integrator<f64, 3>>(dt: f64, steps: u32) -> f64 {
-        let start = Start {
-            depth: 0.0,
-            force: Some(1.0),
-        };
+        let start = Start { depth: 0.0, force: Some(1.0) };
         let mut one = I::at_any_step(&SeriesBody::from(THESIS), dt, start);
         (0..steps).fold(1.0, |_, _| one.step(0.0).expect("a force"))
     }
@@ -62,16 +59,10 @@ fn amplification_of_every_scheme() {
             };
             let found = of(scheme, dt, 1);
             let miss = (found - wanted).abs();
-            assert!(
-                miss < 1e-12 * wanted.abs().max(1.0),
-                "{scheme:?} {h}: {found}"
-            );
+            assert!(miss < 1e-12 * wanted.abs().max(1.0), "{scheme:?} {h}: {found}");
         }
         // Explicit Euler alternates between 1 and 2 relaxation times, and grows beyond.
-        let (one, ten) = (
-            of(Scheme::ExplicitEuler, dt, 1),
-            of(Scheme::ExplicitEuler, dt, 10),
-        );
+        let (one, ten) = (of(Scheme::ExplicitEuler, dt, 1), of(Scheme::ExplicitEuler, dt, 10));
         assert_eq!(one < 0.0, h > 1.0);
         assert_eq!(ten.abs() > 1.0 + 1e-9, h > 2.0, "{h}: {ten}");
     }
@@ -81,11 +72,8 @@ fn amplification_of_every_scheme() {
 fn ramp_force(speed: f64, t: f64) -> f64 {
     let [mu1, mu2, mu3] = THESIS.mu;
     let tau = THESIS.tau_eps;
-    let rates = [
-        mu1 * speed + THESIS.tau_sig * speed * speed,
-        mu2 * speed * speed,
-        mu3 * speed.powi(3),
-    ];
+    let rates =
+        [mu1 * speed + THESIS.tau_sig * speed * speed, mu2 * speed * speed, mu3 * speed.powi(3)];
     let particular = |t: f64| -> f64 {
         let term = |k: i32, a: f64| -> f64 {
             let mut falling = 1.0;
@@ -133,10 +121,7 @@ fn ramps_are_the_closed_form() {
 #[test]
 fn the_left_edge_exponential_misses_a_ramp() {
     for scheme in [Scheme::Exact, Scheme::ExponentialLeft] {
-        let mut law = law(LawSettings {
-            scheme,
-            ..settings(4_000_000)
-        });
+        let mut law = law(LawSettings { scheme, ..settings(4_000_000) });
         let mut worst = 0.0f64;
         for i in 1..=250 {
             let t = f64::from(i) * 0.004;
@@ -214,10 +199,7 @@ fn a_small_sine_loses_what_its_formula_says() {
             }
             let miss = (work / wanted - 1.0).abs();
             // The amplitude squared beside the depth squared, 1e-8, and what is left of the start, e^-12.
-            assert!(
-                miss < 2e-5,
-                "{depth} mm {hz} Hz: {work:e} {wanted:e} {miss:e}"
-            );
+            assert!(miss < 2e-5, "{depth} mm {hz} Hz: {work:e} {wanted:e} {miss:e}");
         }
     }
 }
@@ -250,12 +232,7 @@ fn slow_pokes_and_the_observer_agree() {
         let share = work / (2.0 * speed * predicted);
         assert!((share - 1.0).abs() < 0.1, "{depth}: {share}");
         // The observer counts a held force, less by half a move's force change: k dx^2 / 2 each.
-        assert_eq!(
-            observer.energy() < 0.0,
-            predicted < 0.0,
-            "{depth}: {}",
-            observer.energy()
-        );
+        assert_eq!(observer.energy() < 0.0, predicted < 0.0, "{depth}: {}", observer.energy());
         signs.push(predicted < 0.0);
     }
     assert_eq!(signs, [true, true, true, false, false, false]);
@@ -286,16 +263,10 @@ fn without_memory_the_force_is_the_forcing() {
         }
     }
     let negative = LawSettings {
-        body: SeriesBody {
-            tau_eps: -1.0,
-            ..SeriesBody::from(THESIS).padded()
-        },
+        body: SeriesBody { tau_eps: -1.0, ..SeriesBody::from(THESIS).padded() },
         ..settings(1_000_000)
     };
-    assert!(matches!(
-        ForceLaw::new(negative, Depth(0.0)),
-        Err(LawError::Integrator(_))
-    ));
+    assert!(matches!(ForceLaw::new(negative, Depth(0.0)), Err(LawError::Integrator(_))));
 }
 
 /// M7: whatever the body and whatever comes, a force that is finite, bounded and never pulls.
@@ -379,46 +350,16 @@ fn a_jump_is_followed_as_fast_as_allowed() {
     for _ in 0..5000 {
         let _ = law.tick(Depth(30.0));
     }
-    let pulls = (0..25)
-        .map(|_| law.tick(Depth(1.0)))
-        .filter(|one| one.flags.has(Flags::PULL));
-    assert!(
-        pulls
-            .inspect(|one| assert!(one.model.0 < 0.0 && one.force.0 == 0.0))
-            .count()
-            > 5
-    );
-    let above = (0..40)
-        .map(|_| law.tick(Depth(-5.0)))
-        .last()
-        .expect("ticks");
+    let pulls = (0..25).map(|_| law.tick(Depth(1.0))).filter(|one| one.flags.has(Flags::PULL));
+    assert!(pulls.inspect(|one| assert!(one.model.0 < 0.0 && one.force.0 == 0.0)).count() > 5);
+    let above = (0..40).map(|_| law.tick(Depth(-5.0))).last().expect("ticks");
     assert!(above.flags == Flags::ABOVE_SURFACE && above.force.0 == 0.0);
     for (name, wrong) in [
-        (
-            "deepest",
-            LawSettings {
-                depth_max: Depth(0.0),
-                ..settings
-            },
-        ),
-        (
-            "speed",
-            LawSettings {
-                speed_max: MmPerS(f64::NAN),
-                ..settings
-            },
-        ),
-        (
-            "largest force",
-            LawSettings {
-                force_max: Newtons(f64::INFINITY),
-                ..settings
-            },
-        ),
+        ("deepest", LawSettings { depth_max: Depth(0.0), ..settings }),
+        ("speed", LawSettings { speed_max: MmPerS(f64::NAN), ..settings }),
+        ("largest force", LawSettings { force_max: Newtons(f64::INFINITY), ..settings }),
     ] {
-        let told = ForceLaw::new(wrong, Depth(0.0))
-            .expect_err("a bound")
-            .to_string();
+        let told = ForceLaw::new(wrong, Depth(0.0)).expect_err("a bound").to_string();
         assert!(told.contains(name), "{told}");
     }
     assert!(ForceLaw::new(settings, Depth(f64::NAN)).is_err());
@@ -428,10 +369,7 @@ fn a_jump_is_followed_as_fast_as_allowed() {
 #[test]
 fn single_precision_does_not_drift() {
     let mut wide = law(settings(1_000_000));
-    let mut narrow = law(LawSettings {
-        precision: Precision::F32,
-        ..settings(1_000_000)
-    });
+    let mut narrow = law(LawSettings { precision: Precision::F32, ..settings(1_000_000) });
     let ticks = 10_000_000u64;
     // In and out over 16 mm in 65536 ticks, exact in either precision.
     let (mut worst, mut peak) = (0.0f64, 0.0f64);
@@ -444,10 +382,7 @@ fn single_precision_does_not_drift() {
             worst = worst.max((a - b).abs());
         }
     }
-    println!(
-        "f32 beside f64 after 1e7 ticks: {:.1e} of {peak:.2} N",
-        worst / peak
-    );
+    println!("f32 beside f64 after 1e7 ticks: {:.1e} of {peak:.2} N", worst / peak);
     assert!(worst / peak < 1e-4);
     assert_eq!(wide.time().0, ticks * 1_000_000);
     assert_eq!(wide.ticks(), ticks);

@@ -15,13 +15,7 @@ use palpate_model::{Depth, Newtons, Seconds, Volts};
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 
 fn input(counts: i64, cell: f64) -> Input {
-    Input {
-        counts,
-        elapsed: 1,
-        cell: Newtons(cell),
-        slave_pulses: None,
-        is_on: true,
-    }
+    Input { counts, elapsed: 1, cell: Newtons(cell), slave_pulses: None, is_on: true }
 }
 
 /// L8: a force at the threshold with noise: contact comes and goes hundreds of times a second without hysteresis and not
@@ -35,10 +29,8 @@ fn hysteresis_as_wide_as_the_noise_keeps_contact() {
         - noise.iter().fold(f64::MAX, |a, b| a.min(*b));
     let mut rates = Vec::new();
     for width in [0.0, sigma, 2.0 * sigma, 3.0 * sigma, peak_to_peak] {
-        let settings = ContactSettings {
-            on: Newtons(0.2 + 0.5 * width),
-            off: Newtons(0.2 - 0.5 * width),
-        };
+        let settings =
+            ContactSettings { on: Newtons(0.2 + 0.5 * width), off: Newtons(0.2 - 0.5 * width) };
         let mut contact = ContactDetector::new(settings.checked().expect("thresholds"));
         let mut guard = ForceGuard::new(&GuardSettings::default(), Period::MILLISECOND);
         let mut last = 0.0;
@@ -56,14 +48,7 @@ fn hysteresis_as_wide_as_the_noise_keeps_contact() {
         );
     }
     assert!(rates[0] > 100.0 && rates.windows(2).all(|pair| pair[1] < pair[0]) && rates[4] < 2.0);
-    assert!(
-        ContactSettings {
-            on: Newtons(0.1),
-            off: Newtons(0.2)
-        }
-        .checked()
-        .is_err()
-    );
+    assert!(ContactSettings { on: Newtons(0.1), off: Newtons(0.2) }.checked().is_err());
     let mut contact = ContactDetector::new(ContactSettings::above_noise(Newtons(sigma)));
     contact.tick(Newtons(1.0));
     assert!(contact.tick(Newtons(f64::NAN)) == Flags::CELL && contact.is_touching());
@@ -105,22 +90,11 @@ fn a_calibration_finds_slope_dead_band_ceiling_and_hysteresis() {
             .expect("a line");
         within += u32::from((fit.slope - slope).abs() < 2.0 * fit.slope_error);
         count += 1;
-        assert!(
-            (fit.slope - slope).abs() < 5.0 * fit.slope_error,
-            "{seed}: {fit:?}"
-        );
-        assert!(
-            (fit.residual / 0.05 - 1.0).abs() < 0.35,
-            "{seed}: {}",
-            fit.residual
-        );
+        assert!((fit.slope - slope).abs() < 5.0 * fit.slope_error, "{seed}: {fit:?}");
+        assert!((fit.residual / 0.05 - 1.0).abs() < 0.35, "{seed}: {}", fit.residual);
         assert!((fit.hysteresis().expect("both ways").0 - 2.0 * friction).abs() < 0.08);
         // 0.81 N over 5.25 N/V.
-        assert!(
-            (fit.begins().0 - friction / slope).abs() < 0.03,
-            "{seed}: {}",
-            fit.begins()
-        );
+        assert!((fit.begins().0 - friction / slope).abs() < 0.03, "{seed}: {}", fit.begins());
         assert!(
             fit.rising.dead.is_some()
                 && (fit.rising.ceiling.expect("a ceiling").0 - ceiling).abs() < 0.05
@@ -143,11 +117,8 @@ fn a_calibration_finds_slope_dead_band_ceiling_and_hysteresis() {
 
 #[test]
 fn a_calibration_that_tells_nothing_is_refused() {
-    let refusal = |points: &[BiasPoint]| {
-        BiasCalibration::fit(points)
-            .expect_err("no line")
-            .to_string()
-    };
+    let refusal =
+        |points: &[BiasPoint]| BiasCalibration::fit(points).expect_err("no line").to_string();
     assert!(refusal(&measured(0.0, 1.0, 0.0, 9.0, 0.05, 1)).contains("does not rise"));
     assert!(refusal(&measured(5.0, 0.0, 0.0, 99.0, 0.0, 1)[..4]).contains("4 points"));
     let mut bad = measured(5.0, 0.0, 0.0, 99.0, 0.0, 1);
@@ -170,19 +141,13 @@ fn commanded_torque_and_measured_force_follow_each_other() {
         (DriveKind::Current { amps_per_volt: 1.0 }, 0.0, 0.81),
         (DriveKind::Current { amps_per_volt: 1.0 }, 1.0, 0.0),
     ] {
-        let settings = CheckSettings {
-            drive,
-            friction_share: share,
-            ..CheckSettings::source(THESIS)
-        };
+        let settings =
+            CheckSettings { drive, friction_share: share, ..CheckSettings::source(THESIS) };
         let mut samples = Vec::new();
         let mut done = 0.0;
         check(&settings, |one| samples.push(*one), |share| done = share).expect("a check");
         assert!(samples.len() == 1800 && done > 0.999);
-        let peak = samples
-            .iter()
-            .map(|one| one.commanded.0)
-            .fold(0.0, f64::max);
+        let peak = samples.iter().map(|one| one.commanded.0).fold(0.0, f64::max);
         let last = samples[samples.len() - 1];
         // 6.396 N at the end of the ramp, 5.591 N at the end of the hold; the slider gives way by a few hundredths of a mm
         // of 30, the slave counts 15 um.
@@ -198,10 +163,7 @@ fn commanded_torque_and_measured_force_follow_each_other() {
         let ramp = samples.iter().filter(|one| (10.0..39.9).contains(&one.t.0));
         let gaps: Vec<f64> = ramp.map(|one| one.measured.0 - one.commanded.0).collect();
         let mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
-        assert!(
-            (mean - apart).abs() < 0.03,
-            "{drive:?} {share}: apart by {mean}, not {apart}"
-        );
+        assert!((mean - apart).abs() < 0.03, "{drive:?} {share}: apart by {mean}, not {apart}");
         let spread =
             (gaps.iter().map(|gap| (gap - mean).powi(2)).sum::<f64>() / gaps.len() as f64).sqrt();
         assert!(spread < 0.15, "{spread}");
@@ -225,52 +187,14 @@ fn commanded_torque_and_measured_force_follow_each_other() {
 fn a_check_that_cannot_be_is_refused() {
     let right = CheckSettings::source(THESIS);
     for (wrong, words) in [
-        (
-            CheckSettings {
-                speed: palpate_model::MmPerS(0.0),
-                ..right
-            },
-            "speed = 0",
-        ),
-        (
-            CheckSettings {
-                depth: Depth(f64::NAN),
-                ..right
-            },
-            "depth = NaN",
-        ),
-        (
-            CheckSettings {
-                hold: Seconds(f64::NAN),
-                ..right
-            },
-            "hold = NaN",
-        ),
-        (
-            CheckSettings {
-                hold: Seconds(f64::INFINITY),
-                ..right
-            },
-            "at most a day",
-        ),
-        (
-            CheckSettings {
-                samples_hz: 0.0,
-                ..right
-            },
-            "samples = 0",
-        ),
-        (
-            CheckSettings {
-                friction_share: -1.0,
-                ..right
-            },
-            "share of friction",
-        ),
+        (CheckSettings { speed: palpate_model::MmPerS(0.0), ..right }, "speed = 0"),
+        (CheckSettings { depth: Depth(f64::NAN), ..right }, "depth = NaN"),
+        (CheckSettings { hold: Seconds(f64::NAN), ..right }, "hold = NaN"),
+        (CheckSettings { hold: Seconds(f64::INFINITY), ..right }, "at most a day"),
+        (CheckSettings { samples_hz: 0.0, ..right }, "samples = 0"),
+        (CheckSettings { friction_share: -1.0, ..right }, "share of friction"),
     ] {
-        let told = check(&wrong, |_| (), |_| ())
-            .expect_err("no check")
-            .to_string();
+        let told = check(&wrong, |_| (), |_| ()).expect_err("no check").to_string();
         assert!(told.contains(words), "{words}: {told}");
     }
 }
@@ -282,15 +206,9 @@ fn the_thesis_body_buzzes_without_guard_and_not_with_it() {
     let mut swings = Vec::new();
     for is_guarded in [false, true] {
         let settings = SimulationSettings::buzz(is_guarded);
-        let verdict = settings
-            .system
-            .watch()
-            .before_play(Depth(30.0), palpate_model::MmPerS(0.0));
+        let verdict = settings.system.watch().before_play(Depth(30.0), palpate_model::MmPerS(0.0));
         assert!(!verdict.is_calm());
-        let there = settings
-            .system
-            .watch()
-            .exactly_at(Depth(25.0), palpate_model::MmPerS(0.0));
+        let there = settings.system.watch().exactly_at(Depth(25.0), palpate_model::MmPerS(0.0));
         assert!((there.needed * 1e3 - 3.55).abs() < 0.01, "{there:?}");
         let mut simulation = Simulation::new(&settings).expect("a simulation");
         let (mut buzzes, mut low, mut high, mut hz) = (0u32, f64::MAX, f64::MIN, 0.0);
@@ -338,11 +256,7 @@ fn the_thesis_body_buzzes_without_guard_and_not_with_it() {
 #[test]
 fn a_late_slave_lags_and_turns_the_impedance() {
     let stiffness = 0.3;
-    let body = ModifiedKelvin {
-        tau_eps: 1e-6,
-        mu: [stiffness, 0.0, 0.0],
-        tau_sig: 0.0,
-    };
+    let body = ModifiedKelvin { tau_eps: 1e-6, mu: [stiffness, 0.0, 0.0], tau_sig: 0.0 };
     let settings = MasterSlaveSettings {
         guard: GuardSettings::OPEN,
         controller: None,
@@ -360,10 +274,7 @@ fn a_late_slave_lags_and_turns_the_impedance() {
                     let counts = (place(t) / count).round() as i64;
                     // The slave is where it was sent so many ticks before; with no delay where it is sent now.
                     let reported = (late > 0).then(|| sent[sent.len().saturating_sub(late)]);
-                    let one = Input {
-                        slave_pulses: reported,
-                        ..input(counts, 1.0)
-                    };
+                    let one = Input { slave_pulses: reported, ..input(counts, 1.0) };
                     let output = system.tick(&one);
                     let snapshot = system.snapshot();
                     sent.push(snapshot.pulses);
@@ -373,10 +284,7 @@ fn a_late_slave_lags_and_turns_the_impedance() {
         let mut behind = 0.0;
         run(&|t| 20.0 * t, 1000, &mut |_, lag, _| behind = lag);
         // Half a pulse and half a count.
-        assert!(
-            (behind - 20.0 * late as f64 * 1e-3).abs() < 0.016,
-            "{late}: {behind}"
-        );
+        assert!((behind - 20.0 * late as f64 * 1e-3).abs() < 0.016, "{late}: {behind}");
         for hz in [1.0, 2.0, 5.0, 10.0, 20.0] {
             let w = std::f64::consts::TAU * hz;
             let place = move |t: f64| 8.0 - 4.0 * (w * t).cos();
@@ -409,39 +317,21 @@ fn a_late_slave_lags_and_turns_the_impedance() {
 /// the ramp says and never steps by more than the limit. Switched off and on, it starts softly.
 #[test]
 fn stalls_and_switches_of_the_whole_are_ramped() {
-    let hand = Hand::firm(HandPath::RampHold {
-        from: 0.0,
-        to: 25.0,
-        speed: 50.0,
-    });
+    let hand = Hand::firm(HandPath::RampHold { from: 0.0, to: 25.0, speed: 50.0 });
     let settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
     let step = 0.5 * settings.system.torque.volts_per_newton() + 20.0 / 4096.0;
     let mut simulation = Simulation::new(&settings).expect("a simulation");
     let mut last = 0.0;
     for i in 0..1500 {
-        let one = if (300..450).contains(&i) {
-            simulation.stalled()
-        } else {
-            simulation.tick()
-        };
+        let one = if (300..450).contains(&i) { simulation.stalled() } else { simulation.tick() };
         let bias = one.output.bias.0;
-        assert!(
-            (bias - last).abs() <= step,
-            "tick {i}: from {last} V to {bias} V"
-        );
-        assert_eq!(
-            one.snapshot.flags.has(Flags::STALL),
-            (450..699).contains(&i),
-            "{i}"
-        );
+        assert!((bias - last).abs() <= step, "tick {i}: from {last} V to {bias} V");
+        assert_eq!(one.snapshot.flags.has(Flags::STALL), (450..699).contains(&i), "{i}");
         last = bias;
     }
     assert!(simulation.system().snapshot().force.0 > 1.0);
     let mut system = *simulation.system();
-    let one = Input {
-        counts: system.snapshot().counts,
-        ..input(0, 1.0)
-    };
+    let one = Input { counts: system.snapshot().counts, ..input(0, 1.0) };
     for i in 0..400 {
         let before = system.snapshot().force.0;
         let is_on = i > 100;
@@ -457,11 +347,7 @@ fn stalls_and_switches_of_the_whole_are_ramped() {
 /// and the controller does next to nothing.
 #[test]
 fn calm_play_is_left_alone() {
-    let hand = Hand::firm(HandPath::Sine {
-        middle: 10.0,
-        amplitude: 12.0,
-        hz: 0.5,
-    });
+    let hand = Hand::firm(HandPath::Sine { middle: 10.0, amplitude: 12.0, hz: 0.5 });
     let mut settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
     settings.plant.x = -2.0;
     settings.system.surface_mm = 2.0;
@@ -482,16 +368,9 @@ fn calm_play_is_left_alone() {
 /// Commands above what the motor may give for long heat it; too hot, it gets no more than that until it has cooled.
 #[test]
 fn a_hot_winding_gets_what_it_may_have_for_long() {
-    let body = ModifiedKelvin {
-        tau_eps: 0.01,
-        mu: [2.0, 0.0, 0.0],
-        tau_sig: 0.0,
-    };
+    let body = ModifiedKelvin { tau_eps: 0.01, mu: [2.0, 0.0, 0.0], tau_sig: 0.0 };
     let mut settings = MasterSlaveSettings {
-        guard: GuardSettings {
-            force_max: Newtons(40.0),
-            ..GuardSettings::default()
-        },
+        guard: GuardSettings { force_max: Newtons(40.0), ..GuardSettings::default() },
         controller: None,
         ..MasterSlaveSettings::of(LawSettings::of::<3>(body, Period::MILLISECOND))
     };
@@ -527,20 +406,13 @@ fn a_voltage_drive_drags_and_a_current_drive_does_not() {
         (DriveKind::Voltage { gain: 1.0 }, 0.81 + 1.764),
         (DriveKind::Current { amps_per_volt: 1.0 }, 0.81),
     ] {
-        let hand = Hand::firm(HandPath::RampHold {
-            from: -100.0,
-            to: 0.0,
-            speed: 100.0,
-        });
+        let hand = Hand::firm(HandPath::RampHold { from: -100.0, to: 0.0, speed: 100.0 });
         let mut settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
         settings.plant.x = -100.0;
         settings.system.surface_mm = 200.0;
         settings.system.torque.drive = drive;
         let mut simulation = Simulation::new(&settings).expect("a simulation");
-        let drag = (0..900)
-            .map(|_| simulation.tick().hand.0)
-            .last()
-            .expect("ticks");
+        let drag = (0..900).map(|_| simulation.tick().hand.0).last().expect("ticks");
         let plant = simulation.plant();
         let energies = plant.energies();
         let residual =
@@ -564,28 +436,13 @@ fn settings_that_make_no_system_are_refused_in_words() {
     };
     for (text, words) in [
         (told(&|one| one.law.body.tau_eps = f64::NAN), "tau_eps"),
-        (
-            told(&|one| one.law.force_max = Newtons(-1.0)),
-            "largest force",
-        ),
+        (told(&|one| one.law.force_max = Newtons(-1.0)), "largest force"),
         (told(&|one| one.contact.off = Newtons(1.0)), "no hysteresis"),
         (told(&|one| one.encoder.lines = 0), "0 lines"),
-        (
-            told(&|one| one.slave.mm_per_pulse = 0.0),
-            "pulses per master count",
-        ),
-        (
-            told(&|one| one.torque.motor.resistance = 0.0),
-            "resistance = 0",
-        ),
-        (
-            told(&|one| one.torque.motor.thermal.case_s = f64::NAN),
-            "time constant of the case",
-        ),
-        (
-            told(&|one| one.torque.friction_share = 2.0),
-            "share of friction",
-        ),
+        (told(&|one| one.slave.mm_per_pulse = 0.0), "pulses per master count"),
+        (told(&|one| one.torque.motor.resistance = 0.0), "resistance = 0"),
+        (told(&|one| one.torque.motor.thermal.case_s = f64::NAN), "time constant of the case"),
+        (told(&|one| one.torque.friction_share = 2.0), "share of friction"),
         (told(&|one| one.damping = f64::INFINITY), "damping = inf"),
         (told(&|one| one.delay_ticks = 33.0), "delay = 33 ticks"),
         (told(&|one| one.surface_mm = f64::NAN), "surface"),
@@ -612,15 +469,8 @@ fn states_are_plain_numbers() {
 #[test]
 fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
     let settings = MasterSlaveSettings::of(LawSettings::of::<3>(THESIS, Period::MILLISECOND));
-    let wild = [
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::MAX,
-        -f64::MAX,
-        f64::MIN_POSITIVE,
-        -0.0,
-    ];
+    let wild =
+        [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, f64::MIN_POSITIVE, -0.0];
     let mut random = SplitMix::seeded(29);
     let mut counts = 0i64;
     let inputs: Vec<Input> = (0..50_000)
@@ -690,10 +540,7 @@ fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
         }
     }
     let whole = again.snapshot();
-    let torn = palpate_haptics::Snapshot {
-        tick: whole.tick ^ 1,
-        ..whole
-    };
+    let torn = palpate_haptics::Snapshot { tick: whole.tick ^ 1, ..whole };
     assert!(!torn.is_whole());
 }
 
@@ -717,10 +564,7 @@ fn a_million_ticks_do_not_drift() {
     // The first time it starts softly; the memory of that fades by e^-10 a round, so that from the sixth on nothing may
     // change but rounding.
     for one in &seen[6..] {
-        let close = one
-            .iter()
-            .zip(&seen[5])
-            .all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
+        let close = one.iter().zip(&seen[5]).all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
         assert!(close, "{one:?} {:?}", seen[5]);
     }
     let last = system.snapshot();

@@ -9,10 +9,7 @@ use palpate_model::{Depth, Newtons, Seconds};
 
 /// A spring, or a body.
 #[derive(Clone, Copy, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one of them, on the stack of a simulation"
-)]
+#[expect(clippy::large_enum_variant, reason = "one of them, on the stack of a simulation")]
 pub enum Rendered {
     /// `stiffness` N/mm either way of zero.
     Spring {
@@ -64,11 +61,7 @@ impl Renderer {
         controller: Option<&ControllerSettings>,
     ) -> Self {
         let period = plant.period;
-        let count_mm = if plant.count_mm > 0.0 {
-            plant.count_mm
-        } else {
-            STEPLESS_MM
-        };
+        let count_mm = if plant.count_mm > 0.0 { plant.count_mm } else { STEPLESS_MM };
         let heard = BuzzSettings::of(plant.count_mm.max(0.001));
         Self {
             rendered,
@@ -118,11 +111,7 @@ impl Renderer {
             flags |= one.flags;
         }
         self.observer.hold(force.0);
-        RendererTick {
-            force,
-            energy: self.observer.energy(),
-            flags,
-        }
+        RendererTick { force, energy: self.observer.energy(), flags }
     }
 }
 

@@ -21,10 +21,7 @@ fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, Sc
 
 /// A place, and no turn.
 fn at(x: f64, y: f64, z: f64) -> Hand6 {
-    Hand6 {
-        at: [x, y, z],
-        turn: [0.0; 3],
-    }
+    Hand6 { at: [x, y, z], turn: [0.0; 3] }
 }
 
 fn pose(x: f64, y: f64, z: f64) -> Pose {
@@ -55,14 +52,8 @@ fn a_device_under_a_constant_force_moves_as_mass_and_damping_say() {
         let decayed = 1.0 - (-b * t / m).exp();
         let place = force / b * (t - m / b * decayed);
         let [x, _] = device.motion();
-        assert!(
-            (x[0] - place).abs() < 1e-4 * place.abs().max(1e-3),
-            "{t}: {x:?} {place}"
-        );
-        assert!(
-            (x[2] + 2.0 * place).abs() < 2e-4 * place.abs().max(1e-3),
-            "{t}"
-        );
+        assert!((x[0] - place).abs() < 1e-4 * place.abs().max(1e-3), "{t}: {x:?} {place}");
+        assert!((x[2] + 2.0 * place).abs() < 2e-4 * place.abs().max(1e-3), "{t}");
         assert_eq!(x[1], 0.0);
         // Sensed within half a step, in whole steps.
         let sensed = device.pose().at[0];
@@ -74,10 +65,7 @@ fn a_device_under_a_constant_force_moves_as_mass_and_damping_say() {
 
 #[test]
 fn a_hand_settles_where_its_spring_balances_the_force_and_friction_holds() {
-    let settings = DeviceSettings {
-        friction_n: 0.0,
-        ..DeviceSettings::default()
-    };
+    let settings = DeviceSettings { friction_n: 0.0, ..DeviceSettings::default() };
     let settled = |settings: DeviceSettings| {
         let mut device =
             SimulatedDevice::new(settings, Period::MILLISECOND, [0.0; 3], [0.0; 3]).unwrap();
@@ -86,18 +74,12 @@ fn a_hand_settles_where_its_spring_balances_the_force_and_friction_holds() {
     };
     let [x, y, z] = settled(settings);
     let lifted = 1.0 / settings.hand_stiffness_n_per_mm;
-    assert!(
-        (x - 10.0).abs() < 1e-6 && y == 0.0 && (z - lifted).abs() < 1e-6,
-        "{x} {z}"
-    );
+    assert!((x - 10.0).abs() < 1e-6 && y == 0.0 && (z - lifted).abs() < 1e-6, "{x} {z}");
     // With friction it stays short by no more than what friction holds.
     let rough = DeviceSettings::default();
     let [x, _, z] = settled(rough);
     let short = rough.friction_n / rough.hand_stiffness_n_per_mm;
-    assert!(
-        (x - 10.0).abs() <= short + 1e-9 && (z - lifted).abs() <= short + 1e-9,
-        "{x} {z}"
-    );
+    assert!((x - 10.0).abs() <= short + 1e-9 && (z - lifted).abs() <= short + 1e-9, "{x} {z}");
     assert!((z - lifted).abs() > 1e-3, "{z}");
 }
 
@@ -150,10 +132,7 @@ fn the_same_hands_give_the_same_bits_and_one_bit_more_does_not() {
         assert!(all.iter().any(SceneTick::is_contact), "{path:?}");
         let last = first.last();
         let end = settings.start();
-        assert!(
-            !last.is_contact() && (last.device[2] - end[2]).abs() < 1.0,
-            "{path:?} {last:?}"
-        );
+        assert!(!last.is_contact() && (last.device[2] - end[2]).abs() < 1.0, "{path:?} {last:?}");
     }
     let other = SceneSettings {
         max_shear_mm: f64::from_bits(settings.max_shear_mm.to_bits() + 1),
@@ -165,10 +144,7 @@ fn the_same_hands_give_the_same_bits_and_one_bit_more_does_not() {
 
 #[test]
 fn the_force_of_a_long_hold_is_the_bodys_own() {
-    let settings = SceneSettings {
-        controller: None,
-        ..SceneSettings::default()
-    };
+    let settings = SceneSettings { controller: None, ..SceneSettings::default() };
     let mut scene = Scene::new(settings).unwrap();
     let mut last = scene.last();
     for _ in 0..25_000 {
@@ -183,25 +159,15 @@ fn the_force_of_a_long_hold_is_the_bodys_own() {
 
 #[test]
 fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
-    let settings = SceneSettings {
-        recovery_s: 0.1,
-        ..SceneSettings::default()
-    };
+    let settings = SceneSettings { recovery_s: 0.1, ..SceneSettings::default() };
     let mut scene = Scene::new(settings).unwrap();
     let flat = scene.hash();
     for tick in 0..200 {
         let x = 20.0 + 0.1 * f64::from(tick);
         let told = scene.feel(pose(x, 31.2, -3.0), 1);
-        let node = scene
-            .field()
-            .grid()
-            .nearest(told.proxy[0], told.proxy[1])
-            .unwrap();
+        let node = scene.field().grid().nearest(told.proxy[0], told.proxy[1]).unwrap();
         let height = scene.field().heights()[scene.field().grid().index(node)];
-        assert!(
-            (height - (told.proxy[2] - told.depth)).abs() < 1e-12,
-            "{told:?} {height}"
-        );
+        assert!((height - (told.proxy[2] - told.depth)).abs() < 1e-12, "{told:?} {height}");
         assert!(told.moved > 0, "{told:?}");
         assert!(scene.field().worst_excess() < 1e-9);
     }
@@ -224,10 +190,7 @@ fn a_fast_poke_never_pops_through() {
         for tick in 0..200 {
             let z = 1.0 - speed * f64::from(tick);
             let told = scene.feel(pose(x, y, z), 1);
-            assert!(
-                told.depth >= depth && (told.depth - (-z).max(0.0)).abs() < 1e-9,
-                "{told:?}"
-            );
+            assert!(told.depth >= depth && (told.depth - (-z).max(0.0)).abs() < 1e-9, "{told:?}");
             depth = told.depth;
         }
     }
@@ -241,10 +204,7 @@ fn the_force_is_bounded_and_its_part_across_is_within_friction() {
         run(settings, path, |_, tick| {
             let [fx, fy, fz] = tick.force;
             let total = fx.hypot(fy).hypot(fz);
-            assert!(
-                total <= settings.device.force_max_n * (1.0 + 1e-12),
-                "{tick:?}"
-            );
+            assert!(total <= settings.device.force_max_n * (1.0 + 1e-12), "{tick:?}");
             let across = fx.hypot(fy);
             across_most = across_most.max(across);
             assert!(
@@ -253,11 +213,7 @@ fn the_force_is_bounded_and_its_part_across_is_within_friction() {
             );
         });
         // Only a drag has something across.
-        assert_eq!(
-            across_most > 0.05,
-            path == ScenePath::Drag,
-            "{path:?} {across_most}"
-        );
+        assert_eq!(across_most > 0.05, path == ScenePath::Drag, "{path:?} {across_most}");
     }
 }
 
@@ -304,15 +260,9 @@ fn a_stall_is_led_through_and_the_force_rises_from_what_was_held() {
     // The hand goes on while the loop is away.
     let after = follow(1, 22.0, away);
     assert_eq!(after.tick, before.tick + away);
-    assert!(
-        after.flags.has(Flags::STALL) && after.why == WhyNoForce::RampingIn,
-        "{after:?}"
-    );
+    assert!(after.flags.has(Flags::STALL) && after.why == WhyNoForce::RampingIn, "{after:?}");
     assert!(after.depth > before.depth + 2.0, "{after:?}");
-    assert!(
-        (after.force[2] - before.force[2]).abs() < 0.05,
-        "{before:?} {after:?}"
-    );
+    assert!((after.force[2] - before.force[2]).abs() < 0.05, "{before:?} {after:?}");
     let risen = follow(2000, 22.0, 1);
     assert!(
         risen.force[2] > 1.5 * before.force[2] && !risen.flags.has(Flags::STALL),
@@ -334,40 +284,13 @@ fn scenes_that_cannot_be_are_refused_in_words() {
     };
     for (settings, word) in [
         (SceneSettings { nodes: 1, ..usual }, "not possible"),
-        (
-            SceneSettings {
-                side_mm: f64::NAN,
-                ..usual
-            },
-            "not possible",
-        ),
-        (
-            SceneSettings {
-                max_shear_mm: -1.0,
-                ..usual
-            },
-            "MaxShear",
-        ),
-        (
-            SceneSettings {
-                recovery_s: -1.0,
-                ..usual
-            },
-            "recovery",
-        ),
-        (
-            SceneSettings {
-                friction: 11.0,
-                ..usual
-            },
-            "friction",
-        ),
+        (SceneSettings { side_mm: f64::NAN, ..usual }, "not possible"),
+        (SceneSettings { max_shear_mm: -1.0, ..usual }, "MaxShear"),
+        (SceneSettings { recovery_s: -1.0, ..usual }, "recovery"),
+        (SceneSettings { friction: 11.0, ..usual }, "friction"),
         (device(|one| one.mass_kg = 0.0), "mass_kg"),
         (device(|one| one.friction_n = -1.0), "friction_n"),
-        (
-            device(|one| one.workspace_mm[1] = f64::INFINITY),
-            "workspace_mm",
-        ),
+        (device(|one| one.workspace_mm[1] = f64::INFINITY), "workspace_mm"),
     ] {
         let said = refused(settings);
         assert!(said.contains(word), "{said}");

@@ -24,10 +24,7 @@ fn scene(rest: fn(f64, f64) -> f64) -> PokeScene {
 
 #[test]
 fn the_error_of_a_mesh_falls_with_its_spacing() {
-    for rest in [
-        |_: f64, _: f64| 0.0,
-        |x: f64, y: f64| (0.3 * x).sin() + 0.02 * y,
-    ] {
+    for rest in [|_: f64, _: f64| 0.0, |x: f64, y: f64| (0.3 * x).sin() + 0.02 * y] {
         let scene = scene(rest);
         let errors: Vec<_> = [51, 101, 201, 401]
             .map(|nodes| (nodes, scene.mesh_error_against(nodes, 1201).unwrap()))
@@ -35,10 +32,7 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
         for (nodes, error) in &errors {
             let spacing = 40.0 / (*nodes as f64 - 1.0);
             // Half a spacing along each axis to the nearest node, and as much for a bent cell.
-            assert!(
-                error.linf_mm <= 2.0 * SLOPE * (spacing + 40.0 / 1200.0),
-                "{nodes} {error:?}"
-            );
+            assert!(error.linf_mm <= 2.0 * SLOPE * (spacing + 40.0 / 1200.0), "{nodes} {error:?}");
             assert!(error.l2_mm < error.linf_mm && error.l2_mm > 0.0);
         }
         let order = |pick: fn(&palpate_haptics::surface::ShapeError) -> f64| {
@@ -51,13 +45,7 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
         assert!(itself.linf_mm < 1e-12);
     }
     assert!(scene(|_, _| 0.0).mesh_error(1).is_err());
-    assert!(
-        scene(|x, _| x)
-            .mesh_error(51)
-            .unwrap_err()
-            .to_string()
-            .contains("MaxShear")
-    );
+    assert!(scene(|x, _| x).mesh_error(51).unwrap_err().to_string().contains("MaxShear"));
 }
 
 #[test]
@@ -77,20 +65,14 @@ fn the_error_of_a_cut_is_at_most_its_threshold_or_what_is_left_at_its_range() {
     for range in [5u32, 20, 40, 80] {
         // From flat, the first node left out would have moved by this.
         let left: f64 = 5.0 - SLOPE * spacing * f64::from(range + 1);
-        assert!(
-            (error(Some(range), 0.0).linf_mm - left.max(0.0)).abs() < 1e-9,
-            "{range}"
-        );
+        assert!((error(Some(range), 0.0).linf_mm - left.max(0.0)).abs() < 1e-9, "{range}");
     }
 }
 
 #[test]
 fn the_error_of_force_falls_with_the_order_of_the_integrator() {
     let body: SeriesBody<3> = ModifiedKelvin::THESIS.into();
-    let poke = HandPoke {
-        depth: 10.0,
-        duration: 2.0,
-    };
+    let poke = HandPoke { depth: 10.0, duration: 2.0 };
     for (scheme, order) in [
         (Scheme::ExplicitEuler, 1.0),
         (Scheme::ImplicitEuler, 1.0),
@@ -107,10 +89,7 @@ fn the_error_of_force_falls_with_the_order_of_the_integrator() {
         assert!((coarse[1] - fine[1]).abs() < 1e-4 * fine[1]);
     }
     for step in [0.0, f64::NAN, 1e-12, 3.0] {
-        assert!(
-            poke.force_error(&body, Scheme::ExplicitEuler, step)
-                .is_err()
-        );
+        assert!(poke.force_error(&body, Scheme::ExplicitEuler, step).is_err());
     }
 }
 
@@ -227,34 +206,15 @@ fn the_plan_is_the_cheapest_of_all_that_hold() {
 
 /// Curves as they look.
 fn measured() -> SceneCurves {
-    let mesh = |nodes, error_mm, cost_us| MeshPoint {
-        nodes,
-        error_mm,
-        cost_us,
-    };
-    let cut = |range, error_mm, cost_share| CutPoint {
-        range,
-        threshold_mm: 0.0,
-        error_mm,
-        cost_share,
-    };
-    let step = |step_s, error_n, cost_us| StepPoint {
-        scheme: Scheme::Exact,
-        step_s,
-        error_n,
-        cost_us,
-    };
-    let family = |family: &str, error_n, cost_us| FamilyPoint {
-        family: family.into(),
-        error_n,
-        cost_us,
-    };
+    let mesh = |nodes, error_mm, cost_us| MeshPoint { nodes, error_mm, cost_us };
+    let cut =
+        |range, error_mm, cost_share| CutPoint { range, threshold_mm: 0.0, error_mm, cost_share };
+    let step =
+        |step_s, error_n, cost_us| StepPoint { scheme: Scheme::Exact, step_s, error_n, cost_us };
+    let family =
+        |family: &str, error_n, cost_us| FamilyPoint { family: family.into(), error_n, cost_us };
     SceneCurves {
-        meshes: vec![
-            mesh(51, 0.4, 3.0),
-            mesh(201, 0.1, 40.0),
-            mesh(801, 0.02, 600.0),
-        ],
+        meshes: vec![mesh(51, 0.4, 3.0), mesh(201, 0.1, 40.0), mesh(801, 0.02, 600.0)],
         cuts: vec![cut(None, 0.0, 1.0), cut(Some(40), 0.05, 0.4)],
         steps: vec![step(1e-3, 1e-3, 0.05), step(5e-4, 2e-4, 0.1)],
         families: vec![family("series-3", 0.005, 0.1), family("kelvin", 0.2, 0.08)],
@@ -272,15 +232,8 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     };
     let first = plan(&needs, &curves, 1.0).unwrap();
     assert_eq!((first.mesh.nodes, first.cut.range), (201, None));
-    assert_eq!(
-        (first.family.family.as_str(), first.step.step_s),
-        ("series-3", 1e-3)
-    );
-    let dropped: Vec<_> = first
-        .dropped
-        .iter()
-        .map(|one| (one.what.as_str(), one.error))
-        .collect();
+    assert_eq!((first.family.family.as_str(), first.step.step_s), ("series-3", 1e-3));
+    let dropped: Vec<_> = first.dropped.iter().map(|one| (one.what.as_str(), one.error)).collect();
     assert!(dropped[0].0.contains("801") && dropped[0].0.contains("201") && dropped[0].1 == 0.1);
     assert_eq!(first.dropped[0].saved_us, 560.0);
     assert_eq!(dropped.len(), 2);
@@ -289,19 +242,10 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     // It took longer than it may: with that, nothing holds 0.12 mm, and what is nearest is told.
     let again = slower(&first, 1.0, 130.0);
     let none = plan(&needs, &curves, again).unwrap_err();
-    assert!(
-        none.why.contains("130.0 us") && none.why.contains("100 us"),
-        "{}",
-        none.why
-    );
+    assert!(none.why.contains("130.0 us") && none.why.contains("100 us"), "{}", none.why);
     let nearest = none.nearest.unwrap();
     assert_eq!((nearest.mesh.nodes, nearest.cut.range), (201, Some(40)));
-    assert!(
-        nearest
-            .dropped
-            .iter()
-            .any(|one| one.what.contains("40 nodes"))
-    );
+    assert!(nearest.dropped.iter().any(|one| one.what.contains("40 nodes")));
     assert!((nearest.shape_error_mm - 0.15).abs() < 1e-12);
     // The factor makes the plan cost what it was seen to; faster ticks and no times change nothing.
     assert!((again * first.cost_us - 130.0).abs() < 1e-9);
@@ -320,34 +264,16 @@ fn what_cannot_be_planned_is_refused_in_a_sentence() {
     };
     let why = |needs: Needs, curves: &SceneCurves| plan(&needs, curves, 1.0).unwrap_err().why;
     let good = measured();
-    for (shape_mm, budget_us) in [
-        (f64::NAN, 1.0),
-        (0.0, 1.0),
-        (0.1, f64::INFINITY),
-        (0.1, -1.0),
-    ] {
-        let needs = Needs {
-            shape_mm,
-            budget_us,
-            ..needs
-        };
+    for (shape_mm, budget_us) in [(f64::NAN, 1.0), (0.0, 1.0), (0.1, f64::INFINITY), (0.1, -1.0)] {
+        let needs = Needs { shape_mm, budget_us, ..needs };
         assert!(why(needs, &good).contains("not possible"));
     }
-    let finer = Needs {
-        shape_mm: 0.01,
-        ..needs
-    };
+    let finer = Needs { shape_mm: 0.01, ..needs };
     let said = why(finer, &good);
     assert!(said.contains("0.01 mm") && said.contains("0.02"));
-    let firmer = Needs {
-        peak: Newtons(0.1),
-        ..needs
-    };
+    let firmer = Needs { peak: Newtons(0.1), ..needs };
     assert!(why(firmer, &good).contains("force"));
-    let hurried = Needs {
-        budget_us: 0.01,
-        ..needs
-    };
+    let hurried = Needs { budget_us: 0.01, ..needs };
     assert!(why(hurried, &good).contains("budget"));
     let mut empty = good.clone();
     empty.cuts.clear();

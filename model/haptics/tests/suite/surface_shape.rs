@@ -15,10 +15,7 @@ fn grid(columns: usize, rows: usize) -> Grid {
 }
 
 fn node(column: usize, row: usize) -> Node {
-    Node {
-        column: column as u16,
-        row: row as u16,
-    }
+    Node { column: column as u16, row: row as u16 }
 }
 
 fn surface(field: &HeightField, method: Method, recovery: Recovery, cut: Cut) -> Surface {
@@ -69,9 +66,7 @@ fn binary(random: &mut Noise, most: f64) -> f64 {
 }
 
 fn limits(random: &mut Noise, grid: &Grid) -> Vec<f64> {
-    (0..grid.nodes())
-        .map(|_| (1.0 + (31.0 * random.uniform()).floor()) / 64.0)
-        .collect()
+    (0..grid.nodes()).map(|_| (1.0 + (31.0 * random.uniform()).floor()) / 64.0).collect()
 }
 
 #[test]
@@ -160,11 +155,7 @@ fn pulling_up_is_pushing_down_mirrored() {
                 binary(&mut random, 4.0),
                 Side::Push,
             );
-            let pull = Contact {
-                z: -push.z,
-                side: Side::Pull,
-                ..push
-            };
+            let pull = Contact { z: -push.z, side: Side::Pull, ..push };
             assert_eq!(down.tick(&[push]), up.tick(&[pull]));
             for (down, up) in down.heights().iter().zip(up.heights()) {
                 assert_eq!(*down, -up);
@@ -193,11 +184,7 @@ fn no_link_is_ever_beyond_its_limit() {
         for _ in 0..40 {
             let contacts: Vec<Contact> = (0..3)
                 .map(|_| {
-                    let side = if random.uniform() < 0.7 {
-                        Side::Push
-                    } else {
-                        Side::Pull
-                    };
+                    let side = if random.uniform() < 0.7 { Side::Push } else { Side::Pull };
                     let z = 12.0 * (random.uniform() - 0.5);
                     Contact::at(&grid, any_node(&mut random, &grid), z, side)
                 })
@@ -220,11 +207,7 @@ fn pokes_are_idempotent_monotone_and_commute() {
         let own = Shear::PerNode(limits(&mut random, &grid).into());
         let varied = HeightField::new(grid, vec![0.0; grid.nodes()], own).unwrap();
         let method = Method::ALL[trial % 3];
-        let field = if method == Method::Sorted {
-            &varied
-        } else {
-            &uniform
-        };
+        let field = if method == Method::Sorted { &varied } else { &uniform };
         let [a, b] = [0, 1].map(|_| {
             let z = binary(&mut random, 5.0);
             Contact::at(&grid, any_node(&mut random, &grid), z, Side::Push)
@@ -239,15 +222,8 @@ fn pokes_are_idempotent_monotone_and_commute() {
         let once = after(&[a]);
         assert_eq!(once, after(&[a, a]));
         assert_eq!(after(&[a, b]), after(&[b, a]));
-        let deeper = after(&[Contact {
-            z: a.z - random.uniform(),
-            ..a
-        }]);
-        assert!(
-            once.iter()
-                .zip(&deeper)
-                .all(|(once, deeper)| deeper <= once)
-        );
+        let deeper = after(&[Contact { z: a.z - random.uniform(), ..a }]);
+        assert!(once.iter().zip(&deeper).all(|(once, deeper)| deeper <= once));
     }
 }
 
@@ -335,20 +311,11 @@ fn where_limits_differ_largest_first_is_right_and_first_moved_first_is_not() {
         let mut mutant = expected.clone();
         // The later ones meet a surface that is valid but not flat.
         for _ in 0..4 {
-            let (at, z) = (
-                any_node(&mut random, &grid),
-                -2.0 - binary(&mut random, 1.5),
-            );
+            let (at, z) = (any_node(&mut random, &grid), -2.0 - binary(&mut random, 1.5));
             sorted.tick(&[Contact::at(&grid, at, z, Side::Push)]);
             expected = shortest(&expected, columns, &own, (grid.index(at), z));
             assert_eq!(sorted.heights(), expected);
-            naive::push(
-                &mut mutant,
-                columns,
-                link,
-                (grid.index(at), z),
-                Order::First,
-            );
+            naive::push(&mut mutant, columns, link, (grid.index(at), z), Order::First);
         }
         assert!(sorted.field().worst_excess() <= 0.0);
         broken += usize::from(naive::worst_excess(&mutant, columns, link) > 0.01);
@@ -362,12 +329,8 @@ fn a_threshold_leaves_out_no_more_than_itself() {
     for _ in 0..20 {
         let grid = grid(39, 31);
         let field = HeightField::new(grid, hills(&mut random, &grid), Shear::Uniform(S)).unwrap();
-        let contact = Contact::at(
-            &grid,
-            any_node(&mut random, &grid),
-            binary(&mut random, 5.0),
-            Side::Push,
-        );
+        let contact =
+            Contact::at(&grid, any_node(&mut random, &grid), binary(&mut random, 5.0), Side::Push);
         for method in Method::ALL {
             let mut whole = lasting(&field, method);
             let mut last = whole.tick(&[contact]).moved.moved;
@@ -441,12 +404,7 @@ fn edges_and_numbers_that_are_none() {
             }
         }
         let mut surface = lasting(&flat(S), method);
-        let none = |x, y, z| Contact {
-            x,
-            y,
-            z,
-            side: Side::Push,
-        };
+        let none = |x, y, z| Contact { x, y, z, side: Side::Push };
         let [nan, inf] = [f64::NAN, f64::INFINITY];
         let nothing = [
             none(-0.3, 0.0, -1.0),
@@ -485,19 +443,13 @@ fn pinned_nodes_stay_and_are_gone_around() {
     let mut random = Noise::seeded(8);
     let grid = grid(25, 25);
     let marks: Box<[bool]> = (0..grid.nodes()).map(|_| random.uniform() < 0.15).collect();
-    let field = HeightField::flat(grid, S)
-        .unwrap()
-        .pinned(Pins::Nodes(marks.clone()))
-        .unwrap();
+    let field = HeightField::flat(grid, S).unwrap().pinned(Pins::Nodes(marks.clone())).unwrap();
     assert!(Surface::new(field.clone(), Method::Envelope, Recovery::NONE, Cut::NONE).is_err());
     let [mut chain, mut sorted] = [Method::Chain, Method::Sorted].map(|m| lasting(&field, m));
     for _ in 0..20 {
         let (at, z) = (any_node(&mut random, &grid), binary(&mut random, 4.0));
         let contact = [Contact::at(&grid, at, z, Side::Push)];
-        assert_eq!(
-            chain.tick(&contact).moved.moved,
-            sorted.tick(&contact).moved.moved
-        );
+        assert_eq!(chain.tick(&contact).moved.moved, sorted.tick(&contact).moved.moved);
     }
     assert_eq!(chain.heights(), sorted.heights());
     assert!(chain.field().worst_excess() <= 0.0);
@@ -505,18 +457,13 @@ fn pinned_nodes_stay_and_are_gone_around() {
         assert!(!mark || chain.heights()[index] == 0.0);
     }
     // A pinned border: all three.
-    let field = HeightField::flat(grid, S)
-        .unwrap()
-        .pinned(Pins::Border)
-        .unwrap();
+    let field = HeightField::flat(grid, S).unwrap().pinned(Pins::Border).unwrap();
     let recovery = Recovery::new(Seconds(0.01), Seconds(1e-3)).unwrap();
     let mut surfaces = Method::ALL.map(|method| surface(&field, method, recovery, Cut::NONE));
     for _ in 0..40 {
         let (at, z) = (any_node(&mut random, &grid), binary(&mut random, 6.0));
         let contact = [Contact::at(&grid, at, z, Side::Push)];
-        let [one, two, three] = surfaces
-            .each_mut()
-            .map(|surface| surface.tick(&contact).moved);
+        let [one, two, three] = surfaces.each_mut().map(|surface| surface.tick(&contact).moved);
         assert_eq!((one.moved, one.held), (two.moved, two.held));
         assert_eq!((one.moved, one.held), (three.moved, three.held));
         for other in &surfaces[1..] {
@@ -563,16 +510,11 @@ fn whatever_comes_in_heights_stay_numbers_within_a_kilometre() {
     ];
     let mut any = |mostly: f64| {
         let pick = (random.uniform() * 2.0 * odd.len() as f64) as usize;
-        odd.get(pick)
-            .copied()
-            .unwrap_or(mostly * (2.0 * random.uniform() - 1.0))
+        odd.get(pick).copied().unwrap_or(mostly * (2.0 * random.uniform() - 1.0))
     };
     let grid = grid(13, 11);
     let taus = [0.0, 5e-324, 1e-3, 1e300, f64::INFINITY];
-    for (trial, shear) in [0.0, 5e-324, 0.1, 1e300, f64::INFINITY]
-        .into_iter()
-        .enumerate()
-    {
+    for (trial, shear) in [0.0, 5e-324, 0.1, 1e300, f64::INFINITY].into_iter().enumerate() {
         for method in Method::ALL {
             let shear = match method {
                 Method::Sorted => {
@@ -590,11 +532,7 @@ fn whatever_comes_in_heights_stay_numbers_within_a_kilometre() {
                     x: any(8.0),
                     y: any(6.0),
                     z: any(4.0),
-                    side: if tick % 2 == 0 {
-                        Side::Push
-                    } else {
-                        Side::Pull
-                    },
+                    side: if tick % 2 == 0 { Side::Push } else { Side::Pull },
                 });
                 let told = surface.tick(&contacts);
                 let is_none = |contact: &&Contact| {

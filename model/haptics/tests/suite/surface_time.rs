@@ -40,10 +40,7 @@ fn recovery_is_the_exponential_and_ends() {
             }
             // ln(3 mm / 1 nm) time constants.
             let expected = (3.0 / SETTLED_MM).ln_1p() * tau / tick;
-            assert!(
-                (f64::from(ticks) - expected).abs() <= 2.0,
-                "{ticks} {expected}"
-            );
+            assert!((f64::from(ticks) - expected).abs() <= 2.0, "{ticks} {expected}");
             assert!(surface.heights().iter().all(|z| *z == 0.0));
         }
     }
@@ -55,11 +52,7 @@ fn elastic_shapes_depend_on_this_ticks_contacts_alone() {
     for method in Method::ALL {
         let mut used = surface(31, method, Recovery::ELASTIC);
         for _ in 0..50 {
-            let side = if random.uniform() < 0.5 {
-                Side::Push
-            } else {
-                Side::Pull
-            };
+            let side = if random.uniform() < 0.5 { Side::Push } else { Side::Pull };
             let [column, row] = [0, 1].map(|_| (31.0 * random.uniform()) as u16);
             let contacts = [at(&used, column, row, 4.0 * random.normal(), side)];
             let mut new = surface(31, method, Recovery::ELASTIC);
@@ -95,13 +88,7 @@ fn everything_that_changed_is_in_the_dirty_rectangle() {
             // Bursts with rests between, in which everything comes to rest.
             if tick % 50 < 10 {
                 let [column, row] = [0, 1].map(|_| (51.0 * random.uniform()) as u16);
-                contacts.push(at(
-                    &surface,
-                    column,
-                    row,
-                    -2.0 * random.uniform(),
-                    Side::Push,
-                ));
+                contacts.push(at(&surface, column, row, -2.0 * random.uniform(), Side::Push));
             }
             let told = surface.tick(&contacts);
             for (index, (now, was)) in surface.heights().iter().zip(&before).enumerate() {

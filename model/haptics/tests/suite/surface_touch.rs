@@ -11,9 +11,7 @@ fn heights(grid: &Grid, of: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     let h = grid.spacing();
     let nodes =
         (0..grid.rows()).flat_map(|row| (0..grid.columns()).map(move |column| (column, row)));
-    nodes
-        .map(|(column, row)| of(column as f64 * h, row as f64 * h))
-        .collect()
+    nodes.map(|(column, row)| of(column as f64 * h, row as f64 * h)).collect()
 }
 
 fn unit(v: [f64; 3]) -> [f64; 3] {
@@ -64,9 +62,7 @@ fn normals_of_a_paraboloid_converge_with_the_square_inside_and_the_spacing_at_th
     let errors = |n: usize| {
         let h = 2.0 / (n - 1) as f64;
         let grid = Grid::new(n, n, h).unwrap();
-        let bowl = heights(&grid, |x, y| {
-            0.4 * (x - 0.9).powi(2) + 0.3 * x * y + 0.2 * y * y
-        });
+        let bowl = heights(&grid, |x, y| 0.4 * (x - 0.9).powi(2) + 0.3 * x * y + 0.2 * y * y);
         let normals = normals(Heights::new(grid, &bowl).unwrap());
         let mut worst = [0.0f64; 2];
         for (index, normal) in normals.into_iter().enumerate() {
@@ -141,10 +137,7 @@ fn friction_holds_up_to_its_cone_and_then_follows_at_its_edge() {
     let mut proxy = Proxy::new(0.5, f64::INFINITY).unwrap();
     proxy.follow(plane, [20.0, 50.0, 1.0]);
     // Straight down to 2 mm: friction holds 1 mm aside.
-    assert_eq!(
-        proxy.follow(plane, [20.0, 50.0, -2.0]).state,
-        TouchState::Sticks
-    );
+    assert_eq!(proxy.follow(plane, [20.0, 50.0, -2.0]).state, TouchState::Sticks);
     for tick in 0..300 {
         let aside = 0.01 * f64::from(tick);
         let touch = proxy.follow(plane, [20.0 + aside, 50.0, -2.0]);
@@ -189,9 +182,7 @@ fn wander(friction: f64, most_step: f64, mut see: impl FnMut(Option<&Touch>, &To
         device[1] = (device[1] + 0.05 * random.normal()).clamp(0.0, 30.0);
         device[2] = z;
         let touch = proxy.follow(waves, device);
-        let below = waves
-            .at(device[0], device[1])
-            .is_some_and(|(height, _)| height > z);
+        let below = waves.at(device[0], device[1]).is_some_and(|(height, _)| height > z);
         assert_eq!(touch.is_contact(), below);
         see(last.as_ref(), &touch, device);
         last = Some(touch);
@@ -269,35 +260,18 @@ fn places_that_are_none_give_no_contact_and_say_why() {
     let mut proxy = Proxy::new(0.5, 1.0).unwrap();
     let free = proxy.follow(plane, [1.0, 1.0, 1.0]);
     assert_eq!(free.state, TouchState::Free);
-    for device in [
-        [f64::NAN, 0.0, 0.0],
-        [0.0, f64::INFINITY, 0.0],
-        [0.0, 0.0, f64::NAN],
-    ] {
+    for device in [[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0, 0.0, f64::NAN]] {
         let touch = proxy.follow(plane, device);
-        assert_eq!(
-            (touch.state, touch.point),
-            (TouchState::NotANumber, [1.0; 3])
-        );
+        assert_eq!((touch.state, touch.point), (TouchState::NotANumber, [1.0; 3]));
         assert_eq!(touch.force(1.0), [0.0; 3]);
     }
     let outside = proxy.follow(plane, [-1.0, 1.0, -1.0]);
     assert_eq!(outside.state, TouchState::Outside);
     let deep = proxy.follow(plane, [1.0, 1.0, -f64::MAX]);
-    assert!(
-        deep.point
-            .iter()
-            .chain(&deep.normal)
-            .all(|part| part.is_finite())
-    );
+    assert!(deep.point.iter().chain(&deep.normal).all(|part| part.is_finite()));
     assert!(deep.depth.is_finite() && deep.force(1.0).iter().all(|part| part.is_finite()));
-    for (friction, step) in [
-        (-0.1, 1.0),
-        (f64::NAN, 1.0),
-        (11.0, 1.0),
-        (0.1, 0.0),
-        (0.1, f64::NAN),
-    ] {
+    for (friction, step) in [(-0.1, 1.0), (f64::NAN, 1.0), (11.0, 1.0), (0.1, 0.0), (0.1, f64::NAN)]
+    {
         assert!(Proxy::new(friction, step).is_err());
     }
 }
@@ -308,12 +282,7 @@ fn depth_is_of_the_rest_surface_for_the_one_that_followed_the_tool_has_none() {
     let field = HeightField::new(grid, vec![0.0; 51 * 51], Shear::Uniform(0.1)).unwrap();
     let mut surface = Surface::new(field, Method::Envelope, Recovery::ELASTIC, Cut::NONE).unwrap();
     let device = [12.5, 12.5, -2.0];
-    let tool = Contact {
-        x: 12.5,
-        y: 12.5,
-        z: -2.0,
-        side: Side::Push,
-    };
+    let tool = Contact { x: 12.5, y: 12.5, z: -2.0, side: Side::Push };
     surface.tick(&[tool]);
     let depth = |surface| Proxy::new(0.0, 1.0).unwrap().follow(surface, device).depth;
     assert!((depth(surface.field().at_rest()) - 2.0).abs() < 1e-12);

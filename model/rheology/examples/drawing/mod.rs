@@ -17,10 +17,7 @@ impl Axes {
     fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let [left, top, width, height] = self.panel;
         let share = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
-        (
-            left + width * share(x, self.x),
-            top + height * (1.0 - share(y, self.y)),
-        )
+        (left + width * share(x, self.x), top + height * (1.0 - share(y, self.y)))
     }
 
     pub fn draw(
@@ -32,44 +29,24 @@ impl Axes {
         let [left, top, width, height] = self.panel;
         let (right, bottom, middle) = (left + width, top + height, left + 0.5 * width);
         let (above, below) = (top - 28.0, bottom + 42.0);
-        writeln!(
-            svg,
-            "<text x=\"{left}\" y=\"{above}\" font-weight=\"bold\">{title}</text>"
-        )?;
+        writeln!(svg, "<text x=\"{left}\" y=\"{above}\" font-weight=\"bold\">{title}</text>")?;
         writeln!(
             svg,
             "<text x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">{x_title}</text>"
         )?;
-        writeln!(
-            svg,
-            "<text x=\"{}\" y=\"{}\">{y_title}</text>",
-            left - 40.0,
-            top - 8.0
-        )?;
+        writeln!(svg, "<text x=\"{}\" y=\"{}\">{y_title}</text>", left - 40.0, top - 8.0)?;
         for &tick in y_ticks {
             let (x, y) = (left - 8.0, self.at((0.0, tick)).1);
-            writeln!(
-                svg,
-                "<path d=\"M{left} {y:.1}H{right}\" stroke=\"#dddddd\"/>"
-            )?;
+            writeln!(svg, "<path d=\"M{left} {y:.1}H{right}\" stroke=\"#dddddd\"/>")?;
             let y = y + 4.0;
-            writeln!(
-                svg,
-                "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{tick}</text>"
-            )?;
+            writeln!(svg, "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{tick}</text>")?;
         }
         for &tick in x_ticks {
             let (x, y) = (self.at((tick, 0.0)).0, bottom + 20.0);
             writeln!(svg, "<path d=\"M{x:.1} {bottom}v5\" stroke=\"black\"/>")?;
-            writeln!(
-                svg,
-                "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{tick}</text>"
-            )?;
+            writeln!(svg, "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{tick}</text>")?;
         }
-        writeln!(
-            svg,
-            "<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"black\"/>"
-        )
+        writeln!(svg, "<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"black\"/>")
     }
 
     pub fn line(
@@ -84,10 +61,7 @@ impl Axes {
             let (x, y) = self.at(point);
             write!(svg, "{x:.1},{y:.1} ")?;
         }
-        writeln!(
-            svg,
-            "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" {style}/>"
-        )
+        writeln!(svg, "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" {style}/>")
     }
 
     pub fn dot(
@@ -98,10 +72,7 @@ impl Axes {
         radius: f64,
     ) -> std::fmt::Result {
         let (x, y) = self.at(at);
-        writeln!(
-            svg,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"/>"
-        )
+        writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"/>")
     }
 
     pub fn text(
@@ -112,9 +83,6 @@ impl Axes {
         text: &str,
     ) -> std::fmt::Result {
         let (x, y) = self.at(at);
-        writeln!(
-            svg,
-            "<text x=\"{x:.0}\" y=\"{y:.0}\" fill=\"{colour}\">{text}</text>"
-        )
+        writeln!(svg, "<text x=\"{x:.0}\" y=\"{y:.0}\" fill=\"{colour}\">{text}</text>")
     }
 }

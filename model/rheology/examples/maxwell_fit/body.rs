@@ -76,10 +76,7 @@ impl MaxwellState {
     /// A relaxed body at `strain`.
     #[must_use]
     pub fn at_rest_from(strain: f64) -> Self {
-        Self {
-            response: Compensated::default(),
-            strain,
-        }
+        Self { response: Compensated::default(), strain }
     }
 
     /// Moves to `strain_to` within `dt` and returns the stress at the end.

@@ -4,11 +4,7 @@
 //! one-dimensional and needs no guess: a scan finds the deepest valley of the sum of squares, and
 //! the root of its slope in it is bisected to the last digit.
 
-#![allow(
-    dead_code,
-    unused_imports,
-    reason = "the example and its test each take their own part"
-)]
+#![allow(dead_code, unused_imports, reason = "the example and its test each take their own part")]
 
 mod body;
 
@@ -57,17 +53,11 @@ pub fn fit_maxwell(
     integrator: Integrator,
 ) -> Result<MaxwellFit, FitError> {
     if samples.len() < 3 {
-        return Err(FitError::TooFewSamples {
-            samples: samples.len(),
-            parameters: 2,
-        });
+        return Err(FitError::TooFewSamples { samples: samples.len(), parameters: 2 });
     }
     check(samples)?;
     let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
-    let (low, high) = (
-        (length / (samples.len() - 1) as f64).ln(),
-        (LENGTHS * length).ln(),
-    );
+    let (low, high) = ((length / (samples.len() - 1) as f64).ln(), (LENGTHS * length).ln());
     let spacing = (high - low) / (NODES - 1) as f64;
     let at = |node: usize| low + spacing * node as f64;
     let deepest = (0..NODES)
@@ -77,9 +67,7 @@ pub fn fit_maxwell(
         .max_by(|a, b| a.1.explained().total_cmp(&b.1.explained()));
     let node = match deepest {
         None => {
-            return Err(inseparable(
-                "the strain never changes; record a ramp or a step",
-            ));
+            return Err(inseparable("the strain never changes; record a ramp or a step"));
         }
         Some((0, _)) => {
             return Err(inseparable(
@@ -117,20 +105,12 @@ fn inseparable(advice: &str) -> FitError {
 fn check(samples: &[StrainSample]) -> Result<(), FitError> {
     let mut before = f64::NEG_INFINITY;
     for (index, sample) in samples.iter().enumerate() {
-        let named = [
-            ("time", sample.t.0),
-            ("strain", sample.strain),
-            ("stress", sample.stress),
-        ];
+        let named = [("time", sample.t.0), ("strain", sample.strain), ("stress", sample.stress)];
         if let Some((what, value)) = named.into_iter().find(|(_, value)| !value.is_finite()) {
             return Err(FitError::NotFinite { index, what, value });
         }
         if sample.t.0 <= before {
-            return Err(FitError::TimeNotIncreasing {
-                index,
-                t: sample.t.0,
-                before,
-            });
+            return Err(FitError::TimeNotIncreasing { index, t: sample.t.0, before });
         }
         before = sample.t.0;
     }
@@ -205,21 +185,14 @@ impl Products {
 fn report(samples: &[StrainSample], log_tau: f64, integrator: Integrator) -> MaxwellFit {
     let products = Products::new(samples, log_tau, integrator);
     let k = products.stiffness();
-    let body = Maxwell {
-        eta: k * log_tau.exp(),
-        k,
-    };
+    let body = Maxwell { eta: k * log_tau.exp(), k };
     let mut residual_sum = 0.0;
     walk(samples, log_tau, integrator, |sample, response, _| {
         residual_sum += (sample.stress - k * response).powi(2);
     });
     // Inverse of the 2 x 2 normal matrix of (ln k, ln tau); ln eta is their sum.
-    let [aa, ab, bb] = [
-        products.response_response,
-        products.response_slope,
-        products.slope_slope,
-    ]
-    .map(|product| k * k * product);
+    let [aa, ab, bb] = [products.response_response, products.response_slope, products.slope_slope]
+        .map(|product| k * k * product);
     let variance = residual_sum / (samples.len() - 2) as f64 / (aa * bb - ab * ab);
     MaxwellFit {
         body,

@@ -83,10 +83,7 @@ mod tests {
         let hold: Vec<CycleSample> = (0..=10_000).map(|i| at(f64::from(i) * 1e-3)).collect();
         let found = creep(&hold, None).unwrap();
         let end = 2.0 * (1.0 - (-2.0f64).exp());
-        assert_eq!(
-            (found.depth_start, found.force),
-            (Depth(10.0), Newtons(3.0))
-        );
+        assert_eq!((found.depth_start, found.force), (Depth(10.0), Newtons(3.0)));
         // A line through a second of it misses its curvature by x'' / 12 s^2.
         assert!((found.depth_end.value.0 - 10.0 - end).abs() < 1.5e-3);
         assert!((found.percent - 10.0 * end).abs() < 1.5e-2);

@@ -33,9 +33,7 @@ pub(super) fn line(points: &[[f64; 2]], at: f64) -> Option<Local> {
 
 fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<Local> {
     let columns = degree + 1;
-    let reach = points
-        .iter()
-        .fold(0.0f64, |reach, point| reach.max((point[0] - at).abs()));
+    let reach = points.iter().fold(0.0f64, |reach, point| reach.max((point[0] - at).abs()));
     if points.len() <= columns || reach <= 0.0 {
         return None;
     }
@@ -50,10 +48,7 @@ fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<Local> {
     let found = triangle.solve(columns)?;
     let variance = triangle.residual_sum() / (points.len() - columns) as f64;
     let error = |index: usize| Some((variance * triangle.inverse_diagonal(index, columns)?).sqrt());
-    Some(Local {
-        value: [found[0], error(0)?],
-        slope: [found[1] / reach, error(1)? / reach],
-    })
+    Some(Local { value: [found[0], error(0)?], slope: [found[1] / reach, error(1)? / reach] })
 }
 
 /// Most bins a way is cut into to find a force on it: straight lines between them then miss a curve by less than
@@ -65,9 +60,8 @@ const BIN_SAMPLES: usize = 4;
 /// Means of `(x, y)` over equal stretches of x from the least to the greatest, empty ones left out, each with the
 /// standard error of its y (that of the whole, where it has too few samples of its own).
 pub(super) fn bins(points: &[[f64; 2]]) -> Vec<[f64; 3]> {
-    let (low, high) = points
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
+    let (low, high) =
+        points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
             (low.min(point[0]), high.max(point[0]))
         });
     let count = (points.len() / BIN_SAMPLES).clamp(1, BINS_MAX);
@@ -90,25 +84,15 @@ pub(super) fn bins(points: &[[f64; 2]]) -> Vec<[f64; 3]> {
 /// Standard deviation of the noise of y, from second differences, which know no slope: for white noise their
 /// variance is six times its own.
 fn noise_of(points: &[[f64; 2]]) -> f64 {
-    let seconds = points
-        .windows(3)
-        .map(|three| three[0][1] - 2.0 * three[1][1] + three[2][1]);
-    let (count, sum) = seconds.fold((0.0f64, 0.0), |(count, sum), one| {
-        (count + 1.0, sum + one * one)
-    });
-    if count > 0.0 {
-        (sum / count / 6.0).sqrt()
-    } else {
-        0.0
-    }
+    let seconds = points.windows(3).map(|three| three[0][1] - 2.0 * three[1][1] + three[2][1]);
+    let (count, sum) =
+        seconds.fold((0.0f64, 0.0), |(count, sum), one| (count + 1.0, sum + one * one));
+    if count > 0.0 { (sum / count / 6.0).sqrt() } else { 0.0 }
 }
 
 /// Where y rises through a level for the last time, and its standard error, from bins in order of x.
 pub(super) fn last_rise(bins: &[[f64; 3]], level: f64) -> Option<[f64; 2]> {
-    let pair = bins
-        .windows(2)
-        .rev()
-        .find(|pair| pair[0][1] < level && pair[1][1] >= level)?;
+    let pair = bins.windows(2).rev().find(|pair| pair[0][1] < level && pair[1][1] >= level)?;
     let ([x0, y0, _], [x1, y1, error]) = (pair[0], pair[1]);
     let slope = (y1 - y0) / (x1 - x0);
     Some([x0 + (level - y0) / slope, error / slope])
@@ -122,18 +106,15 @@ mod tests {
     #[test]
     fn a_parabola_is_read_exactly_and_its_errors_are_those_of_the_textbook() {
         let curve = |x: f64| 2.0 + 3.0 * (x - 7.0) - 0.5 * (x - 7.0).powi(2);
-        let points: Vec<[f64; 2]> = (0..50)
-            .map(|i| 6.0 + 0.04 * f64::from(i))
-            .map(|x| [x, curve(x)])
-            .collect();
+        let points: Vec<[f64; 2]> =
+            (0..50).map(|i| 6.0 + 0.04 * f64::from(i)).map(|x| [x, curve(x)]).collect();
         let found = parabola(&points, 7.0).unwrap();
         assert!((found.value[0] - 2.0).abs() < 1e-12 && (found.slope[0] - 3.0).abs() < 1e-12);
         assert!(found.value[1] < 1e-12);
         assert!(parabola(&points[..3], 7.0).is_none() && line(&points[..1], 7.0).is_none());
         // A line of n points, read at their mean: sigma / sqrt(n), and sigma / (spread of x) for the slope.
-        let noisy: Vec<[f64; 2]> = (0..100)
-            .map(|i| [f64::from(i), if i % 2 == 0 { 0.1 } else { -0.1 }])
-            .collect();
+        let noisy: Vec<[f64; 2]> =
+            (0..100).map(|i| [f64::from(i), if i % 2 == 0 { 0.1 } else { -0.1 }]).collect();
         let found = line(&noisy, 49.5).unwrap();
         assert!((found.value[1] / 0.01 - 1.0).abs() < 0.02);
         let spread = (100.0f64 * (100.0 * 100.0 - 1.0) / 12.0).sqrt();

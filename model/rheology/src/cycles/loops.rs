@@ -96,11 +96,8 @@ pub fn analyse(
 ) -> Vec<CycleAnalysis> {
     let mut cycles: Vec<CycleAnalysis> = Vec::new();
     let mut levels = None;
-    let of_cycles: Vec<CycleSample> = samples
-        .iter()
-        .filter(|one| is_of_cycle(one.phase))
-        .copied()
-        .collect();
+    let of_cycles: Vec<CycleSample> =
+        samples.iter().filter(|one| is_of_cycle(one.phase)).copied().collect();
     // Steps of one cycle, as in a relaxation in several steps, each have a way in.
     let is_same = |one: &CycleSample, next: &CycleSample| {
         one.cycle == next.cycle && (next.phase != Phase::Ramp || one.phase == Phase::Ramp)
@@ -114,9 +111,7 @@ pub fn analyse(
             let start = force_start.map_or(0.0, |start| start.value.0);
             LEVELS.map(|share| start + share * (way.force_peak.value.0 - start))
         });
-        let at = at.or(cycles
-            .first()
-            .and_then(|first| Some(first.stiffness?.depth)));
+        let at = at.or(cycles.first().and_then(|first| Some(first.stiffness?.depth)));
         let at = at.unwrap_or(Depth(0.8 * way.depth_peak));
         cycles.push(way.analysis(cycle, force_start, (levels, at), pulse));
     }
@@ -131,30 +126,19 @@ pub fn stiffness_at(way_in: &[[f64; 2]], at: Depth) -> Option<Stiffness> {
         return None;
     }
     let half = NEAR * (high - low);
-    let near: Vec<[f64; 2]> = way_in
-        .iter()
-        .filter(|point| (point[0] - at.0).abs() <= half)
-        .copied()
-        .collect();
-    Some(Stiffness {
-        depth: at,
-        slope: Estimate::of(|slope| slope, parabola(&near, at.0)?.slope),
-    })
+    let near: Vec<[f64; 2]> =
+        way_in.iter().filter(|point| (point[0] - at.0).abs() <= half).copied().collect();
+    Some(Stiffness { depth: at, slope: Estimate::of(|slope| slope, parabola(&near, at.0)?.slope) })
 }
 
 fn is_of_cycle(phase: Phase) -> bool {
-    matches!(
-        phase,
-        Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Sine | Phase::Unload
-    )
+    matches!(phase, Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Sine | Phase::Unload)
 }
 
 fn reach(points: &[[f64; 2]]) -> (f64, f64) {
-    points
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
-            (low.min(point[0]), high.max(point[0]))
-        })
+    points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
+        (low.min(point[0]), high.max(point[0]))
+    })
 }
 
 /// The ramp of a cycle as depth and force.
@@ -168,10 +152,7 @@ struct WayIn {
 
 impl WayIn {
     fn of(cycle: &[CycleSample]) -> Option<Self> {
-        let ramp: Vec<&CycleSample> = cycle
-            .iter()
-            .filter(|one| one.phase == Phase::Ramp)
-            .collect();
+        let ramp: Vec<&CycleSample> = cycle.iter().filter(|one| one.phase == Phase::Ramp).collect();
         let (first, last) = (*ramp.first()?, *ramp.last()?);
         let points: Vec<[f64; 2]> = ramp.iter().map(|one| [one.depth.0, one.force.0]).collect();
         let (depth_start, depth_peak) = reach(&points);
@@ -179,11 +160,8 @@ impl WayIn {
         if points.len() < 20 || way <= 0.0 {
             return None;
         }
-        let end: Vec<[f64; 2]> = points
-            .iter()
-            .filter(|point| point[0] >= depth_peak - NEAR * way)
-            .copied()
-            .collect();
+        let end: Vec<[f64; 2]> =
+            points.iter().filter(|point| point[0] >= depth_peak - NEAR * way).copied().collect();
         let force_peak = match parabola(&end, depth_peak) {
             Some(local) => local.value,
             // A sparse record: the last sample, as uncertain as its noise.
@@ -223,11 +201,7 @@ impl WayIn {
         let step = (level - value) / slope;
         // Where the force hardly rises a tangent leads astray.
         let is_near = slope > 0.0 && step.abs() <= half;
-        Some(if is_near {
-            [coarse[0] + step, error / slope]
-        } else {
-            coarse
-        })
+        Some(if is_near { [coarse[0] + step, error / slope] } else { coarse })
     }
 
     fn analysis(
@@ -255,9 +229,7 @@ impl WayIn {
         let is_one_step = |one: &CycleSample, next: &CycleSample| {
             (one.phase, one.step) == (next.phase, next.step)
         };
-        let creeping = cycle
-            .chunk_by(is_one_step)
-            .filter(|part| part[0].phase == Phase::Creep);
+        let creeping = cycle.chunk_by(is_one_step).filter(|part| part[0].phase == Phase::Creep);
         CycleAnalysis {
             cycle: cycle.first().map_or(0, |one| one.cycle),
             start: Seconds(start),

@@ -52,9 +52,6 @@ pub struct Estimate<T> {
 
 impl<T> Estimate<T> {
     fn of(unit: impl Fn(f64) -> T, [value, std_error]: [f64; 2]) -> Self {
-        Self {
-            value: unit(value),
-            std_error: unit(std_error),
-        }
+        Self { value: unit(value), std_error: unit(std_error) }
     }
 }

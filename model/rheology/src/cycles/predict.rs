@@ -80,29 +80,21 @@ pub fn predict(
         .filter(|(one, _)| one.is_measured())
         .map(|(one, force)| (one, force.0 - one.force.0))
         .collect();
-    let deepest = errors
-        .iter()
-        .map(|(one, _)| one.depth.0)
-        .fold(f64::MIN, f64::max);
+    let deepest = errors.iter().map(|(one, _)| one.depth.0).fold(f64::MIN, f64::max);
     let turn = errors.iter().position(|(one, _)| one.depth.0 >= deepest);
     let turn = turn
         .filter(|turn| *turn >= 2)
-        .ok_or(PredictionError::TooFew {
-            measured: turn.unwrap_or(0),
-        })?;
+        .ok_or(PredictionError::TooFew { measured: turn.unwrap_or(0) })?;
     let too_few = || PredictionError::TooFew { measured: turn };
     let (at_peak, peak) = last_of(&errors[..=turn]).ok_or_else(too_few)?;
     let square: f64 = errors.iter().map(|(_, error)| error * error).sum();
     let count = errors.len() as f64;
     let mean = errors.iter().map(|(_, error)| error).sum::<f64>() / count;
     let about: f64 = errors.iter().map(|(_, error)| (error - mean).powi(2)).sum();
-    let worst = errors.iter().copied().fold(errors[0], |worst, one| {
-        if one.1.abs() > worst.1.abs() {
-            one
-        } else {
-            worst
-        }
-    });
+    let worst = errors
+        .iter()
+        .copied()
+        .fold(errors[0], |worst, one| if one.1.abs() > worst.1.abs() { one } else { worst });
     Ok(Prediction {
         peak: Newtons(peak),
         rms: Newtons((square / count).sqrt()),
@@ -125,10 +117,7 @@ fn last_of(part: &[(&FitSample, f64)]) -> Option<(Estimate<Newtons>, f64)> {
         Some(line(&points, last)?.value)
     };
     let error = read(|(_, error)| *error)?;
-    Some((
-        Estimate::of(Newtons, error),
-        read(|(one, _)| one.force.0)?[0],
-    ))
+    Some((Estimate::of(Newtons, error), read(|(one, _)| one.force.0)?[0]))
 }
 
 #[cfg(test)]
@@ -181,14 +170,8 @@ mod tests {
         samples[5000].force = Newtons(99.0);
         samples[5000].sigma = Newtons(f64::INFINITY);
         assert!(predict(&body, &samples).unwrap().worst.0.0.abs() < 1e-12);
-        assert!(matches!(
-            predict(&body, &samples[..2]),
-            Err(PredictionError::TooFew { .. })
-        ));
-        assert!(matches!(
-            predict(&body, &[]),
-            Err(PredictionError::TooFew { .. })
-        ));
+        assert!(matches!(predict(&body, &samples[..2]), Err(PredictionError::TooFew { .. })));
+        assert!(matches!(predict(&body, &[]), Err(PredictionError::TooFew { .. })));
         samples[100].t = Seconds(0.0);
         assert_eq!(predict(&body, &samples), Err(PredictionError::NotFinite));
     }

@@ -47,10 +47,7 @@ pub fn relaxation(hold: &[[f64; 2]], peak: Estimate<Newtons>) -> Option<Relaxati
     Some(Relaxation {
         duration: Seconds(duration),
         force_end: Estimate::of(Newtons, end.value),
-        percent: Estimate {
-            value: 100.0 * (1.0 - remaining),
-            std_error: percent_error,
-        },
+        percent: Estimate { value: 100.0 * (1.0 - remaining), std_error: percent_error },
         half_time: half_time(hold, 0.5 * (top + end.value[0])),
         rate_end: Estimate::of(|rate| rate, end.slope),
         equilibrium: equilibrium(hold, last - 0.5 * duration, 0.5 * duration),
@@ -117,19 +114,11 @@ mod tests {
         let mut random = SplitMix::seeded(seed);
         (0..=(seconds * 1e3) as u32)
             .map(|i| f64::from(i) * 1e-3)
-            .map(|t| {
-                [
-                    100.0 + t,
-                    5.0 + 2.0 * (-t / tau).exp() + noise * random.normal(),
-                ]
-            })
+            .map(|t| [100.0 + t, 5.0 + 2.0 * (-t / tau).exp() + noise * random.normal()])
             .collect()
     }
 
-    const PEAK: Estimate<Newtons> = Estimate {
-        value: Newtons(7.0),
-        std_error: Newtons(0.01),
-    };
+    const PEAK: Estimate<Newtons> = Estimate { value: Newtons(7.0), std_error: Newtons(0.01) };
 
     #[test]
     fn an_exponential_has_the_numbers_of_its_formula() {
@@ -150,10 +139,7 @@ mod tests {
         assert!((found.force_end.value.0 - 5.0 - 2.0 * (-2.0f64).exp()).abs() < 1e-3);
         assert!((found.equilibrium.unwrap().value.0 - 5.0).abs() < 1e-3);
         let slope = found.rate_end.value;
-        assert!(
-            (slope / (-0.2 * (-2.0f64).exp()) - 1.0).abs() < 0.12,
-            "{slope}"
-        );
+        assert!((slope / (-0.2 * (-2.0f64).exp()) - 1.0).abs() < 0.12, "{slope}");
         // A hundredth of a time constant: no telling.
         let found = relaxation(&hold(2000.0, 20.0, 0.0, 1), PEAK).unwrap();
         assert_eq!(found.equilibrium, None);
@@ -170,11 +156,7 @@ mod tests {
             heads.push((head.value.0 - 5.0) / head.std_error.0);
         }
         let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / 100.0).sqrt();
-        println!(
-            "end {:.2}, equilibrium {:.2} standard errors",
-            rms(&ends),
-            rms(&heads)
-        );
+        println!("end {:.2}, equilibrium {:.2} standard errors", rms(&ends), rms(&heads));
         // The curvature of the tail adds a little to the one, the fall within a part makes the other too careful.
         assert!((0.8..1.6).contains(&rms(&ends)), "{}", rms(&ends));
         assert!((0.1..1.2).contains(&rms(&heads)), "{}", rms(&heads));

@@ -127,12 +127,8 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
     let used = || samples.iter().filter(move |one| one.t.0 >= start);
     let span = whole / frequency;
     let fitted = |value: fn(&CycleSample) -> f64| {
-        fit(
-            used().map(|one| (one.t.0 - start, value(one))),
-            frequency,
-            span,
-        )
-        .ok_or(SinusoidError::NoMotion { frequency })
+        fit(used().map(|one| (one.t.0 - start, value(one))), frequency, span)
+            .ok_or(SinusoidError::NoMotion { frequency })
     };
     let (depth, force) = (fitted(|one| one.depth.0)?, fitted(|one| one.force.0)?);
     let x = phasor(&depth.coefficients, 1);
@@ -167,14 +163,8 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
             value: loss.atan2(storage).to_degrees(),
             std_error: (force.error / force_amplitude).to_degrees(),
         },
-        storage: Estimate {
-            value: storage,
-            std_error: error,
-        },
-        loss: Estimate {
-            value: loss,
-            std_error: error,
-        },
+        storage: Estimate { value: storage, std_error: error },
+        loss: Estimate { value: loss, std_error: error },
         distortion_percent: 100.0 * harmonics.sqrt() / force_amplitude,
         zero_share: zero_share(used().map(|one| one.force.0), force_amplitude, force.noise),
     })
@@ -197,11 +187,7 @@ fn whole_cycles(samples: &[CycleSample], frequency: f64) -> Result<(f64, f64), S
     if per_cycle < PER_CYCLE_MIN {
         return Err(SinusoidError::TooSparse { per_cycle });
     }
-    let settling = if cycles + 1e-6 >= 2.0 * SETTLING + 1.0 {
-        SETTLING
-    } else {
-        0.0
-    };
+    let settling = if cycles + 1e-6 >= 2.0 * SETTLING + 1.0 { SETTLING } else { 0.0 };
     let whole = (cycles - settling + 1e-6).floor();
     Ok((last + 0.5 * interval - whole / frequency, whole))
 }
@@ -245,11 +231,7 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
     let variance = triangle.residual_sum() / free as f64;
     let errors =
         triangle.inverse_diagonal(2, COLUMNS - 1)? + triangle.inverse_diagonal(3, COLUMNS - 1)?;
-    Some(Fitted {
-        coefficients,
-        error: (variance * 0.5 * errors).sqrt(),
-        noise: variance.sqrt(),
-    })
+    Some(Fitted { coefficients, error: (variance * 0.5 * errors).sqrt(), noise: variance.sqrt() })
 }
 
 #[cfg(test)]
@@ -281,10 +263,8 @@ mod tests {
         for f in [0.05, 0.5, 2.0] {
             let w = TAU * f;
             let under = 1.0 + (w * tau).powi(2);
-            let (storage, loss) = (
-                mu * (1.0 + w * w * s * tau) / under,
-                mu * w * (s - tau) / under,
-            );
+            let (storage, loss) =
+                (mu * (1.0 + w * w * s * tau) / under, mu * w * (s - tau) / under);
             // x = 10 - 0.5 cos: its answer, and what the start leaves, which decays with tau.
             let force = |t: f64| {
                 5.0 - 0.5 * (storage * (w * t).cos() - loss * (w * t).sin())
@@ -293,10 +273,7 @@ mod tests {
             let seconds = (20.0 / f).max(40.0);
             let all = record(f, seconds, force);
             let found = sinusoid(&all[20_000.min(all.len() / 2)..], f).unwrap();
-            assert!(
-                (found.storage.value - storage).abs() < 1e-8,
-                "{f}: {found:?}"
-            );
+            assert!((found.storage.value - storage).abs() < 1e-8, "{f}: {found:?}");
             assert!((found.loss.value - loss).abs() < 1e-8, "{f}: {found:?}");
             let degrees = (loss / storage).atan().to_degrees();
             assert!((found.phase_degrees.value - degrees).abs() < 1e-6);

@@ -32,10 +32,7 @@ pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
             .last()
             .unwrap_or(arrival);
         // Nor does the way back begin where it leaves the band.
-        let leaving = (turn + 1..=late)
-            .rev()
-            .find(|&i| part[i] >= part[i - 1])
-            .unwrap_or(turn);
+        let leaving = (turn + 1..=late).rev().find(|&i| part[i] >= part[i - 1]).unwrap_or(turn);
         for (i, &x) in part.iter().enumerate() {
             let phase = match i {
                 _ if i <= turn => Phase::Ramp,
@@ -93,9 +90,7 @@ mod tests {
         let t: Vec<f64> = (0..depth.len()).map(|i| i as f64).collect();
         let all = by_depth(&t, &depth, &depth);
         let count = |cycle: u32, phase: Phase| {
-            all.iter()
-                .filter(|one| one.cycle == cycle && one.phase == phase)
-                .count()
+            all.iter().filter(|one| one.cycle == cycle && one.phase == phase).count()
         };
         assert_eq!(all.len(), depth.len());
         assert_eq!([count(1, Phase::Ramp), count(1, Phase::Hold)], [101, 50]);

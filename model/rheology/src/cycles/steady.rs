@@ -17,10 +17,7 @@ impl Default for SteadyRule {
     /// One percent is a tenth of what preconditioning changes, and what one specimen repeats itself within; once could
     /// be luck, as a peak has its own noise.
     fn default() -> Self {
-        Self {
-            percent: 1.0,
-            in_a_row: 2,
-        }
+        Self { percent: 1.0, in_a_row: 2 }
     }
 }
 
@@ -51,29 +48,18 @@ impl SteadyRule {
     /// Judges cycles in their order.
     #[must_use]
     pub fn judge(&self, cycles: &[CycleAnalysis]) -> Steadiness {
-        let changes: Vec<Change> = cycles
-            .windows(2)
-            .map(|pair| change(&pair[0], &pair[1]))
-            .collect();
-        let late = changes
-            .iter()
-            .rev()
-            .take_while(|change| self.is_small(change))
-            .count();
+        let changes: Vec<Change> =
+            cycles.windows(2).map(|pair| change(&pair[0], &pair[1])).collect();
+        let late = changes.iter().rev().take_while(|change| self.is_small(change)).count();
         // A change belongs between two cycles: the first of the row is the one into the cycle after the steady one.
         let steady_from =
             (late >= self.in_a_row.max(1)).then(|| cycles[changes.len() - late].cycle);
-        Steadiness {
-            changes,
-            steady_from,
-        }
+        Steadiness { changes, steady_from }
     }
 
     fn is_small(&self, change: &Change) -> bool {
         change.peak_percent.abs() < self.percent
-            && change
-                .shift_percent
-                .is_some_and(|shift| shift.abs() < self.percent)
+            && change.shift_percent.is_some_and(|shift| shift.abs() < self.percent)
     }
 }
 

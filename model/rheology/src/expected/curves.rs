@@ -91,9 +91,7 @@ pub fn curves(
             })
             .collect(),
         between,
-        rate: curve(speed, decades(RATE_HZ), &|rate| {
-            Protocol::ramp_hold(speed, depth, hold, rate)
-        }),
+        rate: curve(speed, decades(RATE_HZ), &|rate| Protocol::ramp_hold(speed, depth, hold, rate)),
         rate_hold: hold,
     })
 }
@@ -105,11 +103,7 @@ fn decades(from: f64) -> Vec<f64> {
     let values = (first..first + DECADES).flat_map(|decade| {
         // Negative powers of ten have no exact number; quotients by positive ones are the nearest.
         DECADE.map(|value| {
-            if decade < 0 {
-                value / 10f64.powi(-decade)
-            } else {
-                value * 10f64.powi(decade)
-            }
+            if decade < 0 { value / 10f64.powi(-decade) } else { value * 10f64.powi(decade) }
         })
     });
     let last = 10f64.powi(first + DECADES);

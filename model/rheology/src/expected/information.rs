@@ -161,13 +161,8 @@ pub fn intervals(
     for pieces in &protocol.presses {
         let secs = duration_of(pieces);
         check_resolved(body.tau_eps, protocol.sample_rate_hz, secs)?;
-        let press = Press {
-            body,
-            pieces,
-            sample_rate_hz: protocol.sample_rate_hz,
-            noise,
-            unknowns,
-        };
+        let press =
+            Press { body, pieces, sample_rate_hz: protocol.sample_rate_hz, noise, unknowns };
         let sums = PressSums::of(&press, unknowns);
         forces = [forces[0].min(sums.forces[0]), forces[1].max(sums.forces[1])];
         for row in sums.triangle.r.iter().skip(NUISANCES) {
@@ -181,13 +176,7 @@ pub fn intervals(
     let inverse = triangle::inverse(&shared, &lengths.map(f64::sqrt))
         .map_err(|names| ExpectedError::Inseparable { names })?;
     let variances = variances(&inverse, &slow, noise);
-    let values = [
-        body.tau_eps,
-        body.mu[0],
-        body.mu[1],
-        body.mu[2],
-        body.tau_sig,
-    ];
+    let values = [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig];
     let parameters = std::array::from_fn(|k| {
         // The first column is the derivative by log tau.
         let scale = if k == 0 { body.tau_eps } else { 1.0 };

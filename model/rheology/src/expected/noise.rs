@@ -26,10 +26,7 @@ impl Noise {
     /// Independent noise alone, standard deviation in N.
     #[must_use]
     pub fn white(sd: Newtons) -> Self {
-        Self {
-            white: sd,
-            memory: None,
-        }
+        Self { white: sd, memory: None }
     }
 
     pub(super) fn check(&self) -> Result<(), ExpectedError> {
@@ -65,9 +62,6 @@ pub struct Unknowns {
 impl Default for Unknowns {
     /// What [`crate::fit::FitOptions`] frees by default.
     fn default() -> Self {
-        Self {
-            f0: true,
-            f_offset: true,
-        }
+        Self { f0: true, f_offset: true }
     }
 }

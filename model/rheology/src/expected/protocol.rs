@@ -31,11 +31,7 @@ impl Protocol {
     /// One ramp at `speed` to `depth` and `hold` seconds there (none for a hold of 0).
     #[must_use]
     pub fn ramp_hold(speed: MmPerS, depth: Depth, hold: Seconds, sample_rate_hz: f64) -> Self {
-        Self {
-            presses: vec![press(speed, depth, hold)],
-            rest: Seconds(0.0),
-            sample_rate_hz,
-        }
+        Self { presses: vec![press(speed, depth, hold)], rest: Seconds(0.0), sample_rate_hz }
     }
 
     /// Two ramps and holds, one at each speed, the second after `rest` seconds out of the tissue.
@@ -68,17 +64,10 @@ impl Protocol {
         let mut at = Depth(0.0);
         let mut pieces = Vec::with_capacity(2 * count);
         for turn in (0..count).flat_map(|_| [bottom, top]) {
-            pieces.push(Piece {
-                to: turn,
-                duration: Seconds((turn - at).abs().0 / speed.0),
-            });
+            pieces.push(Piece { to: turn, duration: Seconds((turn - at).abs().0 / speed.0) });
             at = turn;
         }
-        Self {
-            presses: vec![pieces],
-            rest: Seconds(0.0),
-            sample_rate_hz,
-        }
+        Self { presses: vec![pieces], rest: Seconds(0.0), sample_rate_hz }
     }
 
     /// Time in tissue and rests between presses, in s; without what a rig does before (homing,
@@ -114,19 +103,9 @@ impl Protocol {
 }
 
 fn press(speed: MmPerS, depth: Depth, hold: Seconds) -> Vec<Piece> {
-    let ramp = Piece {
-        to: depth,
-        duration: Seconds(depth.0 / speed.0),
-    };
-    let hold = Piece {
-        to: depth,
-        duration: hold,
-    };
-    if hold.duration.0 > 0.0 {
-        vec![ramp, hold]
-    } else {
-        vec![ramp]
-    }
+    let ramp = Piece { to: depth, duration: Seconds(depth.0 / speed.0) };
+    let hold = Piece { to: depth, duration: hold };
+    if hold.duration.0 > 0.0 { vec![ramp, hold] } else { vec![ramp] }
 }
 
 /// Time of one press, in s.

@@ -103,11 +103,7 @@ impl Press<'_> {
         let tau = self.body.tau_eps;
         self.noise.memory.map(|memory| {
             let time = memory.time.0;
-            if (time / tau - 1.0).abs() < TIMES_APART {
-                tau * (1.0 + TIMES_APART)
-            } else {
-                time
-            }
+            if (time / tau - 1.0).abs() < TIMES_APART { tau * (1.0 + TIMES_APART) } else { time }
         })
     }
 
@@ -170,20 +166,13 @@ impl Press<'_> {
             point
         };
         let end = duration_of(self.pieces) * (1.0 - 1e-12);
-        take(Point {
-            weight: 0.5,
-            ..at(&State::default())
-        });
+        take(Point { weight: 0.5, ..at(&State::default()) });
         self.walk(|start, x0, speed, duration| {
             let mut from = 0.0;
             while from < duration {
                 let wanted = if from > 0.0 { 2.0 * from } else { shortest };
                 // No sliver at the end.
-                let to = if wanted > 0.9 * duration {
-                    duration
-                } else {
-                    wanted
-                };
+                let to = if wanted > 0.9 * duration { duration } else { wanted };
                 let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
                 for (abscissa, weight) in GAUSS {
                     for since in [middle - half * abscissa, middle + half * abscissa] {
@@ -197,10 +186,7 @@ impl Press<'_> {
             }
             let corner = self.after(start, x0, speed, duration);
             let weight = if corner.elapsed < end { 0.0 } else { 0.5 };
-            take(Point {
-                weight,
-                ..at(&corner)
-            });
+            take(Point { weight, ..at(&corner) });
         });
     }
 
@@ -221,9 +207,7 @@ impl Press<'_> {
         State {
             elapsed: from.elapsed + dt,
             body: from.body.after(x0, d, dt, self.body.tau_eps),
-            slow: self
-                .memory_secs()
-                .map_or(from.slow, |time| from.slow.after(x0, d, dt, time)),
+            slow: self.memory_secs().map_or(from.slow, |time| from.slow.after(x0, d, dt, time)),
         }
     }
 

@@ -44,17 +44,14 @@ pub(super) fn allowed_speeds(
         ("longest duration in s", rig.duration_max.0),
         ("sampling rate in Hz", rig.sample_rate_hz),
     ];
-    if let Some((what, value)) = checked
-        .into_iter()
-        .find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+    if let Some((what, value)) =
+        checked.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()))
     {
         return Err(ExpectedError::BadNumber { what, value });
     }
     let speed = |multiple: f64| MmPerS(multiple * rig.speed_quantum.0);
     // A ramp may take half the time at most; the other half is for what is learned from it.
-    let slowest = (2.0 * rig.depth.0 / rig.duration_max.0 / rig.speed_quantum.0)
-        .ceil()
-        .max(1.0);
+    let slowest = (2.0 * rig.depth.0 / rig.duration_max.0 / rig.speed_quantum.0).ceil().max(1.0);
     let fastest = (rig.speed_max.0 / rig.speed_quantum.0 * (1.0 + 1e-9)).floor();
     if slowest > fastest {
         return Err(ExpectedError::TooLittleTime {
@@ -127,8 +124,5 @@ pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &Rig, speed: MmPerS) -
         let twice = Protocol::cycles(speed, [*turn, rig.depth], 2, rig.sample_rate_hz);
         !pulls(body, &twice)
     };
-    turns
-        .into_iter()
-        .find(presses)
-        .unwrap_or(turns[TURNS.len() - 1])
+    turns.into_iter().find(presses).unwrap_or(turns[TURNS.len() - 1])
 }

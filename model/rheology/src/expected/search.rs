@@ -33,16 +33,12 @@ impl Target {
     pub fn new(name: &str, percent: f64) -> Result<Self, ExpectedError> {
         let full = if name == "tau" { "tau_eps" } else { name };
         let known = PARAMETER_NAMES.into_iter().find(|known| *known == full);
-        let parameter = known.ok_or_else(|| ExpectedError::UnknownParameter {
-            name: name.to_owned(),
-        })?;
+        let parameter =
+            known.ok_or_else(|| ExpectedError::UnknownParameter { name: name.to_owned() })?;
         if percent > 0.0 && percent.is_finite() {
             Ok(Self { parameter, percent })
         } else {
-            Err(ExpectedError::BadNumber {
-                what: "wanted interval in percent",
-                value: percent,
-            })
+            Err(ExpectedError::BadNumber { what: "wanted interval in percent", value: percent })
         }
     }
 }
@@ -88,11 +84,7 @@ impl Family {
             Self::TwoSpeeds { speeds, hold, rest } => {
                 Protocol::two_speeds(speeds, depth, hold, rest, rate)
             }
-            Self::Cycles {
-                speed,
-                between,
-                count,
-            } => Protocol::cycles(speed, between, count, rate),
+            Self::Cycles { speed, between, count } => Protocol::cycles(speed, between, count, rate),
         }
     }
 }
@@ -122,27 +114,14 @@ pub fn shortest(
     noise.check()?;
     let speeds = allowed_speeds(&body.checked()?, rig)?;
     check_resolved(body.tau_eps, rig.sample_rate_hz, rig.duration_max.0)?;
-    let mut search = Search {
-        body,
-        noise,
-        unknowns,
-        targets,
-        rig,
-        closest: None,
-    };
+    let mut search = Search { body, noise, unknowns, targets, rig, closest: None };
     for target in targets {
         let value = value_of(body, target.parameter);
         if value.abs() <= 0.0 {
-            return Err(ExpectedError::ZeroParameter {
-                name: target.parameter,
-            });
+            return Err(ExpectedError::ZeroParameter { name: target.parameter });
         }
     }
-    let found = [
-        search.ramp_hold(&speeds),
-        search.two_speeds(&speeds),
-        search.cycles(&speeds),
-    ];
+    let found = [search.ramp_hold(&speeds), search.two_speeds(&speeds), search.cycles(&speeds)];
     let proposals: Vec<Proposal> = found.into_iter().flatten().collect();
     match (proposals.is_empty(), search.closest) {
         (true, Some((_, target, reached))) => Err(ExpectedError::Unreachable {
@@ -151,21 +130,13 @@ pub fn shortest(
             reached: format!("{reached:.3}"),
             longest_s: rig.duration_max.0,
         }),
-        (true, None) => Err(ExpectedError::Inseparable {
-            names: PARAMETER_NAMES.join(", "),
-        }),
+        (true, None) => Err(ExpectedError::Inseparable { names: PARAMETER_NAMES.join(", ") }),
         (false, _) => Ok(proposals),
     }
 }
 
 fn value_of(body: &ModifiedKelvin, name: &str) -> f64 {
-    let values = [
-        body.tau_eps,
-        body.mu[0],
-        body.mu[1],
-        body.mu[2],
-        body.tau_sig,
-    ];
+    let values = [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig];
     PARAMETER_NAMES
         .iter()
         .zip(values)
@@ -199,16 +170,9 @@ impl Search<'_> {
         let reason = if speed == speeds[0] {
             format!("{}; {}", self.decides(&expected), self.why_fastest(speed))
         } else {
-            format!(
-                "{}; a faster ramp needs a longer hold",
-                self.decides(&expected)
-            )
+            format!("{}; a faster ramp needs a longer hold", self.decides(&expected))
         };
-        Some(Proposal {
-            family,
-            expected,
-            reason,
-        })
+        Some(Proposal { family, expected, reason })
     }
 
     fn two_speeds(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
@@ -231,11 +195,7 @@ impl Search<'_> {
             self.decides(&expected),
             rest.0
         );
-        Some(Proposal {
-            family,
-            expected,
-            reason,
-        })
+        Some(Proposal { family, expected, reason })
     }
 
     fn cycles(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
@@ -252,11 +212,7 @@ impl Search<'_> {
             "{}; it turns back while the probe still presses, since tissue lets go of a probe that pulls",
             self.decides(&expected)
         );
-        Some(Proposal {
-            family,
-            expected,
-            reason,
-        })
+        Some(Proposal { family, expected, reason })
     }
 
     /// The shortest hold that reaches every target and beats `best`.
@@ -294,11 +250,7 @@ impl Search<'_> {
 
     fn least_cycles(&mut self, best: &Found, speed: MmPerS, between: [Depth; 2]) -> Found {
         let limit = self.limit(best);
-        let family = |count| Family::Cycles {
-            speed,
-            between,
-            count,
-        };
+        let family = |count| Family::Cycles { speed, between, count };
         let secs = |count| family(count).protocol(self.rig).duration().0;
         if pulls(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
             return None;
@@ -354,9 +306,7 @@ impl Search<'_> {
     }
 
     fn decides(&self, expected: &Expected) -> String {
-        let name = self
-            .worst(expected)
-            .map_or("nothing", |(target, _)| target.parameter);
+        let name = self.worst(expected).map_or("nothing", |(target, _)| target.parameter);
         format!("{name} decides the length")
     }
 
@@ -398,12 +348,7 @@ mod tests {
 
     #[test]
     fn holds_are_rounded_up_to_what_a_person_types() {
-        for (value, rounded) in [
-            (12.301, 12.4),
-            (0.012_31, 0.0124),
-            (1234.0, 1240.0),
-            (5.0, 5.0),
-        ] {
+        for (value, rounded) in [(12.301, 12.4), (0.012_31, 0.0124), (1234.0, 1240.0), (5.0, 5.0)] {
             assert!((rounded_up(value) / rounded - 1.0).abs() < 1e-12, "{value}");
         }
     }
@@ -412,10 +357,7 @@ mod tests {
     fn names_and_percentages_are_checked() {
         assert_eq!(Target::new("tau", 1.0).unwrap().parameter, "tau_eps");
         let text = Target::new("nu", 1.0).unwrap_err().to_string();
-        assert!(
-            text.contains("'nu'") && text.contains("mu3, tau_sig"),
-            "{text}"
-        );
+        assert!(text.contains("'nu'") && text.contains("mu3, tau_sig"), "{text}");
         assert!(Target::new("mu1", 0.0).is_err());
     }
 }

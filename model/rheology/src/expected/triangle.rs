@@ -30,9 +30,7 @@ pub fn inverse(
     if condition.is_nan() || condition > CONDITION_MAX {
         return Err(named(&blind));
     }
-    Ok(std::array::from_fn(|i| {
-        inverse[i].map(|value| value / lengths[i])
-    }))
+    Ok(std::array::from_fn(|i| inverse[i].map(|value| value / lengths[i])))
 }
 
 /// Largest singular value of a matrix and its left vector, by power iteration: what the inverse of a
@@ -55,10 +53,8 @@ fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
 }
 
 fn named(blind: &[f64; BODY]) -> String {
-    let names: Vec<&str> = heaviest(blind)
-        .into_iter()
-        .map(|place| PARAMETER_NAMES[place])
-        .collect();
+    let names: Vec<&str> =
+        heaviest(blind).into_iter().map(|place| PARAMETER_NAMES[place]).collect();
     match names.as_slice() {
         [one, other] => format!("{one} from {other}"),
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),

@@ -28,9 +28,7 @@ pub(super) fn fitted(
     let error = truth.map_or(0.0, |truth| {
         let found = report.body.outer.iter().chain(&report.body.linear);
         let exact = truth.outer.iter().chain(&truth.linear);
-        let relative = found
-            .zip(exact)
-            .map(|(found, exact)| (found / exact - 1.0).abs());
+        let relative = found.zip(exact).map(|(found, exact)| (found / exact - 1.0).abs());
         relative.fold(0.0, f64::max)
     });
     // NaN or infinity anywhere in a report is an error without end.

@@ -29,11 +29,7 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
         ("infinite depth at the start", f64::INFINITY, (0.1, 1.0)),
         ("NaN depth in a step", 0.0, (0.1, f64::NAN)),
         ("infinite depth in a step", 0.0, (0.1, f64::INFINITY)),
-        (
-            "minus infinite depth in a step",
-            0.0,
-            (0.1, f64::NEG_INFINITY),
-        ),
+        ("minus infinite depth in a step", 0.0, (0.1, f64::NEG_INFINITY)),
         ("NaN duration of a step", 0.0, (f64::NAN, 1.0)),
         ("infinite duration of a step", 0.0, (f64::INFINITY, 1.0)),
         ("negative duration of a step", 0.0, (-0.1, 1.0)),
@@ -53,11 +49,9 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
         start: 0.0,
         steps: vec![(0.1, 1.0), (0.1, 1.0)],
     };
-    for (name, value) in [
-        ("NaN", f64::NAN),
-        ("infinite", f64::INFINITY),
-        ("negative infinite", f64::NEG_INFINITY),
-    ] {
+    for (name, value) in
+        [("NaN", f64::NAN), ("infinite", f64::INFINITY), ("negative infinite", f64::NEG_INFINITY)]
+    {
         let mut model = usual();
         model.linear[0] = value;
         rows.push(plain(&format!("{name} coefficient")).put_to(&FamilyBody(model)));
@@ -76,12 +70,12 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
             rows.push(plain(&name).put_to(&FamilyBody(model)));
         }
     }
-    rows.extend(
-        bad_records(|samples| fitted(Arc::clone(family), samples, None)).map(|(case, answer)| {
+    rows.extend(bad_records(|samples| fitted(Arc::clone(family), samples, None)).map(
+        |(case, answer)| {
             let subject = format!("fit of {}", family.key());
             judge([GROUP, case], &subject, Expected::Refusal, 0.0, answer)
-        }),
-    );
+        },
+    ));
     rows
 }
 
@@ -98,9 +92,8 @@ fn after_bad_steps(family: &dyn Family) -> Row {
         }
 
         fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
-            let mut body = (self.0.0)
-                .at_rest_from(Depth(path.start))
-                .map_err(|err| err.to_string())?;
+            let mut body =
+                (self.0.0).at_rest_from(Depth(path.start)).map_err(|err| err.to_string())?;
             let mut forces = Vec::new();
             for &(dt, depth) in &path.steps {
                 for (bad_dt, bad_depth) in [(0.1, f64::NAN), (-1.0, 3.0), (1e-300, 1e300)] {
@@ -136,23 +129,16 @@ fn bad_records(
             }
         }),
         ("a NaN depth", |all| all[7].depth = Depth(f64::NAN)),
-        ("an infinite depth", |all| {
-            all[7].depth = Depth(f64::INFINITY)
-        }),
+        ("an infinite depth", |all| all[7].depth = Depth(f64::INFINITY)),
         ("a NaN force", |all| all[7].force = Newtons(f64::NAN)),
-        ("an infinite force", |all| {
-            all[7].force = Newtons(f64::NEG_INFINITY)
-        }),
+        ("an infinite force", |all| all[7].force = Newtons(f64::NEG_INFINITY)),
         ("a NaN uncertainty", |all| all[7].sigma = Newtons(f64::NAN)),
         ("an uncertainty of zero", |all| all[7].sigma = Newtons(0.0)),
-        ("a negative uncertainty", |all| {
-            all[7].sigma = Newtons(-0.02)
-        }),
+        ("a negative uncertainty", |all| all[7].sigma = Newtons(-0.02)),
         ("a duplicate time", |all| all[7].t = all[6].t),
         ("a backward time", |all| all.swap(6, 7)),
         ("every force censored", |all| {
-            all.iter_mut()
-                .for_each(|one| one.sigma = Newtons(f64::INFINITY));
+            all.iter_mut().for_each(|one| one.sigma = Newtons(f64::INFINITY));
         }),
         ("constant force", |all| {
             all.iter_mut().for_each(|one| one.force = Newtons(1.5));

@@ -64,11 +64,7 @@ fn poke(group: &'static str, case: String, depth: f64, dt: f64) -> PathCase {
         group,
         case,
         start: 0.0,
-        steps: down
-            .chain(hold)
-            .chain(back)
-            .map(|share| (dt, share * depth))
-            .collect(),
+        steps: down.chain(hold).chain(back).map(|share| (dt, share * depth)).collect(),
     }
 }
 
@@ -88,11 +84,9 @@ fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<Row> {
     ] {
         put(case, path(depth, 0.01), subject(1.0, 1.0));
     }
-    for (case, force) in [
-        ("forces of 1e-6 N", 1e-6),
-        ("forces of 1e6 N", 1e6),
-        ("forces of zero", 0.0),
-    ] {
+    for (case, force) in
+        [("forces of 1e-6 N", 1e-6), ("forces of 1e6 N", 1e6), ("forces of zero", 0.0)]
+    {
         put(case, path(20.0, 0.01), subject(1.0, force));
     }
     for (case, at, value) in [
@@ -108,11 +102,9 @@ fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<Row> {
         }
         put(case, path, subject(1.0, 1.0));
     }
-    for (case, dt) in [
-        ("NaN step", f64::NAN),
-        ("infinite step", f64::INFINITY),
-        ("negative step", -0.01),
-    ] {
+    for (case, dt) in
+        [("NaN step", f64::NAN), ("infinite step", f64::INFINITY), ("negative step", -0.01)]
+    {
         put(case, path(20.0, dt), subject(1.0, 1.0));
     }
     for (case, tau) in [

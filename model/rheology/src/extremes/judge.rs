@@ -110,33 +110,25 @@ pub(super) fn judged(
         Answer::Refused(reason) if reason.trim().is_empty() => {
             (Verdict::Wrong, None, "refused without a reason".to_owned())
         }
-        Answer::Refused(reason) if expected == Expected::Number => (
-            Verdict::Wrong,
-            None,
-            format!("refused what has an answer: {reason}"),
-        ),
+        Answer::Refused(reason) if expected == Expected::Number => {
+            (Verdict::Wrong, None, format!("refused what has an answer: {reason}"))
+        }
         Answer::Refused(reason) => (Verdict::Refused, None, reason),
-        Answer::Number { error, .. } if !error.is_finite() => (
-            Verdict::Wrong,
-            None,
-            "the answer is not a finite number".to_owned(),
-        ),
-        Answer::Number { error, .. } if expected == Expected::Refusal => (
-            Verdict::Wrong,
-            Some(error),
-            "a number where there is no answer".to_owned(),
-        ),
+        Answer::Number { error, .. } if !error.is_finite() => {
+            (Verdict::Wrong, None, "the answer is not a finite number".to_owned())
+        }
+        Answer::Number { error, .. } if expected == Expected::Refusal => {
+            (Verdict::Wrong, Some(error), "a number where there is no answer".to_owned())
+        }
         Answer::Number { error, .. } if error <= tolerance => {
             (Verdict::Right, Some(error), String::new())
         }
         Answer::Number { error, warnings } if !warnings.is_empty() => {
             (Verdict::Flagged, Some(error), warnings.join("; "))
         }
-        Answer::Number { error, .. } => (
-            Verdict::Wrong,
-            Some(error),
-            format!("off by {error:.1e}, more than {tolerance:.0e}"),
-        ),
+        Answer::Number { error, .. } => {
+            (Verdict::Wrong, Some(error), format!("off by {error:.1e}, more than {tolerance:.0e}"))
+        }
     };
     Row {
         group,
@@ -245,10 +237,7 @@ impl PathCase {
                 warnings: Vec::new(),
             },
             // Judged as a number where there is none.
-            (Ok(_), Err(_)) => Answer::Number {
-                error: 0.0,
-                warnings: Vec::new(),
-            },
+            (Ok(_), Err(_)) => Answer::Number { error: 0.0, warnings: Vec::new() },
         };
         judged(
             self.group,
@@ -282,9 +271,7 @@ impl PathCase {
             },
         };
         for (index, &(dt, depth)) in self.steps.iter().enumerate() {
-            let exact = reference
-                .step(Depth(depth), Seconds(dt))
-                .map_err(|err| err.to_string())?;
+            let exact = reference.step(Depth(depth), Seconds(dt)).map_err(|err| err.to_string())?;
             truth.peak = truth.peak.max(exact.0.abs());
             if let Some(&force) = forces.get(index) {
                 let miss = reference.error_of(Newtons(force)).abs();

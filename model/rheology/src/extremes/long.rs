@@ -65,10 +65,7 @@ pub(super) fn scheme_parts(extent: Extent) -> Vec<Part> {
             Extent::Whole | Extent::Soak => &LONGEST,
         };
         rows(cases, &subject, progress, |samples, dt, progress| {
-            let start = Start {
-                depth: 0.0,
-                force: None,
-            };
+            let start = Start { depth: 0.0, force: None };
             let mut exact = Exact::<f64, 3>::at_any_step(&body, dt, start);
             let step = |depth| exact.step(depth).map(Newtons);
             drift(&[body.term()], samples, dt, step, progress)
@@ -124,16 +121,9 @@ fn drift(
             .map_err(|err| err.to_string())?;
         peak = peak.max(exact.0.abs());
         let miss = reference.error_of(force).abs();
-        worst = if force.is_finite() {
-            worst.max(miss)
-        } else {
-            f64::INFINITY
-        };
+        worst = if force.is_finite() { worst.max(miss) } else { f64::INFINITY };
         done += leg;
         progress(done as f64 / samples as f64);
     }
-    Ok(Answer::Number {
-        error: worst / peak,
-        warnings: Vec::new(),
-    })
+    Ok(Answer::Number { error: worst / peak, warnings: Vec::new() })
 }

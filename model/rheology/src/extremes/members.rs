@@ -22,24 +22,16 @@ pub fn member(family: &dyn Family, tau: f64, depth: f64, force: f64) -> Model {
         OuterRange::Share(low, high) => 0.5 * (low + high),
     });
     let outer: Vec<f64> = outer.collect();
-    let linear = family
-        .linear()
-        .into_iter()
-        .enumerate()
-        .map(|(index, (name, unit))| {
-            let (_, below) = unit.split_once("/mm").unwrap_or((unit, "^0"));
-            let power: i32 = match below.strip_prefix('^') {
-                Some(power) => power.parse().unwrap_or(1),
-                None => 1,
-            };
-            // Members of a family differ, or columns alike would hide behind each other.
-            let size = force / depth.powi(power) / (index + 1) as f64;
-            let sign = if name == "mu2" { -1.0 } else { 1.0 };
-            sign * size * if unit.contains("*s") { tau } else { 1.0 }
-        });
-    Model {
-        family: family.key(),
-        outer,
-        linear: linear.collect(),
-    }
+    let linear = family.linear().into_iter().enumerate().map(|(index, (name, unit))| {
+        let (_, below) = unit.split_once("/mm").unwrap_or((unit, "^0"));
+        let power: i32 = match below.strip_prefix('^') {
+            Some(power) => power.parse().unwrap_or(1),
+            None => 1,
+        };
+        // Members of a family differ, or columns alike would hide behind each other.
+        let size = force / depth.powi(power) / (index + 1) as f64;
+        let sign = if name == "mu2" { -1.0 } else { 1.0 };
+        sign * size * if unit.contains("*s") { tau } else { 1.0 }
+    });
+    Model { family: family.key(), outer, linear: linear.collect() }
 }

@@ -55,11 +55,7 @@ impl Part {
         subject: String,
         run: impl Fn(&mut dyn FnMut(f64)) -> Vec<Row> + 'static,
     ) -> Self {
-        Self {
-            group,
-            subject,
-            run: Box::new(run),
-        }
+        Self { group, subject, run: Box::new(run) }
     }
 
     /// Its rows; `progress` hears the share done, 0 to 1.
@@ -75,19 +71,10 @@ pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownF
         None => all(),
     };
     let mut parts = Vec::new();
-    for group in [
-        tau_step::parts,
-        path::parts,
-        scale::parts,
-        input::parts,
-        records::parts,
-        long::parts,
-    ] {
-        parts.extend(
-            families
-                .iter()
-                .flat_map(|family| group(extent, &family.key())),
-        );
+    for group in
+        [tau_step::parts, path::parts, scale::parts, input::parts, records::parts, long::parts]
+    {
+        parts.extend(families.iter().flat_map(|family| group(extent, &family.key())));
     }
     // What is of no family is left out where one was asked for.
     if family.is_none() {

@@ -49,11 +49,7 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
     };
     for &depth in depths {
         let depth_mm = 10f64.powi(depth);
-        cases.push(ramp(
-            format!("1 mm/s to 1e{depth} mm and 1 s of hold"),
-            1.0,
-            depth_mm,
-        ));
+        cases.push(ramp(format!("1 mm/s to 1e{depth} mm and 1 s of hold"), 1.0, depth_mm));
     }
     cases.push(still("depth 0", 0.0));
     cases.push(still("-1e3 mm, far out of contact", -1e3));
@@ -67,12 +63,7 @@ fn ramp(case: String, speed: f64, depth: f64) -> PathCase {
     let down = (1..=STEPS).map(|i| (dt, depth * f64::from(i) / f64::from(STEPS)));
     let hold = (0..STEPS).map(|_| (1.0 / f64::from(STEPS), depth));
     let out = [(2.0 * depth / speed, -depth), (0.5, -depth)];
-    PathCase {
-        group: GROUP,
-        case,
-        start: 0.0,
-        steps: down.chain(hold).chain(out).collect(),
-    }
+    PathCase { group: GROUP, case, start: 0.0, steps: down.chain(hold).chain(out).collect() }
 }
 
 fn still(case: &str, depth: f64) -> PathCase {
@@ -97,11 +88,7 @@ fn special() -> Vec<PathCase> {
         crossings.extend([(0.01, 1e-3), (0.01, -1e-3)]);
     }
     vec![
-        path(
-            "touches at the last 1e-12 of a step",
-            -1.0,
-            &[(1.0, 1e-12), (1.0, 2e-12)],
-        ),
+        path("touches at the last 1e-12 of a step", -1.0, &[(1.0, 1e-12), (1.0, 2e-12)]),
         path(
             "leaves at the last 1e-12 of a step",
             5.0,
@@ -113,11 +100,7 @@ fn special() -> Vec<PathCase> {
             &[(1.0, 0.0), (1.0, 4.0), (1.0, 0.0), (1.0, -4.0)],
         ),
         path("crosses the surface sixteen times", -1e-3, &crossings),
-        path(
-            "1e3 mm in one step and back",
-            -1e3,
-            &[(1.0, 1e3), (1.0, -1e3), (1.0, 1e3)],
-        ),
+        path("1e3 mm in one step and back", -1e3, &[(1.0, 1e3), (1.0, -1e3), (1.0, 1e3)]),
         path(
             "a move of 1e-12 mm at 10 mm",
             10.0,
@@ -126,22 +109,12 @@ fn special() -> Vec<PathCase> {
         path(
             "a jump of 1e-9 mm at 1e3 mm and a jump back",
             1e3,
-            &[
-                (0.0, 1_000.000_000_001),
-                (1.0, 1_000.000_000_001),
-                (0.0, 1e3),
-            ],
+            &[(0.0, 1_000.000_000_001), (1.0, 1_000.000_000_001), (0.0, 1e3)],
         ),
         path(
             "a jump to 10 mm, 1 s, a jump out",
             -1.0,
-            &[
-                (0.0, 10.0),
-                (0.5, 10.0),
-                (0.5, 10.0),
-                (0.0, -1.0),
-                (1.0, -1.0),
-            ],
+            &[(0.0, 10.0), (0.5, 10.0), (0.5, 10.0), (0.0, -1.0), (1.0, -1.0)],
         ),
         path(
             "steps of 1e-9 s and of 1e3 s by turns",

@@ -78,20 +78,13 @@ fn path(count: u32) -> Vec<(f64, f64)> {
         let back = 10.0 * (t - 20.0).clamp(0.0, 1.0);
         4.0 * t.min(5.0) - back
     };
-    (0..count)
-        .map(|i| 25.0 * f64::from(i) / f64::from(count - 1))
-        .map(|t| (t, at(t)))
-        .collect()
+    (0..count).map(|i| 25.0 * f64::from(i) / f64::from(count - 1)).map(|t| (t, at(t))).collect()
 }
 
 /// A record of the thesis body along that path.
 pub(super) fn ramp_hold(count: u32) -> Vec<FitSample> {
     let plan = Plan::new("", Expected::Number, path(count));
-    plan.samples(|path| {
-        thesis(ModifiedKelvin::THESIS)
-            .along(path.iter().copied())
-            .ok()
-    })
+    plan.samples(|path| thesis(ModifiedKelvin::THESIS).along(path.iter().copied()).ok())
 }
 
 /// A thesis body as a model of the third order.
@@ -107,24 +100,16 @@ fn thesis(body: ModifiedKelvin) -> Model {
 fn plans(extent: Extent) -> Vec<Plan> {
     use Expected::{Either, Number, Refusal};
     let full = || path(161);
-    let ramp: Vec<(f64, f64)> = (0..100)
-        .map(|i| f64::from(i) * 0.05)
-        .map(|t| (t, 4.0 * t))
-        .collect();
-    let stairs: Vec<(f64, f64)> = full()
-        .chunks(2)
-        .flat_map(|pair| pair.iter().map(|&(t, _)| (t, pair[0].1)))
-        .collect();
+    let ramp: Vec<(f64, f64)> =
+        (0..100).map(|i| f64::from(i) * 0.05).map(|t| (t, 4.0 * t)).collect();
+    let stairs: Vec<(f64, f64)> =
+        full().chunks(2).flat_map(|pair| pair.iter().map(|&(t, _)| (t, pair[0].1))).collect();
     let mut plans = vec![
         Plan::new("0 samples", Refusal, Vec::new()),
         Plan::new("1 sample", Refusal, path(161)[..1].to_vec()),
         Plan::new("2 samples", Refusal, path(2)),
         Plan::new("5 samples", Either, path(5)),
-        Plan::new(
-            "constant depth",
-            Refusal,
-            (0..100).map(|i| (0.1 * f64::from(i), 8.0)).collect(),
-        ),
+        Plan::new("constant depth", Refusal, (0..100).map(|i| (0.1 * f64::from(i), 8.0)).collect()),
         Plan::new("ramp only", Either, ramp),
         Plan::new("every depth twice", Number, stairs),
         Plan::new("ramp, hold and half back", Number, full()),
@@ -174,21 +159,9 @@ fn plans(extent: Extent) -> Vec<Plan> {
         sized("depths of 1e-6 mm", Number, [1.0, 1e-6, 1.0]),
         sized("depths of 1e3 mm", Number, [1.0, 50.0, 1.0]),
         sized("depths of 1e100 mm", Either, [1.0, 1e100, 1.0]),
-        sized(
-            "relaxation in 1e-9 s, steps of 1e-10 s",
-            Number,
-            [1e-9, 1.0, 1.0],
-        ),
-        sized(
-            "relaxation in 1e4 s, steps of 1e3 s",
-            Number,
-            [1e4, 1.0, 1.0],
-        ),
-        sized(
-            "relaxation in 1e9 s, steps of 1e8 s",
-            Number,
-            [1e9, 1.0, 1.0],
-        ),
+        sized("relaxation in 1e-9 s, steps of 1e-10 s", Number, [1e-9, 1.0, 1.0]),
+        sized("relaxation in 1e4 s, steps of 1e3 s", Number, [1e4, 1.0, 1.0]),
+        sized("relaxation in 1e9 s, steps of 1e8 s", Number, [1e9, 1.0, 1.0]),
         sized("relaxation in 1e-100 s", Either, [1e-100, 1.0, 1.0]),
         sized("relaxation in 1e100 s", Either, [1e100, 1.0, 1.0]),
     ]);
@@ -210,21 +183,14 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
                 }
             }
         }
-        rows(plans, &subject, progress, |plan| {
-            family_answer(&family, plan)
-        })
+        rows(plans, &subject, progress, |plan| family_answer(&family, plan))
     })]
 }
 
 fn family_answer(family: &Arc<dyn Family>, plan: &Plan) -> Answer {
     // Relaxation times around a second on the record's scale.
     let first = if times(&**family) > 1 { 0.2 } else { 1.0 };
-    let body = member(
-        &**family,
-        first * plan.time,
-        20.0 * plan.depth,
-        2.0 * plan.force,
-    );
+    let body = member(&**family, first * plan.time, 20.0 * plan.depth, 2.0 * plan.force);
     let samples = plan.samples(|path| body.along(path.iter().copied()).ok());
     fitted(Arc::clone(family), &samples, Some(&body))
 }
@@ -266,13 +232,7 @@ fn rows(
     let rows = plans.iter().enumerate().map(|(index, plan)| {
         let answer = answer(plan);
         progress((index + 1) as f64 / count);
-        judge(
-            [GROUP, plan.case],
-            subject,
-            plan.expected,
-            plan.tolerance,
-            answer,
-        )
+        judge([GROUP, plan.case], subject, plan.expected, plan.tolerance, answer)
     });
     rows.collect()
 }

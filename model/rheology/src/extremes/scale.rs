@@ -61,19 +61,13 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
         Extent::Whole | Extent::Soak => &[-300, -100, -30, 30, 100, 300],
     };
     for length in lengths {
-        cases.push((
-            poke(format!("depths of 1e{length} mm"), 10f64.powi(*length), 0.1),
-            usual(),
-        ));
+        cases.push((poke(format!("depths of 1e{length} mm"), 10f64.powi(*length), 0.1), usual()));
         let time = 10f64.powi(*length);
         cases.push((
             poke(format!("steps and times of 1e{length} s"), 20.0, 0.1 * time),
             member(family, time, 20.0, 2.0),
         ));
-        cases.push((
-            poke(format!("steps of 1e{length} s, times of 1 s"), 20.0, time),
-            usual(),
-        ));
+        cases.push((poke(format!("steps of 1e{length} s, times of 1 s"), 20.0, time), usual()));
         cases.push((
             poke(format!("steps of 0.1 s, times of 1e{length} s"), 20.0, 0.1),
             member(family, time, 20.0, 2.0),
@@ -81,11 +75,7 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
     }
     cases.push((poke("subnormal depths".to_owned(), SUBNORMAL, 0.1), usual()));
     cases.push((poke("subnormal steps".to_owned(), 20.0, SUBNORMAL), usual()));
-    let gentle = poke(
-        "subnormal steps and depths".to_owned(),
-        20.0 * SUBNORMAL,
-        SUBNORMAL,
-    );
+    let gentle = poke("subnormal steps and depths".to_owned(), 20.0 * SUBNORMAL, SUBNORMAL);
     cases.push((gentle, usual()));
     cases.push((
         poke("subnormal relaxation times".to_owned(), 20.0, 0.1),

@@ -22,9 +22,7 @@ impl Subject for FamilyBody {
 
     fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
         let model = self.0.clone().checked().map_err(|err| err.to_string())?;
-        let mut body = model
-            .at_rest_from(Depth(path.start))
-            .map_err(|err| err.to_string())?;
+        let mut body = model.at_rest_from(Depth(path.start)).map_err(|err| err.to_string())?;
         let forces = path.steps.iter().map(|&(dt, depth)| {
             let force = body.step(Depth(depth), Seconds(dt));
             force.map(|force| force.0).map_err(|err| err.to_string())
@@ -56,9 +54,7 @@ impl SchemeBody {
         let depths = std::iter::once(path.start).chain(path.steps.iter().map(|step| step.1));
         let depths: Vec<R> = depths.map(R::of).collect();
         let mut forces = Vec::new();
-        self.scheme
-            .respond(&self.body, dt, &depths, &mut forces)
-            .map_err(|err| err.to_string())?;
+        self.scheme.respond(&self.body, dt, &depths, &mut forces).map_err(|err| err.to_string())?;
         Ok(forces.iter().skip(1).map(|force| force.to_f64()).collect())
     }
 }
@@ -100,8 +96,6 @@ impl Subject for SchemeBody {
     /// Beyond its limit of stability.
     fn may_refuse(&self, path: &PathCase) -> bool {
         let h = path.steps.first().map_or(0.0, |step| step.0) / self.body.tau_eps;
-        self.scheme
-            .stability_limit()
-            .is_some_and(|limit| h >= limit)
+        self.scheme.stability_limit().is_some_and(|limit| h >= limit)
     }
 }

@@ -21,9 +21,7 @@ const MANY: usize = 12;
 
 pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
     let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| {
-        rows(extent, &key, progress)
-    })]
+    vec![Part::new(GROUP, key.clone(), move |progress| rows(extent, &key, progress))]
 }
 
 /// Powers of ten of relaxation times and of steps.

@@ -46,10 +46,7 @@ impl Family for ExponentialKelvin {
     }
 
     fn outer(&self) -> Vec<Outer> {
-        vec![
-            Outer::new("tau_eps", "s", OuterRange::Time),
-            Outer::new("B", "1/mm", CURVATURE),
-        ]
+        vec![Outer::new("tau_eps", "s", OuterRange::Time), Outer::new("B", "1/mm", CURVATURE)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {

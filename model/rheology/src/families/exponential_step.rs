@@ -38,11 +38,7 @@ pub(super) fn chi_omega(b: f64, r: f64) -> (f64, f64) {
         r * (-r).exp()
     };
     // Where `b` is small, `r` is not and `r e^b - r - b psi_0` keeps its digits.
-    let omega = if b.abs() < 0.5 {
-        (r * b.exp_m1() - b * psi_0) / sum
-    } else {
-        chi - psi_0
-    };
+    let omega = if b.abs() < 0.5 { (r * b.exp_m1() - b * psi_0) / sum } else { chi - psi_0 };
     (chi, omega)
 }
 

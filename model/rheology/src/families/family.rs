@@ -103,11 +103,7 @@ pub struct Outer {
 
 impl Outer {
     pub(super) fn new(name: impl Into<String>, unit: &'static str, range: OuterRange) -> Self {
-        Self {
-            name: name.into(),
-            unit,
-            range,
-        }
+        Self { name: name.into(), unit, range }
     }
 }
 

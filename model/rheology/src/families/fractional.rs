@@ -31,9 +31,7 @@ const DECADES: f64 = 12.0;
 
 impl Default for FractionalZener {
     fn default() -> Self {
-        Self {
-            digits: FRACTIONAL_DIGITS,
-        }
+        Self { digits: FRACTIONAL_DIGITS }
     }
 }
 
@@ -123,11 +121,8 @@ impl Family for FractionalZener {
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {
-        (self.digits > COARSE_DIGITS).then(|| {
-            Arc::new(Self {
-                digits: COARSE_DIGITS,
-            }) as Arc<dyn Family>
-        })
+        (self.digits > COARSE_DIGITS)
+            .then(|| Arc::new(Self { digits: COARSE_DIGITS }) as Arc<dyn Family>)
     }
 
     fn is_non_negative(&self, coefficient: usize) -> bool {
@@ -135,10 +130,6 @@ impl Family for FractionalZener {
     }
 
     fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter::new(
-            "k_instant",
-            linear[0] + linear[1],
-            "N/mm",
-        )]
+        vec![ModelParameter::new("k_instant", linear[0] + linear[1], "N/mm")]
     }
 }

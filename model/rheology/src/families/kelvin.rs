@@ -38,10 +38,7 @@ impl Family for Kelvin {
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {
         vec![
-            (
-                "voigt".into(),
-                "relaxation of the spring beside the dashpot",
-            ),
+            ("voigt".into(), "relaxation of the spring beside the dashpot"),
             ("maxwell".into(), "a spring that holds"),
         ]
     }

@@ -21,11 +21,7 @@ pub struct ModelParameter {
 
 impl ModelParameter {
     pub(super) fn new(name: &str, value: f64, unit: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            value,
-            unit: unit.to_owned(),
-        }
+        Self { name: name.to_owned(), value, unit: unit.to_owned() }
     }
 }
 
@@ -90,9 +86,8 @@ impl Model {
         let (outer, linear) = (family.outer(), family.linear());
         if outer.len() != self.outer.len() || linear.len() != self.linear.len() {
             let names = outer.iter().map(|one| one.name.clone());
-            let names: Vec<String> = names
-                .chain(linear.iter().map(|(name, _)| name.clone()))
-                .collect();
+            let names: Vec<String> =
+                names.chain(linear.iter().map(|(name, _)| name.clone())).collect();
             return Err(ModelError::Count {
                 family: self.family.clone(),
                 wanted: outer.len() + linear.len(),
@@ -122,10 +117,7 @@ impl Model {
     /// Its terms, those of one relaxation time joined, ready for any depth history.
     pub fn terms(&self) -> Result<Vec<Relaxation>, ModelError> {
         let family = by_key(&self.family)?;
-        Ok(joined(
-            &family.columns(&self.outer),
-            self.linear.iter().copied(),
-        ))
+        Ok(joined(&family.columns(&self.outer), self.linear.iter().copied()))
     }
 
     /// The body, relaxed with the probe at `depth`.
@@ -183,10 +175,7 @@ pub(crate) fn joined(
     for (column, coefficient) in columns.iter().zip(linear) {
         for term in column {
             let term = term.scaled(coefficient);
-            match joined
-                .iter_mut()
-                .find_map(|one| one.plus(&term).map(|sum| (one, sum)))
-            {
+            match joined.iter_mut().find_map(|one| one.plus(&term).map(|sum| (one, sum))) {
                 Some((one, sum)) => *one = sum,
                 None => joined.push(term),
             }
@@ -224,11 +213,6 @@ impl Body {
 impl dyn Family + '_ {
     /// A model of this family.
     pub fn model(&self, outer: &[f64], linear: &[f64]) -> Result<Model, ModelError> {
-        Model {
-            family: self.key(),
-            outer: outer.to_vec(),
-            linear: linear.to_vec(),
-        }
-        .checked()
+        Model { family: self.key(), outer: outer.to_vec(), linear: linear.to_vec() }.checked()
     }
 }

@@ -84,18 +84,13 @@ impl Family for Prony {
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
-        (0..=self.terms)
-            .map(|i| (format!("k_{i}"), "N/mm"))
-            .collect()
+        (0..=self.terms).map(|i| (format!("k_{i}"), "N/mm")).collect()
     }
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
         let spring = Drive::power(1, 1.0);
         let relaxing = outer.iter().map(|&tau| Relaxation::maxwell(spring, tau));
-        std::iter::once(Relaxation::spring(spring))
-            .chain(relaxing)
-            .map(|term| vec![term])
-            .collect()
+        std::iter::once(Relaxation::spring(spring)).chain(relaxing).map(|term| vec![term]).collect()
     }
 
     fn is_non_negative(&self, coefficient: usize) -> bool {

@@ -16,10 +16,7 @@ pub(super) fn gauss_legendre(count: usize) -> (Vec<f64>, Vec<f64>) {
             let (mut before, mut value) = (1.0, x);
             for k in 2..=count {
                 let k = k as f64;
-                (before, value) = (
-                    value,
-                    ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k,
-                );
+                (before, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k);
             }
             slope = count as f64 * (x * value - before) / (x * x - 1.0);
             x -= value / slope;
@@ -39,16 +36,8 @@ mod tests {
         for count in [2, 5, 12, 31] {
             let (nodes, weights) = gauss_legendre(count);
             for degree in 0..2 * count as i32 {
-                let sum: f64 = nodes
-                    .iter()
-                    .zip(&weights)
-                    .map(|(x, w)| w * x.powi(degree))
-                    .sum();
-                let exact = if degree % 2 == 0 {
-                    2.0 / f64::from(degree + 1)
-                } else {
-                    0.0
-                };
+                let sum: f64 = nodes.iter().zip(&weights).map(|(x, w)| w * x.powi(degree)).sum();
+                let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
                 assert!((sum - exact).abs() < 3e-15, "{count} {degree}: {sum}");
             }
         }

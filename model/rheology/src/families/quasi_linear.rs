@@ -29,9 +29,7 @@ const COARSE_NODES: usize = 6;
 
 impl Default for QuasiLinear {
     fn default() -> Self {
-        Self {
-            nodes: QUASI_LINEAR_NODES,
-        }
+        Self { nodes: QUASI_LINEAR_NODES }
     }
 }
 
@@ -75,10 +73,7 @@ impl Family for QuasiLinear {
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {
         vec![
-            (
-                "exponential".into(),
-                "a continuous spread of relaxation times",
-            ),
+            ("exponential".into(), "a continuous spread of relaxation times"),
             ("fractional".into(), "stiffness that grows with force"),
         ]
     }
@@ -107,11 +102,8 @@ impl Family for QuasiLinear {
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {
-        (self.nodes > COARSE_NODES).then(|| {
-            Arc::new(Self {
-                nodes: COARSE_NODES,
-            }) as Arc<dyn Family>
-        })
+        (self.nodes > COARSE_NODES)
+            .then(|| Arc::new(Self { nodes: COARSE_NODES }) as Arc<dyn Family>)
     }
 
     fn is_non_negative(&self, _coefficient: usize) -> bool {

@@ -39,19 +39,13 @@ impl Drive {
     pub fn power(power: usize, coefficient: f64) -> Self {
         let mut powers = [0.0; POWER_MAX];
         powers[power - 1] = coefficient;
-        Self {
-            powers,
-            ..Self::default()
-        }
+        Self { powers, ..Self::default() }
     }
 
     /// `amplitude * (e^(per_mm x) - 1)`.
     #[must_use]
     pub fn exponential(amplitude: f64, per_mm: f64) -> Self {
-        Self {
-            exponential: Some((amplitude, per_mm)),
-            ..Self::default()
-        }
+        Self { exponential: Some((amplitude, per_mm)), ..Self::default() }
     }
 
     /// `coefficient * x^power (1 - x / x_max)`, `power` 1 to 3.
@@ -59,10 +53,7 @@ impl Drive {
     pub fn softening(power: usize, coefficient: f64) -> Self {
         let mut softening = [0.0; SOFTENING_MAX];
         softening[power - 1] = coefficient;
-        Self {
-            softening,
-            ..Self::default()
-        }
+        Self { softening, ..Self::default() }
     }
 
     /// The drive times a number.
@@ -108,9 +99,7 @@ impl Drive {
     #[inline]
     fn softened(&self, x_max: f64) -> impl Iterator<Item = (usize, (f64, f64))> {
         let pairs = self.softening.into_iter().map(move |s| (s, -s / x_max));
-        (1..)
-            .zip(pairs)
-            .filter(|(_, (_, per_mm))| per_mm.is_finite())
+        (1..).zip(pairs).filter(|(_, (_, per_mm))| per_mm.is_finite())
     }
 
     /// Value at depth `x` after `x_max`.
@@ -167,11 +156,7 @@ impl Drive {
         }
         if let Some((amplitude, b)) = self.exponential {
             let turn = b * (x1 - x0);
-            let growth = if turn == 0.0 {
-                1.0
-            } else {
-                turn.exp_m1() / turn
-            };
+            let growth = if turn == 0.0 { 1.0 } else { turn.exp_m1() / turn };
             sum += amplitude * ((b * x0).exp() * growth - 1.0);
         }
         sum
@@ -182,9 +167,7 @@ impl Drive {
         let powers = self.powers.iter().rposition(|value| *value != 0.0);
         // x^j (1 - x / x_max) has one power more.
         let softening = self.softening.iter().rposition(|value| *value != 0.0);
-        powers
-            .map_or(0, |k| k + 1)
-            .max(softening.map_or(0, |j| j + 2))
+        powers.map_or(0, |k| k + 1).max(softening.map_or(0, |j| j + 2))
     }
 
     /// Whether it depends on the greatest depth so far.
@@ -209,21 +192,13 @@ impl Relaxation {
     /// What tends to `elastic` in `tau` seconds when held.
     #[must_use]
     pub fn settling(elastic: Drive, tau: f64) -> Self {
-        Self {
-            tau,
-            elastic,
-            rate: Drive::default(),
-        }
+        Self { tau, elastic, rate: Drive::default() }
     }
 
     /// What moving drives by `rate` and fades in `tau` seconds.
     #[must_use]
     pub fn driven(rate: Drive, tau: f64) -> Self {
-        Self {
-            tau,
-            elastic: Drive::default(),
-            rate,
-        }
+        Self { tau, elastic: Drive::default(), rate }
     }
 
     /// A spring without memory.
@@ -251,11 +226,7 @@ impl Relaxation {
     /// The term times a number.
     #[must_use]
     pub fn scaled(self, by: f64) -> Self {
-        Self {
-            tau: self.tau,
-            elastic: self.elastic.scaled(by),
-            rate: self.rate.scaled(by),
-        }
+        Self { tau: self.tau, elastic: self.elastic.scaled(by), rate: self.rate.scaled(by) }
     }
 
     /// The sum of two terms of one relaxation time, `None` if it is not one term.
@@ -414,9 +385,11 @@ impl Relaxing {
     fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
         if piece.d == 0.0 {
             // Held: no rate, and the elastic part stands still.
-            return self.term.elastic.exponential.map_or(0.0, |(amplitude, b)| {
-                amplitude * (b * piece.x0).exp_m1() * self.psi[0]
-            });
+            return self
+                .term
+                .elastic
+                .exponential
+                .map_or(0.0, |(amplitude, b)| amplitude * (b * piece.x0).exp_m1() * self.psi[0]);
         }
         let r = piece.dt / self.term.tau;
         let mut sum = 0.0;

@@ -88,11 +88,8 @@ impl Response {
     #[must_use]
     pub fn new(columns: &[Vec<Relaxation>], depth: Depth) -> Self {
         let start = depth.0.max(0.0);
-        let terms: Vec<Relaxing> = columns
-            .iter()
-            .flatten()
-            .map(|term| Relaxing::relaxed(*term, start))
-            .collect();
+        let terms: Vec<Relaxing> =
+            columns.iter().flatten().map(|term| Relaxing::relaxed(*term, start)).collect();
         let softens = terms.iter().any(|one| one.softens);
         let owners = columns.iter().enumerate();
         Self {
@@ -161,9 +158,7 @@ impl Response {
         }
         if Pieces::of(from, to) == Pieces::Inside && !self.is_cut_by_softening(x0, x1) {
             let piece = self.piece(x0, x1 - x0, dt);
-            return self
-                .advance(&piece, [from, to, dt])
-                .map(|()| self.arrive(to));
+            return self.advance(&piece, [from, to, dt]).map(|()| self.arrive(to));
         }
         // A cut step either happens whole or not at all; cuts are rare, so a copy is cheap.
         let mut trial = self.clone();
@@ -215,13 +210,7 @@ impl Response {
     }
 
     fn piece(&self, x0: f64, d: f64, dt: f64) -> Piece {
-        Piece {
-            x0,
-            d,
-            dt,
-            x_max: self.depth_max,
-            primary: d >= 0.0 && x0 >= self.depth_max,
-        }
+        Piece { x0, d, dt, x_max: self.depth_max, primary: d >= 0.0 && x0 >= self.depth_max }
     }
 
     /// The parts of a step, in depth in contact and time.
@@ -269,11 +258,7 @@ mod tests {
     fn softening_maxwell(softens: bool) -> Response {
         let spring = Drive {
             powers: [0.2, 0.01, 0.0, 0.0, 0.0],
-            softening: if softens {
-                [-0.1, 0.004, -1e-4]
-            } else {
-                [0.0; 3]
-            },
+            softening: if softens { [-0.1, 0.004, -1e-4] } else { [0.0; 3] },
             ..Drive::default()
         };
         Response::new(&[vec![Relaxation::maxwell(spring, 3.0)]], Depth(0.0))
@@ -282,14 +267,7 @@ mod tests {
     /// Two ways of one path: in one step a piece, and in many. Depth over time is the same.
     #[test]
     fn a_rate_that_softens_is_cut_where_the_greatest_depth_is() {
-        let path = [
-            (2.0, 8.0),
-            (1.0, 3.0),
-            (1.5, -1.0),
-            (2.5, 12.0),
-            (1.0, 12.0),
-            (0.5, 5.0),
-        ];
+        let path = [(2.0, 8.0), (1.0, 3.0), (1.5, -1.0), (2.5, 12.0), (1.0, 12.0), (0.5, 5.0)];
         for parts in [3u32, 64] {
             let (mut whole, mut cut) = (softening_maxwell(true), softening_maxwell(true));
             let mut before = 0.0;

@@ -54,11 +54,7 @@ impl Stretched {
         // The real part of w stays positive up to +-i pi / (2 p), that of e^u up to +-i pi / 2, and near phi = pi w
         // grows like a power 1 / (1 - beta) of the distance. A rule errs by exp(-2 pi width / step).
         let step = 2.0 * PI * (0.5 * PI / p).min(0.5 * PI) / accuracy;
-        let angles = angles(
-            beta,
-            2.0 * PI * (0.5 * PI * (1.0 - beta)) / accuracy,
-            accuracy,
-        );
+        let angles = angles(beta, 2.0 * PI * (0.5 * PI * (1.0 - beta)) / accuracy, accuracy);
         // K ends where the smallest w, at phi = 0, is large, and falls like exp(-beta u).
         let least = (1.0 - beta).ln() + p * beta.ln();
         let first = ((least - (accuracy + 4.0).ln()) / (p * step)).floor() as i32;
@@ -158,11 +154,7 @@ impl Family for Stretched {
     }
 
     fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter::new(
-            "k_instant",
-            linear[0] + linear[1],
-            "N/mm",
-        )]
+        vec![ModelParameter::new("k_instant", linear[0] + linear[1], "N/mm")]
     }
 }
 
@@ -179,9 +171,7 @@ mod tests {
                 // Twelve decades of time, but those that are lumped at the ends.
                 for i in -60..=60 {
                     let s = 10f64.powf(0.1 * f64::from(i));
-                    let found = spectrum
-                        .iter()
-                        .map(|(u, share)| share * (-s * u.exp()).exp());
+                    let found = spectrum.iter().map(|(u, share)| share * (-s * u.exp()).exp());
                     let miss = found.sum::<f64>() - (-s.powf(beta)).exp();
                     let allowed = 10f64.powi(-(digits as i32));
                     assert!(miss.abs() < allowed, "{digits} {beta} {s:e}: {miss:e}");
@@ -199,9 +189,7 @@ mod tests {
             for i in 0..=800 {
                 let beta = 0.1 + 0.001 * f64::from(i);
                 let spectrum = family.spectrum(beta);
-                let shares = spectrum
-                    .iter()
-                    .map(|(u, share)| share * (-s * u.exp()).exp());
+                let shares = spectrum.iter().map(|(u, share)| share * (-s * u.exp()).exp());
                 let off = shares.sum::<f64>() - (-s.powf(beta)).exp();
                 let moved = (off - before.unwrap_or(off)).abs();
                 assert!(moved < 4e-5, "{beta} {s}: {moved:e}");

@@ -64,11 +64,7 @@ pub fn by_key(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
     };
     found.ok_or_else(|| UnknownFamily {
         key: key.to_owned(),
-        known: all()
-            .iter()
-            .map(|family| family.key())
-            .collect::<Vec<_>>()
-            .join(", "),
+        known: all().iter().map(|family| family.key()).collect::<Vec<_>>().join(", "),
     })
 }
 
@@ -87,24 +83,12 @@ mod tests {
             }
         }
         // Keys of families that are compared only where somebody names them.
-        for key in [
-            "prony-1",
-            "prony-40",
-            "unloading-1",
-            "fung-8",
-            "fractional-12",
-        ] {
+        for key in ["prony-1", "prony-40", "unloading-1", "fung-8", "fractional-12"] {
             assert_eq!(by_key(key).unwrap().key(), key);
         }
-        for key in [
-            "", "voigt-1", "series", "series-0", "series-x", "prony-41", "fung-0",
-        ] {
+        for key in ["", "voigt-1", "series", "series-0", "series-x", "prony-41", "fung-0"] {
             let refused = by_key(key).unwrap_err();
-            assert!(
-                refused
-                    .known
-                    .starts_with("voigt, maxwell, kelvin, series-1")
-            );
+            assert!(refused.known.starts_with("voigt, maxwell, kelvin, series-1"));
         }
     }
 }

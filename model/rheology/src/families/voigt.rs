@@ -46,10 +46,7 @@ impl Family for Voigt {
 
     fn columns(&self, _outer: &[f64]) -> Vec<Vec<Relaxation>> {
         let dashpot = Relaxation::driven(Drive::power(1, 1.0), 0.0);
-        vec![
-            vec![Relaxation::spring(Drive::power(1, 1.0))],
-            vec![dashpot],
-        ]
+        vec![vec![Relaxation::spring(Drive::power(1, 1.0))], vec![dashpot]]
     }
 }
 
@@ -69,10 +66,7 @@ mod tests {
                 let force = body.step(Depth(depth), Seconds(dt)).unwrap().0;
                 let exact = 0.2 * depth + 0.15 * (depth - before) / dt;
                 // A few roundings of the largest term.
-                assert!(
-                    (force - exact).abs() <= 1e-15 * (1.0 + 1.0 / dt),
-                    "{dt} {depth}"
-                );
+                assert!((force - exact).abs() <= 1e-15 * (1.0 + 1.0 / dt), "{dt} {depth}");
                 before = depth;
             }
         }

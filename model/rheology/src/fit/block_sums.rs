@@ -49,11 +49,7 @@ impl NoiseSums {
     pub fn add(&mut self, columns: &[Lane], samples: &[FitSample]) {
         let count = samples.len();
         // The walk visits the first sample alone; it joins the first block.
-        let part = if count == 1 {
-            1
-        } else {
-            self.length.min(LANES)
-        };
+        let part = if count == 1 { 1 } else { self.length.min(LANES) };
         let mut start = 0;
         while start < count {
             let end = (start + part).min(count);

@@ -57,10 +57,7 @@ impl Fitted<'_> {
             .map(|record| self.residual_source(&uncertainty, record))
             .collect();
         if let Some(short) = sources.iter().find(|source| source.blocks() < BLOCKS_MIN) {
-            return Err(FitError::TooFewBlocks {
-                blocks: short.blocks(),
-                needed: BLOCKS_MIN,
-            });
+            return Err(FitError::TooFewBlocks { blocks: short.blocks(), needed: BLOCKS_MIN });
         }
         let free: Vec<usize> = (0..self.system.layout().count())
             .filter(|&k| self.system.fixed(record, k).is_none())
@@ -103,9 +100,7 @@ impl Fitted<'_> {
     /// Model and residuals of a record, the latter in units of each sample's sigma and widened by
     /// what the fit has taken out of them.
     fn residual_source(&self, uncertainty: &Uncertainty, record: usize) -> Residuals {
-        let Record {
-            samples, measured, ..
-        } = self.system.records[record];
+        let Record { samples, measured, .. } = self.system.records[record];
         let point = &self.refined.points[record];
         let scale = self.system.scale(&point.outer);
         let model = self.system.source.forces(samples, scale, point);
@@ -123,22 +118,14 @@ impl Fitted<'_> {
         let white = uncertainty.scatter.unwrap_or(0.0).powi(2);
         let effective = memory
             .filter(|memory| memory.long_run() > 0.0)
-            .map_or(measured as f64, |memory| {
-                measured as f64 * white / memory.long_run()
-            })
+            .map_or(measured as f64, |memory| measured as f64 * white / memory.long_run())
             .clamp(1.0, measured as f64);
         let taken = self.system.unknowns.len() as f64;
         let widened = (effective / (effective - taken).max(1.0)).sqrt();
-        residuals
-            .iter_mut()
-            .for_each(|residual| *residual *= widened);
+        residuals.iter_mut().for_each(|residual| *residual *= widened);
         // The cube root of the count is the usual length for noise without memory.
         let length = (MEMORIES * remembered).max((measured as f64).cbrt()) as usize;
-        Residuals {
-            model,
-            length: length.clamp(1, residuals.len().max(1)),
-            residuals,
-        }
+        Residuals { model, length: length.clamp(1, residuals.len().max(1)), residuals }
     }
 }
 
@@ -169,10 +156,7 @@ impl Residuals {
                 }
                 let residual = self.residuals[at] * sample.sigma.0;
                 (at, left) = (at + 1, left - 1);
-                FitSample {
-                    force: Newtons(model + residual),
-                    ..*sample
-                }
+                FitSample { force: Newtons(model + residual), ..*sample }
             })
             .collect()
     }

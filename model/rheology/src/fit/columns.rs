@@ -232,11 +232,7 @@ impl Source {
         slopes: &[Slope],
     ) -> Option<Factor> {
         if self.is_fast() && slopes.is_empty() {
-            return Some(design_blocks::thin_factor(
-                blocks,
-                scale,
-                point.outer.values[0],
-            ));
+            return Some(design_blocks::thin_factor(blocks, scale, point.outer.values[0]));
         }
         let width = self.layout.linear_count() + slopes.len() + 1;
         let mut triangle = Triangle::new(width);
@@ -286,10 +282,7 @@ impl Source {
         };
         let columns = self.family.columns(values);
         let coefficients = || point.at[..self.layout.coefficients].iter().copied();
-        let initial = self
-            .layout
-            .initial()
-            .map_or(0.0, |k| point.at[k - self.layout.outers]);
+        let initial = self.layout.initial().map_or(0.0, |k| point.at[k - self.layout.outers]);
         let mut bodies = vec![body(&columns, contact)];
         let mut fading = vec![self.family.fading(values)];
         for slope in slopes {
@@ -373,9 +366,7 @@ impl Moving {
         for body in &mut self.bodies {
             let (depth, dt) = (Depth(block.depth - body.contact), Seconds(block.dt));
             body.values.fill(0.0);
-            let step = body
-                .response
-                .step_mean(depth, dt, block.count, &mut body.values);
+            let step = body.response.step_mean(depth, dt, block.count, &mut body.values);
             step.ok()?;
         }
         self.elapsed += block.dt;

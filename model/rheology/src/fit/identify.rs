@@ -41,9 +41,7 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
     let Some(blind) = triangle.finish().blind(width) else {
         return Ok(());
     };
-    let names = blind
-        .into_iter()
-        .map(|place| name(system, &unknowns[place]));
+    let names = blind.into_iter().map(|place| name(system, &unknowns[place]));
     let names: Vec<String> = names.collect();
     if names.is_empty() {
         return Err(FitError::Overflow);
@@ -51,19 +49,14 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
     let begins = |start: &str| names.iter().any(|name| name.starts_with(start));
     let is_speed = begins("mu1")
         && begins("tau_sig")
-        && names
-            .iter()
-            .all(|name| name.starts_with("mu1") || name.starts_with("tau_sig"));
+        && names.iter().all(|name| name.starts_with("mu1") || name.starts_with("tau_sig"));
     let advice = if is_speed {
         "the depth moves at one speed only; add a hold of about 5 tau or a second speed"
     } else {
         "along this path they change the force in the same way; add a hold of about 5 tau or a \
          second speed, or fix one of them"
     };
-    Err(FitError::Inseparable {
-        names,
-        advice: advice.to_owned(),
-    })
+    Err(FitError::Inseparable { names, advice: advice.to_owned() })
 }
 
 fn name(system: &System<'_>, unknown: &Unknown) -> String {
@@ -101,13 +94,11 @@ fn push_rows(
     let mut row = vec![0.0; unknowns.len() + 1];
     let blocks = &system.records[record].thin.blocks;
     let scale = system.scale(&point.outer);
-    let walked = system
-        .source
-        .redrawn(blocks, scale, point, &slopes, |block, values| {
-            for (slot, place) in row.iter_mut().zip(&places) {
-                *slot = place.map_or(0.0, |k| values[k]);
-            }
-            triangle.push(&row, block.weight);
-        });
+    let walked = system.source.redrawn(blocks, scale, point, &slopes, |block, values| {
+        for (slot, place) in row.iter_mut().zip(&places) {
+            *slot = place.map_or(0.0, |k| values[k]);
+        }
+        triangle.push(&row, block.weight);
+    });
     walked.ok_or(FitError::Overflow)
 }

@@ -60,12 +60,7 @@ pub(super) struct Memory {
 impl Memory {
     /// Noise without memory.
     pub fn none(level: f64) -> Self {
-        Self {
-            level,
-            neighbour: 0.0,
-            forgetting: 0.0,
-            uncertainty: 0.0,
-        }
+        Self { level, neighbour: 0.0, forgetting: 0.0, uncertainty: 0.0 }
     }
 
     /// Variance of a sum over many blocks, for each block.
@@ -116,9 +111,7 @@ pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memo
         let neighbour = neighbour(forgetting, share);
         whitened
             .at(forgetting, neighbour)
-            .map_or(f64::INFINITY, |one| {
-                spare * (one.square / spare).ln() + spare + one.logs
-            })
+            .map_or(f64::INFINITY, |one| spare * (one.square / spare).ln() + spare + one.logs)
     };
     let mut best = (f64::INFINITY, 0.0, 0.0);
     for i in 0..MEMORIES {
@@ -143,19 +136,10 @@ pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memo
     let forgetting = (-(-at[0]).exp()).exp();
     let neighbour = neighbour(forgetting, expit(at[1]));
     let level = whitened.at(forgetting, neighbour)?.square / spare;
-    let found = Memory {
-        level,
-        neighbour,
-        forgetting,
-        uncertainty: uncertainty(at, of, spare),
-    };
+    let found = Memory { level, neighbour, forgetting, uncertainty: uncertainty(at, of, spare) };
     // Residuals that alternate add up to less than independent ones; that is no memory, and no
     // reason for narrower intervals.
-    Some(if found.long_run() > white {
-        found
-    } else {
-        Memory::none(white)
-    })
+    Some(if found.long_run() > white { found } else { Memory::none(white) })
 }
 
 /// Correlation of neighbours: the share that lasts, times the mean of an exponential over two
@@ -164,11 +148,7 @@ fn neighbour(forgetting: f64, share: f64) -> f64 {
     let r = -forgetting.ln();
     // Lag-one correlation of block means of exp(-t): (1 - e^-r)^2 / (2 (r - 1 + e^-r)).
     let lost = -(-r).exp_m1();
-    let within = if r < 1e-3 {
-        r * r * (1.0 - r / 3.0)
-    } else {
-        2.0 * (r - lost)
-    };
+    let within = if r < 1e-3 { r * r * (1.0 - r / 3.0) } else { 2.0 * (r - lost) };
     share * lost * lost / within
 }
 
@@ -261,10 +241,8 @@ struct Whitening {
 impl Whitened {
     fn new(blocks: &Blocks, alone: &[bool]) -> Option<Self> {
         let own = blocks.columns.iter().zip(alone);
-        let own: Vec<&[f64]> = own
-            .filter(|(_, alone)| **alone)
-            .map(|(column, _)| column.as_slice())
-            .collect();
+        let own: Vec<&[f64]> =
+            own.filter(|(_, alone)| **alone).map(|(column, _)| column.as_slice()).collect();
         let columns = orthonormal(&own);
         let columns = &columns[..columns.len().min(COLUMNS_MAX - 1)];
         let count = blocks.residuals.len();
@@ -281,11 +259,7 @@ impl Whitened {
         });
         let places = &blocks.places;
         let is_first = (0..count).map(|b| b == 0 || places[b] != places[b - 1] + 1);
-        Some(Self {
-            is_first: is_first.collect(),
-            rows: rows.collect(),
-            columns: columns.len(),
-        })
+        Some(Self { is_first: is_first.collect(), rows: rows.collect(), columns: columns.len() })
     }
 
     fn spare(&self) -> f64 {
@@ -437,9 +411,5 @@ pub(super) fn inflation(
         uncertain += memory.uncertainty * part * part;
     }
     let inflation = with / without;
-    if inflation.is_finite() {
-        (inflation.max(1.0), uncertain / (with * with))
-    } else {
-        (1.0, 0.0)
-    }
+    if inflation.is_finite() { (inflation.max(1.0), uncertain / (with * with)) } else { (1.0, 0.0) }
 }

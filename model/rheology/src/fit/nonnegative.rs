@@ -59,9 +59,7 @@ fn gradient(factor: &Factor, solution: &[f64]) -> Vec<f64> {
             row[last] - fitted
         })
         .collect();
-    let force: f64 = (0..factor.width())
-        .map(|i| factor.row(i)[last].powi(2))
-        .sum();
+    let force: f64 = (0..factor.width()).map(|i| factor.row(i)[last].powi(2)).sum();
     (0..solution.len())
         .map(|k| {
             let (mut along, mut size) = (0.0, 0.0);

@@ -6,16 +6,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Names of the parameters of the modified Kelvin body, in the order of every report.
-pub const PARAMETER_NAMES: [&str; 8] = [
-    "tau_eps",
-    "mu1",
-    "mu2",
-    "mu3",
-    "tau_sig",
-    "f0",
-    "f_offset",
-    "x_contact",
-];
+pub const PARAMETER_NAMES: [&str; 8] =
+    ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "f0", "f_offset", "x_contact"];
 
 /// Units of the parameters, in the same order.
 pub const PARAMETER_UNITS: [&str; 8] =
@@ -128,12 +120,7 @@ impl FitOptions {
             range: Some(one.range),
             is_bound: false,
         });
-        let plain = |name: String, unit| Known {
-            name,
-            unit,
-            range: None,
-            is_bound: false,
-        };
+        let plain = |name: String, unit| Known { name, unit, range: None, is_bound: false };
         let linear = family.linear().into_iter().enumerate();
         let linear = linear.map(|(k, (name, unit))| Known {
             is_bound: family.is_non_negative(k),
@@ -145,13 +132,7 @@ impl FitOptions {
         let known: Vec<Known> = outer.chain(linear).chain(initial).chain(own).collect();
         let mut fixed = vec![None; known.len()];
         fixed[layout.contact()] = Some(0.0);
-        Self {
-            family,
-            known,
-            layout,
-            fixed,
-            is_at_rest: false,
-        }
+        Self { family, known, layout, fixed, is_at_rest: false }
     }
 
     /// The family of a key such as `prony-2`.
@@ -182,11 +163,7 @@ impl FitOptions {
     /// Keeps a parameter at `value`, in its unit.
     pub fn fix(&mut self, name: &str, value: f64) -> Result<(), FitError> {
         let index = self.index_of(name)?;
-        let bad = |reason| FitError::BadValue {
-            name: name.to_owned(),
-            value,
-            reason,
-        };
+        let bad = |reason| FitError::BadValue { name: name.to_owned(), value, reason };
         if !value.is_finite() {
             return Err(bad("give a finite number"));
         }
@@ -273,20 +250,12 @@ mod tests {
     fn unknown_names_and_impossible_values_are_refused() {
         let mut options = FitOptions::default();
         let text = options.fix("mu9", 1.0).unwrap_err().to_string();
-        assert!(
-            text.contains("'mu9'") && text.contains("mu1, mu2"),
-            "{text}"
-        );
+        assert!(text.contains("'mu9'") && text.contains("mu1, mu2"), "{text}");
         assert!(options.fix("tau_eps", 0.0).is_err());
         assert!(options.fix("mu1", f64::NAN).is_err());
         assert_eq!(options, FitOptions::default());
         // Several relaxation times have no one time in which a force could fade.
         assert!(FitOptions::by_key("prony-2").unwrap().free("f0").is_err());
-        assert!(
-            FitOptions::by_key("fractional")
-                .unwrap()
-                .fix("alpha", 2.0)
-                .is_err()
-        );
+        assert!(FitOptions::by_key("fractional").unwrap().fix("alpha", 2.0).is_err());
     }
 }

@@ -21,9 +21,7 @@ const RETURN_MIN: f64 = 0.1;
 impl System<'_> {
     /// Searched ranges of a record by itself.
     pub fn range(&self, record: usize) -> Ranges {
-        let Record {
-            samples, depths, ..
-        } = &self.records[record];
+        let Record { samples, depths, .. } = &self.records[record];
         let outers = &self.known()[..self.layout().outers];
         let outers = outers.iter().filter_map(|one| one.range);
         let shallowest = depths.0 / self.depth_mm;
@@ -50,10 +48,7 @@ impl System<'_> {
         let middle = self.middle();
         let columns = self.source.family.columns(&middle);
         let softens = columns.iter().flatten();
-        if !softens
-            .into_iter()
-            .any(|term| term.elastic.softens() || term.rate.softens())
-        {
+        if !softens.into_iter().any(|term| term.elastic.softens() || term.rate.softens()) {
             return Ok(());
         }
         let share = self.records.iter().map(Record::returned);
@@ -74,8 +69,7 @@ impl System<'_> {
     /// Outer parameters in the middle of their ranges.
     fn middle(&self) -> Vec<f64> {
         let ends = self.ranges[0].outers.iter().enumerate();
-        ends.map(|(k, (low, high))| self.outer_value(k, 0.5 * (low + high)))
-            .collect()
+        ends.map(|(k, (low, high))| self.outer_value(k, 0.5 * (low + high))).collect()
     }
 
     /// An outer parameter in its unit, from its search coordinate.
@@ -105,10 +99,8 @@ impl System<'_> {
 
     /// The body of the first record, if the family allows its numbers.
     pub fn model(&self, points: &[Point]) -> Result<Model, FitError> {
-        let refused = |reason: String| FitError::Unsupported {
-            family: self.source.family.name(),
-            reason,
-        };
+        let refused =
+            |reason: String| FitError::Unsupported { family: self.source.family.name(), reason };
         // The search keeps within the bounds, so what the records do not hold ends on one.
         if let Some(parameter) = self.zero(points) {
             return Err(refused(format!(
@@ -168,10 +160,7 @@ impl System<'_> {
     }
 
     pub fn scale(&self, outer: &Outer) -> Scale {
-        Scale {
-            depth_mm: self.depth_mm,
-            contact: outer.contact,
-        }
+        Scale { depth_mm: self.depth_mm, contact: outer.contact }
     }
 
     /// The column of a linear unknown in a record, as coefficients of that record's columns; zero
@@ -201,9 +190,8 @@ impl System<'_> {
     pub fn fixed_coefficients(&self, record: usize) -> Vec<f64> {
         let units = self.source.units(self.depth_mm);
         let linear = self.layout().linear().zip(units);
-        let bare: Vec<f64> = linear
-            .map(|(k, unit)| self.fixed(record, k).unwrap_or(0.0) * unit)
-            .collect();
+        let bare: Vec<f64> =
+            linear.map(|(k, unit)| self.fixed(record, k).unwrap_or(0.0) * unit).collect();
         self.source.basis(&bare)
     }
 
@@ -270,16 +258,12 @@ impl System<'_> {
 fn log_tau_range(samples: &[FitSample]) -> (f64, f64) {
     let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
     let interval = length / (samples.len() - 1) as f64;
-    let shortest = samples
-        .windows(2)
-        .map(|pair| pair[1].t.0 - pair[0].t.0)
-        .fold(interval, f64::min);
+    let shortest =
+        samples.windows(2).map(|pair| pair[1].t.0 - pair[0].t.0).fold(interval, f64::min);
     ((INTERVALS * shortest).ln(), (LENGTHS * length).ln())
 }
 
 /// The range that holds all of them.
 pub(super) fn union(ranges: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
-    ranges
-        .reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
-        .unwrap_or_default()
+    ranges.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1))).unwrap_or_default()
 }

@@ -72,23 +72,18 @@ impl System<'_> {
     /// refinement; Bjorck, "Numerical Methods for Least Squares Problems", section 2.9).
     pub fn pass(&self, points: &[Point], rows: Rows) -> Option<Pass> {
         let each = points.iter().enumerate();
-        let records: Option<Vec<RecordFactor>> = each
-            .map(|(record, point)| self.record_factor(record, point, rows))
-            .collect();
+        let records: Option<Vec<RecordFactor>> =
+            each.map(|(record, point)| self.record_factor(record, point, rows)).collect();
         let records = records?;
         let factors = records.iter().map(|record| &record.factor);
-        Some(Pass {
-            joint: self.stack(factors, Column::Residual),
-            records,
-        })
+        Some(Pass { joint: self.stack(factors, Column::Residual), records })
     }
 
     /// All records triangularised at given outer parameters, without derivatives.
     pub fn values_pass(&self, outers: &[Outer], rows: Rows) -> Option<Factor> {
         let each = outers.iter().enumerate();
-        let factors: Option<Vec<Factor>> = each
-            .map(|(record, outer)| self.values_factor(record, outer, rows))
-            .collect();
+        let factors: Option<Vec<Factor>> =
+            each.map(|(record, outer)| self.values_factor(record, outer, rows)).collect();
         Some(self.stack(factors?.iter(), Column::Force))
     }
 
@@ -188,63 +183,50 @@ impl System<'_> {
         let slopes = self.slopes(record);
         let scale = self.scale(&point.outer);
         if rows == Rows::Thin {
-            let factor = self
-                .source
-                .thin_factor(&thin.blocks, scale, point, &slopes)?;
-            return Some(RecordFactor {
-                factor: factor.less(&point.at),
-                blocks: Vec::new(),
-            });
+            let factor = self.source.thin_factor(&thin.blocks, scale, point, &slopes)?;
+            return Some(RecordFactor { factor: factor.less(&point.at), blocks: Vec::new() });
         }
         let linear = self.layout().linear_count();
         let width = linear + slopes.len() + 1;
         let mut triangle = Triangle::new(width);
         let mut sums = NoiseSums::new(samples.len(), width);
         let mut lanes = vec![[0.0; LANES]; width];
-        self.source
-            .walk(samples, scale, point, &slopes, |block, filled| {
-                wide(
-                    #[inline(always)]
-                    || {
-                        filled.write(&mut lanes, point, &slopes);
-                        self.forces(block, &mut lanes);
-                        subtract(&mut lanes, &point.at);
-                        self.weigh(block, &mut lanes);
-                        sums.add(&lanes, block);
-                        triangle.push_lanes(&mut lanes, block.len());
-                    },
-                );
-            })?;
-        Some(RecordFactor {
-            factor: triangle.finish(),
-            blocks: sums.finish(),
-        })
+        self.source.walk(samples, scale, point, &slopes, |block, filled| {
+            wide(
+                #[inline(always)]
+                || {
+                    filled.write(&mut lanes, point, &slopes);
+                    self.forces(block, &mut lanes);
+                    subtract(&mut lanes, &point.at);
+                    self.weigh(block, &mut lanes);
+                    sums.add(&lanes, block);
+                    triangle.push_lanes(&mut lanes, block.len());
+                },
+            );
+        })?;
+        Some(RecordFactor { factor: triangle.finish(), blocks: sums.finish() })
     }
 
     fn values_factor(&self, record: usize, outer: &Outer, rows: Rows) -> Option<Factor> {
         let Record { samples, thin, .. } = &self.records[record];
         let scale = self.scale(outer);
-        let point = Point {
-            outer: outer.clone(),
-            at: vec![0.0; self.layout().linear_count()],
-        };
+        let point = Point { outer: outer.clone(), at: vec![0.0; self.layout().linear_count()] };
         if rows == Rows::Thin {
             return self.source.thin_factor(&thin.blocks, scale, &point, &[]);
         }
         let mut triangle = Triangle::new(point.at.len() + 1);
         let mut lanes = vec![[0.0; LANES]; point.at.len() + 1];
-        self.source
-            .walk(samples, scale, &point, &[], |block, filled| {
-                wide(
-                    #[inline(always)]
-                    || {
-                        filled.write(&mut lanes, &point, &[]);
-                        self.forces(block, &mut lanes);
-                        self.weigh(block, &mut lanes);
-                        triangle.push_lanes(&mut lanes, block.len());
-                    },
-                );
-            })?;
+        self.source.walk(samples, scale, &point, &[], |block, filled| {
+            wide(
+                #[inline(always)]
+                || {
+                    filled.write(&mut lanes, &point, &[]);
+                    self.forces(block, &mut lanes);
+                    self.weigh(block, &mut lanes);
+                    triangle.push_lanes(&mut lanes, block.len());
+                },
+            );
+        })?;
         let factor = triangle.finish();
         factor.is_finite().then_some(factor)
     }
@@ -256,11 +238,7 @@ impl System<'_> {
             return;
         };
         for (force, sample) in last.iter_mut().zip(block) {
-            *force = if sample.is_measured() {
-                sample.force.0
-            } else {
-                0.0
-            };
+            *force = if sample.is_measured() { sample.force.0 } else { 0.0 };
         }
     }
 

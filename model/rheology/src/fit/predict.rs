@@ -30,14 +30,10 @@ pub fn predict(
     own: Range<usize>,
     score: Range<usize>,
 ) -> Result<Predicted, FitError> {
-    let unsupported = |reason: String| FitError::Unsupported {
-        family: model.family.clone(),
-        reason,
-    };
+    let unsupported =
+        |reason: String| FitError::Unsupported { family: model.family.clone(), reason };
     let path = samples.iter().map(|sample| (sample.t, sample.depth));
-    let forces = model
-        .along(path)
-        .map_err(|err| unsupported(err.to_string()))?;
+    let forces = model.along(path).map_err(|err| unsupported(err.to_string()))?;
     let (mut plain, mut scaled) = (Triangle::new(2), Triangle::new(3));
     for index in own.filter(|&index| samples[index].is_measured()) {
         let (force, weight) = (samples[index].force.0, 1.0 / samples[index].sigma.0);

@@ -73,9 +73,8 @@ impl Fitted<'_> {
         let system = &self.system;
         let uncertainty = Uncertainty::of(system, &self.refined);
         let errors = self.errors(&uncertainty, record);
-        let asked: Vec<usize> = (0..system.layout().count())
-            .filter(|&k| system.fixed(record, k).is_none())
-            .collect();
+        let asked: Vec<usize> =
+            (0..system.layout().count()).filter(|&k| system.fixed(record, k).is_none()).collect();
         let scatter = uncertainty.scatter.unwrap_or(0.0);
         // Without an error of its own (at an edge) a parameter is judged as under white noise.
         let rise = |parameter: usize| {
@@ -107,9 +106,7 @@ impl Fitted<'_> {
         let each = asked.iter().enumerate().map(|(index, &parameter)| {
             let ends = if Some(parameter) == time {
                 let tau = self.refined.points[record].outer.values[parameter];
-                profile
-                    .reach(rise(parameter))
-                    .map(|end| end.map(|offset| tau * offset.exp()))
+                profile.reach(rise(parameter)).map(|end| end.map(|offset| tau * offset.exp()))
             } else {
                 [-1.0, 1.0].map(|side| profile.end(index, rise(parameter), side))
             };
@@ -348,11 +345,7 @@ impl Profile {
 
 /// Chebyshev points of the second kind from one end to the other.
 fn chebyshev([from, to]: [f64; 2]) -> Vec<f64> {
-    let count = if to - from < NARROW {
-        NODES
-    } else {
-        NODES_WIDE
-    };
+    let count = if to - from < NARROW { NODES } else { NODES_WIDE };
     (0..count)
         .map(|i| {
             let angle = std::f64::consts::PI * i as f64 / (count - 1) as f64;

@@ -61,10 +61,7 @@ pub(super) fn check(
 ) -> Result<f64, FitError> {
     let measured = measured(samples);
     if measured < own.max(2) {
-        return Err(FitError::TooFewSamples {
-            samples: measured,
-            parameters: own.max(2),
-        });
+        return Err(FitError::TooFewSamples { samples: measured, parameters: own.max(2) });
     }
     check_samples(samples)?;
     let (shallowest, deepest) = depths(samples);
@@ -89,21 +86,17 @@ fn measured(samples: &[FitSample]) -> usize {
 /// Shallowest and deepest sample in mm.
 fn depths(samples: &[FitSample]) -> (f64, f64) {
     let outside = (f64::INFINITY, f64::NEG_INFINITY);
-    samples.iter().fold(outside, |(low, high), sample| {
-        (low.min(sample.depth.0), high.max(sample.depth.0))
-    })
+    samples
+        .iter()
+        .fold(outside, |(low, high), sample| (low.min(sample.depth.0), high.max(sample.depth.0)))
 }
 
 /// The force if it never changes beyond rounding.
 fn constant_force(samples: &[FitSample]) -> Option<f64> {
-    let mut forces = samples
-        .iter()
-        .filter(|sample| sample.is_measured())
-        .map(|sample| sample.force.0);
+    let mut forces =
+        samples.iter().filter(|sample| sample.is_measured()).map(|sample| sample.force.0);
     let first = forces.next()?;
-    forces
-        .all(|force| (force - first).abs() <= 1e-12 * first.abs())
-        .then_some(first)
+    forces.all(|force| (force - first).abs() <= 1e-12 * first.abs()).then_some(first)
 }
 
 fn force_square(samples: &[FitSample], sigma_scale: f64) -> f64 {

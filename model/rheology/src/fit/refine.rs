@@ -171,13 +171,7 @@ impl Here {
             (change, factor.residual_sum(passive.len()))
         };
         let is_finite = pass.joint.is_finite() && change.iter().all(|value| value.is_finite());
-        (is_finite && sum <= allowed).then_some(Self {
-            points,
-            pass,
-            sum,
-            passive,
-            change,
-        })
+        (is_finite && sum <= allowed).then_some(Self { points, pass, sum, passive, change })
     }
 
     /// The step to the solution of the triangles, shorter the more it is damped. Parameters are held that it would push
@@ -271,12 +265,7 @@ impl Here {
         for (record, point) in points.iter_mut().enumerate() {
             point.at = system.changed(record, &point.at, &change);
         }
-        Step {
-            points,
-            change,
-            taken,
-            is_whole,
-        }
+        Step { points, change, taken, is_whole }
     }
 
     /// Whether a step is a small share of the standard error of each parameter, judged by what it leaves: without noise
@@ -287,11 +276,7 @@ impl Here {
         let scatter = (joint.residual_sum(all) / spare as f64).sqrt();
         let contact = system.layout().contact();
         let has_contact = system.unknowns.iter().any(|one| one.parameter == contact);
-        let share = if has_contact {
-            STEP_SHARE_CONTACT
-        } else {
-            STEP_SHARE
-        };
+        let share = if has_contact { STEP_SHARE_CONTACT } else { STEP_SHARE };
         step.iter().enumerate().all(|(k, step)| {
             let mut outer = vec![0.0; all];
             outer[system.linear + k] = 1.0;
@@ -339,8 +324,7 @@ fn damped(factor: &Factor, linear: usize, damping: f64) -> Factor {
 }
 
 fn length(step: &[f64]) -> f64 {
-    step.iter()
-        .fold(0.0, |longest, step| longest.max(step.abs()))
+    step.iter().fold(0.0, |longest, step| longest.max(step.abs()))
 }
 
 /// Search coordinate of an outer parameter or the scaled contact.
@@ -353,9 +337,5 @@ fn coordinate_of(system: &System<'_>, point: &Point, parameter: usize) -> f64 {
 
 fn range_of(system: &System<'_>, record: usize, parameter: usize) -> (f64, f64) {
     let ranges = &system.ranges[record];
-    ranges
-        .outers
-        .get(parameter)
-        .copied()
-        .unwrap_or(ranges.contact)
+    ranges.outers.get(parameter).copied().unwrap_or(ranges.contact)
 }

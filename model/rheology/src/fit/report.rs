@@ -104,10 +104,7 @@ impl JointReport {
 impl FitReport {
     /// Warnings, then findings: what window, command line and files say in the same words.
     pub fn sentences(&self) -> impl Iterator<Item = &str> {
-        self.warnings
-            .iter()
-            .chain(&self.findings)
-            .map(String::as_str)
+        self.warnings.iter().chain(&self.findings).map(String::as_str)
     }
 
     /// The value of a parameter, in its unit; `None` for a name that is not one.
@@ -119,9 +116,7 @@ impl FitReport {
     /// A parameter by name.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
-        self.parameters
-            .iter()
-            .find(|parameter| parameter.name == name)
+        self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
     /// The body found, where it is a modified Kelvin body of third order or less.
@@ -167,16 +162,10 @@ impl FitReport {
         let value = |k: usize| self.parameters[k].value;
         let source = Source::new(family, self.is_at_rest);
         // Depth scale 1: scaled and physical coefficients are the same.
-        let scale = Scale {
-            depth_mm: 1.0,
-            contact: value(layout.contact()),
-        };
+        let scale = Scale { depth_mm: 1.0, contact: value(layout.contact()) };
         let bare: Vec<f64> = layout.linear().map(value).collect();
         let point = Point {
-            outer: Outer {
-                values: self.body.outer.clone(),
-                contact: scale.contact,
-            },
+            outer: Outer { values: self.body.outer.clone(), contact: scale.contact },
             at: source.basis(&bare),
         };
         source.forces(samples, scale, &point)
@@ -253,13 +242,7 @@ impl Fitted<'_> {
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
             let interval = length / (samples.len() - 1) as f64;
             let block = uncertainty.block_length(record);
-            noise_found(
-                &memory,
-                uncertainty.variance(record),
-                interval,
-                block,
-                measured,
-            )
+            noise_found(&memory, uncertainty.variance(record), interval, block, measured)
         });
         let layout = system.layout();
         let values = |range: std::ops::Range<usize>| {
@@ -297,16 +280,12 @@ impl Fitted<'_> {
         let measured = || samples.iter().filter(|sample| sample.is_measured());
         let count = system.records[record].measured as f64;
         let mean = measured().map(|sample| sample.force.0).sum::<f64>() / count;
-        let total: f64 = measured()
-            .map(|sample| (sample.force.0 - mean).powi(2))
-            .sum();
+        let total: f64 = measured().map(|sample| (sample.force.0 - mean).powi(2)).sum();
         let is_even = measured().all(|sample| system.weight(sample) == 1.0);
         if is_even && system.records.len() == 1 && self.refined.is_converged {
             return Residuals::of(self.refined.sum, total, count);
         }
-        let forces = system
-            .source
-            .forces(samples, system.scale(&point.outer), point);
+        let forces = system.source.forces(samples, system.scale(&point.outer), point);
         let pairs = samples.iter().zip(forces.unwrap_or_default());
         let squares = pairs
             .filter(|(sample, _)| sample.is_measured())
@@ -322,17 +301,9 @@ impl Fitted<'_> {
         let known = system.known().iter().zip(&values).enumerate();
         let own = known.map(|(k, (one, value))| {
             let is_fixed = system.fixed(record, k).is_some();
-            (
-                one.name.clone(),
-                one.unit.to_owned(),
-                *value,
-                one.range,
-                is_fixed,
-            )
+            (one.name.clone(), one.unit.to_owned(), *value, one.range, is_fixed)
         });
-        let derived = derived
-            .into_iter()
-            .map(|one| (one.name, one.unit, one.value, None, false));
+        let derived = derived.into_iter().map(|one| (one.name, one.unit, one.value, None, false));
         let errors = self.errors(uncertainty, record);
         let all = own.chain(derived).zip(errors);
         all.map(|((name, unit, value, range, is_fixed), error)| Parameter {
@@ -367,11 +338,7 @@ struct Residuals {
 impl Residuals {
     fn of(sum: f64, total: f64, count: f64) -> Self {
         Self {
-            r2: if total > 0.0 {
-                1.0 - sum / total
-            } else {
-                f64::NAN
-            },
+            r2: if total > 0.0 { 1.0 - sum / total } else { f64::NAN },
             rmse_n: (sum / count).sqrt(),
         }
     }

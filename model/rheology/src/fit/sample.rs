@@ -190,16 +190,9 @@ pub(super) fn check_scale(samples: &[FitSample]) -> Result<(), FitError> {
     };
     let depth = largest(&mut samples.iter().map(|one| one.depth.0));
     let force = largest(&mut measured().map(|one| one.force.0));
-    let sizes = [
-        ("largest depth", "mm", depth),
-        ("largest force", "N", force),
-    ];
+    let sizes = [("largest depth", "mm", depth), ("largest force", "N", force)];
     let sigmas = measured().map(|one| ("force uncertainty", "N", one.sigma.0));
-    match sizes
-        .into_iter()
-        .chain(sigmas)
-        .find(|(.., value)| !SIZES.contains(value))
-    {
+    match sizes.into_iter().chain(sigmas).find(|(.., value)| !SIZES.contains(value)) {
         Some((what, unit, value)) => Err(FitError::Scale { what, value, unit }),
         None => Ok(()),
     }
@@ -218,31 +211,18 @@ fn list(names: &[String]) -> String {
 pub(super) fn check_samples(samples: &[FitSample]) -> Result<(), FitError> {
     let mut before = f64::NEG_INFINITY;
     for (index, sample) in samples.iter().enumerate() {
-        let named = [
-            ("time", sample.t.0),
-            ("depth", sample.depth.0),
-            ("force", sample.force.0),
-        ];
+        let named = [("time", sample.t.0), ("depth", sample.depth.0), ("force", sample.force.0)];
         // The force of a censored sample means nothing.
         let counted = if sample.is_measured() { 3 } else { 2 };
-        let bad = named[..counted]
-            .iter()
-            .find(|(_, value)| !value.is_finite());
+        let bad = named[..counted].iter().find(|(_, value)| !value.is_finite());
         if let Some(&(what, value)) = bad {
             return Err(FitError::NotFinite { index, what, value });
         }
         if sample.sigma.0.is_nan() || sample.sigma.0 <= 0.0 {
-            return Err(FitError::SigmaNotPositive {
-                index,
-                sigma: sample.sigma.0,
-            });
+            return Err(FitError::SigmaNotPositive { index, sigma: sample.sigma.0 });
         }
         if sample.t.0 <= before {
-            return Err(FitError::TimeNotIncreasing {
-                index,
-                t: sample.t.0,
-                before,
-            });
+            return Err(FitError::TimeNotIncreasing { index, t: sample.t.0, before });
         }
         before = sample.t.0;
     }

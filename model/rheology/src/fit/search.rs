@@ -59,9 +59,8 @@ pub(super) fn best_outers(system: &System<'_>) -> Option<Vec<Outer>> {
 
 /// The best outer parameters, the same in all records, at given contact positions.
 fn outers(system: &System<'_>, contacts: &[f64]) -> Option<Vec<Outer>> {
-    let free: Vec<usize> = (0..system.layout().outers)
-        .filter(|&k| system.fixed(0, k).is_none())
-        .collect();
+    let free: Vec<usize> =
+        (0..system.layout().outers).filter(|&k| system.fixed(0, k).is_none()).collect();
     let is_time = |k: &&usize| system.source.kind(**k) == OuterRange::Time;
     let times = free.iter().filter(is_time).count();
     let at = |z: &[f64]| all_at(system, contacts, &free, z);
@@ -89,10 +88,7 @@ fn all_at(system: &System<'_>, contacts: &[f64], free: &[usize], z: &[f64]) -> V
         None => system.fixed(0, k).unwrap_or(f64::NAN),
     };
     let values: Vec<f64> = (0..system.layout().outers).map(value).collect();
-    let each = contacts.iter().map(|&contact| Outer {
-        values: values.clone(),
-        contact,
-    });
+    let each = contacts.iter().map(|&contact| Outer { values: values.clone(), contact });
     each.collect()
 }
 
@@ -128,9 +124,7 @@ fn valley(system: &System<'_>, contacts: &[f64], free: &[usize], times: usize) -
         let (low, high) = system.ranges[0].outers[free[0]];
         let share = |i: usize| (i as f64 + 0.5) / times as f64;
         let even = (0..times).map(|i| low + (high - low) * share(i)).collect();
-        let starts = grown(system, contacts, (low, high), times)
-            .into_iter()
-            .chain([even]);
+        let starts = grown(system, contacts, (low, high), times).into_iter().chain([even]);
         let starts: Vec<Vec<f64>> = starts.collect();
         return deepest(system, starts.iter().filter_map(|z| Some(place(z)?.0)));
     }
@@ -180,20 +174,17 @@ fn valley(system: &System<'_>, contacts: &[f64], free: &[usize], times: usize) -
         .collect();
     valleys.sort_by(|&a, &b| sum(a).total_cmp(&sum(b)));
     let starts = valleys.into_iter().take(CELLS);
-    deepest(
-        system,
-        starts.filter_map(|cell| Some(places[cell].as_ref()?.0.clone())),
-    )
+    deepest(system, starts.filter_map(|cell| Some(places[cell].as_ref()?.0.clone())))
 }
 
 /// The deepest floor below these starts; one whose coefficients the family allows, if there is any.
 fn deepest(system: &System<'_>, starts: impl Iterator<Item = Vec<Point>>) -> Option<Refined> {
-    starts
-        .filter_map(|start| refine(system, &start, Rows::Thin, Settle::Gain(GAIN_VALLEY)))
-        .min_by(|a, b| {
+    starts.filter_map(|start| refine(system, &start, Rows::Thin, Settle::Gain(GAIN_VALLEY))).min_by(
+        |a, b| {
             let refused = system.has_zero(&a.points).cmp(&system.has_zero(&b.points));
             refused.then(a.sum.total_cmp(&b.sum))
-        })
+        },
+    )
 }
 
 /// Where a series of `terms` relaxation times may start, in search coordinates: a non-negative fit over a
@@ -209,10 +200,7 @@ fn grown(
     let log_taus = nodes((low, high), grid);
     let dense = system.with_family(&FitOptions::of(Arc::new(Prony::dense(grid))).at_rest());
     let taus: Vec<f64> = log_taus.iter().map(|log_tau| log_tau.exp()).collect();
-    let outers = contacts.iter().map(|&contact| Outer {
-        values: taus.clone(),
-        contact,
-    });
+    let outers = contacts.iter().map(|&contact| Outer { values: taus.clone(), contact });
     let factor = dense.values_pass(&outers.collect::<Vec<_>>(), Rows::Thin)?;
     let solution = non_negative(&factor, &dense.all_bounds(grid + 1));
     // Weight and centre of each run of neighbours.
@@ -267,9 +255,8 @@ fn contact(system: &System<'_>) -> Option<f64> {
     }
     let searched = system.searched();
     let (low, high) = system.ranges[0].contact;
-    let free: Vec<usize> = (0..system.layout().outers)
-        .filter(|&k| system.fixed(0, k).is_none())
-        .collect();
+    let free: Vec<usize> =
+        (0..system.layout().outers).filter(|&k| system.fixed(0, k).is_none()).collect();
     let (taus, contacts) = CONTACT_GRID;
     let starts: Vec<Vec<f64>> = match free.as_slice() {
         [] => vec![Vec::new()],
@@ -314,9 +301,7 @@ fn contact(system: &System<'_>) -> Option<f64> {
     let mut valleys = valleys(contacts, |i| profile[i].0);
     valleys.sort_by(|&a, &b| profile[a].0.total_cmp(&profile[b].0));
     let found = valleys.into_iter().take(VALLEYS).map(around);
-    found
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, contact)| contact)
+    found.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, contact)| contact)
 }
 
 /// Indices that are not above their neighbours.
@@ -329,9 +314,7 @@ fn valleys(count: usize, value: impl Fn(usize) -> f64) -> Vec<usize> {
 }
 
 fn nodes((low, high): (f64, f64), count: usize) -> Vec<f64> {
-    (0..count)
-        .map(|i| low + (high - low) * i as f64 / (count - 1) as f64)
-        .collect()
+    (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
 }
 
 struct Cost<F>(F);
@@ -347,9 +330,7 @@ impl<F: Fn(f64) -> f64> CostFunction for Cost<F> {
 /// Brent's minimum inside a bracket, as close as comparing values allows.
 fn minimum((low, high): (f64, f64), cost: impl Fn(f64) -> f64) -> Option<f64> {
     let solver = BrentOpt::new(low, high).set_tolerance(1e-8, 1e-6);
-    let result = Executor::new(Cost(cost), solver)
-        .configure(|state| state.max_iters(40))
-        .run()
-        .ok()?;
+    let result =
+        Executor::new(Cost(cost), solver).configure(|state| state.max_iters(40)).run().ok()?;
     result.state().get_best_param().copied()
 }

@@ -112,11 +112,7 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
         && let Some(time) = noise.correlation_time_s
         && noise.effective_samples < 0.95 * report.samples as f64
     {
-        let about = if time > LONGEST_SHARE * length {
-            "at least"
-        } else {
-            "about"
-        };
+        let about = if time > LONGEST_SHARE * length { "at least" } else { "about" };
         findings.push(format!(
             "the residuals have memory: {} % of their variance lasts {about} {}; {} samples tell as \
              much as {}, and the intervals allow for it",
@@ -138,11 +134,7 @@ fn edge(fitted: &Fitted<'_>, record: usize, outer: usize, end: End, found: &Para
     let name = &found.name;
     if fitted.system.source.kind(outer) != OuterRange::Time {
         let (value, unit) = (found.value, &found.unit);
-        let unit = if unit.is_empty() {
-            String::new()
-        } else {
-            format!(" {unit}")
-        };
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         return format!(
             "{name} lies at an end of its range, {value:.3e}{unit}; the other parameters are conditional on it"
         );

@@ -104,20 +104,15 @@ pub fn fit_coefficients(
     outer: &[f64],
     records: &[(&str, &[FitSample])],
 ) -> Result<Model, FitError> {
-    let refused = |err: ModelError| FitError::Unsupported {
-        family: family.name(),
-        reason: err.to_string(),
-    };
+    let refused =
+        |err: ModelError| FitError::Unsupported { family: family.name(), reason: err.to_string() };
     // Judged before it is used: its numbers are the caller's.
     let nothing = vec![0.0; family.linear().len()];
     family.model(outer, &nothing).map_err(refused)?;
     let mut options = FitOptions::of(Arc::clone(&family)).at_rest();
     options.fix("f_offset", 0.0)?;
     let system = joint_system(records, &options, &options.body_names())?;
-    let outer = Outer {
-        values: outer.to_vec(),
-        contact: 0.0,
-    };
+    let outer = Outer { values: outer.to_vec(), contact: 0.0 };
     let outers = vec![outer; records.len()];
     let factor = system.values_pass(&outers, Rows::All);
     let factor = factor.ok_or(FitError::Overflow)?;
@@ -214,11 +209,7 @@ impl<'a> Fitted<'a> {
             }
         };
         system.model(&refined.points)?;
-        Ok(Self {
-            system,
-            refined,
-            blind,
-        })
+        Ok(Self { system, refined, blind })
     }
 }
 
@@ -239,10 +230,7 @@ fn joint_system<'a>(
         is_shared[index] = true;
     }
     if records.is_empty() {
-        return Err(FitError::TooFewSamples {
-            samples: 0,
-            parameters: options.free_count(),
-        });
+        return Err(FitError::TooFewSamples { samples: 0, parameters: options.free_count() });
     }
     System::new(records, options, is_shared)
 }

@@ -72,10 +72,7 @@ impl<'a> System<'a> {
         let several = records.len() > 1;
         let layout = options.layout();
         let named = |name: &str, reason: FitError| match several {
-            true => FitError::InRecord {
-                record: name.to_owned(),
-                reason: Box::new(reason),
-            },
+            true => FitError::InRecord { record: name.to_owned(), reason: Box::new(reason) },
             false => reason,
         };
         let fixed = options.fixed().to_vec();
@@ -145,17 +142,13 @@ impl<'a> System<'a> {
                 let is_one = records == 1 || self.shared[parameter];
                 (0..if is_one { 1 } else { records })
                     .filter(|&record| self.fixed[record][parameter].is_none())
-                    .map(|record| Unknown {
-                        parameter,
-                        record: (!is_one).then_some(record),
-                    })
+                    .map(|record| Unknown { parameter, record: (!is_one).then_some(record) })
                     .collect::<Vec<_>>()
             })
             .collect();
         let linear = self.unknowns.iter();
-        self.linear = linear
-            .take_while(|unknown| layout.linear().contains(&unknown.parameter))
-            .count();
+        self.linear =
+            linear.take_while(|unknown| layout.linear().contains(&unknown.parameter)).count();
         self
     }
 
@@ -238,12 +231,7 @@ impl<'a> System<'a> {
     {
         let pairs = self.records.iter().zip(samples);
         System {
-            records: pairs
-                .map(|(record, samples)| Record {
-                    samples,
-                    ..record.clone()
-                })
-                .collect(),
+            records: pairs.map(|(record, samples)| Record { samples, ..record.clone() }).collect(),
             ..self.clone()
         }
     }
@@ -277,9 +265,7 @@ impl<'a> System<'a> {
     /// Which linear unknowns must not be negative.
     pub fn bounds(&self) -> Vec<bool> {
         let linear = self.unknowns[..self.linear].iter();
-        linear
-            .map(|unknown| self.known()[unknown.parameter].is_bound)
-            .collect()
+        linear.map(|unknown| self.known()[unknown.parameter].is_bound).collect()
     }
 
     /// The rows from which a solution is found many times cheaper, and a small share of a standard error from it; all of

@@ -122,11 +122,7 @@ pub(super) struct Knot {
 /// cone of slopes from its start, narrowed sample by sample. Stairs and noise vanish; ramps, holds
 /// and corners stay. At least two knots for at least two samples.
 pub(super) fn redraw(samples: &[FitSample], tolerance: f64) -> Vec<Knot> {
-    let knot = |index: usize, depth: f64| Knot {
-        index,
-        t: samples[index].t.0,
-        depth,
-    };
+    let knot = |index: usize, depth: f64| Knot { index, t: samples[index].t.0, depth };
     let mut knots = vec![knot(0, samples[0].depth.0)];
     let mut anchor = knots[0];
     let mut cone = (f64::NEG_INFINITY, f64::INFINITY);
@@ -134,10 +130,8 @@ pub(super) fn redraw(samples: &[FitSample], tolerance: f64) -> Vec<Knot> {
     while index < samples.len() {
         let over_run = 1.0 / (samples[index].t.0 - anchor.t);
         let rise = samples[index].depth.0 - anchor.depth;
-        let narrowed = (
-            cone.0.max((rise - tolerance) * over_run),
-            cone.1.min((rise + tolerance) * over_run),
-        );
+        let narrowed =
+            (cone.0.max((rise - tolerance) * over_run), cone.1.min((rise + tolerance) * over_run));
         let is_last = index + 1 == samples.len();
         if narrowed.0 <= narrowed.1 {
             cone = narrowed;
@@ -238,10 +232,7 @@ mod tests {
         let knots = redraw(&samples, tolerance(&samples, 30.0));
         assert!((3..=5).contains(&knots.len()), "{knots:?}");
         let inner = &knots[1..knots.len() - 1];
-        assert!(
-            inner.iter().any(|knot| (knot.t - 40.0).abs() < 0.3),
-            "{knots:?}"
-        );
+        assert!(inner.iter().any(|knot| (knot.t - 40.0).abs() < 0.3), "{knots:?}");
         for block in Thin::new(&samples, 30.0, 1.0).blocks {
             // Eight times what the second differences of such stairs look like as noise.
             assert!((block.depth - block.redrawn).abs() < 0.075);
@@ -254,11 +245,7 @@ mod tests {
         let thin = Thin::new(&samples, 30.0, 1.0);
         let count: usize = thin.blocks.iter().map(|block| block.count).sum();
         assert_eq!(count, samples.len());
-        let force: f64 = thin
-            .blocks
-            .iter()
-            .map(|b| b.force * b.weight * b.weight)
-            .sum();
+        let force: f64 = thin.blocks.iter().map(|b| b.force * b.weight * b.weight).sum();
         assert!((force - 6000.0 * 6001.0 / 2.0).abs() < 1e-6);
         let time: f64 = thin.blocks.iter().map(|block| block.dt).sum();
         assert!((time - 60.0).abs() < 1e-9);

@@ -35,12 +35,7 @@ pub(crate) struct Triangle {
 impl Triangle {
     /// An empty triangle for rows of `width` numbers.
     pub fn new(width: usize) -> Self {
-        Self {
-            width,
-            r: vec![0.0; width * width],
-            block: vec![[0.0; LANES]; width],
-            waiting: 0,
-        }
+        Self { width, r: vec![0.0; width * width], block: vec![[0.0; LANES]; width], waiting: 0 }
     }
 
     /// Adds a row given number by number, times `weight`.
@@ -69,10 +64,7 @@ impl Triangle {
     /// The finished triangle, `width` by `width`, row by row.
     pub fn finish(mut self) -> Factor {
         self.flush();
-        Factor {
-            width: self.width,
-            r: self.r,
-        }
+        Factor { width: self.width, r: self.r }
     }
 
     fn flush(&mut self) {
@@ -164,9 +156,7 @@ impl Factor {
 
     /// Sum of squares left after fitting the first `columns` columns to the last.
     pub fn residual_sum(&self, columns: usize) -> f64 {
-        (columns..self.width)
-            .map(|i| self.at(i, self.width - 1).powi(2))
-            .sum()
+        (columns..self.width).map(|i| self.at(i, self.width - 1).powi(2)).sum()
     }
 
     /// Sum of squares that any `solution` of all columns but the last leaves of the last.
@@ -268,9 +258,8 @@ impl Factor {
     /// vector of the smallest: `(largest / smallest, vector)`. A column of zeros counts as
     /// infinitely ill. One-sided Jacobi rotations (Hestenes, J. SIAM 6 (1958) 51-90).
     pub fn condition(&self, columns: usize) -> (f64, Vec<f64>) {
-        let mut a: Vec<Vec<f64>> = (0..columns)
-            .map(|j| (0..columns).map(|i| self.at(i, j)).collect())
-            .collect();
+        let mut a: Vec<Vec<f64>> =
+            (0..columns).map(|j| (0..columns).map(|i| self.at(i, j)).collect()).collect();
         let mut v: Vec<Vec<f64>> = (0..columns)
             .map(|j| (0..columns).map(|i| f64::from(u8::from(i == j))).collect())
             .collect();
@@ -303,10 +292,7 @@ impl Factor {
                 break;
             }
         }
-        let lengths: Vec<f64> = a
-            .iter()
-            .map(|col| sum_of_products(col, col).sqrt())
-            .collect();
+        let lengths: Vec<f64> = a.iter().map(|col| sum_of_products(col, col).sqrt()).collect();
         let largest = lengths.iter().copied().fold(0.0, f64::max);
         let mut smallest = 0;
         for (index, length) in lengths.iter().enumerate() {

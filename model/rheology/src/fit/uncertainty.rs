@@ -72,11 +72,7 @@ impl Uncertainty {
                 (blocks, memory, own)
             })
             .collect();
-        Self {
-            scatter,
-            records,
-            block_factor,
-        }
+        Self { scatter, records, block_factor }
     }
 
     /// Samples in a block of a record.
@@ -113,16 +109,8 @@ impl Uncertainty {
         let (inflation, uncertainty) =
             noise::inflation(&self.records, &self.block_factor, combination, white);
         let std_error = independent * inflation.sqrt();
-        let freedom = if uncertainty > 0.0 {
-            spare.min(2.0 / uncertainty)
-        } else {
-            spare
-        };
-        std_error.is_finite().then_some(Error {
-            std_error,
-            inflation,
-            freedom,
-        })
+        let freedom = if uncertainty > 0.0 { spare.min(2.0 / uncertainty) } else { spare };
+        std_error.is_finite().then_some(Error { std_error, inflation, freedom })
     }
 }
 
@@ -257,14 +245,10 @@ impl Fitted<'_> {
             let is_free = self.system.fixed(record, k).is_none();
             let pairs = up.into_iter().zip(down);
             let slopes = pairs.map(|(up, down)| (up.value - down.value) / (2.0 * step));
-            slopes
-                .map(|slope| if is_free { slope } else { 0.0 })
-                .collect()
+            slopes.map(|slope| if is_free { slope } else { 0.0 }).collect()
         });
         let columns: Vec<Vec<f64>> = columns.collect();
         let count = columns.first().map_or(0, Vec::len);
-        (0..count)
-            .map(|k| columns.iter().map(|column| column[k]).collect())
-            .collect()
+        (0..count).map(|k| columns.iter().map(|column| column[k]).collect()).collect()
     }
 }

@@ -17,11 +17,7 @@ pub struct SeriesBody<const N: usize> {
 
 impl From<ModifiedKelvin> for SeriesBody<3> {
     fn from(body: ModifiedKelvin) -> Self {
-        Self {
-            tau_eps: body.tau_eps,
-            mu: body.mu,
-            tau_sig: body.tau_sig,
-        }
+        Self { tau_eps: body.tau_eps, mu: body.mu, tau_sig: body.tau_sig }
     }
 }
 
@@ -35,10 +31,7 @@ impl<const N: usize> SeriesBody<N> {
         if !(self.tau_eps > 0.0 && self.tau_eps.is_finite()) {
             return Err(bad("tau_eps", self.tau_eps));
         }
-        match named
-            .chain([("tau_sig", self.tau_sig)])
-            .find(|(_, value)| !value.is_finite())
-        {
+        match named.chain([("tau_sig", self.tau_sig)]).find(|(_, value)| !value.is_finite()) {
             Some((name, value)) => Err(bad(name, value)),
             None => Ok(self),
         }
@@ -50,11 +43,7 @@ impl<const N: usize> SeriesBody<N> {
     pub fn padded(&self) -> SeriesBody<POWER_MAX> {
         let mut mu = [0.0; POWER_MAX];
         mu[..N].copy_from_slice(&self.mu);
-        SeriesBody {
-            tau_eps: self.tau_eps,
-            mu,
-            tau_sig: self.tau_sig,
-        }
+        SeriesBody { tau_eps: self.tau_eps, mu, tau_sig: self.tau_sig }
     }
 
     /// As the one relaxation term it is.
@@ -81,31 +70,14 @@ struct Stored {
 
 impl Serialize for SeriesBody<POWER_MAX> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self {
-            tau_eps,
-            mu,
-            tau_sig,
-        } = *self;
-        Stored {
-            tau_eps,
-            mu,
-            tau_sig,
-        }
-        .serialize(serializer)
+        let Self { tau_eps, mu, tau_sig } = *self;
+        Stored { tau_eps, mu, tau_sig }.serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for SeriesBody<POWER_MAX> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Stored {
-            tau_eps,
-            mu,
-            tau_sig,
-        } = Stored::deserialize(deserializer)?;
-        Ok(Self {
-            tau_eps,
-            mu,
-            tau_sig,
-        })
+        let Stored { tau_eps, mu, tau_sig } = Stored::deserialize(deserializer)?;
+        Ok(Self { tau_eps, mu, tau_sig })
     }
 }

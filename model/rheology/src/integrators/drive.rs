@@ -42,10 +42,7 @@ impl<R: Real, const N: usize> Drive<R, N> {
             tau_sig: R::of(body.tau_sig),
             dt,
             per_dt: R::of(1.0 / dt),
-            at: Place {
-                x: R::ZERO,
-                elastic: R::ZERO,
-            },
+            at: Place { x: R::ZERO, elastic: R::ZERO },
         };
         drive.at = drive.place(depth);
         drive
@@ -70,10 +67,7 @@ impl<R: Real, const N: usize> Drive<R, N> {
     fn place(&self, depth: R) -> Place<R> {
         let x = if depth < R::ZERO { R::ZERO } else { depth };
         let inner = self.mu.iter().rev().fold(R::ZERO, |sum, &mu| sum * x + mu);
-        Place {
-            x,
-            elastic: inner * x,
-        }
+        Place { x, elastic: inner * x }
     }
 
     /// The forcing of a straight move to `depth`.

@@ -43,10 +43,7 @@ impl<R: Real, const N: usize> Table<R, N> {
         // tau_sig x x' with x' = d / dt.
         rows[1][1] += body.tau_sig / dt * psi[0];
         rows[2][0] += body.tau_sig / dt * psi[1];
-        Self {
-            psi_0: R::of(psi[0]),
-            rows: rows.map(|row| row.map(R::of)),
-        }
+        Self { psi_0: R::of(psi[0]), rows: rows.map(|row| row.map(R::of)) }
     }
 
     /// Row by row with constant numbers, so that a compiler writes every product out: the same in nested

@@ -10,9 +10,6 @@ impl Rule for ExplicitEuler {
     const USES: [bool; 3] = [true, false, false];
 
     fn weights(h: f64) -> Weights {
-        Weights {
-            forcing: [h, 0.0, 0.0],
-            share: h,
-        }
+        Weights { forcing: [h, 0.0, 0.0], share: h }
     }
 }

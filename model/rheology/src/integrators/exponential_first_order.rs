@@ -14,9 +14,6 @@ impl Rule for ExponentialFirstOrder {
 
     fn weights(h: f64) -> Weights {
         let (psi_0, psi_1) = (psi(0, h), psi(1, h));
-        Weights {
-            forcing: [psi_0 - psi_1, 0.0, psi_1],
-            share: psi_0,
-        }
+        Weights { forcing: [psi_0 - psi_1, 0.0, psi_1], share: psi_0 }
     }
 }

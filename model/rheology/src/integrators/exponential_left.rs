@@ -12,9 +12,6 @@ impl Rule for ExponentialLeft {
 
     fn weights(h: f64) -> Weights {
         let share = psi(0, h);
-        Weights {
-            forcing: [share, 0.0, 0.0],
-            share,
-        }
+        Weights { forcing: [share, 0.0, 0.0], share }
     }
 }

@@ -11,9 +11,6 @@ impl Rule for ImplicitEuler {
 
     fn weights(h: f64) -> Weights {
         let share = h / (1.0 + h);
-        Weights {
-            forcing: [0.0, 0.0, share],
-            share,
-        }
+        Weights { forcing: [0.0, 0.0, share], share }
     }
 }

@@ -218,12 +218,9 @@ impl Scheme {
             return Err(IntegratorError::Time(dt));
         }
         match self.stability_limit() {
-            Some(limit) if h >= limit => Err(IntegratorError::Unstable {
-                name: self.name(),
-                dt,
-                h,
-                limit,
-            }),
+            Some(limit) if h >= limit => {
+                Err(IntegratorError::Unstable { name: self.name(), dt, h, limit })
+            }
             _ => Ok(()),
         }
     }
@@ -292,11 +289,7 @@ fn finished<R: Real>(force: Running<R>, ends: [R; 2], dt: f64) -> Result<Running
 
 #[cold]
 fn unfinished([from, to]: [f64; 2], dt: f64) -> StepError {
-    if to.is_finite() {
-        StepError::Overflow { from, to, dt }
-    } else {
-        StepError::Depth(to)
-    }
+    if to.is_finite() { StepError::Overflow { from, to, dt } } else { StepError::Depth(to) }
 }
 
 #[cfg(test)]

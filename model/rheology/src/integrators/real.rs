@@ -88,10 +88,7 @@ pub(super) struct Running<R> {
 
 impl<R: Real> Running<R> {
     pub fn new(value: R) -> Self {
-        Self {
-            value,
-            carry: R::ZERO,
-        }
+        Self { value, carry: R::ZERO }
     }
 
     /// A filter left alone decays for ever. Cold, so that the check stays a branch beside the sum
@@ -109,9 +106,6 @@ impl<R: Real> Running<R> {
         if value.abs() < R::NEGLIGIBLE {
             return Self::faded();
         }
-        Self {
-            value,
-            carry: increment - (value - self.value),
-        }
+        Self { value, carry: increment - (value - self.value) }
     }
 }

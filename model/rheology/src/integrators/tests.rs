@@ -6,11 +6,8 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
-const FIFTH: SeriesBody<5> = SeriesBody {
-    tau_eps: 0.9,
-    mu: [0.08, -0.02, 0.003, -2e-4, 5e-6],
-    tau_sig: 0.05,
-};
+const FIFTH: SeriesBody<5> =
+    SeriesBody { tau_eps: 0.9, mu: [0.08, -0.02, 0.003, -2e-4, 5e-6], tau_sig: 0.05 };
 
 /// One step of a scheme, from a force and a depth, to a depth.
 fn one_step<R: Real, const N: usize>(
@@ -25,9 +22,7 @@ fn one_step<R: Real, const N: usize>(
         (force, depth, to): (R, R, R),
     ) -> R {
         let force = Some(force);
-        I::at_any_step(body, dt, Start { depth, force })
-            .step(to)
-            .unwrap()
+        I::at_any_step(body, dt, Start { depth, force }).step(to).unwrap()
     }
     let ends = (force, from, to);
     match scheme {
@@ -84,9 +79,7 @@ fn textbook<const N: usize>(
                 let s = f64::from(i) / f64::from(parts);
                 h * (-h * (1.0 - s)).exp() * u(s)
             };
-            let inner: f64 = (1..parts)
-                .map(|i| if i % 2 == 1 { 4.0 } else { 2.0 } * at(i))
-                .sum();
+            let inner: f64 = (1..parts).map(|i| if i % 2 == 1 { 4.0 } else { 2.0 } * at(i)).sum();
             kept * force + (at(0) + inner + at(parts)) / (3.0 * f64::from(parts))
         }
     }
@@ -96,12 +89,9 @@ fn textbook<const N: usize>(
 fn each_takes_its_textbook_step() {
     fn check<const N: usize>(body: &SeriesBody<N>) {
         for scheme in Scheme::ALL {
-            for (force, from, to) in [
-                (0.0, 0.0, 1.5),
-                (2.0, 3.0, 8.0),
-                (1.0, 12.0, 4.0),
-                (1.0, 0.0, 0.0),
-            ] {
+            for (force, from, to) in
+                [(0.0, 0.0, 1.5), (2.0, 3.0, 8.0), (1.0, 12.0, 4.0), (1.0, 0.0, 0.0)]
+            {
                 for h in [0.1, 0.7, 1.6, 2.5] {
                     let dt = h * body.tau_eps;
                     let step = one_step(scheme, body, dt, (force, from, to));
@@ -115,33 +105,16 @@ fn each_takes_its_textbook_step() {
                     );
                     let narrow = one_step(scheme, body, dt, (force as f32, from as f32, to as f32));
                     let miss = (f64::from(narrow) - exact).abs();
-                    assert!(
-                        miss < 2e-5 * size,
-                        "{scheme:?} {N} {h} in f32: {narrow} {exact}"
-                    );
+                    assert!(miss < 2e-5 * size, "{scheme:?} {N} {h} in f32: {narrow} {exact}");
                 }
             }
         }
     }
-    let SeriesBody {
-        tau_eps, tau_sig, ..
-    } = FIFTH;
-    check(&SeriesBody {
-        tau_eps,
-        mu: [0.08],
-        tau_sig,
-    });
-    check(&SeriesBody {
-        tau_eps,
-        mu: [0.08, -0.01],
-        tau_sig,
-    });
+    let SeriesBody { tau_eps, tau_sig, .. } = FIFTH;
+    check(&SeriesBody { tau_eps, mu: [0.08], tau_sig });
+    check(&SeriesBody { tau_eps, mu: [0.08, -0.01], tau_sig });
     check(&SeriesBody::from(THESIS));
-    check(&SeriesBody {
-        tau_eps,
-        mu: [0.08, -0.02, 0.003, -2e-4],
-        tau_sig,
-    });
+    check(&SeriesBody { tau_eps, mu: [0.08, -0.02, 0.003, -2e-4], tau_sig });
     check(&FIFTH);
 }
 
@@ -155,9 +128,7 @@ fn error_on_a_ramp(scheme: Scheme, h: f64) -> f64 {
     scheme.respond(&body, dt, &depths, &mut forces).unwrap();
     let mut reference = Reference::new(&[body.term()], Depth(0.0)).unwrap();
     let end = depths.len() - 1;
-    reference
-        .step(Depth(depths[end]), Seconds(dt * end as f64))
-        .unwrap();
+    reference.step(Depth(depths[end]), Seconds(dt * end as f64)).unwrap();
     reference.error_of(Newtons(forces[end])) / reference.force().0
 }
 
@@ -176,11 +147,7 @@ fn each_has_its_order() {
         let (coarse, fine) = (error_on_a_ramp(scheme, h), error_on_a_ramp(scheme, h / 2.0));
         let measured = (coarse / fine).log2();
         let share = measured / f64::from(order) - 1.0;
-        println!(
-            "{}: order {measured:.4}, {fine:.1e} at {:.1e}",
-            scheme.name(),
-            h / 2.0
-        );
+        println!("{}: order {measured:.4}, {fine:.1e} at {:.1e}", scheme.name(), h / 2.0);
         assert!(share.abs() < 0.01, "{scheme:?}: order {measured}");
     }
     for h in [1.0 / 512.0, 0.25, 1.0, 4.0] {
@@ -206,21 +173,14 @@ fn each_is_stable_as_far_as_it_says() {
             let (mut low, mut high) = (0.1, 1e6);
             while high / low > 1.0 + 1e-12 {
                 let middle = f64::sqrt(low * high);
-                if amplification(middle) <= 1.0 {
-                    low = middle
-                } else {
-                    high = middle
-                }
+                if amplification(middle) <= 1.0 { low = middle } else { high = middle }
             }
             Some(low)
         };
         println!("{}: stable below {measured:?}", scheme.name());
         match (measured, scheme.stability_limit()) {
             (Some(measured), Some(said)) => {
-                assert!(
-                    (measured / said - 1.0).abs() < 1e-10,
-                    "{scheme:?}: {measured} {said}"
-                );
+                assert!((measured / said - 1.0).abs() < 1e-10, "{scheme:?}: {measured} {said}");
             }
             (measured, said) => assert_eq!(measured, said, "{scheme:?}"),
         }
@@ -232,25 +192,15 @@ fn the_exact_step_is_the_reference_across_the_surface_too() {
     let path = [0.0, 1.0, 7.5, 7.5, 3.0, -2.0, -3.0, 2.0, 20.0, 20.0, 12.0];
     for dt in [1e-6, 1e-3, 0.4, 30.0, 1e5] {
         for tau_eps in [1e-9, 1e-2, 1.023, 1e4, 1e9] {
-            let body = SeriesBody {
-                tau_eps,
-                ..SeriesBody::from(THESIS)
-            };
+            let body = SeriesBody { tau_eps, ..SeriesBody::from(THESIS) };
             let mut forces = Vec::new();
-            Scheme::Exact
-                .respond(&body, dt, &path, &mut forces)
-                .unwrap();
+            Scheme::Exact.respond(&body, dt, &path, &mut forces).unwrap();
             let mut reference = Reference::new(&[body.term()], Depth(0.0)).unwrap();
             for (i, &depth) in path.iter().enumerate().skip(1) {
                 let exact = reference.step(Depth(depth), Seconds(dt)).unwrap().0;
                 let miss = reference.error_of(Newtons(forces[i])).abs();
-                let peak = forces[..=i]
-                    .iter()
-                    .fold(0.0, |peak: f64, force| peak.max(force.abs()));
-                assert!(
-                    miss < 1e-14 * peak,
-                    "{dt} {tau_eps} at {depth}: {exact} off by {miss:e}"
-                );
+                let peak = forces[..=i].iter().fold(0.0, |peak: f64, force| peak.max(force.abs()));
+                assert!(miss < 1e-14 * peak, "{dt} {tau_eps} at {depth}: {exact} off by {miss:e}");
             }
         }
     }
@@ -263,15 +213,10 @@ fn small_steps_do_not_wear_single_precision_out() {
     let mut depths = vec![0f32];
     depths.resize(200_000, 10.0);
     let mut forces = Vec::new();
-    Scheme::Exact
-        .respond(&body, 5e-5, &depths, &mut forces)
-        .unwrap();
+    Scheme::Exact.respond(&body, 5e-5, &depths, &mut forces).unwrap();
     let mut reference = Reference::new(&[body.term()], Depth(0.0)).unwrap();
     reference.step(Depth(10.0), Seconds(5e-5)).unwrap();
-    let exact = reference
-        .step(Depth(10.0), Seconds(5e-5 * 199_998.0))
-        .unwrap()
-        .0;
+    let exact = reference.step(Depth(10.0), Seconds(5e-5 * 199_998.0)).unwrap().0;
     let miss = f64::from(forces[forces.len() - 1]) / exact - 1.0;
     // Coefficients have 24 digits of two; without compensation the force stops 1e-3 too high.
     assert!(miss.abs() < 2e-6, "{miss:e}");
@@ -285,10 +230,9 @@ fn what_cannot_be_stepped_is_refused() {
         scheme.respond(body, dt, depths, &mut forces).unwrap_err()
     };
     let path = [0.0, 1.0];
-    for (scheme, dt, most) in [
-        (Scheme::ExplicitEuler, 2.1, 2.0),
-        (Scheme::RungeKutta, 3.0, 2.785_293_563_405_282),
-    ] {
+    for (scheme, dt, most) in
+        [(Scheme::ExplicitEuler, 2.1, 2.0), (Scheme::RungeKutta, 3.0, 2.785_293_563_405_282)]
+    {
         match refusal(scheme, &body, dt, &path) {
             IntegratorError::Unstable { name, limit, .. } => {
                 assert_eq!((name, limit), (scheme.name(), most));
@@ -300,10 +244,7 @@ fn what_cannot_be_stepped_is_refused() {
         let refused = refusal(Scheme::Exact, &body, dt, &path);
         assert!(matches!(refused, IntegratorError::Time(_)), "{refused:?}");
     }
-    let bad = SeriesBody {
-        tau_eps: 0.0,
-        ..body
-    };
+    let bad = SeriesBody { tau_eps: 0.0, ..body };
     let refused = refusal(Scheme::Exact, &bad, 0.1, &path);
     assert!(matches!(refused, IntegratorError::Body(_)), "{refused:?}");
     for scheme in Scheme::ALL {

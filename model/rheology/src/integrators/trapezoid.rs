@@ -11,9 +11,6 @@ impl Rule for Trapezoid {
 
     fn weights(h: f64) -> Weights {
         let half = h / (2.0 + h);
-        Weights {
-            forcing: [half, 0.0, half],
-            share: 2.0 * half,
-        }
+        Weights { forcing: [half, 0.0, half], share: 2.0 * half }
     }
 }

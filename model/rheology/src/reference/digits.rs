@@ -15,9 +15,7 @@ pub(super) struct Digits {
 impl Digits {
     /// At least so many decimal digits, log2(10) = 3.32 bits each.
     pub const fn decimal(digits: usize) -> Self {
-        Self {
-            bits: digits * 3322 / 1000 + 1,
-        }
+        Self { bits: digits * 3322 / 1000 + 1 }
     }
 
     /// Binary digits.

@@ -90,13 +90,9 @@ impl Reference {
             return Err(ReferenceError::Term);
         }
         let digits = Digits::decimal(digits);
-        let softens = terms
-            .iter()
-            .any(|term| term.elastic.softens() || term.rate.softens());
-        let terms: Result<Vec<Term>, ReferenceError> = terms
-            .iter()
-            .map(|term| Term::new(digits, term, depth))
-            .collect();
+        let softens = terms.iter().any(|term| term.elastic.softens() || term.rate.softens());
+        let terms: Result<Vec<Term>, ReferenceError> =
+            terms.iter().map(|term| Term::new(digits, term, depth)).collect();
         Ok(Self {
             digits,
             terms: terms?,
@@ -115,11 +111,7 @@ impl Reference {
             return Err(StepError::Time(dt.0));
         }
         if self.terms.iter().any(|term| term.is_beyond(depth)) {
-            return Err(StepError::Overflow {
-                from: nearest(&self.depth),
-                to: depth.0,
-                dt: dt.0,
-            });
+            return Err(StepError::Overflow { from: nearest(&self.depth), to: depth.0, dt: dt.0 });
         }
         let to = self.digits.exact(depth.0);
         let from = std::mem::replace(&mut self.depth, to.clone());
@@ -135,14 +127,9 @@ impl Reference {
             if self.terms.iter().any(driven) {
                 let from_depth = nearest(&from);
                 self.depth = from;
-                return Err(StepError::Jump {
-                    from: from_depth,
-                    to: depth.0,
-                });
+                return Err(StepError::Jump { from: from_depth, to: depth.0 });
             }
-            self.terms
-                .iter_mut()
-                .for_each(|term| term.jump(&ends, deepest));
+            self.terms.iter_mut().for_each(|term| term.jump(&ends, deepest));
             self.softened_to = after;
             return self.finite_force(nearest(&from), dt);
         }
@@ -168,11 +155,7 @@ impl Reference {
 
     fn finite_force(&self, from: f64, dt: Seconds) -> Result<Newtons, StepError> {
         let force = self.force();
-        let overflow = StepError::Overflow {
-            from,
-            to: nearest(&self.depth),
-            dt: dt.0,
-        };
+        let overflow = StepError::Overflow { from, to: nearest(&self.depth), dt: dt.0 };
         force.is_finite().then_some(force).ok_or(overflow)
     }
 

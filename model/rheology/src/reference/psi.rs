@@ -21,18 +21,10 @@ impl Weights {
     pub fn new(digits: Digits, dt: &Big, tau: &Big, count: usize) -> Self {
         let one = digits.whole(1);
         if *tau == Big::ZERO {
-            return Self {
-                r: None,
-                kept: digits.zero(),
-                psi: vec![one; count],
-            };
+            return Self { r: None, kept: digits.zero(), psi: vec![one; count] };
         }
         let r = dt / tau;
-        let kept = if r > digits.whole(FORGOTTEN) {
-            digits.zero()
-        } else {
-            (-&r).exp()
-        };
+        let kept = if r > digits.whole(FORGOTTEN) { digits.zero() } else { (-&r).exp() };
         let psi = if r < one {
             (0..count).map(|j| series(digits, j, &r)).collect()
         } else {
@@ -43,11 +35,7 @@ impl Weights {
             }
             all
         };
-        Self {
-            r: Some(r),
-            kept,
-            psi,
-        }
+        Self { r: Some(r), kept, psi }
     }
 }
 

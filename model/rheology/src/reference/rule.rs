@@ -88,11 +88,7 @@ impl RuleReference {
         };
         self.depth = to;
         let force = self.force();
-        let overflow = StepError::Overflow {
-            from: nearest(&self.depth),
-            to: depth.0,
-            dt: dt.0,
-        };
+        let overflow = StepError::Overflow { from: nearest(&self.depth), to: depth.0, dt: dt.0 };
         force.is_finite().then_some(force).ok_or(overflow)
     }
 
@@ -109,9 +105,6 @@ impl RuleReference {
     }
 
     fn elastic(&self, x: &Big) -> Big {
-        self.mu
-            .iter()
-            .rev()
-            .fold(Big::ZERO, |sum, mu| (sum + mu) * x)
+        self.mu.iter().rev().fold(Big::ZERO, |sum, mu| (sum + mu) * x)
     }
 }

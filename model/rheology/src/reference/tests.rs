@@ -9,9 +9,7 @@ const DIGITS: Digits = Digits::decimal(REFERENCE_DIGITS);
 
 fn thesis(tau: f64) -> (Model, Vec<Relaxation>) {
     let family = families::by_key("series-3").unwrap();
-    let model = family
-        .model(&[tau], &[0.05333, -0.0086, 0.000_434_5, 0.06])
-        .unwrap();
+    let model = family.model(&[tau], &[0.05333, -0.0086, 0.000_434_5, 0.06]).unwrap();
     let terms = model.terms().unwrap();
     (model, terms)
 }
@@ -24,17 +22,9 @@ fn miss(reference: &Reference, exact: &Big) -> f64 {
 /// `F = P(t) - P(0) e^(-t/tau)`, `P = sum_k a_k sum_j (-tau)^j k!/(k-j)! t^(k-j)`, on a ramp from the
 /// surface at speed `v`.
 fn on_a_ramp(model: &Model, v: f64, t: f64) -> Big {
-    let (tau, t, v) = (
-        DIGITS.exact(model.outer[0]),
-        DIGITS.exact(t),
-        DIGITS.exact(v),
-    );
+    let (tau, t, v) = (DIGITS.exact(model.outer[0]), DIGITS.exact(t), DIGITS.exact(v));
     let [mu1, mu2, mu3, sigma] = [0, 1, 2, 3].map(|k| DIGITS.exact(model.linear[k]));
-    let a = [
-        mu1 * &v + sigma * &v * &v,
-        mu2 * &v * &v,
-        mu3 * &v * &v * &v,
-    ];
+    let a = [mu1 * &v + sigma * &v * &v, mu2 * &v * &v, mu3 * &v * &v * &v];
     let (mut now, mut start) = (DIGITS.zero(), DIGITS.zero());
     for (k, a) in (1..).zip(&a) {
         let mut factor = a.clone();
@@ -91,15 +81,8 @@ fn a_jump_relaxes_exponentially() {
 #[test]
 fn agrees_with_the_file_of_quadratures() {
     // Corners of the path of `scripts/family_reference.py`, in s and mm.
-    let corners: [(f64, f64); 7] = [
-        (0.0, 0.0),
-        (2.5, 10.0),
-        (6.0, 10.0),
-        (8.0, 4.0),
-        (9.0, -2.0),
-        (9.5, -2.0),
-        (12.0, 8.0),
-    ];
+    let corners: [(f64, f64); 7] =
+        [(0.0, 0.0), (2.5, 10.0), (6.0, 10.0), (8.0, 4.0), (9.0, -2.0), (9.5, -2.0), (12.0, 8.0)];
     let numbers = |text: &str| -> Vec<f64> {
         let fields = text.split(',').filter(|field| !field.is_empty());
         fields.map(|field| field.parse().unwrap()).collect()
@@ -108,14 +91,7 @@ fn agrees_with_the_file_of_quadratures() {
     for line in include_str!("../../tests/data/family_reference.txt").lines() {
         let fields: Vec<&str> = line.split('/').map(str::trim).collect();
         // Families with a spectrum are what their quadrature makes of them, not exact.
-        let exact_kinds = [
-            "voigt",
-            "maxwell",
-            "kelvin",
-            "series",
-            "exponential",
-            "prony",
-        ];
+        let exact_kinds = ["voigt", "maxwell", "kelvin", "series", "exponential", "prony"];
         if !exact_kinds.iter().any(|kind| fields[0].starts_with(kind)) {
             continue;
         }
@@ -137,9 +113,8 @@ fn agrees_with_the_file_of_quadratures() {
         let miss = nearest(&(reference.sum() - exact)).abs();
         // The file shows 25 digits of a few newtons. The coefficient of a Maxwell term's rate is a
         // product, rounded before it comes here.
-        let is_rounded = ["maxwell", "kelvin", "prony"]
-            .iter()
-            .any(|kind| fields[0].starts_with(kind));
+        let is_rounded =
+            ["maxwell", "kelvin", "prony"].iter().any(|kind| fields[0].starts_with(kind));
         let allowed = if is_rounded { 1e-15 } else { 1e-23 };
         assert!(miss < allowed, "{}: {miss:e}", fields[0]);
         seen.insert(fields[0].to_owned());
@@ -175,11 +150,7 @@ fn splitting_changes_nothing_and_what_has_no_force_is_refused() {
     assert_eq!(softens.step(Depth(8.0), Seconds(1.0)).unwrap().0, 0.0);
     let back = softens.step(Depth(3.0), Seconds(1.0)).unwrap().0;
     assert!((back - 0.1875).abs() < 1e-16, "{back}");
-    let dashpot = Relaxation {
-        tau: 0.0,
-        elastic: Drive::default(),
-        rate: Drive::power(1, 1.0),
-    };
+    let dashpot = Relaxation { tau: 0.0, elastic: Drive::default(), rate: Drive::power(1, 1.0) };
     let mut dashpot = Reference::new(&[dashpot], Depth(0.0)).unwrap();
     assert!(dashpot.step(Depth(1.0), Seconds(0.0)).is_err());
 }

@@ -27,18 +27,11 @@ impl Cost {
             states: usize::from(term.tau > 0.0),
             drives: drives(&term.elastic) + drives(&term.rate),
         });
-        one.fold(
-            Self {
-                operations: 0,
-                states: 0,
-                drives: 0,
-            },
-            |all, one| Self {
-                operations: all.operations + one.operations,
-                states: all.states + one.states,
-                drives: all.drives + one.drives,
-            },
-        )
+        one.fold(Self { operations: 0, states: 0, drives: 0 }, |all, one| Self {
+            operations: all.operations + one.operations,
+            states: all.states + one.states,
+            drives: all.drives + one.drives,
+        })
     }
 }
 
@@ -47,11 +40,7 @@ fn powers(drive: &Drive) -> usize {
 }
 
 fn softenings(drive: &Drive) -> usize {
-    drive
-        .softening
-        .iter()
-        .filter(|value| **value != 0.0)
-        .count()
+    drive.softening.iter().filter(|value| **value != 0.0).count()
 }
 
 fn drives(drive: &Drive) -> usize {
@@ -68,11 +57,7 @@ fn operations(term: &Relaxation) -> usize {
     let degree = term.degree();
     // Moved to the start of the piece (a multiplication and an addition for each pair of powers), then
     // weighted (three for each power, one for the constant).
-    let polynomial = if coefficients > 0 {
-        degree * (degree + 1) + 3 * degree + 1
-    } else {
-        0
-    };
+    let polynomial = if coefficients > 0 { degree * (degree + 1) + 3 * degree + 1 } else { 0 };
     // Elastic: value at the start, its growth over the piece (three exponentials). Rate: value at the
     // start and two exponentials of growth.
     let exponentials = elastic.exponential.map_or(0, |_| 4 * EXPONENTIAL + 9)

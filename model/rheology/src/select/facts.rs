@@ -32,9 +32,7 @@ pub struct RecordFacts {
 impl RecordFacts {
     /// The facts of a record whose samples were checked.
     pub(super) fn of(name: &str, samples: &[FitSample]) -> Self {
-        let deepest = samples
-            .iter()
-            .fold(f64::NEG_INFINITY, |all, one| all.max(one.depth.0));
+        let deepest = samples.iter().fold(f64::NEG_INFINITY, |all, one| all.max(one.depth.0));
         let start = samples.first().map_or(0.0, |one| one.depth.0);
         let stroke = deepest - start;
         let first = |level: f64| {

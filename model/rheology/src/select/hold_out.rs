@@ -151,40 +151,22 @@ pub(super) fn folds(
     samples: &[&[FitSample]],
 ) -> Result<Vec<Fold>, HoldOutError> {
     let each = || -> Vec<Fold> {
-        let one = |index| Fold {
-            test: vec![index],
-            cut: None,
-        };
+        let one = |index| Fold { test: vec![index], cut: None };
         (0..facts.len()).map(one).collect()
     };
     let (groups, what) = match hold_out {
         HoldOut::None => return Ok(Vec::new()),
         HoldOut::Auto if facts.len() == 1 => {
             let cut = cut(&facts[0], samples[0]);
-            return Ok(cut
-                .map(|cut| Fold {
-                    test: vec![0],
-                    cut: Some(cut),
-                })
-                .into_iter()
-                .collect());
+            return Ok(cut.map(|cut| Fold { test: vec![0], cut: Some(cut) }).into_iter().collect());
         }
         HoldOut::Auto => return Ok(each()),
         HoldOut::Specimen => (by_specimen(facts)?, "specimen"),
-        HoldOut::Speed => (
-            alike(facts.iter().map(|one| one.speed_mm_per_s).collect()),
-            "speed",
-        ),
-        HoldOut::Depth => (
-            alike(facts.iter().map(|one| one.depth_mm).collect()),
-            "depth",
-        ),
+        HoldOut::Speed => (alike(facts.iter().map(|one| one.speed_mm_per_s).collect()), "speed"),
+        HoldOut::Depth => (alike(facts.iter().map(|one| one.depth_mm).collect()), "depth"),
     };
     if groups.len() < 2 {
-        return Err(HoldOutError::AllAlike {
-            what,
-            records: facts.len(),
-        });
+        return Err(HoldOutError::AllAlike { what, records: facts.len() });
     }
     Ok(groups)
 }
@@ -194,19 +176,11 @@ fn by_specimen(facts: &[RecordFacts]) -> Result<Vec<Fold>, HoldOutError> {
     let mut groups: Vec<(&str, Fold)> = Vec::new();
     for (index, one) in facts.iter().enumerate() {
         let Some(specimen) = &one.specimen else {
-            return Err(HoldOutError::NoSpecimen {
-                record: one.record.clone(),
-            });
+            return Err(HoldOutError::NoSpecimen { record: one.record.clone() });
         };
         match groups.iter_mut().find(|(known, _)| known == specimen) {
             Some((_, group)) => group.test.push(index),
-            None => groups.push((
-                specimen,
-                Fold {
-                    test: vec![index],
-                    cut: None,
-                },
-            )),
+            None => groups.push((specimen, Fold { test: vec![index], cut: None })),
         }
     }
     Ok(groups.into_iter().map(|(_, group)| group).collect())
@@ -222,10 +196,7 @@ fn alike(values: Vec<f64>) -> Vec<Fold> {
             Some(group) if !are_unlike(values[group.test[0]], values[index]) => {
                 group.test.push(index);
             }
-            _ => groups.push(Fold {
-                test: vec![index],
-                cut: None,
-            }),
+            _ => groups.push(Fold { test: vec![index], cut: None }),
         }
     }
     groups
@@ -351,12 +322,7 @@ mod tests {
 
     #[test]
     fn what_is_new_in_a_record() {
-        let mut facts = [
-            facts(1.0, 10.0),
-            facts(1.02, 20.0),
-            facts(5.0, 20.5),
-            facts(1.0, 20.0),
-        ];
+        let mut facts = [facts(1.0, 10.0), facts(1.02, 20.0), facts(5.0, 20.5), facts(1.0, 20.0)];
         for (one, specimen) in facts.iter_mut().zip(["A", "B", "A", "B"]) {
             one.specimen = Some(specimen.into());
         }

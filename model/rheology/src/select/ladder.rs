@@ -30,9 +30,7 @@ pub struct Step {
 pub(super) fn steps(candidates: &[Candidate]) -> Vec<Step> {
     let rungs = candidates.iter().flat_map(|after| {
         let simpler = by_key(&after.family).map_or(Vec::new(), |family| family.adds_to());
-        simpler
-            .into_iter()
-            .map(move |(key, adds)| (key, adds, after))
+        simpler.into_iter().map(move |(key, adds)| (key, adds, after))
     });
     let step = |(key, adds, after): (String, &'static str, &Candidate)| {
         let before = candidates.iter().find(|one| one.family == key)?;

@@ -30,12 +30,7 @@ pub struct SelectOptions {
 
 impl Default for SelectOptions {
     fn default() -> Self {
-        Self {
-            families: all(),
-            tolerance: None,
-            hold_out: HoldOut::Auto,
-            specimens: Vec::new(),
-        }
+        Self { families: all(), tolerance: None, hold_out: HoldOut::Auto, specimens: Vec::new() }
     }
 }
 
@@ -110,11 +105,7 @@ pub struct Candidate {
 impl Candidate {
     /// The error that a tolerance is compared with: of prediction where `is_predicted`, else of the fit.
     pub(super) fn error(&self, is_predicted: bool) -> Option<f64> {
-        if is_predicted {
-            self.prediction.as_ref().map(|one| one.rms_n)
-        } else {
-            Some(self.rms_n)
-        }
+        if is_predicted { self.prediction.as_ref().map(|one| one.rms_n) } else { Some(self.rms_n) }
     }
 }
 
@@ -199,10 +190,8 @@ pub fn select(
         return Err(SelectError::NoFamilies);
     }
     check(records)?;
-    let mut facts: Vec<RecordFacts> = records
-        .iter()
-        .map(|(name, samples)| RecordFacts::of(name, samples))
-        .collect();
+    let mut facts: Vec<RecordFacts> =
+        records.iter().map(|(name, samples)| RecordFacts::of(name, samples)).collect();
     for (facts, specimen) in facts.iter_mut().zip(&options.specimens) {
         facts.specimen.clone_from(specimen);
     }
@@ -215,9 +204,7 @@ pub fn select(
         return Err(reason.clone().into());
     }
     let samples = fitted.first().map_or(0, |(_, fit, _)| fit.samples);
-    let best = fitted
-        .iter()
-        .min_by(|a, b| a.1.weighted_square.total_cmp(&b.1.weighted_square));
+    let best = fitted.iter().min_by(|a, b| a.1.weighted_square.total_cmp(&b.1.weighted_square));
     let effective = best.map_or(0.0, |(_, fit, _)| fit.effective_samples);
     // The force of the tissue: a sensor offset is no part of it.
     if let Some(best) = best {
@@ -233,11 +220,7 @@ pub fn select(
     let tolerance_n = options.tolerance.map(|one| one.in_newtons(Newtons(peak)).0);
     let is_predicted = candidates.iter().any(|one| one.prediction.is_some());
     compare(&mut candidates, tolerance_n, is_predicted);
-    let counts = Counts {
-        records: records.len(),
-        samples,
-        effective,
-    };
+    let counts = Counts { records: records.len(), samples, effective };
     let verdict = verdict(&candidates, tolerance_n, is_predicted, counts);
     Ok(Selection {
         steps: steps(&candidates),
@@ -250,20 +233,13 @@ pub fn select(
         candidates,
         refused: refused
             .into_iter()
-            .map(|(family, reason)| Refused {
-                family,
-                reason: reason.to_string(),
-            })
+            .map(|(family, reason)| Refused { family, reason: reason.to_string() })
             .collect(),
     })
 }
 
 /// A family with its fit to all records, and its predictions of what was held out or why there are none.
-type FamilyFit<'a> = (
-    &'a dyn Family,
-    JointReport,
-    Result<Vec<super::PredictionOf>, String>,
-);
+type FamilyFit<'a> = (&'a dyn Family, JointReport, Result<Vec<super::PredictionOf>, String>);
 /// Families that the records do not hold, by key.
 type Refusals = Vec<(String, FitError)>;
 
@@ -276,11 +252,8 @@ fn fit_families<'a>(
 ) -> Result<(Vec<FamilyFit<'a>>, Refusals), SelectError> {
     let per_family = 1 + folds.len();
     let begin = |done: usize, family: &dyn Family| {
-        let news = Progress {
-            done,
-            total: options.families.len() * per_family,
-            family: family.key(),
-        };
+        let news =
+            Progress { done, total: options.families.len() * per_family, family: family.key() };
         match progress(&news) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(SelectError::Ended),
@@ -315,17 +288,13 @@ fn fit_families<'a>(
 fn compare(candidates: &mut [Candidate], tolerance_n: Option<f64>, is_predicted: bool) {
     let lowest =
         |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
-    let (bic, aicc) = (
-        lowest(|one| one.bic),
-        lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)),
-    );
+    let (bic, aicc) =
+        (lowest(|one| one.bic), lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)));
     for one in candidates {
         one.bic_above = one.bic - bic;
         one.aicc_above = one.aicc_above.map(|value| value - aicc);
-        one.is_within = tolerance_n.map(|tolerance| {
-            one.error(is_predicted)
-                .is_some_and(|error| error <= tolerance)
-        });
+        one.is_within = tolerance_n
+            .map(|tolerance| one.error(is_predicted).is_some_and(|error| error <= tolerance));
     }
 }
 
@@ -333,16 +302,10 @@ fn compare(candidates: &mut [Candidate], tolerance_n: Option<f64>, is_predicted:
 fn check(records: &[(&str, &[FitSample])]) -> Result<(), SelectError> {
     for (name, samples) in records {
         if samples.is_empty() {
-            let reason = FitError::TooFewSamples {
-                samples: 0,
-                parameters: 2,
-            };
+            let reason = FitError::TooFewSamples { samples: 0, parameters: 2 };
             return Err(match records.len() {
                 1 => reason,
-                _ => FitError::InRecord {
-                    record: (*name).to_owned(),
-                    reason: Box::new(reason),
-                },
+                _ => FitError::InRecord { record: (*name).to_owned(), reason: Box::new(reason) },
             }
             .into());
         }

@@ -78,21 +78,15 @@ fn simplest<'a>(candidates: &[&'a Candidate]) -> Option<&'a Candidate> {
 
 /// The lowest BIC, if no other family comes near it and it describes the records.
 fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
-    let near: Vec<&Candidate> = candidates
-        .iter()
-        .filter(|one| one.bic_above < BARE_MENTION)
-        .collect();
+    let near: Vec<&Candidate> =
+        candidates.iter().filter(|one| one.bic_above < BARE_MENTION).collect();
     let among: Vec<String> = near.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&near);
     let (outcome, sentence) = match chosen {
         Some(_) if counts.is_curve() => {
             let closest = candidates.iter().min_by(|a, b| a.rms_n.total_cmp(&b.rms_n));
             let left = closest.map_or(String::new(), |one| {
-                format!(
-                    "what even {} leaves, {} rms,",
-                    one.family,
-                    newtons(one.rms_n)
-                )
+                format!("what even {} leaves, {} rms,", one.family, newtons(one.rms_n))
             });
             (
                 Outcome::NoneAdequate,
@@ -121,10 +115,7 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
             } else {
                 ", the only family compared".to_owned()
             };
-            (
-                Outcome::Recommended,
-                format!("use {} ({}){lead}", one.family, one.name),
-            )
+            (Outcome::Recommended, format!("use {} ({}){lead}", one.family, one.name))
         }
         None => (
             Outcome::NoneAdequate,
@@ -143,20 +134,11 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
 /// The cheapest within the tolerance.
 fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdict {
     let error = |one: &Candidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
-    let what = if is_predicted {
-        "predicts what was held out"
-    } else {
-        "describes the records"
-    };
-    let good: Vec<&Candidate> = candidates
-        .iter()
-        .filter(|one| error(one) <= tolerance)
-        .collect();
+    let what = if is_predicted { "predicts what was held out" } else { "describes the records" };
+    let good: Vec<&Candidate> = candidates.iter().filter(|one| error(one) <= tolerance).collect();
     let by_cost = |one: &&&Candidate| (one.cost, one.free);
     let Some(cheapest) = good.iter().min_by_key(by_cost) else {
-        let nearest = candidates
-            .iter()
-            .min_by(|a, b| error(a).total_cmp(&error(b)));
+        let nearest = candidates.iter().min_by(|a, b| error(a).total_cmp(&error(b)));
         let nearest = nearest.filter(|one| error(one).is_finite());
         let sentence = match nearest {
             Some(one) => format!(
@@ -203,11 +185,7 @@ fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdi
     }];
     sentences.extend(remarks(candidates, chosen, tolerance, is_predicted));
     Verdict {
-        outcome: if equals.len() > 1 {
-            Outcome::NoWinner
-        } else {
-            Outcome::Recommended
-        },
+        outcome: if equals.len() > 1 { Outcome::NoWinner } else { Outcome::Recommended },
         family: Some(chosen.family.clone()),
         among,
         sentences,
@@ -300,11 +278,7 @@ mod tests {
 
     #[test]
     fn noise_with_a_short_memory_is_no_curve() {
-        let counts = |samples, effective| Counts {
-            records: 2,
-            samples,
-            effective,
-        };
+        let counts = |samples, effective| Counts { records: 2, samples, effective };
         // A filter's memory of fifty samples in a minute at 1 kHz; a short record of white noise.
         assert!(!counts(60_000, 1200.0).is_curve());
         assert!(!counts(100, 90.0).is_curve());

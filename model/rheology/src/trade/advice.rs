@@ -99,10 +99,7 @@ impl TradeCurves {
     fn integrator(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
         let period = 1.0 / rate_hz;
         // A step of a rounded tenth of a millisecond still fits a period.
-        let fitting = self
-            .integrators
-            .iter()
-            .filter(|row| row.step_s <= period * (1.0 + 1e-9));
+        let fitting = self.integrators.iter().filter(|row| row.step_s <= period * (1.0 + 1e-9));
         let candidates = fitting.filter_map(|row| {
             let error = row.error?;
             let choice = Choice {

@@ -68,9 +68,7 @@ impl TradeCurves {
         }
         let number = |what: &str, value: f64, is_possible: bool| {
             let what = what.to_owned();
-            is_possible
-                .then_some(())
-                .ok_or(CurveError::Number { what, value })
+            is_possible.then_some(()).ok_or(CurveError::Number { what, value })
         };
         let error = |what: &str, value: f64| number(what, value, value >= 0.0 && value.is_finite());
         let positive =
@@ -119,12 +117,7 @@ impl TradeCurves {
     /// Whether the errors are those of `now`, computed afresh for the same rows.
     pub fn agrees_with(&self, now: &Self) -> Result<(), CurveError> {
         let peak = self.peak;
-        same(
-            "the ramp and hold",
-            peak.ramp_hold_n,
-            now.peak.ramp_hold_n,
-            LAST_DIGITS,
-        )?;
+        same("the ramp and hold", peak.ramp_hold_n, now.peak.ramp_hold_n, LAST_DIGITS)?;
         same("the poke", peak.poke_n, now.peak.poke_n, LAST_DIGITS)?;
         self.integrators_agree(now)?;
         for row in &now.families {
@@ -160,12 +153,8 @@ impl TradeCurves {
     fn integrators_agree(&self, now: &Self) -> Result<(), CurveError> {
         let peak = self.peak;
         for row in &now.integrators {
-            let name = format!(
-                "{} at {} s in {}",
-                row.scheme.name(),
-                row.step_s,
-                row.precision.name()
-            );
+            let name =
+                format!("{} at {} s in {}", row.scheme.name(), row.step_s, row.precision.name());
             let stored = self.integrators.iter().find(|stored| {
                 (stored.scheme, stored.precision, stored.step_s)
                     == (row.scheme, row.precision, row.step_s)
@@ -175,12 +164,7 @@ impl TradeCurves {
                 (Some(None), None) => {}
                 (Some(Some(stored)), Some(found)) => {
                     let share = last_digits(row.precision);
-                    same(
-                        &name,
-                        stored.ramp_hold_n,
-                        found.ramp_hold_n,
-                        share * peak.ramp_hold_n,
-                    )?;
+                    same(&name, stored.ramp_hold_n, found.ramp_hold_n, share * peak.ramp_hold_n)?;
                     same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
                 }
                 (Some(_), _) => return Err(CurveError::Contradiction(name)),
@@ -199,11 +183,7 @@ fn within(
     if (stored - found).abs() <= share * stored.max(found) + rounding {
         return Ok(());
     }
-    Err(CurveError::Error {
-        what: what.to_owned(),
-        stored,
-        found,
-    })
+    Err(CurveError::Error { what: what.to_owned(), stored, found })
 }
 
 /// Whether computed errors are the same.

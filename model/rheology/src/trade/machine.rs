@@ -23,12 +23,7 @@ impl Machine {
     /// In words.
     #[must_use]
     pub fn words(&self) -> String {
-        let Self {
-            cpu,
-            os,
-            cores,
-            profile,
-        } = self;
+        let Self { cpu, os, cores, profile } = self;
         format!("{cpu}, {cores} logical cores, {os}, {profile} build")
     }
 
@@ -37,10 +32,7 @@ impl Machine {
     pub fn file_stem(&self) -> String {
         let words = self.words().to_lowercase();
         let parts = words.split(|c: char| !c.is_ascii_alphanumeric());
-        parts
-            .filter(|part| !part.is_empty())
-            .collect::<Vec<_>>()
-            .join("-")
+        parts.filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
     }
 }
 

@@ -161,10 +161,7 @@ impl TradeCurves {
             (error, row.second_ns)
         });
         let front = pareto(&points.collect::<Vec<_>>());
-        self.integrators
-            .iter_mut()
-            .zip(front)
-            .for_each(|(row, front)| row.front = front);
+        self.integrators.iter_mut().zip(front).for_each(|(row, front)| row.front = front);
         for index in 0..self.families.len() {
             let target = &self.families[index].target;
             let rivals = self.families.iter().filter(|row| row.target == *target);
@@ -173,24 +170,11 @@ impl TradeCurves {
                 pareto::beats((rival.error_n, rival.cost.ns), (row.error_n, row.cost.ns))
             });
         }
-        let points: Vec<_> = self
-            .fit
-            .iter()
-            .map(|row| (Some(row.tau_error), row.cost.ns))
-            .collect();
-        self.fit
-            .iter_mut()
-            .zip(pareto(&points))
-            .for_each(|(row, front)| row.front = front);
-        let points: Vec<_> = self
-            .live
-            .iter()
-            .map(|row| (row.tau_error, row.cost.ns))
-            .collect();
-        self.live
-            .iter_mut()
-            .zip(pareto(&points))
-            .for_each(|(row, front)| row.front = front);
+        let points: Vec<_> =
+            self.fit.iter().map(|row| (Some(row.tau_error), row.cost.ns)).collect();
+        self.fit.iter_mut().zip(pareto(&points)).for_each(|(row, front)| row.front = front);
+        let points: Vec<_> = self.live.iter().map(|row| (row.tau_error, row.cost.ns)).collect();
+        self.live.iter_mut().zip(pareto(&points)).for_each(|(row, front)| row.front = front);
     }
 
     /// All costs measured.
@@ -198,10 +182,7 @@ impl TradeCurves {
         let integrators = self.integrators.iter().map(|row| &row.cost);
         let families = self.families.iter().map(|row| &row.cost);
         let fits = self.fit.iter().map(|row| &row.cost);
-        integrators
-            .chain(families)
-            .chain(fits)
-            .chain(self.live.iter().map(|row| &row.cost))
+        integrators.chain(families).chain(fits).chain(self.live.iter().map(|row| &row.cost))
     }
 
     /// Largest difference between two halves of the measurement, as a share: how far the times would

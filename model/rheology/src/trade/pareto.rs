@@ -14,19 +14,14 @@ pub fn pareto(points: &[(Option<f64>, f64)]) -> Vec<bool> {
             other.is_some_and(|other| beats((other, other_cost), (error, cost)))
         })
     };
-    points
-        .iter()
-        .map(|&(error, cost)| error.is_some_and(|error| !is_beaten(error, cost)))
-        .collect()
+    points.iter().map(|&(error, cost)| error.is_some_and(|error| !is_beaten(error, cost))).collect()
 }
 
 /// The front of points of `[cost, error]`: indices of those that nothing beats, the cheapest first.
 #[must_use]
 pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
-    let pairs: Vec<(Option<f64>, f64)> = points
-        .iter()
-        .map(|&[cost, error]| (Some(error), cost))
-        .collect();
+    let pairs: Vec<(Option<f64>, f64)> =
+        points.iter().map(|&[cost, error]| (Some(error), cost)).collect();
     let on_front = pareto(&pairs);
     let mut front: Vec<usize> = (0..points.len()).filter(|&index| on_front[index]).collect();
     front.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));

@@ -2,11 +2,7 @@ use super::*;
 use crate::tolerance::Tolerance;
 
 fn cost(ns: f64) -> Cost {
-    Cost {
-        ns,
-        spread: 0.02,
-        halves: 0.01,
-    }
+    Cost { ns, spread: 0.02, halves: 0.01 }
 }
 
 fn integrator(scheme: Scheme, step_s: f64, error: f64, ns: f64) -> IntegratorRow {
@@ -14,10 +10,7 @@ fn integrator(scheme: Scheme, step_s: f64, error: f64, ns: f64) -> IntegratorRow
         scheme,
         precision: Precision::F64,
         step_s,
-        error: Some(ForceError {
-            ramp_hold_n: 6.0 * error,
-            poke_n: 3.0 * error,
-        }),
+        error: Some(ForceError { ramp_hold_n: 6.0 * error, poke_n: 3.0 * error }),
         refused: None,
         cost: cost(ns),
         second_ns: ns / step_s,
@@ -65,10 +58,7 @@ fn curves() -> TradeCurves {
         machine: here(),
         measured_at: "2026-11-21T00:00:00Z".into(),
         quick: false,
-        peak: ForceError {
-            ramp_hold_n: 6.0,
-            poke_n: 3.0,
-        },
+        peak: ForceError { ramp_hold_n: 6.0, poke_n: 3.0 },
         seeds: [1, 8],
         integrators: vec![
             integrator(Scheme::ExplicitEuler, 1e-3, 1e-3, 4.0),
@@ -86,12 +76,7 @@ fn curves() -> TradeCurves {
             family("fung-4", "a spectrum", 0.03, 300.0),
         ],
         fit: vec![fit(1000.0, 1e-3, 2e7), fit(10.0, 9e-3, 4e5)],
-        live: vec![LiveRow {
-            nodes: 64,
-            tau_error: Some(1e-9),
-            cost: cost(300.0),
-            front: false,
-        }],
+        live: vec![LiveRow { nodes: 64, tau_error: Some(1e-9), cost: cost(300.0), front: false }],
     };
     curves.mark_fronts();
     curves
@@ -189,15 +174,9 @@ fn stale_and_foreign_curves_are_noticed() {
     assert!(doubt(&here(), "1.2.3", -2.0).contains("future"));
     let other = Machine { cores: 4, ..here() };
     assert!(doubt(&other, "1.2.3", 1.0).contains("foreign"));
-    let debug = Machine {
-        profile: "debug".into(),
-        ..here()
-    };
+    let debug = Machine { profile: "debug".into(), ..here() };
     assert!(doubt(&debug, "1.2.3", 1.0).contains("debug"));
-    assert_eq!(
-        here().file_stem(),
-        "example-r-cpu-3-ghz-8-logical-cores-linux-release-build"
-    );
+    assert_eq!(here().file_stem(), "example-r-cpu-3-ghz-8-logical-cores-linux-release-build");
 }
 
 #[test]
@@ -218,18 +197,12 @@ fn curves_that_were_changed_are_noticed() {
     };
     for change in contradicted {
         let refusal = checked(change);
-        assert!(
-            matches!(refusal, CurveError::Contradiction(_)),
-            "{refusal:?}"
-        );
+        assert!(matches!(refusal, CurveError::Contradiction(_)), "{refusal:?}");
     }
     let impossible: [(Change, f64); 4] = [
         (|curves| curves.integrators[0].cost.ns = -1.0, -1.0),
         (|curves| curves.families[0].error_n = f64::NAN, f64::NAN),
-        (
-            |curves| curves.fit[0].tau_error = f64::INFINITY,
-            f64::INFINITY,
-        ),
+        (|curves| curves.fit[0].tau_error = f64::INFINITY, f64::INFINITY),
         (|curves| curves.peak.poke_n = 0.0, 0.0),
     ];
     for (change, number) in impossible {
@@ -241,22 +214,14 @@ fn curves_that_were_changed_are_noticed() {
     assert_eq!(checked(|curves| curves.format = 2), CurveError::Format(2));
     let changes: [(Change, &str); 6] = [
         (
-            |curves| {
-                curves.integrators[1]
-                    .error
-                    .iter_mut()
-                    .for_each(|e| e.poke_n *= 1.00001)
-            },
+            |curves| curves.integrators[1].error.iter_mut().for_each(|e| e.poke_n *= 1.00001),
             "trapezoid at 0.001 s",
         ),
         (|curves| curves.families[1].error_n *= 0.999, "series-2"),
         (|curves| curves.fit[1].tau_error *= 1.001, "10 Hz"),
         (|curves| curves.peak.ramp_hold_n *= 1.00001, "ramp and hold"),
         (|curves| curves.live.clear(), "live"),
-        (
-            |curves| curves.integrators.truncate(3),
-            Scheme::Exact.name(),
-        ),
+        (|curves| curves.integrators.truncate(3), Scheme::Exact.name()),
     ];
     assert_eq!(good.agrees_with(&good), Ok(()));
     for (change, row) in changes {

@@ -27,11 +27,7 @@ fn bodies() -> Vec<Model> {
         model("series-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06]),
         model("series-4", &[1.2], &[0.08, -0.012, 0.0004, 3e-5, 0.05]),
         model("series-5", &[1.2], &[0.08, -0.02, 0.003, -2e-4, 5e-6, 0.05]),
-        model(
-            "unloading-3",
-            &[1.023],
-            &[0.05333, -0.0086, 0.0004345, 0.06, -0.02, 0.003, -2e-4],
-        ),
+        model("unloading-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06, -0.02, 0.003, -2e-4]),
         model("exponential", &[1.5, 0.15], &[0.3, 0.9]),
         model("prony-2", &[0.5, 9.0], &[0.1, 0.15, 0.1]),
         model("fractional", &[2.0, 0.5], &[0.1, 0.3]),
@@ -73,9 +69,7 @@ fn path(speed: f64) -> Vec<(Seconds, Depth)> {
         from.1 + (to.1 - from.1) * (t - from.0) / (to.0 - from.0)
     };
     let at = |i: usize| 0.1 * i as f64;
-    (0..=count)
-        .map(|i| (Seconds(at(i)), Depth(depth(at(i)))))
-        .collect()
+    (0..=count).map(|i| (Seconds(at(i)), Depth(depth(at(i))))).collect()
 }
 
 /// A record of a body, its contact `contact` mm behind where depth is counted from, an offset of 0.03 N.
@@ -148,12 +142,7 @@ fn every_family_finds_where_contact_is() {
         let report = fit(&samples, &options).unwrap();
         // The force of a dashpot alone jumps at contact, so that the sum of squares has a corner there.
         let allowed = if model.family == "voigt" { 100.0 } else { 1.0 };
-        check(
-            &model.family,
-            report.value("x_contact"),
-            0.7,
-            1e-5 * allowed,
-        );
+        check(&model.family, report.value("x_contact"), 0.7, 1e-5 * allowed);
         for (name, exact) in truth(&model) {
             let what = format!("{} {name}", model.family);
             check(&what, report.value(&name), exact, 1e-4 * allowed);
@@ -173,21 +162,11 @@ fn every_family_shares_what_is_to_be_shared() {
         let own = model.outer.len();
         let mut other = model.clone();
         other.linear[0] *= 1.5;
-        let records = [
-            record(&model, 2.0, 0.0, 0.0, 1),
-            record(&other, 5.0, 0.0, 0.0, 2),
-        ];
-        let both = [
-            ("one", records[0].as_slice()),
-            ("other", records[1].as_slice()),
-        ];
+        let records = [record(&model, 2.0, 0.0, 0.0, 1), record(&other, 5.0, 0.0, 0.0, 2)];
+        let both = [("one", records[0].as_slice()), ("other", records[1].as_slice())];
         let options = options(&model);
         let names = options.body_names();
-        let shared: Vec<&str> = names
-            .iter()
-            .copied()
-            .filter(|name| *name != names[own])
-            .collect();
+        let shared: Vec<&str> = names.iter().copied().filter(|name| *name != names[own]).collect();
         for shared in [shared.as_slice(), &[]] {
             let joint = fit_joint(&both, &options, shared)
                 .unwrap_or_else(|err| panic!("{}: {err}", model.family));
@@ -211,9 +190,7 @@ fn every_family_states_what_it_does_not_know() {
         let report = fitted.report();
         for (name, exact) in truth(&model) {
             let one = report.parameter(&name).unwrap();
-            let error = one
-                .std_error
-                .unwrap_or_else(|| panic!("{} {name}", model.family));
+            let error = one.std_error.unwrap_or_else(|| panic!("{} {name}", model.family));
             // One record in a thousand is as far off by its noise.
             let off = (one.value - exact).abs() / error;
             assert!(off < 4.5, "{} {name}: {off}", model.family);
@@ -245,22 +222,14 @@ fn profiles_of_every_family_are_the_symmetric_intervals_where_noise_is_small() {
             let width = ends[1] - ends[0];
             assert!(low < known.value && known.value < high, "{one:?}");
             let ratio = (high - low) / width;
-            assert!(
-                (ratio - 1.0).abs() < 0.1,
-                "{} {}: {ratio}",
-                model.family,
-                one.name
-            );
+            assert!((ratio - 1.0).abs() < 0.1, "{} {}: {ratio}", model.family, one.name);
         }
     }
 }
 
 #[test]
 fn bootstraps_of_every_family_spread_like_their_standard_errors() {
-    let choice = Bootstrap {
-        seed: 3,
-        repeats: 60,
-    };
+    let choice = Bootstrap { seed: 3, repeats: 60 };
     for model in quick_bodies() {
         let samples = record(&model, 2.0, 0.0, NOISE, 7);
         let fitted = Fitted::of(&samples, &options(&model)).unwrap();
@@ -269,12 +238,7 @@ fn bootstraps_of_every_family_spread_like_their_standard_errors() {
             let error = report.parameter(&one.name).unwrap().std_error.unwrap();
             // Sixty repeats tell a standard deviation to 9 %.
             let ratio = one.std_dev / error;
-            assert!(
-                (0.6..1.6).contains(&ratio),
-                "{} {}: {ratio}",
-                model.family,
-                one.name
-            );
+            assert!((0.6..1.6).contains(&ratio), "{} {}: {ratio}", model.family, one.name);
         }
     }
 }
@@ -298,10 +262,7 @@ fn every_family_tells_what_a_badly_known_compliance_does() {
             .collect();
         assert!(!ratios.is_empty(), "{}", model.family);
         // Twice the error moves twice as far, but for what a fit bends.
-        let middle = ratios
-            .iter()
-            .filter(|ratio| (**ratio - 2.0).abs() < 0.2)
-            .count();
+        let middle = ratios.iter().filter(|ratio| (**ratio - 2.0).abs() < 0.2).count();
         assert!(2 * middle > ratios.len(), "{}: {ratios:?}", model.family);
     }
 }
@@ -319,11 +280,7 @@ fn every_family_says_that_it_does_not_describe_a_record() {
         let noise = report.noise.unwrap();
         assert!(noise.correlation_time_s.is_some(), "{}", model.family);
         assert!(noise.effective_samples < 0.2 * samples.len() as f64);
-        assert!(
-            report.warnings.len() > clean.warnings.len(),
-            "{}",
-            model.family
-        );
+        assert!(report.warnings.len() > clean.warnings.len(), "{}", model.family);
         let name = options(&model).body_names()[0].to_owned();
         let error = |report: &palpate_rheology::fit::FitReport| {
             report.parameter(&name).and_then(|one| one.std_error)
@@ -337,14 +294,9 @@ fn every_family_says_that_it_does_not_describe_a_record() {
 #[test]
 fn what_a_path_cannot_separate_is_refused_by_name() {
     // One speed and no hold: the viscous term is the first elastic one.
-    for model in bodies()
-        .iter()
-        .filter(|one| one.family.starts_with("series"))
-    {
-        let path: Vec<_> = (0..200)
-            .map(|i| 0.1 * f64::from(i))
-            .map(|t| (Seconds(t), Depth(t)))
-            .collect();
+    for model in bodies().iter().filter(|one| one.family.starts_with("series")) {
+        let path: Vec<_> =
+            (0..200).map(|i| 0.1 * f64::from(i)).map(|t| (Seconds(t), Depth(t))).collect();
         let forces = model.along(path.iter().copied()).unwrap();
         let samples: Vec<FitSample> = path
             .iter()
@@ -363,9 +315,7 @@ fn what_a_path_cannot_separate_is_refused_by_name() {
             other => panic!("{}: {other:?}", model.family),
         }
         let mut known = options(model);
-        known
-            .fix("tau_sig", model.linear[model.linear.len() - 1])
-            .unwrap();
+        known.fix("tau_sig", model.linear[model.linear.len() - 1]).unwrap();
         let report = fit(&samples, &known).unwrap();
         check(&model.family, report.value("mu1"), model.linear[0], 1e-5);
     }

@@ -8,13 +8,8 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_test_support::record::{ramp_hold, remembering, respond};
 
-const TRUTH: [(&str, f64); 5] = [
-    ("tau_eps", 1.023),
-    ("mu1", 0.05333),
-    ("mu2", -0.0086),
-    ("mu3", 0.0004345),
-    ("tau_sig", 0.06),
-];
+const TRUTH: [(&str, f64); 5] =
+    [("tau_eps", 1.023), ("mu1", 0.05333), ("mu2", -0.0086), ("mu3", 0.0004345), ("tau_sig", 0.06)];
 
 /// Slow noise in N, its memory in s, white noise in N; the sum of squares is always 0.02^2.
 const NOISES: [(&str, (f64, f64, f64)); 6] = [
@@ -58,25 +53,18 @@ fn intervals_cover_under_white_and_remembering_noise() {
             let second = covered(&clean, noise, 1000 + half..1000 + draws);
             [first.join().unwrap(), second]
         });
-        let shares: Vec<f64> = (0..5)
-            .map(|k| 100.0 * (parts[0][k] + parts[1][k]) as f64 / draws as f64)
-            .collect();
+        let shares: Vec<f64> =
+            (0..5).map(|k| 100.0 * (parts[0][k] + parts[1][k]) as f64 / draws as f64).collect();
         let mean = shares.iter().sum::<f64>() / 5.0;
         println!("{name}: {shares:.1?} %, mean {mean:.1} % of {draws} draws");
         // Three standard deviations of a count with a chance of 0.945, the middle of 92 to 97 %.
         let chance = 300.0 * (0.945 * 0.055 / draws as f64).sqrt();
         for share in &shares {
-            assert!(
-                (92.0 - chance..=97.0 + chance).contains(share),
-                "{name}: {shares:?}"
-            );
+            assert!((92.0 - chance..=97.0 + chance).contains(share), "{name}: {shares:?}");
         }
         // The five agree with each other to about 0.6, so their mean varies less; many draws leave
         // chance no say in it.
         let chance = if draws < 500 { 0.7 * chance } else { 0.0 };
-        assert!(
-            (92.0 - chance..=97.0 + chance).contains(&mean),
-            "{name}: {mean}"
-        );
+        assert!((92.0 - chance..=97.0 + chance).contains(&mean), "{name}: {mean}");
     }
 }

@@ -63,10 +63,7 @@ fn shifts_peaks_and_the_steady_cycle_are_found() {
         // Peaks change by 3.7, 1.9, 0.94 and 0.47 %: from the third cycle on by less than one. Noise of 0.3 % of the
         // change is not enough to blur that.
         assert_eq!(steady.steady_from, Some(3), "{:?}", steady.changes);
-        let strict = SteadyRule {
-            percent: 1e-3,
-            ..SteadyRule::default()
-        };
+        let strict = SteadyRule { percent: 1e-3, ..SteadyRule::default() };
         assert_eq!(strict.judge(&found).steady_from, None);
         assert_eq!(SteadyRule::default().judge(&found[..2]).steady_from, None);
         for one in &found {
@@ -95,10 +92,7 @@ fn peak_and_stiffness_are_those_of_the_body() {
         let stiffness = one.stiffness.unwrap();
         assert!((stiffness.depth.0 - 24.0).abs() < 1e-9);
         let misses = [
-            (
-                one.force_peak.value.0 - exact(30.0),
-                one.force_peak.std_error.0,
-            ),
+            (one.force_peak.value.0 - exact(30.0), one.force_peak.std_error.0),
             (stiffness.slope.value - slope, stiffness.slope.std_error),
         ];
         for (miss, error) in misses {
@@ -110,10 +104,7 @@ fn peak_and_stiffness_are_those_of_the_body() {
     let at = analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(12.0)), None)[0].stiffness;
     let slope = (exact(12.01) - exact(11.99)) / 0.02;
     assert!((at.unwrap().slope.value - slope).abs() < 1e-3);
-    assert_eq!(
-        analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)), None)[0].stiffness,
-        None
-    );
+    assert_eq!(analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)), None)[0].stiffness, None);
 }
 
 #[test]
@@ -203,31 +194,15 @@ fn each_hold_of_a_force_has_its_own_row() {
     let rows: Vec<[f64; 4]> = found
         .creep
         .iter()
-        .map(|one| {
-            [
-                one.duration.0.round(),
-                one.force.0,
-                one.force_sd.0,
-                one.depth_start.0,
-            ]
-        })
+        .map(|one| [one.duration.0.round(), one.force.0, one.force_sd.0, one.depth_start.0])
         .collect();
     assert_eq!(rows, [[30.0, 1.0, 0.0, 20.0], [30.0, 2.0, 0.0, 20.5]]);
-    assert!(
-        found
-            .creep
-            .iter()
-            .all(|one| (2.4..2.6).contains(&one.percent))
-    );
+    assert!(found.creep.iter().all(|one| (2.4..2.6).contains(&one.percent)));
 }
 
 #[test]
 fn a_cycle_with_more_than_a_hold_in_it_is_no_loop() {
-    for (extra, is_loop) in [
-        (Phase::Hold, true),
-        (Phase::Creep, false),
-        (Phase::Sine, false),
-    ] {
+    for (extra, is_loop) in [(Phase::Hold, true), (Phase::Creep, false), (Phase::Sine, false)] {
         let found = &analyse(&two_forces(extra), None, None)[0];
         assert_eq!(
             (found.work_loop.is_some(), found.loss_share().is_some()),
@@ -250,11 +225,8 @@ fn a_cycle_with_more_than_a_hold_in_it_is_no_loop() {
 fn a_record_without_phases_has_the_same_cycles() {
     let named = cycles(&receding(4), 5.0, 0.0);
     let column = |value: fn(&CycleSample) -> f64| -> Vec<f64> { named.iter().map(value).collect() };
-    let split = by_depth(
-        &column(|one| one.t.0),
-        &column(|one| one.depth.0),
-        &column(|one| one.force.0),
-    );
+    let split =
+        by_depth(&column(|one| one.t.0), &column(|one| one.depth.0), &column(|one| one.force.0));
     let (one, other) = (analyse(&named, None, None), analyse(&split, None, None));
     assert_eq!(one.len(), other.len());
     for (a, b) in one.iter().zip(&other) {

@@ -11,19 +11,10 @@ use palpate_test_support::record;
 
 const BODY: ModifiedKelvin = ModifiedKelvin::THESIS;
 const DEPTH: Depth = Depth(30.0);
-const WITHOUT_OFFSET: Unknowns = Unknowns {
-    f0: true,
-    f_offset: false,
-};
+const WITHOUT_OFFSET: Unknowns = Unknowns { f0: true, f_offset: false };
 
 fn slow(white: f64, sd: f64, time: f64) -> Noise {
-    Noise {
-        white: Newtons(white),
-        memory: Some(Memory {
-            sd: Newtons(sd),
-            time: Seconds(time),
-        }),
-    }
+    Noise { white: Newtons(white), memory: Some(Memory { sd: Newtons(sd), time: Seconds(time) }) }
 }
 
 /// Relative standard deviations in percent.
@@ -32,9 +23,7 @@ fn percents(protocol: &Protocol, noise: &Noise, unknowns: Unknowns) -> [f64; 5] 
 }
 
 fn relative(expected: &Expected) -> [f64; 5] {
-    expected
-        .parameters
-        .map(|parameter| 100.0 * parameter.std_error / parameter.value.abs())
+    expected.parameters.map(|parameter| 100.0 * parameter.std_error / parameter.value.abs())
 }
 
 fn thesis_protocol(rate: f64) -> Protocol {
@@ -49,17 +38,9 @@ fn published_figures() {
     let triangle = Protocol::triangle(MmPerS(0.75), DEPTH, 1, 1e3);
     let cases = [
         (&one, WITHOUT_OFFSET, [0.158, 0.111, 0.073, 0.036, 0.068]),
-        (
-            &one,
-            Unknowns::default(),
-            [0.166, 0.271, 0.126, 0.053, 0.068],
-        ),
+        (&one, Unknowns::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
         (&two, WITHOUT_OFFSET, [0.072, 0.086, 0.056, 0.027, 0.027]),
-        (
-            &triangle,
-            WITHOUT_OFFSET,
-            [0.060, 0.078, 0.051, 0.025, 0.018],
-        ),
+        (&triangle, WITHOUT_OFFSET, [0.060, 0.078, 0.051, 0.025, 0.018]),
     ];
     for (protocol, unknowns, published) in cases {
         let found = percents(protocol, &Noise::white(Newtons(0.02)), unknowns);
@@ -110,22 +91,14 @@ fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     for i in 0..count {
         let pivot = rows[i].clone();
         for (k, row) in rows.iter_mut().enumerate() {
-            let factor = if k == i {
-                1.0 - 1.0 / pivot[i]
-            } else {
-                row[i] / pivot[i]
-            };
-            row.iter_mut()
-                .zip(&pivot)
-                .for_each(|(value, pivot)| *value -= factor * pivot);
+            let factor = if k == i { 1.0 - 1.0 / pivot[i] } else { row[i] / pivot[i] };
+            row.iter_mut().zip(&pivot).for_each(|(value, pivot)| *value -= factor * pivot);
         }
     }
     (0..count)
         .map(|i| {
             let right = rows[i].iter().skip(count).enumerate();
-            right
-                .map(|(j, value)| value * scale[i] * scale[j])
-                .collect()
+            right.map(|(j, value)| value * scale[i] * scale[j]).collect()
         })
         .collect()
 }
@@ -151,23 +124,13 @@ fn brute_force(protocol: &Protocol, noise: &Noise) -> [f64; 5] {
         body
     };
     let mut columns = vec![
-        derivative(&|h| ModifiedKelvin {
-            tau_eps: BODY.tau_eps * (1.0 + h),
-            ..BODY
-        }),
+        derivative(&|h| ModifiedKelvin { tau_eps: BODY.tau_eps * (1.0 + h), ..BODY }),
         derivative(&|h| scaled_mu(0, h)),
         derivative(&|h| scaled_mu(1, h)),
         derivative(&|h| scaled_mu(2, h)),
-        derivative(&|h| ModifiedKelvin {
-            tau_sig: BODY.tau_sig * (1.0 + h),
-            ..BODY
-        }),
+        derivative(&|h| ModifiedKelvin { tau_sig: BODY.tau_sig * (1.0 + h), ..BODY }),
     ];
-    columns.push(
-        path.iter()
-            .map(|(t, _)| (-t / BODY.tau_eps).exp())
-            .collect(),
-    );
+    columns.push(path.iter().map(|(t, _)| (-t / BODY.tau_eps).exp()).collect());
     columns.push(vec![1.0; path.len()]);
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     let covariance = |i: usize, j: usize| {
@@ -185,10 +148,7 @@ fn brute_force(protocol: &Protocol, noise: &Noise) -> [f64; 5] {
         })
         .collect();
     let of = |other: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        columns
-            .iter()
-            .map(|a| other.iter().map(|b| dot(a, b)).collect())
-            .collect()
+        columns.iter().map(|a| other.iter().map(|b| dot(a, b)).collect()).collect()
     };
     let (bread, filling) = (inverse(&of(&columns)), of(&noisy));
     std::array::from_fn(|i| {
@@ -207,9 +167,8 @@ fn quadrature_and_recursions_agree_with_every_pair_of_samples() {
         thesis_protocol(10.0),
         Protocol::triangle(MmPerS(6.0), DEPTH, 7, 10.0),
     ];
-    for (protocol, time) in protocols
-        .iter()
-        .flat_map(|protocol| [0.01, 0.5, 1.023, 8.0].map(|time| (protocol, time)))
+    for (protocol, time) in
+        protocols.iter().flat_map(|protocol| [0.01, 0.5, 1.023, 8.0].map(|time| (protocol, time)))
     {
         let noise = slow(0.01, 0.02, time);
         let long_way = brute_force(protocol, &noise);
@@ -253,10 +212,7 @@ fn a_record_shorter_than_its_unknowns_is_refused() {
 
 #[test]
 fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
-    let hasty = ModifiedKelvin {
-        tau_eps: 1e-3,
-        ..BODY
-    };
+    let hasty = ModifiedKelvin { tau_eps: 1e-3, ..BODY };
     let noise = Noise::white(Newtons(0.02));
     let refusal = intervals(&hasty, &thesis_protocol(1e3), &noise, Unknowns::default());
     let text = refusal.unwrap_err().to_string();
@@ -264,22 +220,12 @@ fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
     // At a rate that resolves it, the plan is the same question on another scale of time: speeds
     // and times in units of tau, with the viscous coefficient to match.
     let (slow, quick) = (BODY, 0.01);
-    let scaled = ModifiedKelvin {
-        tau_eps: slow.tau_eps * quick,
-        tau_sig: slow.tau_sig * quick,
-        ..slow
-    };
-    let fast = Protocol::ramp_hold(
-        MmPerS(0.75 / quick),
-        DEPTH,
-        Seconds(50.0 * quick),
-        1e3 / quick,
-    );
+    let scaled =
+        ModifiedKelvin { tau_eps: slow.tau_eps * quick, tau_sig: slow.tau_sig * quick, ..slow };
+    let fast = Protocol::ramp_hold(MmPerS(0.75 / quick), DEPTH, Seconds(50.0 * quick), 1e3 / quick);
     let one = intervals(&scaled, &fast, &noise, Unknowns::default()).unwrap();
     for (one, other) in
-        relative(&one)
-            .into_iter()
-            .zip(percents(&thesis_protocol(1e3), &noise, Unknowns::default()))
+        relative(&one).into_iter().zip(percents(&thesis_protocol(1e3), &noise, Unknowns::default()))
     {
         // The same numbers but for rounding through a condition of some hundreds.
         assert!((one / other - 1.0).abs() < 1e-9, "{one} {other}");
@@ -293,9 +239,9 @@ fn variance_ratios(clean: &[FitSample], noise: &Noise, draws: u32) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for seed in 0..draws {
         let mut random = record::Noise::seeded(u64::from(seed) + 77);
-        let memory = noise.memory.map_or((0.0, 0.0), |memory| {
-            (memory.sd.0, (-1.0 / rate / memory.time.0).exp())
-        });
+        let memory = noise
+            .memory
+            .map_or((0.0, 0.0), |memory| (memory.sd.0, (-1.0 / rate / memory.time.0).exp()));
         let mut state = memory.0 * random.normal();
         let record: Vec<FitSample> = clean
             .iter()
@@ -321,17 +267,10 @@ fn real_fits_scatter_as_expected() {
     let clean = record::respond(&BODY, &record::ramp_hold(0.75, 50.0, 1e-2));
     // 100 draws: the variance of a variance ratio is 2 / 100, so these bounds are 3.5 standard
     // deviations wide; seeds are fixed.
-    for noise in [
-        Noise::white(Newtons(0.02)),
-        slow(0.0, 0.02, 0.5),
-        slow(0.02, 0.01, 0.05),
-    ] {
+    for noise in [Noise::white(Newtons(0.02)), slow(0.0, 0.02, 0.5), slow(0.02, 0.01, 0.05)] {
         let ratios = variance_ratios(&clean, &noise, 100);
         println!("{noise:?}: {ratios:.2?}");
-        assert!(
-            ratios.iter().all(|ratio| (0.5..1.5).contains(ratio)),
-            "{ratios:?}"
-        );
+        assert!(ratios.iter().all(|ratio| (0.5..1.5).contains(ratio)), "{ratios:?}");
     }
 }
 
@@ -362,17 +301,12 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
         for proposal in &proposals {
             let protocol = proposal.family.protocol(&rig());
             assert!(reached(&protocol).unwrap() <= percent, "{proposal:?}");
-            assert!(
-                proposal.expected.force_max.0 <= 8.1 * (1.0 + 1e-9),
-                "{proposal:?}"
-            );
+            assert!(proposal.expected.force_max.0 <= 8.1 * (1.0 + 1e-9), "{proposal:?}");
             assert_eq!(proposal.expected.duration, protocol.duration());
         }
         // A plain scan over speeds and holds, finer than the search, finds no shorter ramp and hold
         // by more than a twentieth: the distance between the search's speeds.
-        let Family::RampHold { .. } = proposals[0].family else {
-            unreachable!()
-        };
+        let Family::RampHold { .. } = proposals[0].family else { unreachable!() };
         let best = proposals[0].expected.duration.0;
         for multiple in (20..=70).step_by(2) {
             let speed = MmPerS(0.03 * f64::from(multiple));
@@ -401,15 +335,9 @@ fn impossible_wishes_are_refused_in_words() {
         text.contains("tau_eps") && text.contains("0.001 %") && text.contains("3600 s"),
         "{text}"
     );
-    let gentle = Rig {
-        force_max: Newtons(4.0),
-        ..rig()
-    };
+    let gentle = Rig { force_max: Newtons(4.0), ..rig() };
     let text = ask("tau", 1.0, gentle);
     assert!(text.contains("allow more force"), "{text}");
-    let hasty = Rig {
-        duration_max: Seconds(2.0),
-        ..rig()
-    };
+    let hasty = Rig { duration_max: Seconds(2.0), ..rig() };
     assert!(ask("tau", 1.0, hasty).contains("allow more time"));
 }

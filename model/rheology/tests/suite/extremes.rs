@@ -70,12 +70,7 @@ fn poke(depth: f64) -> PathCase {
         group: "test",
         case: "poke".into(),
         start: 0.0,
-        steps: vec![
-            (0.1, 0.5 * depth),
-            (0.1, depth),
-            (1.0, depth),
-            (1.0, 0.6 * depth),
-        ],
+        steps: vec![(0.1, 0.5 * depth), (0.1, depth), (1.0, depth), (1.0, 0.6 * depth)],
     }
 }
 
@@ -148,12 +143,7 @@ fn a_broken_weight_is_judged_wrong() {
                 None => other.linear[index - right.outer.len()] *= 1.0 + 1e-5,
             }
             let row = poke(10.0).put_to(&Other(FamilyBody(right.clone()), FamilyBody(other)));
-            assert_eq!(
-                row.verdict,
-                Verdict::Wrong,
-                "{} {index}: {row:?}",
-                family.key()
-            );
+            assert_eq!(row.verdict, Verdict::Wrong, "{} {index}: {row:?}", family.key());
         }
     }
 }
@@ -168,10 +158,7 @@ fn a_fit_is_judged_by_its_parameters_and_warnings() {
     assert_eq!(verdict(Expected::Number, 1e-7, &["slow"]), Verdict::Right);
     assert_eq!(verdict(Expected::Number, 1e-5, &["slow"]), Verdict::Flagged);
     assert_eq!(verdict(Expected::Number, 1e-5, &[]), Verdict::Wrong);
-    assert_eq!(
-        verdict(Expected::Either, f64::NAN, &["slow"]),
-        Verdict::Wrong
-    );
+    assert_eq!(verdict(Expected::Either, f64::NAN, &["slow"]), Verdict::Wrong);
     assert_eq!(verdict(Expected::Refusal, 0.0, &["slow"]), Verdict::Wrong);
 }
 
@@ -233,10 +220,7 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
         |i, _| f64::from(i).powi(5) * if i % 2 == 0 { 1.0 } else { -1.0 },
     ];
     for family in families::all() {
-        let counted = Arc::new(Counted {
-            family,
-            asked: AtomicUsize::new(0),
-        });
+        let counted = Arc::new(Counted { family, asked: AtomicUsize::new(0) });
         let options = FitOptions::of(counted.clone());
         let limit = bound(counted.outer().len());
         for (number, force) in records.iter().enumerate() {
@@ -255,10 +239,7 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
             match fit {
                 Ok(fit) => {
                     let values = fit.parameters.iter().map(|one| one.value);
-                    assert!(
-                        values.chain([fit.r2, fit.rmse_n]).all(f64::is_finite),
-                        "{fit:?}"
-                    );
+                    assert!(values.chain([fit.r2, fit.rmse_n]).all(f64::is_finite), "{fit:?}");
                 }
                 Err(err) => assert!(err.to_string().len() > 20, "{err}"),
             }

@@ -60,11 +60,7 @@ fn bodies() -> Vec<Model> {
         model("series-4", &[1.2], &[0.08, -0.012, 0.0004, 3e-5, 0.05]),
         model("series-5", &[1.2], &[0.08, -0.02, 0.003, -2e-4, 5e-6, 0.05]),
         model("unloading-1", &[1.3], &[0.12, 0.05, -0.04, 2e-3, -1e-4]),
-        model(
-            "unloading-3",
-            &[1.023],
-            &[0.05333, -0.0086, 0.0004345, 0.06, -0.02, 0.003, -2e-4],
-        ),
+        model("unloading-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06, -0.02, 0.003, -2e-4]),
         model("exponential", &[1.5, 0.15], &[0.3, 0.9]),
         model("prony-2", &[0.5, 9.0], &[0.1, 0.15, 0.1]),
         model("prony-3", &[0.2, 2.0, 20.0], &[0.1, 0.1, 0.08, 0.06]),
@@ -140,12 +136,7 @@ fn kernel_and_terms_of_the_third_order_find_the_same() {
             let dt = Seconds(if i == 0 { 0.0 } else { 0.05 });
             let error = 0.02 * f64::from((i * i * 37 % 101) as u32) / 29.0;
             let force = state.step(&ModifiedKelvin::THESIS, depth, dt).0 + error;
-            FitSample {
-                t,
-                depth,
-                force: Newtons(force),
-                sigma: Newtons(0.02),
-            }
+            FitSample { t, depth, force: Newtons(force), sigma: Newtons(0.02) }
         })
         .collect();
     let own = fit(&samples, &FitOptions::default()).unwrap();
@@ -246,9 +237,7 @@ fn responses_agree_with_quadrature_in_many_digits() {
         let (t, exact): (f64, f64) = (fields[3].parse().unwrap(), fields[4].parse().unwrap());
         let mut check = |key: &str, tolerance: f64| {
             let family = families::by_key(key).unwrap();
-            let model = family
-                .model(&numbers(fields[1]), &numbers(fields[2]))
-                .unwrap();
+            let model = family.model(&numbers(fields[1]), &numbers(fields[2])).unwrap();
             for parts in [1, 100] {
                 let force = model.along(corners(parts, t)).unwrap();
                 let miss = (force[force.len() - 1] - exact).abs();
@@ -260,9 +249,7 @@ fn responses_agree_with_quadrature_in_many_digits() {
             // A few newtons, rounded some ten times.
             exact @ ("voigt" | "maxwell" | "kelvin" | "exponential") => check(exact, 1e-14),
             exact
-                if ["series", "prony", "unloading"]
-                    .iter()
-                    .any(|kind| exact.starts_with(kind)) =>
+                if ["series", "prony", "unloading"].iter().any(|kind| exact.starts_with(kind)) =>
             {
                 check(exact, 1e-14);
             }

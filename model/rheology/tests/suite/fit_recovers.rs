@@ -5,13 +5,8 @@ use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::fit::{FitError, FitOptions, FitReport, FitSample, fit};
 use palpate_test_support::record::{self, noisy, ramp_hold, respond};
 
-const BODY: [(&str, f64); 5] = [
-    ("tau_eps", 1.023),
-    ("mu1", 0.05333),
-    ("mu2", -0.0086),
-    ("mu3", 0.0004345),
-    ("tau_sig", 0.06),
-];
+const BODY: [(&str, f64); 5] =
+    [("tau_eps", 1.023), ("mu1", 0.05333), ("mu2", -0.0086), ("mu3", 0.0004345), ("tau_sig", 0.06)];
 
 fn thesis_record(dt: f64) -> Vec<FitSample> {
     respond(&ModifiedKelvin::THESIS, &ramp_hold(0.75, 50.0, dt))
@@ -33,17 +28,11 @@ fn without_offset() -> FitOptions {
 fn noiseless_record_gives_the_body_back() {
     let report = fit(&thesis_record(1e-3), &FitOptions::default()).unwrap();
     let worst = worst_error(&report);
-    println!(
-        "worst relative error {worst:.2e}, rmse {:.2e} N",
-        report.rmse_n
-    );
+    println!("worst relative error {worst:.2e}, rmse {:.2e} N", report.rmse_n);
     assert!(worst < 1e-11, "{report:#?}");
     assert!(report.value("f0").unwrap().abs() < 1e-11);
     assert!(report.value("f_offset").unwrap().abs() < 1e-11);
-    assert!(
-        report.rmse_n < 1e-12 && report.warnings.is_empty(),
-        "{report:#?}"
-    );
+    assert!(report.rmse_n < 1e-12 && report.warnings.is_empty(), "{report:#?}");
 }
 
 #[test]
@@ -105,13 +94,8 @@ fn weights_matter_where_the_noise_is_uneven() {
     let (mut weighted, mut unweighted) = (0.0, 0.0);
     for seed in 0..12 {
         let record = noisy(&clean, 500 + seed);
-        let flat: Vec<FitSample> = record
-            .iter()
-            .map(|sample| FitSample {
-                sigma: Newtons(0.02),
-                ..*sample
-            })
-            .collect();
+        let flat: Vec<FitSample> =
+            record.iter().map(|sample| FitSample { sigma: Newtons(0.02), ..*sample }).collect();
         let miss = |samples: &[FitSample]| {
             let report = fit(samples, &without_offset()).unwrap();
             (report.value("mu1").unwrap() / 0.05333 - 1.0).powi(2)
@@ -143,11 +127,7 @@ fn uneven_times_and_two_speeds_are_no_obstacle() {
         };
         path.push((t, depth));
     }
-    let report = fit(
-        &respond(&ModifiedKelvin::THESIS, &path),
-        &FitOptions::default(),
-    )
-    .unwrap();
+    let report = fit(&respond(&ModifiedKelvin::THESIS, &path), &FitOptions::default()).unwrap();
     let worst = worst_error(&report);
     println!("worst relative error {worst:.2e} on uneven times");
     assert!(worst < 1e-11, "{report:#?}");
@@ -156,10 +136,7 @@ fn uneven_times_and_two_speeds_are_no_obstacle() {
 #[test]
 fn every_relaxation_time_the_record_can_show_is_found() {
     for tau_eps in [0.01, 0.05, 0.3, 4.0, 20.0, 80.0] {
-        let body = ModifiedKelvin {
-            tau_eps,
-            ..ModifiedKelvin::THESIS
-        };
+        let body = ModifiedKelvin { tau_eps, ..ModifiedKelvin::THESIS };
         let record = respond(&body, &ramp_hold(0.75, 50.0, 1e-2));
         let report = fit(&record, &FitOptions::default()).unwrap();
         let relative = (report.value("tau_eps").unwrap() / tau_eps - 1.0).abs();
@@ -220,10 +197,7 @@ fn an_unknown_contact_is_found() {
     let clean: Vec<FitSample> = respond(&ModifiedKelvin::THESIS, &inside)
         .into_iter()
         .zip(&path)
-        .map(|(sample, &(_, x))| FitSample {
-            depth: Depth(x),
-            ..sample
-        })
+        .map(|(sample, &(_, x))| FitSample { depth: Depth(x), ..sample })
         .collect();
     let mut options = FitOptions::default();
     options.free("x_contact").unwrap();
@@ -285,35 +259,19 @@ fn records_that_cannot_be_fitted_are_refused_in_words() {
         fit(&record, &FitOptions::default()).unwrap_err()
     };
     let few = refuse(&|record| record.truncate(5));
-    assert!(matches!(
-        few,
-        FitError::TooFewSamples {
-            samples: 5,
-            parameters: 7
-        }
-    ));
+    assert!(matches!(few, FitError::TooFewSamples { samples: 5, parameters: 7 }));
     let bad = refuse(&|record| record[7].force = Newtons(f64::NAN));
     assert!(matches!(
         bad,
         FitError::NotFinite { index: 7, what: "force", value } if value.is_nan()
     ));
     let bad = refuse(&|record| record[7].sigma = Newtons(0.0));
-    assert_eq!(
-        bad,
-        FitError::SigmaNotPositive {
-            index: 7,
-            sigma: 0.0
-        }
-    );
+    assert_eq!(bad, FitError::SigmaNotPositive { index: 7, sigma: 0.0 });
     for t in [good[6].t, Seconds(0.0)] {
         let bad = refuse(&|record| record[7].t = t);
         assert!(matches!(bad, FitError::TimeNotIncreasing { index: 7, .. }));
     }
-    let bad = refuse(&|record| {
-        record
-            .iter_mut()
-            .for_each(|s| s.depth = Depth(-31.0 + s.depth.0))
-    });
+    let bad = refuse(&|record| record.iter_mut().for_each(|s| s.depth = Depth(-31.0 + s.depth.0)));
     assert!(matches!(bad, FitError::NeverInTissue { .. }), "{bad:?}");
 }
 

@@ -22,10 +22,8 @@ fn censored(mut samples: Vec<FitSample>, is_censored: impl Fn(f64) -> bool) -> V
 #[test]
 fn censored_stretches_do_not_pass_for_quiet_noise() {
     let clean = respond(&THESIS, &ramp_hold(0.75, 50.0, 1e-2));
-    let gaps: [fn(f64) -> bool; 2] = [
-        |t| (10.0..30.0).contains(&t) || t > 48.0,
-        |t| t.rem_euclid(8.0) > 5.0,
-    ];
+    let gaps: [fn(f64) -> bool; 2] =
+        [|t| (10.0..30.0).contains(&t) || t > 48.0, |t| t.rem_euclid(8.0) > 5.0];
     let draws = 100;
     for gap in gaps {
         let mut covered = 0;
@@ -33,10 +31,7 @@ fn censored_stretches_do_not_pass_for_quiet_noise() {
         for seed in 0..draws {
             let slow = remembering(&clean, 300 + seed, (0.02, 0.5, 0.0));
             let report = fit(&censored(slow, gap), &FitOptions::default()).unwrap();
-            for (name, truth) in BODY
-                .into_iter()
-                .zip([1.023, 0.05333, -0.0086, 0.0004345, 0.06])
-            {
+            for (name, truth) in BODY.into_iter().zip([1.023, 0.05333, -0.0086, 0.0004345, 0.06]) {
                 let [low, high] = report.parameter(name).unwrap().ci95.unwrap();
                 covered += u64::from(low <= truth && truth <= high);
             }
@@ -48,10 +43,7 @@ fn censored_stretches_do_not_pass_for_quiet_noise() {
         // Five parameters that agree to 0.6: chance of three deviations is 5 % of 100 draws.
         assert!((88.0..=99.5).contains(&share), "{share} %");
         // Memory is looked for at the 5 % level.
-        assert!(
-            found <= 15,
-            "memory found in {found} of {draws} white records"
-        );
+        assert!(found <= 15, "memory found in {found} of {draws} white records");
     }
 }
 
@@ -76,11 +68,7 @@ fn relaxation_faster_than_the_mean_interval_is_found() {
     let mut t = 0.0;
     let mut sparse = vec![(0.0, 0.0)];
     while t < 2000.0 {
-        t += if t < 45.0 {
-            0.1
-        } else {
-            0.1 + 0.03 * (t - 45.0)
-        };
+        t += if t < 45.0 { 0.1 } else { 0.1 + 0.03 * (t - 45.0) };
         sparse.push((t, (0.75f64 * t).min(30.0)));
     }
     for path in [sparse, ramp_hold(0.75, 50.0, 1.5)] {
@@ -101,10 +89,7 @@ fn a_ramp_read_with_much_depth_noise_is_still_one_ramp() {
                 sample.depth = Depth(sample.depth.0 + 1e-3 * micrometres * noise.normal());
             }
             let err = fit(&samples, &FitOptions::default());
-            assert!(
-                matches!(err, Err(FitError::Inseparable { .. })),
-                "{micrometres} um, {seed}"
-            );
+            assert!(matches!(err, Err(FitError::Inseparable { .. })), "{micrometres} um, {seed}");
         }
     }
 }
@@ -112,19 +97,12 @@ fn a_ramp_read_with_much_depth_noise_is_still_one_ramp() {
 #[test]
 fn the_order_of_records_does_not_matter() {
     let short = noisy(&respond(&THESIS, &ramp_hold(15.0, 0.5, 1e-2)), 1);
-    let slow = ModifiedKelvin {
-        tau_eps: 60.0,
-        ..THESIS
-    };
+    let slow = ModifiedKelvin { tau_eps: 60.0, ..THESIS };
 
     let long = noisy(&respond(&slow, &ramp_hold(0.75, 400.0, 1e-1)), 2);
     let fit_of = |records: [(&str, &[FitSample]); 2]| {
         let report = fit_joint(&records, &FitOptions::default(), &["tau_eps"]).unwrap();
-        let tau = report.records[0]
-            .report
-            .parameter("tau_eps")
-            .unwrap()
-            .clone();
+        let tau = report.records[0].report.parameter("tau_eps").unwrap().clone();
         (tau.value, tau.std_error.unwrap())
     };
     let one = fit_of([("short", short.as_slice()), ("long", long.as_slice())]);
@@ -136,14 +114,11 @@ fn the_order_of_records_does_not_matter() {
 #[test]
 fn records_without_content_are_refused_in_words() {
     let mut flat = respond(&THESIS, &ramp_hold(0.75, 50.0, 0.1));
-    flat.iter_mut()
-        .for_each(|sample| sample.force = Newtons(3.0));
+    flat.iter_mut().for_each(|sample| sample.force = Newtons(3.0));
     let err = fit(&flat, &FitOptions::default()).unwrap_err();
     assert!(err.to_string().contains("3 N"), "{err}");
     let mut still = respond(&THESIS, &ramp_hold(0.75, 50.0, 0.1));
-    still
-        .iter_mut()
-        .for_each(|sample| sample.depth = Depth(5.0));
+    still.iter_mut().for_each(|sample| sample.depth = Depth(5.0));
     let mut free = FitOptions::default();
     free.free("x_contact").unwrap();
     for options in [FitOptions::default(), free] {
@@ -157,10 +132,7 @@ fn a_bootstrap_of_one_block_is_refused() {
     let clean = respond(&THESIS, &ramp_hold(0.75, 50.0, 1e-2));
     let record = remembering(&clean, 9, (0.05, 40.0, 0.001));
     let fitted = Fitted::of(&record, &FitOptions::default()).unwrap();
-    let choice = Bootstrap {
-        seed: 1,
-        repeats: 50,
-    };
+    let choice = Bootstrap { seed: 1, repeats: 50 };
     let err = fitted.bootstrap(0, choice, |_| ()).unwrap_err();
     assert!(err.to_string().contains("remember so long"), "{err}");
 }
@@ -171,9 +143,6 @@ fn few_samples_are_not_called_a_wrong_model() {
     let report = fit(&record, &FitOptions::default()).unwrap();
     assert!(report.samples < 70);
     let said: Vec<&str> = report.sentences().collect();
-    assert!(
-        !said.iter().any(|text| text.contains("long memory")),
-        "{said:?}"
-    );
+    assert!(!said.iter().any(|text| text.contains("long memory")), "{said:?}");
     assert!(said.iter().any(|text| text.contains("are few")), "{said:?}");
 }

@@ -21,10 +21,7 @@ fn body_values(body: &ModifiedKelvin) -> [f64; 5] {
 fn two_ramps_identify_what_neither_does_alone() {
     let (slow, fast) = (record(&THESIS, 0.75, 0.0), record(&THESIS, 1.5, 0.0));
     let options = FitOptions::default();
-    assert!(matches!(
-        fit(&slow, &options),
-        Err(FitError::Inseparable { .. })
-    ));
+    assert!(matches!(fit(&slow, &options), Err(FitError::Inseparable { .. })));
     let records = [("slow", slow.as_slice()), ("fast", fast.as_slice())];
     let report = fit_joint(&records, &options, &BODY).unwrap();
     for named in &report.records {
@@ -42,10 +39,7 @@ fn two_ramps_identify_what_neither_does_alone() {
 
 #[test]
 fn specimens_may_share_some_parameters_and_keep_others() {
-    let stiff = ModifiedKelvin {
-        mu: [0.08, -0.011, 0.0006],
-        ..THESIS
-    };
+    let stiff = ModifiedKelvin { mu: [0.08, -0.011, 0.0006], ..THESIS };
     let (one, two) = (record(&THESIS, 0.75, 20.0), record(&stiff, 0.75, 20.0));
     let (one, two) = (noisy(&one, 1), noisy(&two, 2));
     let records = [("one", one.as_slice()), ("two", two.as_slice())];
@@ -58,13 +52,8 @@ fn specimens_may_share_some_parameters_and_keep_others() {
             assert!(z.abs() < 4.5, "{name} of {}: z = {z}", named.record);
         }
     }
-    let [first, second] = &joint.records[..] else {
-        panic!()
-    };
-    assert_eq!(
-        first.report.value("tau_eps"),
-        second.report.value("tau_eps")
-    );
+    let [first, second] = &joint.records[..] else { panic!() };
+    assert_eq!(first.report.value("tau_eps"), second.report.value("tau_eps"));
     assert_ne!(first.report.value("mu1"), second.report.value("mu1"));
     // Sharing halves the information needed: both alone know tau less well.
     let alone = fit(&one, &options).unwrap();
@@ -77,10 +66,8 @@ fn specimens_may_share_some_parameters_and_keep_others() {
 
 #[test]
 fn a_joint_fit_that_shares_nothing_is_both_fits() {
-    let (one, two) = (
-        noisy(&record(&THESIS, 0.75, 20.0), 3),
-        noisy(&record(&THESIS, 1.5, 20.0), 4),
-    );
+    let (one, two) =
+        (noisy(&record(&THESIS, 0.75, 20.0), 3), noisy(&record(&THESIS, 1.5, 20.0), 4));
     let options = FitOptions::default();
     let records = [("one", one.as_slice()), ("two", two.as_slice())];
     let joint = fit_joint(&records, &options, &[]).unwrap();
@@ -88,15 +75,9 @@ fn a_joint_fit_that_shares_nothing_is_both_fits() {
     for (named, samples) in joint.records.iter().zip([&one, &two]) {
         let alone = fit(samples, &options).unwrap();
         for name in BODY {
-            let (a, b) = (
-                named.report.parameter(name).unwrap(),
-                alone.parameter(name).unwrap(),
-            );
+            let (a, b) = (named.report.parameter(name).unwrap(), alone.parameter(name).unwrap());
             // Both stop within a thousandth of a standard error squared.
-            assert!(
-                (a.value - b.value).abs() < 1e-4 * b.std_error.unwrap(),
-                "{name}"
-            );
+            assert!((a.value - b.value).abs() < 1e-4 * b.std_error.unwrap(), "{name}");
         }
     }
 }
@@ -107,10 +88,7 @@ fn sharing_is_refused_in_words() {
     let records = [("one", one.as_slice()), ("two", one.as_slice())];
     let options = FitOptions::default();
     let err = fit_joint(&records, &options, &["f0"]).unwrap_err();
-    assert!(
-        matches!(&err, FitError::NotShareable { name, .. } if name == "f0"),
-        "{err:?}"
-    );
+    assert!(matches!(&err, FitError::NotShareable { name, .. } if name == "f0"), "{err:?}");
     let err = fit_joint(&records, &options, &["mu9"]).unwrap_err();
     assert!(err.to_string().contains("'mu9'"), "{err}");
     let mut bad = one.clone();
@@ -128,18 +106,11 @@ fn censored_forces_do_not_count_but_their_depths_do() {
         .iter()
         .map(|sample| FitSample {
             force: Newtons(sample.force.0.min(6.0)),
-            sigma: Newtons(if sample.force.0 < 6.0 {
-                0.02
-            } else {
-                f64::INFINITY
-            }),
+            sigma: Newtons(if sample.force.0 < 6.0 { 0.02 } else { f64::INFINITY }),
             ..*sample
         })
         .collect();
-    let censored = saturated
-        .iter()
-        .filter(|sample| !sample.is_measured())
-        .count();
+    let censored = saturated.iter().filter(|sample| !sample.is_measured()).count();
     assert!(censored > 50, "{censored}");
     let report = fit(&saturated, &FitOptions::default()).unwrap();
     assert_eq!(report.censored, censored);
@@ -149,13 +120,8 @@ fn censored_forces_do_not_count_but_their_depths_do() {
     }
     assert!(report.findings.iter().any(|text| text.contains("censored")));
     // Taken at face value the same record is wrong by far more.
-    let naive: Vec<FitSample> = saturated
-        .iter()
-        .map(|sample| FitSample {
-            sigma: Newtons(0.02),
-            ..*sample
-        })
-        .collect();
+    let naive: Vec<FitSample> =
+        saturated.iter().map(|sample| FitSample { sigma: Newtons(0.02), ..*sample }).collect();
     let report = fit(&naive, &FitOptions::default()).unwrap();
     assert!((report.value("tau_eps").unwrap() / THESIS.tau_eps - 1.0).abs() > 1e-3);
 }
@@ -185,46 +151,32 @@ fn profiles_agree_with_the_sum_of_squares_they_describe() {
             let rise = square(&fit(&samples, &fixed).unwrap()) - smallest;
             let variance = smallest / (samples.len() - 7) as f64;
             let wanted = 1.959_964f64.powi(2);
-            assert!(
-                (rise / variance / wanted - 1.0).abs() < 2e-3,
-                "{}",
-                interval.name
-            );
+            assert!((rise / variance / wanted - 1.0).abs() < 2e-3, "{}", interval.name);
         }
     }
 }
 
 #[test]
 fn a_relaxation_too_slow_for_the_record_has_an_open_profile() {
-    let body = ModifiedKelvin {
-        tau_eps: 400.0,
-        ..THESIS
-    };
+    let body = ModifiedKelvin { tau_eps: 400.0, ..THESIS };
     let samples = noisy(&record(&body, 1.5, 2.0), 5);
     let mut options = FitOptions::default();
     options.fix("f_offset", 0.0).unwrap();
     let fitted = Fitted::of(&samples, &options).unwrap();
     let profile = fitted.profile(0).unwrap();
-    let tau = profile
-        .iter()
-        .find(|interval| interval.name == "tau_eps")
-        .unwrap();
+    let tau = profile.iter().find(|interval| interval.name == "tau_eps").unwrap();
     assert!(tau.high.is_none(), "{tau:?}");
 }
 
 #[test]
 fn bootstrap_agrees_with_the_standard_errors_and_repeats() {
     let clean = record(&THESIS, 0.75, 50.0);
-    for (samples, allowed) in [
-        (noisy(&clean, 21), 1.35),
-        (remembering(&clean, 22, (0.02, 0.3, 0.005)), 1.8),
-    ] {
+    for (samples, allowed) in
+        [(noisy(&clean, 21), 1.35), (remembering(&clean, 22, (0.02, 0.3, 0.005)), 1.8)]
+    {
         let fitted = Fitted::of(&samples, &FitOptions::default()).unwrap();
         let report = fitted.report();
-        let choice = Bootstrap {
-            seed: 7,
-            repeats: 100,
-        };
+        let choice = Bootstrap { seed: 7, repeats: 100 };
         let mut heard = 0;
         let intervals = fitted.bootstrap(0, choice, |done| heard = done).unwrap();
         assert_eq!(heard, 100);
@@ -233,11 +185,7 @@ fn bootstrap_agrees_with_the_standard_errors_and_repeats() {
             let ratio = interval.std_dev / error;
             println!("{} {ratio:.2}", interval.name);
             // A hundred repeats know a deviation to 7 %, the memory to about 20 %.
-            assert!(
-                (1.0 / allowed..allowed).contains(&ratio),
-                "{} {ratio}",
-                interval.name
-            );
+            assert!((1.0 / allowed..allowed).contains(&ratio), "{} {ratio}", interval.name);
         }
         assert_eq!(fitted.bootstrap(0, choice, |_| ()).unwrap(), intervals);
     }
@@ -258,16 +206,10 @@ fn depth_in_stairs_or_with_noise_never_passes_for_a_second_speed() {
                 } else {
                     sample.depth.0 + 0.002 * noise.normal()
                 };
-                FitSample {
-                    depth: Depth(depth),
-                    ..sample
-                }
+                FitSample { depth: Depth(depth), ..sample }
             })
             .collect();
         let err = fit(&samples, &FitOptions::default()).unwrap_err();
-        assert!(
-            err.to_string().contains("mu1 from tau_sig"),
-            "{seed}: {err}"
-        );
+        assert!(err.to_string().contains("mu1 from tau_sig"), "{seed}: {err}");
     }
 }

@@ -44,10 +44,7 @@ fn last_answer_is_the_exact_one_without_noise() {
 #[test]
 fn other_bodies_too_are_the_exact_ones_without_noise() {
     for tau_eps in [0.1, 0.37, 3.0, 10.0, 40.0] {
-        let body = ModifiedKelvin {
-            tau_eps,
-            ..ModifiedKelvin::THESIS
-        };
+        let body = ModifiedKelvin { tau_eps, ..ModifiedKelvin::THESIS };
         let worst = worst_miss(&respond(&body, &ramp_hold(0.75, 50.0, 5e-3)));
         println!("tau {tau_eps} s: {worst:.1e}");
         assert!(worst < 1e-6, "tau {tau_eps} s: {worst:e}");
@@ -101,10 +98,7 @@ fn depth_of_a_censored_sample_counts_and_its_force_does_not() {
     }
     let live = live_of(&record).estimate().unwrap();
     assert_eq!(live.samples, 85_001);
-    for (name, exact) in BODY
-        .into_iter()
-        .zip([1.023, 0.053_33, -0.0086, 0.000_434_5, 0.06])
-    {
+    for (name, exact) in BODY.into_iter().zip([1.023, 0.053_33, -0.0086, 0.000_434_5, 0.06]) {
         let miss = (value(&live, name) / exact - 1.0).abs();
         assert!(miss < 1e-7, "{name}: {miss:e}");
     }
@@ -159,11 +153,7 @@ fn says_during_the_ramp_what_it_cannot_know_and_after_it_knows_all() {
         for verdict in &live.verdicts {
             assert!(verdict.is_identified, "{verdict:?}");
         }
-        assert!(
-            live.parameters
-                .iter()
-                .all(|found| found.std_error.is_some())
-        );
+        assert!(live.parameters.iter().all(|found| found.std_error.is_some()));
     }
 }
 
@@ -186,12 +176,7 @@ fn says_nothing_before_there_is_something_to_say() {
         if i % 37 == 0
             && let Some(estimate) = live.estimate()
         {
-            assert!(
-                estimate
-                    .parameters
-                    .iter()
-                    .all(|found| found.value.is_finite())
-            );
+            assert!(estimate.parameters.iter().all(|found| found.value.is_finite()));
         }
     }
 }
@@ -218,10 +203,7 @@ fn residual_blocks_are_means_of_the_residuals() {
     let record = noisy(&thesis_record(), 21);
     let live = live_of(&record);
     let exact = fit(&record, &FitOptions::default()).unwrap();
-    let linear: Vec<f64> = exact.parameters[1..7]
-        .iter()
-        .map(|found| found.value)
-        .collect();
+    let linear: Vec<f64> = exact.parameters[1..7].iter().map(|found| found.value).collect();
     let linear: [f64; 6] = linear.try_into().unwrap();
     let tau = exact.value("tau_eps").unwrap();
     let blocks = live.residual_blocks(Seconds(tau), &linear).unwrap();
@@ -242,19 +224,14 @@ fn residual_blocks_are_means_of_the_residuals() {
             .sum();
         let mean = sum / length as f64;
         // A thousandth of the standard error of such a mean.
-        assert!(
-            (mean - residual).abs() < 1e-6,
-            "block {i}: {mean} {residual}"
-        );
+        assert!((mean - residual).abs() < 1e-6, "block {i}: {mean} {residual}");
         let slope = (back.residuals[i] - moved.residuals[i]) / (2.0 * h);
         let miss = (slope - blocks.jacobian[i][0]).abs();
         assert!(miss < 1e-6, "block {i}: {slope} {:?}", blocks.jacobian[i]);
         let modelled: f64 = (0..6).map(|k| linear[k] * blocks.jacobian[i][k + 1]).sum();
-        let force: f64 = record[i * length..(i + 1) * length]
-            .iter()
-            .map(|sample| sample.force.0)
-            .sum::<f64>()
-            / length as f64;
+        let force: f64 =
+            record[i * length..(i + 1) * length].iter().map(|sample| sample.force.0).sum::<f64>()
+                / length as f64;
         assert!((force - modelled - residual).abs() < 1e-9);
     }
 }
@@ -262,16 +239,10 @@ fn residual_blocks_are_means_of_the_residuals() {
 #[test]
 fn a_bank_may_have_more_or_fewer_relaxation_times() {
     for count in [0, 8, 20, 63, 520, usize::MAX] {
-        assert!(
-            LiveFit::with_relaxation_times(Depth(30.0), count).is_none(),
-            "{count}"
-        );
+        assert!(LiveFit::with_relaxation_times(Depth(30.0), count).is_none(), "{count}");
     }
     let deep = Depth(30.0);
-    assert_eq!(
-        LiveFit::with_relaxation_times(deep, 64),
-        Some(LiveFit::new(deep))
-    );
+    assert_eq!(LiveFit::with_relaxation_times(deep, 64), Some(LiveFit::new(deep)));
     // Between nodes a polynomial in log tau is used, so closer nodes are more exact until sums of products
     // have no more digits: half a double's.
     let mut before = f64::INFINITY;
@@ -280,12 +251,7 @@ fn a_bank_may_have_more_or_fewer_relaxation_times() {
         for sample in respond(&ModifiedKelvin::THESIS, &ramp_hold(0.75, 50.0, 0.01)) {
             live.push(sample.t, sample.depth, sample.force, Newtons(0.02));
         }
-        let tau = live
-            .estimate()
-            .unwrap()
-            .identified("tau_eps")
-            .unwrap()
-            .value;
+        let tau = live.estimate().unwrap().identified("tau_eps").unwrap().value;
         let miss = (tau / ModifiedKelvin::THESIS.tau_eps - 1.0).abs();
         assert!(miss < before, "{count}: {miss:e} after {before:e}");
         before = miss.max(1e-7);

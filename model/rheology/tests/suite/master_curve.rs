@@ -45,20 +45,12 @@ const PUBLISHED: [f64; 31] = [
 const PUBLISHED_SUM: f64 = 1739.03;
 
 fn sample(t: f64, depth: f64, force: f64, sigma: f64) -> FitSample {
-    FitSample {
-        t: Seconds(t),
-        depth: Depth(depth),
-        force: Newtons(force),
-        sigma: Newtons(sigma),
-    }
+    FitSample { t: Seconds(t), depth: Depth(depth), force: Newtons(force), sigma: Newtons(sigma) }
 }
 
 /// A relaxation modulus as the force after a step to 1 mm within 1 ns.
 fn relaxation(curve: impl Iterator<Item = (f64, f64)>) -> Vec<FitSample> {
-    let step = [
-        sample(0.0, 0.0, 0.0, f64::INFINITY),
-        sample(1e-9, 1.0, 0.0, f64::INFINITY),
-    ];
+    let step = [sample(0.0, 0.0, 0.0, f64::INFINITY), sample(1e-9, 1.0, 0.0, f64::INFINITY)];
     let held = curve.map(|(t, modulus)| sample(t, 1.0, modulus, 1.0));
     step.into_iter().chain(held).collect()
 }
@@ -91,10 +83,7 @@ fn the_published_series_is_reproduced() {
     for (published, modulus) in PUBLISHED.iter().zip(&model.linear[1..]) {
         // All seven digits that were published.
         let share = modulus / sum;
-        assert!(
-            (share / published - 1.0).abs() < 5e-7,
-            "{share} {published}"
-        );
+        assert!((share / published - 1.0).abs() < 5e-7, "{share} {published}");
     }
     // Twenty-four times that are fitted leave less than thirty-one that were laid down.
     let mut options = FitOptions::by_key("prony-24").unwrap();

@@ -21,11 +21,7 @@ fn record(body: Maxwell, turn: f64, times: impl Iterator<Item = f64>) -> Vec<Str
         .map(|t| {
             let ramp = t.min(turn);
             let stress = -body.eta * (-ramp / tau).exp_m1() * (-(t - ramp) / tau).exp();
-            StrainSample {
-                t: Seconds(t),
-                strain: ramp,
-                stress,
-            }
+            StrainSample { t: Seconds(t), strain: ramp, stress }
         })
         .collect()
 }
@@ -45,21 +41,14 @@ fn rheos_example() -> Option<Vec<StrainSample>> {
     let samples = text.lines().map(|line| {
         let mut fields = line.split(',').map(|field| field.trim().parse().unwrap());
         let mut next = || fields.next().unwrap();
-        StrainSample {
-            t: Seconds(next()),
-            strain: next(),
-            stress: next(),
-        }
+        StrainSample { t: Seconds(next()), strain: next(), stress: next() }
     });
     Some(samples.collect())
 }
 
 #[track_caller]
 fn check(value: f64, exact: f64, relative: f64) {
-    assert!(
-        (value / exact - 1.0).abs() < relative,
-        "{value} is not {exact}"
-    );
+    assert!((value / exact - 1.0).abs() < relative, "{value} is not {exact}");
 }
 
 #[test]
@@ -115,9 +104,7 @@ fn closed_forms_are_recovered_exactly_and_backward_differences_are_not() {
         std::iter::successors(Some(0.0), |t| Some(t + 0.02 + 0.2 * noise.uniform()))
             .take_while(|t| *t < 2.0)
             .collect();
-    let uneven = uneven
-        .into_iter()
-        .chain((0..80).map(|i| 2.0 + 0.1 * f64::from(i)));
+    let uneven = uneven.into_iter().chain((0..80).map(|i| 2.0 + 0.1 * f64::from(i)));
     for (eta, k) in [(4.1, 2.05), (0.8, 2.0), (60.0, 3.0)] {
         let body = Maxwell { eta, k };
         for samples in [record(body, 2.0, even()), record(body, 2.0, uneven.clone())] {
@@ -141,10 +128,7 @@ fn standard_errors_mean_what_they_say() {
         let mut noise = Noise::seeded(1000 + seed);
         let noisy: Vec<StrainSample> = clean
             .iter()
-            .map(|sample| StrainSample {
-                stress: sample.stress + 0.02 * noise.normal(),
-                ..*sample
-            })
+            .map(|sample| StrainSample { stress: sample.stress + 0.02 * noise.normal(), ..*sample })
             .collect();
         let fit = fit_maxwell(&noisy, Integrator::Exact).unwrap();
         chi_square[0] += ((fit.body.eta - BODY.eta) / fit.eta_std_error).powi(2);
@@ -159,18 +143,11 @@ fn standard_errors_mean_what_they_say() {
 
 #[test]
 fn what_a_record_cannot_show_is_refused_in_words() {
-    let refusal = |samples: &[StrainSample]| {
-        fit_maxwell(samples, Integrator::Exact)
-            .unwrap_err()
-            .to_string()
-    };
+    let refusal =
+        |samples: &[StrainSample]| fit_maxwell(samples, Integrator::Exact).unwrap_err().to_string();
     let mut still = record(BODY, 2.0, even());
     still.iter_mut().for_each(|sample| sample.strain = 1.0);
-    assert!(
-        refusal(&still).contains("strain never changes"),
-        "{}",
-        refusal(&still)
-    );
+    assert!(refusal(&still).contains("strain never changes"), "{}", refusal(&still));
     let elastic = Maxwell { eta: 2e6, k: 2.0 };
     let text = refusal(&record(elastic, 2.0, even()));
     assert!(text.contains("longer hold"), "{text}");

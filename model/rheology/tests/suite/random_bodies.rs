@@ -24,21 +24,15 @@ fn body(seed: u64) -> ModifiedKelvin {
     let thesis = ModifiedKelvin::THESIS;
     let mu = thesis.mu.map(&mut around);
     let tau_sig = around(thesis.tau_sig);
-    ModifiedKelvin {
-        tau_eps: 10f64.powf(4.0 * noise.uniform() - 2.0),
-        mu,
-        tau_sig,
-    }
+    ModifiedKelvin { tau_eps: 10f64.powf(4.0 * noise.uniform() - 2.0), mu, tau_sig }
 }
 
 /// The largest relative error of the five parameters, or why there is none.
 fn error_of(body: &ModifiedKelvin) -> Result<f64, String> {
     let hold = (5.0 * body.tau_eps).max(50.0);
     let record = respond(body, &ramp_hold(0.75, hold, 0.01));
-    let found = fit(&record, &FitOptions::default())
-        .map_err(|err| err.to_string())?
-        .kelvin()
-        .unwrap();
+    let found =
+        fit(&record, &FitOptions::default()).map_err(|err| err.to_string())?.kelvin().unwrap();
     let pairs = [
         (found.tau_eps, body.tau_eps),
         (found.mu[0], body.mu[0]),
@@ -46,10 +40,7 @@ fn error_of(body: &ModifiedKelvin) -> Result<f64, String> {
         (found.mu[2], body.mu[2]),
         (found.tau_sig, body.tau_sig),
     ];
-    Ok(pairs
-        .iter()
-        .map(|(found, exact)| (found / exact - 1.0).abs())
-        .fold(0.0, f64::max))
+    Ok(pairs.iter().map(|(found, exact)| (found / exact - 1.0).abs()).fold(0.0, f64::max))
 }
 
 #[test]

@@ -10,9 +10,7 @@ use std::path::Path;
 
 /// Samples of a CSV file with columns t_s, F_N, x_mm.
 fn recording(name: &str) -> Option<Vec<FitSample>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data")
-        .join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
     if skip::lacks_file(&path) {
         return None;
     }
@@ -41,17 +39,9 @@ fn perineal_indentation_is_explained() {
     options.fix("f_offset", 0.0).unwrap();
     let report = fit(&samples, &options).unwrap();
     println!("{report:#?}");
-    assert!(
-        report.r2 >= 0.9998 && report.rmse_n <= 5.4e-3,
-        "{report:#?}"
-    );
+    assert!(report.r2 >= 0.9998 && report.rmse_n <= 5.4e-3, "{report:#?}");
     // Tissue is not this model: what is left over has memory, and the report says so.
-    assert!(
-        report
-            .warnings
-            .iter()
-            .any(|text| text.contains("long memory"))
-    );
+    assert!(report.warnings.iter().any(|text| text.contains("long memory")));
     assert!(report.noise.unwrap().effective_samples < 30.0);
 
     let report = fit(&samples, &FitOptions::default()).unwrap();
@@ -74,12 +64,7 @@ fn no_family_wins_on_tissue_and_a_tolerance_decides() {
     };
     let plain = tolerated(None);
     // What the best family leaves wanders over the record: a criterion proves nothing.
-    assert_eq!(
-        plain.verdict.outcome,
-        Outcome::NoneAdequate,
-        "{:?}",
-        plain.verdict
-    );
+    assert_eq!(plain.verdict.outcome, Outcome::NoneAdequate, "{:?}", plain.verdict);
     assert_eq!(plain.verdict.family, None);
     // Tighter than any family predicts the hold, and as wide as a press shallower than a hand feels.
     let tight = tolerated(Some("0.5%")).verdict;

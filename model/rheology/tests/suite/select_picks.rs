@@ -39,29 +39,13 @@ fn members() -> Vec<Model> {
         model("series-2", &[1.3], &[0.05, 0.01, 0.05]),
         model("series-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06]),
         model("series-4", &[1.2], &[0.2, -0.05, 0.0045, -0.0001, 0.05]),
-        model(
-            "series-5",
-            &[1.2],
-            &[0.25, -0.1, 0.017, -0.0011, 2.45e-5, 0.05],
-        ),
-        model(
-            "unloading-3",
-            &[1.023],
-            &[0.05333, -0.0086, 0.0004345, 0.06, -0.05, 0.004, -0.0003],
-        ),
+        model("series-5", &[1.2], &[0.25, -0.1, 0.017, -0.0011, 2.45e-5, 0.05]),
+        model("unloading-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06, -0.05, 0.004, -0.0003]),
         model("exponential", &[1.5, 0.15], &[0.3, 0.9]),
         model("prony-2", &[0.5, 20.0], &[0.1, 0.15, 0.1]),
         model("prony-3", &[0.3, 6.0, 120.0], &[0.1, 0.12, 0.1, 0.1]),
-        model(
-            "prony-4",
-            &[0.2, 3.0, 40.0, 500.0],
-            &[0.1, 0.1, 0.1, 0.1, 0.1],
-        ),
-        model(
-            "prony-5",
-            &[0.15, 1.5, 12.0, 100.0, 900.0],
-            &[0.1, 0.2, 0.05, 0.2, 0.05, 0.2],
-        ),
+        model("prony-4", &[0.2, 3.0, 40.0, 500.0], &[0.1, 0.1, 0.1, 0.1, 0.1]),
+        model("prony-5", &[0.15, 1.5, 12.0, 100.0, 900.0], &[0.1, 0.2, 0.05, 0.2, 0.05, 0.2]),
         model(
             "prony-6",
             &[0.1, 1.2, 14.0, 160.0, 1600.0, 16000.0],
@@ -107,25 +91,15 @@ fn records(model: &Model) -> Vec<Vec<FitSample>> {
         path(&[(0.0, 0.0), (0.2, 10.0), (30000.2, 10.0)]),
         path(&[(0.0, 0.0), (5.0, 20.0), (10.0, 0.0), (30.0, 0.0)]),
     ];
-    let forces = paths
-        .each_ref()
-        .map(|path| model.along(path.iter().copied()).expect("a force"));
-    let peak = forces
-        .iter()
-        .flatten()
-        .fold(0.0f64, |all, one| all.max(one.abs()));
+    let forces = paths.each_ref().map(|path| model.along(path.iter().copied()).expect("a force"));
+    let peak = forces.iter().flatten().fold(0.0f64, |all, one| all.max(one.abs()));
     let sigma = Newtons(NOISE * peak);
     let together = paths.iter().zip(&forces);
     together
         .map(|(path, forces)| {
             let samples = path.iter().zip(forces);
             samples
-                .map(|(&(t, depth), &force)| FitSample {
-                    t,
-                    depth,
-                    force: Newtons(force),
-                    sigma,
-                })
+                .map(|(&(t, depth), &force)| FitSample { t, depth, force: Newtons(force), sigma })
                 .collect()
         })
         .collect()
@@ -133,17 +107,11 @@ fn records(model: &Model) -> Vec<Vec<FitSample>> {
 
 fn named(records: &[Vec<FitSample>]) -> Vec<(&str, &[FitSample])> {
     let names = ["slow", "fast", "back"];
-    names
-        .into_iter()
-        .zip(records.iter().map(Vec::as_slice))
-        .collect()
+    names.into_iter().zip(records.iter().map(Vec::as_slice)).collect()
 }
 
 fn selection(records: &[Vec<FitSample>]) -> Selection {
-    let options = SelectOptions {
-        hold_out: HoldOut::None,
-        ..SelectOptions::default()
-    };
+    let options = SelectOptions { hold_out: HoldOut::None, ..SelectOptions::default() };
     select(&named(records), &options, &|_| ControlFlow::Continue(())).expect("a selection")
 }
 
@@ -163,10 +131,7 @@ fn the_family_that_made_the_records_is_picked() {
     let mut failed = Vec::new();
     for member in members() {
         let key = &member.family;
-        if only
-            .as_ref()
-            .is_some_and(|only| !only.split(',').any(|one| one == key))
-        {
+        if only.as_ref().is_some_and(|only| !only.split(',').any(|one| one == key)) {
             continue;
         }
         let (mut by_bic, mut by_aicc, mut by_verdict) = ([0; 2], [0; 2], 0);
@@ -192,12 +157,7 @@ fn the_family_that_made_the_records_is_picked() {
             };
             let lowest = |value: &dyn Fn(&palpate_rheology::select::Candidate) -> f64| {
                 let order = |a: &&_, b: &&_| value(a).total_cmp(&value(b));
-                found
-                    .candidates
-                    .iter()
-                    .min_by(order)
-                    .map(|one| one.family.clone())
-                    .expect("one")
+                found.candidates.iter().min_by(order).map(|one| one.family.clone()).expect("one")
             };
             let bic = lowest(&|one| one.bic_above);
             let aicc = lowest(&|one| one.aicc_above.unwrap_or(f64::INFINITY));
@@ -207,11 +167,7 @@ fn the_family_that_made_the_records_is_picked() {
             for (slot, good) in by_aicc.iter_mut().zip(is_good(&aicc)) {
                 *slot += usize::from(good);
             }
-            let said = found
-                .verdict
-                .family
-                .clone()
-                .unwrap_or_else(|| "none".into());
+            let said = found.verdict.family.clone().unwrap_or_else(|| "none".into());
             by_verdict += usize::from(said != "none" && is_good(&said)[1]);
             if said == "none" {
                 misses.push(format!("{seed}: {}", found.verdict.sentences.join("; ")));

@@ -160,11 +160,7 @@ fn missing_in(ticks: u64, rig: &RigDescription) -> u64 {
         return between;
     }
     let usual = (LATE_S / rig.tick().0).max(1.5 * per_sample);
-    if ticks as f64 <= usual {
-        0
-    } else {
-        (between as f64 / per_sample) as u64
-    }
+    if ticks as f64 <= usual { 0 } else { (between as f64 / per_sample) as u64 }
 }
 
 /// Remarks kept: more would tell no more.
@@ -207,11 +203,7 @@ impl FidelityMeter {
     fn record(&mut self, record: &Record) {
         match record {
             Record::PhaseStarted { step_index, .. } => {
-                if self
-                    .current
-                    .as_ref()
-                    .is_some_and(|(index, _)| index == step_index)
-                {
+                if self.current.as_ref().is_some_and(|(index, _)| index == step_index) {
                     return;
                 }
                 self.complete();
@@ -342,10 +334,7 @@ mod tests {
         let mut rig = recorded().manifest.rig.unwrap();
         rig.tick_nanos = 1_000_000;
         let missing = |per_sample: f64, ticks| {
-            let rig = RigDescription {
-                ticks_per_sample: per_sample,
-                ..rig.clone()
-            };
+            let rig = RigDescription { ticks_per_sample: per_sample, ..rig.clone() };
             missing_in(ticks, &rig)
         };
         // Every tick: each between is missing.
@@ -353,14 +342,8 @@ mod tests {
         // A sample in two milliseconds over a link: two scheduler slices are its way.
         assert_eq!([2, 20, 21].map(|ticks| missing(2.0, ticks)), [0, 0, 10]);
         // Eighty a second, by themselves: one that is garbled leaves 25 ms.
-        assert_eq!(
-            [12, 13, 25, 38].map(|ticks| missing(12.5, ticks)),
-            [0, 0, 1, 2]
-        );
+        assert_eq!([12, 13, 25, 38].map(|ticks| missing(12.5, ticks)), [0, 0, 1, 2]);
         // Ten a second.
-        assert_eq!(
-            [100, 149, 200].map(|ticks| missing(100.0, ticks)),
-            [0, 0, 1]
-        );
+        assert_eq!([100, 149, 200].map(|ticks| missing(100.0, ticks)), [0, 0, 1]);
     }
 }

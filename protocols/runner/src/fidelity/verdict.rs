@@ -93,10 +93,7 @@ mod tests {
     use super::*;
 
     fn outcome(ending: EndingKind) -> Outcome {
-        Outcome {
-            ending,
-            reason: "because".into(),
-        }
+        Outcome { ending, reason: "because".into() }
     }
 
     fn target(achieved: f64) -> Achieved {
@@ -116,11 +113,7 @@ mod tests {
 
     #[test]
     fn a_run_is_worth_what_it_did() {
-        let fine = Fidelity {
-            targets: vec![target(20.0)],
-            measured: 1,
-            ..Fidelity::default()
-        };
+        let fine = Fidelity { targets: vec![target(20.0)], measured: 1, ..Fidelity::default() };
         let of = |ending, fidelity: &Fidelity| first_verdict(&outcome(ending), fidelity);
         let (verdict, reason) = of(EndingKind::Finish, &fine);
         assert_eq!(verdict, Verdict::Valid);
@@ -140,55 +133,21 @@ mod tests {
             assert!(reason.contains(fact), "{fact}: {reason}");
         }
         for (change, told) in [
-            (
-                Fidelity {
-                    dropped: 7,
-                    ..fine.clone()
-                },
-                "7 samples are missing",
-            ),
-            (
-                Fidelity {
-                    targets: vec![target(19.9)],
-                    ..fine.clone()
-                },
-                "19.9000 mm",
-            ),
-            (
-                Fidelity {
-                    remarks: vec!["too warm".into()],
-                    ..fine.clone()
-                },
-                "too warm",
-            ),
-            (
-                Fidelity {
-                    targets: vec![target(1.0); 9],
-                    ..fine.clone()
-                },
-                "6 more",
-            ),
+            (Fidelity { dropped: 7, ..fine.clone() }, "7 samples are missing"),
+            (Fidelity { targets: vec![target(19.9)], ..fine.clone() }, "19.9000 mm"),
+            (Fidelity { remarks: vec!["too warm".into()], ..fine.clone() }, "too warm"),
+            (Fidelity { targets: vec![target(1.0); 9], ..fine.clone() }, "6 more"),
         ] {
             let (verdict, reason) = of(EndingKind::Finish, &change);
             assert_eq!(verdict, Verdict::Suspect);
             assert!(reason.contains(told), "{reason}");
         }
-        for ending in [
-            EndingKind::Stop,
-            EndingKind::Abort,
-            EndingKind::Halt,
-            EndingKind::Interlock,
-        ] {
+        for ending in [EndingKind::Stop, EndingKind::Abort, EndingKind::Halt, EndingKind::Interlock]
+        {
             let (verdict, reason) = of(ending, &fine);
             assert_eq!(verdict, Verdict::Suspect);
-            assert!(
-                reason.contains(ending.name()) && reason.contains("because"),
-                "{reason}"
-            );
-            let nothing = Fidelity {
-                measured: 0,
-                ..fine.clone()
-            };
+            assert!(reason.contains(ending.name()) && reason.contains("because"), "{reason}");
+            let nothing = Fidelity { measured: 0, ..fine.clone() };
             assert_eq!(of(ending, &nothing).0, Verdict::Rejected);
         }
     }

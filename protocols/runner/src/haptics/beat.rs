@@ -49,20 +49,12 @@ impl<T: Ticking> Beat<T> {
         let timing = Arc::new(Timing::default());
         let (tell, told) = sync_channel(1);
         let (ending, times) = (Arc::clone(&is_ending), Arc::clone(&timing));
-        let thread = std::thread::Builder::new()
-            .name("haptics".into())
-            .spawn(move || {
-                // Whoever started it waits for this.
-                let _ = tell.try_send(ask());
-                run(task, period, shown, &ending, &times)
-            })?;
-        Ok(Self {
-            thread: Some(thread),
-            is_ending,
-            timing,
-            seen,
-            granted: granted(&told),
-        })
+        let thread = std::thread::Builder::new().name("haptics".into()).spawn(move || {
+            // Whoever started it waits for this.
+            let _ = tell.try_send(ask());
+            run(task, period, shown, &ending, &times)
+        })?;
+        Ok(Self { thread: Some(thread), is_ending, timing, seen, granted: granted(&told) })
     }
 
     /// The priority that the system gave.
@@ -85,9 +77,7 @@ impl<T: Ticking> Beat<T> {
     /// Whether it still ticks; it does until it is ended, unless its work failed.
     #[must_use]
     pub fn is_alive(&self) -> bool {
-        self.thread
-            .as_ref()
-            .is_some_and(|thread| !thread.is_finished())
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// Ends it and gives back what it did; `None` if that failed.
@@ -108,8 +98,7 @@ impl<T: Ticking> Drop for Beat<T> {
 }
 
 fn granted(told: &Receiver<Granted>) -> Granted {
-    told.recv()
-        .unwrap_or_else(|_| Granted::Ordinary("the thread ended".to_owned()))
+    told.recv().unwrap_or_else(|_| Granted::Ordinary("the thread ended".to_owned()))
 }
 
 fn run<T: Ticking>(

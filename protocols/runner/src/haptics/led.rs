@@ -100,11 +100,7 @@ impl Led {
         let mut device = Simulated::new(settings)?;
         device.lead(place, speed);
         let period: Period = settings.system.law.period;
-        let live = Live {
-            last: *device.last(),
-            count: 0,
-            trail: [TrailPoint::default(); TRAIL],
-        };
+        let live = Live { last: *device.last(), count: 0, trail: [TrailPoint::default(); TRAIL] };
         Ok(Self {
             device,
             lead: Lead::at(place),

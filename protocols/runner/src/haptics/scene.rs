@@ -27,18 +27,7 @@ const fn columns(place: [&'static str; 3]) -> Columns {
     let forces = ["force_x_n", "force_y_n", "force_z_n"];
     (
         ["tick", "elapsed", "row_hash"],
-        [
-            x,
-            y,
-            z,
-            "yaw_rad",
-            "pitch_rad",
-            "roll_rad",
-            forces[0],
-            forces[1],
-            forces[2],
-            "depth_mm",
-        ],
+        [x, y, z, "yaw_rad", "pitch_rad", "roll_rad", forces[0], forces[1], forces[2], "depth_mm"],
     )
 }
 
@@ -69,10 +58,7 @@ pub fn scene_row(hand: Hand6, elapsed: u64, told: &SceneTick) -> SceneRow {
 #[must_use]
 pub fn scene_input(row: &SceneRow) -> (Hand6, u64) {
     let [x, y, z, yaw, pitch, roll, ..] = row.real;
-    let hand = Hand6 {
-        at: [x, y, z],
-        turn: [yaw, pitch, roll],
-    };
+    let hand = Hand6 { at: [x, y, z], turn: [yaw, pitch, roll] };
     (hand, row.whole[1])
 }
 
@@ -165,13 +151,7 @@ impl SceneTask {
     ) -> Self {
         let period: Period = scene.settings().period;
         let apart = (period.hz() / FRAMES_HZ).round().max(1.0) as u64;
-        Self {
-            scene,
-            device,
-            recorder,
-            apart,
-            since: apart,
-        }
+        Self { scene, device, recorder, apart, since: apart }
     }
 
     /// What is seen before the first tick.
@@ -316,13 +296,7 @@ impl SceneLoop {
     pub fn stop(self) -> Option<SceneEnd> {
         let kept = self.beat.kept();
         let task = self.beat.end()?;
-        let recorded = task
-            .recorder
-            .map(|recorder| recorder.finish(task.scene.hash()));
-        Some(SceneEnd {
-            scene: task.scene,
-            kept,
-            recorded,
-        })
+        let recorded = task.recorder.map(|recorder| recorder.finish(task.scene.hash()));
+        Some(SceneEnd { scene: task.scene, kept, recorded })
     }
 }

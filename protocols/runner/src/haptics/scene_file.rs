@@ -31,11 +31,7 @@ pub struct Tolerances {
 impl Default for Tolerances {
     /// A fifth of what a hand notices, half a millimetre, half of a millisecond.
     fn default() -> Self {
-        Self {
-            force_percent: 20.0,
-            shape_mm: 0.5,
-            tick_us: 500.0,
-        }
+        Self { force_percent: 20.0, shape_mm: 0.5, tick_us: 500.0 }
     }
 }
 
@@ -109,11 +105,7 @@ impl SceneFile {
         let mut fields = Fields::read(text).map_err(one)?;
         let read = read(&mut fields);
         let mistakes = fields.finish();
-        if mistakes.is_empty() {
-            Ok(read)
-        } else {
-            Err(in_words(file, &mistakes))
-        }
+        if mistakes.is_empty() { Ok(read) } else { Err(in_words(file, &mistakes)) }
     }
 
     /// As a text that reads back to the same bits.
@@ -148,21 +140,14 @@ impl SceneFile {
         put("\n[loop]".to_owned());
         put(format!("rate_hz = {:?}", self.rate_hz));
         let scheme = SCHEMES.iter().find(|(_, scheme)| *scheme == self.scheme);
-        put(format!(
-            "integrator = \"{}\"",
-            scheme.map_or("exact", |(word, _)| word)
-        ));
+        put(format!("integrator = \"{}\"", scheme.map_or("exact", |(word, _)| word)));
         put(format!("guards = {}", self.is_guarded));
         put("\n[device]".to_owned());
         for (name, value) in device_numbers(&mut self.device.clone()) {
             put(format!("{name} = {value:?}"));
         }
         put("\n[tolerances]".to_owned());
-        let Tolerances {
-            force_percent,
-            shape_mm,
-            tick_us,
-        } = self.tolerances;
+        let Tolerances { force_percent, shape_mm, tick_us } = self.tolerances;
         put(format!("force_percent = {force_percent:?}"));
         put(format!("shape_mm = {shape_mm:?}"));
         put(format!("tick_us = {tick_us:?}"));
@@ -218,11 +203,7 @@ const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 /// The parameters of a body as lines that read back to the same bits.
 #[must_use]
 pub fn body_text(body: &ModifiedKelvin) -> String {
-    let ModifiedKelvin {
-        tau_eps,
-        mu: [mu1, mu2, mu3],
-        tau_sig,
-    } = *body;
+    let ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig } = *body;
     let values = [tau_eps, mu1, mu2, mu3, tau_sig];
     let line = |(name, value): (&str, f64)| format!("{name} = {value:?}");
     let lines: Vec<String> = BODY.into_iter().zip(values).map(line).collect();
@@ -233,23 +214,12 @@ pub fn body_text(body: &ModifiedKelvin) -> String {
 pub fn read_body(fields: &mut Fields, table: &str) -> Option<ModifiedKelvin> {
     let values = BODY.map(|name| fields.number(&format!("{table}.{name}"), -1e6, 1e6));
     let given = values.iter().position(Option::is_some)?;
-    let [
-        Some(tau_eps),
-        Some(mu1),
-        Some(mu2),
-        Some(mu3),
-        Some(tau_sig),
-    ] = values
-    else {
+    let [Some(tau_eps), Some(mu1), Some(mu2), Some(mu3), Some(tau_sig)] = values else {
         let key = format!("{table}.{}", BODY[given]);
         fields.mistake(&key, "give all of tau_eps, mu1, mu2, mu3 and tau_sig");
         return None;
     };
-    let body = ModifiedKelvin {
-        tau_eps,
-        mu: [mu1, mu2, mu3],
-        tau_sig,
-    };
+    let body = ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig };
     if let Err(err) = body.checked() {
         fields.mistake(&format!("{table}.tau_eps"), &err.to_string());
     }
@@ -272,18 +242,9 @@ fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15]
         ("reach_y_mm", deep),
         ("reach_z_mm", high),
         ("hand_mass_kg", &mut device.hand_mass_kg),
-        (
-            "hand_stiffness_n_per_mm",
-            &mut device.hand_stiffness_n_per_mm,
-        ),
-        (
-            "hand_damping_n_s_per_mm",
-            &mut device.hand_damping_n_s_per_mm,
-        ),
-        (
-            "hand_speed_max_mm_per_s",
-            &mut device.hand_speed_max_mm_per_s,
-        ),
+        ("hand_stiffness_n_per_mm", &mut device.hand_stiffness_n_per_mm),
+        ("hand_damping_n_s_per_mm", &mut device.hand_damping_n_s_per_mm),
+        ("hand_speed_max_mm_per_s", &mut device.hand_speed_max_mm_per_s),
     ]
 }
 
@@ -296,47 +257,31 @@ fn read(fields: &mut Fields) -> SceneFile {
     let source = fields.text("tissue.source");
     let body = read_body(fields, "tissue");
     if source.is_some() && body.is_some() {
-        fields.mistake(
-            "tissue.source",
-            "give either a source or parameters, not both",
-        );
+        fields.mistake("tissue.source", "give either a source or parameters, not both");
     }
     if let Some(body) = body {
         file.body = body;
     }
     file.source = source.filter(|source| source != THESIS);
     // A spacing from a nanometre to a metre, so that every mesh is possible.
-    set(
-        &mut file.side_mm,
-        fields.number("tissue.side_mm", 1.0, 1000.0),
-    );
+    set(&mut file.side_mm, fields.number("tissue.side_mm", 1.0, 1000.0));
     set(&mut file.slope, fields.number("tissue.slope", 0.0, 1000.0));
     file.recovery_s = fields.number("tissue.recovery_s", 0.0, most);
-    set(
-        &mut file.friction,
-        fields.number("tissue.friction", 0.0, 10.0),
-    );
+    set(&mut file.friction, fields.number("tissue.friction", 0.0, 10.0));
     let nodes = fields.whole("mesh.nodes", NODES[0], NODES[1]);
     match (fields.flag("mesh.auto"), nodes) {
         (Some(true), Some(_)) => {
-            fields.mistake(
-                "mesh.auto",
-                "a mesh with nodes is not planned; leave one of the two out",
-            );
+            fields
+                .mistake("mesh.auto", "a mesh with nodes is not planned; leave one of the two out");
         }
         (Some(true), None) => file.nodes = None,
         (_, Some(nodes)) => file.nodes = Some(nodes as usize),
         (_, None) => {}
     }
-    file.cut_nodes = fields
-        .whole("mesh.cut_nodes", 1, NODES[1] * 2)
-        .map(|range| range as u32);
+    file.cut_nodes = fields.whole("mesh.cut_nodes", 1, NODES[1] * 2).map(|range| range as u32);
     set(&mut file.cut_mm, fields.number("mesh.cut_mm", 0.0, 1000.0));
     let [slowest, fastest] = Period::RATES_HZ;
-    set(
-        &mut file.rate_hz,
-        fields.number("loop.rate_hz", slowest, fastest),
-    );
+    set(&mut file.rate_hz, fields.number("loop.rate_hz", slowest, fastest));
     if let Some(scheme) = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme)) {
         file.scheme = scheme;
     }
@@ -354,10 +299,7 @@ fn read(fields: &mut Fields) -> SceneFile {
         ("tick_us", &mut tolerances.tick_us),
     ] {
         // Zero tolerates nothing, which nothing can hold.
-        set(
-            value,
-            fields.number(&format!("tolerances.{name}"), 1e-6, most),
-        );
+        set(value, fields.number(&format!("tolerances.{name}"), 1e-6, most));
     }
     file
 }
@@ -395,11 +337,7 @@ mod tests {
         let usual = SceneFile::default();
         let odd = SceneFile {
             name: "a \"quoted\"\\ name\tand ü".to_owned(),
-            body: ModifiedKelvin {
-                tau_eps: 1.0 / 3.0,
-                mu: [1e-7, -0.1, 1e-300],
-                tau_sig: 0.7,
-            },
+            body: ModifiedKelvin { tau_eps: 1.0 / 3.0, mu: [1e-7, -0.1, 1e-300], tau_sig: 0.7 },
             side_mm: 59.999_999_999_999_99,
             recovery_s: Some(0.1 + 0.2),
             nodes: None,
@@ -408,16 +346,10 @@ mod tests {
             rate_hz: 3000.0,
             scheme: Scheme::Trapezoid,
             is_guarded: false,
-            device: DeviceSettings {
-                mass_kg: 1.0 / 7.0,
-                ..DeviceSettings::default()
-            },
+            device: DeviceSettings { mass_kg: 1.0 / 7.0, ..DeviceSettings::default() },
             ..usual.clone()
         };
-        let fitted = SceneFile {
-            source: Some("C:\\data\\liver".to_owned()),
-            ..usual.clone()
-        };
+        let fitted = SceneFile { source: Some("C:\\data\\liver".to_owned()), ..usual.clone() };
         for file in [usual, odd, fitted] {
             let again = SceneFile::parse("a.toml", &file.text());
             assert_eq!(again.as_ref(), Ok(&file), "{}", file.text());
@@ -438,14 +370,8 @@ mod tests {
     #[test]
     fn mistakes_are_told_with_their_lines() {
         for (text, told) in [
-            (
-                "[tissue]\nside_mm = -3",
-                "scene.toml, line 2: tissue.side_mm: ",
-            ),
-            (
-                "[tissue]\n\nsid_mm = 3",
-                "scene.toml, line 3: 'tissue.sid_mm'",
-            ),
+            ("[tissue]\nside_mm = -3", "scene.toml, line 2: tissue.side_mm: "),
+            ("[tissue]\n\nsid_mm = 3", "scene.toml, line 3: 'tissue.sid_mm'"),
             ("[tissue]\ntau_eps = 1.0", "line 2: tissue.tau_eps: "),
             (
                 "[tissue]\nsource = \"thesis\"\ntau_eps = 1\nmu1 = 1\nmu2 = 1\nmu3 = 1\ntau_sig = 1",
@@ -454,15 +380,9 @@ mod tests {
             ("[mesh]\nnodes = 10.5", "line 2: mesh.nodes: "),
             ("[mesh]\nnodes = 51\nauto = true", "line 3: mesh.auto"),
             ("[loop]\nrate_hz = 20", "line 2: loop.rate_hz: "),
-            (
-                "[loop]\nintegrator = \"magic\"",
-                "line 2: loop.integrator: give \"",
-            ),
+            ("[loop]\nintegrator = \"magic\"", "line 2: loop.integrator: give \""),
             ("[device]\nmass_kg = 0", "mass_kg = 0"),
-            (
-                "[tolerances]\nshape_mm = \"fine\"",
-                "line 2: tolerances.shape_mm",
-            ),
+            ("[tolerances]\nshape_mm = \"fine\"", "line 2: tolerances.shape_mm"),
             ("side = ", "scene.toml, line 1: "),
         ] {
             let said = SceneFile::parse("scene.toml", text).unwrap_err();

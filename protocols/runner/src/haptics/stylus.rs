@@ -30,10 +30,7 @@ impl Stylus {
         settings: SceneSettings,
         (path, laps): (Option<ScenePath>, u32),
     ) -> Result<(Self, Input<Hand6>), SceneError> {
-        let hand = Hand6 {
-            at: settings.start(),
-            turn: [0.0; 3],
-        };
+        let hand = Hand6 { at: settings.start(), turn: [0.0; 3] };
         let (input, pointed) = triple_buffer(&hand);
         let stylus = Self {
             device: SimulatedDevice::of(&settings)?,

@@ -6,10 +6,8 @@ use palpate_haptics::simulation::SimulationTick;
 use palpate_sessions::ticks::{Recorder, Row};
 
 /// Columns of a recorded master-slave system: whole numbers, then others.
-pub const COLUMNS: ([&str; 3], [&str; 5]) = (
-    ["tick", "elapsed", "state_hash"],
-    ["depth_mm", "model_n", "force_n", "torque_nmm", "bias_v"],
-);
+pub const COLUMNS: ([&str; 3], [&str; 5]) =
+    (["tick", "elapsed", "state_hash"], ["depth_mm", "model_n", "force_n", "torque_nmm", "bias_v"]);
 
 /// A recorded tick.
 pub type TapedRow = Row<3, 5>;
@@ -23,13 +21,7 @@ pub fn taped_row(elapsed: u64, told: &SimulationTick) -> TapedRow {
     let seen = &told.snapshot;
     Row {
         whole: [seen.tick, elapsed, seen.sum()],
-        real: [
-            seen.depth.0,
-            seen.model.0,
-            seen.force.0,
-            seen.torque,
-            seen.bias.0,
-        ],
+        real: [seen.depth.0, seen.model.0, seen.force.0, seen.torque, seen.bias.0],
     }
 }
 
@@ -58,17 +50,8 @@ impl Ticking for Taped {
 }
 
 /// Columns of a recorded system whose hand was led from outside.
-pub const LED_COLUMNS: ([&str; 3], [&str; 6]) = (
-    COLUMNS.0,
-    [
-        "lead_mm",
-        "depth_mm",
-        "model_n",
-        "force_n",
-        "torque_nmm",
-        "bias_v",
-    ],
-);
+pub const LED_COLUMNS: ([&str; 3], [&str; 6]) =
+    (COLUMNS.0, ["lead_mm", "depth_mm", "model_n", "force_n", "torque_nmm", "bias_v"]);
 
 /// A recorded tick of it.
 pub type LedRow = Row<3, 6>;
@@ -81,10 +64,7 @@ pub type LedRecorder = Recorder<3, 6>;
 pub fn led_row(elapsed: u64, led: &Led) -> LedRow {
     let Row { whole, real } = taped_row(elapsed, &led.live().last);
     let [depth, model, force, torque, bias] = real;
-    Row {
-        whole,
-        real: [led.place(), depth, model, force, torque, bias],
-    }
+    Row { whole, real: [led.place(), depth, model, force, torque, bias] }
 }
 
 /// The led device, and where its ticks are recorded, if they are.

@@ -19,10 +19,7 @@ pub struct Durations {
 
 impl Default for Durations {
     fn default() -> Self {
-        Self {
-            bins: (0..BINS).map(|_| AtomicU64::new(0)).collect(),
-            longest: AtomicU64::new(0),
-        }
+        Self { bins: (0..BINS).map(|_| AtomicU64::new(0)).collect(), longest: AtomicU64::new(0) }
     }
 }
 
@@ -57,11 +54,7 @@ impl Durations {
     /// What was counted so far.
     #[must_use]
     pub fn spread(&self) -> Spread {
-        let counts: Vec<u64> = self
-            .bins
-            .iter()
-            .map(|one| one.load(Ordering::Relaxed))
-            .collect();
+        let counts: Vec<u64> = self.bins.iter().map(|one| one.load(Ordering::Relaxed)).collect();
         let count: u64 = counts.iter().sum();
         let longest = self.longest.load(Ordering::Relaxed);
         let at = |share: f64| {
@@ -76,13 +69,7 @@ impl Durations {
             }
             seconds(longest)
         };
-        Spread {
-            count,
-            p50: at(0.5),
-            p99: at(0.99),
-            p99_9: at(0.999),
-            max: seconds(longest),
-        }
+        Spread { count, p50: at(0.5), p99: at(0.99), p99_9: at(0.999), max: seconds(longest) }
     }
 }
 
@@ -186,10 +173,7 @@ mod tests {
         assert_eq!(spread.count, 100_000);
         for (share, found) in [(0.5, spread.p50), (0.99, spread.p99), (0.999, spread.p99_9)] {
             let right = sorted[(share * 1e5) as usize - 1] as f64 * 1e-9;
-            assert!(
-                found.0 >= right && found.0 <= right * 1.01,
-                "{share} {found:?} {right}"
-            );
+            assert!(found.0 >= right && found.0 <= right * 1.01, "{share} {found:?} {right}");
         }
         assert_eq!(spread.max.0, sorted[99_999] as f64 * 1e-9);
     }

@@ -42,16 +42,10 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
     let ending = end.map_or("breaking off", |end| end.outcome.as_str());
     let is_complete = end.is_some_and(|end| end.reason == PLAN_COMPLETE);
     if ending != "finish" || !is_complete {
-        return Err(CalibratingError::Incomplete {
-            session: id,
-            ending: ending.into(),
-        });
+        return Err(CalibratingError::Incomplete { session: id, ending: ending.into() });
     }
     // Decisions of other kinds are other types; a reading that cannot be read back would be no reading.
-    let decisions = session
-        .entries
-        .iter()
-        .filter(|one| one.kind == EntryKind::Decision);
+    let decisions = session.entries.iter().filter(|one| one.kind == EntryKind::Decision);
     let records: Vec<Record> = decisions
         .filter_map(|one| match serde_json::from_value(one.body.clone()) {
             Ok(Effect::Record(record)) => Some(record),
@@ -65,11 +59,7 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
         let (direction, repeat) = (one.direction, one.repeat);
         let is_same = |one: &Series| (one.direction, one.repeat) == (direction, repeat);
         if !series.last().is_some_and(is_same) {
-            series.push(Series {
-                direction,
-                repeat,
-                steps: Vec::new(),
-            });
+            series.push(Series { direction, repeat, steps: Vec::new() });
         }
         if one.mass_g() == 0.0 {
             empty.push(one.volts());
@@ -86,10 +76,7 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
         format: CALIBRATION_FORMAT,
         taken_at: Some(manifest.started_at_text()),
         source: format!("session {id}"),
-        rig: manifest
-            .rig
-            .as_ref()
-            .map_or_else(String::new, |rig| rig.name.clone()),
+        rig: manifest.rig.as_ref().map_or_else(String::new, |rig| rig.name.clone()),
         operator: manifest.operator.clone(),
         zero_before: empty.first().copied(),
         zero_after: empty.last().copied(),
@@ -99,8 +86,5 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
     .with_stacked_weights(TOLERANCE_G)?;
     calibration.check_rise()?;
     let curve = calibration.best_curve()?;
-    Ok(Calibration {
-        curve,
-        ..calibration
-    })
+    Ok(Calibration { curve, ..calibration })
 }

@@ -33,9 +33,7 @@ impl Conditions {
     ) -> Self {
         let pairs = |pairs: [(&str, String); 2]| {
             let pairs = pairs.into_iter();
-            pairs
-                .map(|(name, value)| (name.to_owned(), value))
-                .collect()
+            pairs.map(|(name, value)| (name.to_owned(), value)).collect()
         };
         let limits = [
             ("travel_max", limits.travel_max.to_string()),
@@ -51,10 +49,7 @@ impl Conditions {
             Some((task.name.clone(), source.crc32))
         });
         Self {
-            rig: pairs([
-                ("name", rig.name.clone()),
-                ("identity", rig.identity.clone()),
-            ]),
+            rig: pairs([("name", rig.name.clone()), ("identity", rig.identity.clone())]),
             settings: rig.settings.clone(),
             limits: limits.map(|(name, value)| (name.to_owned(), value)).into(),
             calibration: pairs([
@@ -89,13 +84,9 @@ impl Conditions {
                 }
             }
         };
-        compare(&self.settings, &now.settings, &|name| {
-            format!("the rig's setting {name}")
-        });
+        compare(&self.settings, &now.settings, &|name| format!("the rig's setting {name}"));
         compare(&self.rig, &now.rig, &|name| format!("the rig's {name}"));
-        compare(&self.limits, &now.limits, &|name| {
-            format!("the rig's limit {name}")
-        });
+        compare(&self.limits, &now.limits, &|name| format!("the rig's limit {name}"));
         compare(&self.protocols, &now.protocols, &|task| {
             format!("the protocol of task '{task}' (by its CRC-32)")
         });
@@ -104,11 +95,7 @@ impl Conditions {
                 let of = |key: &str| one.calibration.get(key).map_or("", String::as_str);
                 format!("'{}' (CRC-32 {})", of("name"), of("crc32"))
             };
-            changes.push(format!(
-                "the calibration was {} and is {} now",
-                told(self),
-                told(now)
-            ));
+            changes.push(format!("the calibration was {} and is {} now", told(self), told(now)));
         }
         changes
     }

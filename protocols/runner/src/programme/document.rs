@@ -106,13 +106,7 @@ impl Task {
         if remount.is_some() {
             // What broke off may have left the probe in the tissue, and nobody clips in anything under it.
             let ways_up = |step: &&Step| matches!(step, Step::SelfTest(_) | Step::Home(_));
-            before.extend(
-                plan.steps
-                    .iter()
-                    .map(|one| &one.step)
-                    .filter(ways_up)
-                    .cloned(),
-            );
+            before.extend(plan.steps.iter().map(|one| &one.step).filter(ways_up).cloned());
         }
         let fresh = self.specimen.filter(|_| repeat == 1);
         if let Some(specimen) = fresh.or(remount) {

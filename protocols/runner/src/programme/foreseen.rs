@@ -90,11 +90,7 @@ pub fn foresee(
         list.dedup();
     }
     if refusals.is_empty() {
-        Ok(Foreseen {
-            tasks,
-            notes,
-            to_acknowledge,
-        })
+        Ok(Foreseen { tasks, notes, to_acknowledge })
     } else {
         Err(ProgrammeError(refusals))
     }

@@ -110,14 +110,10 @@ impl Progress {
             Entry::Programme { name, .. } if *name != programme.name => {
                 return Err(ProgressError::Other(name.clone()));
             }
-            Entry::Programme {
-                name, crc32: begun, ..
-            } if begun != crc32 => return Err(ProgressError::Changed(name.clone())),
-            Entry::Programme {
-                name,
-                conditions: Some(begun),
-                ..
-            } if **begun != *conditions => {
+            Entry::Programme { name, crc32: begun, .. } if begun != crc32 => {
+                return Err(ProgressError::Changed(name.clone()));
+            }
+            Entry::Programme { name, conditions: Some(begun), .. } if **begun != *conditions => {
                 return Err(ProgressError::Conditions {
                     programme: name.clone(),
                     changes: begun.changes(conditions),
@@ -157,19 +153,13 @@ impl Progress {
                 (task, repeat, own)
             })
             .find(|(_, _, own)| !own.contains(&Some(FINISHED)))
-            .map(|(task, repeat, own)| Place {
-                task,
-                repeat,
-                attempt: 1 + own.len() as u32,
-            })
+            .map(|(task, repeat, own)| Place { task, repeat, attempt: 1 + own.len() as u32 })
     }
 
     /// How the attempts at one repeat ended.
     fn attempts(&self, task: usize, repeat: u32) -> Vec<Option<&str>> {
-        let own = self
-            .runs
-            .iter()
-            .filter(|(place, ..)| (place.task, place.repeat) == (task, repeat));
+        let own =
+            self.runs.iter().filter(|(place, ..)| (place.task, place.repeat) == (task, repeat));
         own.map(|(_, _, ending)| ending.as_deref()).collect()
     }
 

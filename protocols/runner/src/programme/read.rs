@@ -45,16 +45,8 @@ const NEEDED: [&str; 4] = [
 ];
 
 /// Keys of a task; those that it cannot do without first.
-const TASK_KEYS: [&str; 8] = [
-    "name",
-    "protocol",
-    "set",
-    "specimen",
-    "repeats",
-    "rest_s",
-    "calibrates",
-    "validates",
-];
+const TASK_KEYS: [&str; 8] =
+    ["name", "protocol", "set", "specimen", "repeats", "rest_s", "calibrates", "validates"];
 
 /// The same of a task.
 const TASK_NEEDED: [&str; 2] = ["name = \"press\"", "protocol = \"ramp-hold\""];
@@ -199,11 +191,8 @@ impl Reader {
             match &item.value {
                 Value::Table(table) if item != node => tables.push(table),
                 _ => {
-                    let message = wrong(
-                        "task",
-                        item,
-                        "tables, each under [[task]] in double brackets",
-                    );
+                    let message =
+                        wrong("task", item, "tables, each under [[task]] in double brackets");
                     self.problems.error(item.line, message);
                 }
             }
@@ -259,9 +248,7 @@ impl Reader {
             self.problems.error(line("set"), problem.to_string());
         }
         tasks.names.extend(name.clone());
-        tasks
-            .specimens
-            .extend(table.get("specimen").map(|_| specimen));
+        tasks.specimens.extend(table.get("specimen").map(|_| specimen));
         let (Some(name), Some(protocol)) = (name, protocol) else {
             return;
         };

@@ -129,29 +129,16 @@ pub fn run(
     let lock = laboratory.folder.join(LOCK_FILE);
     let _lock = HolderLock::acquire(&lock).map_err(|err| RunError::Folder(err.to_string()))?;
     if laboratory.folder.join(LOG_FILE).exists() {
-        let reason = format!(
-            "{} is a session; choose a new folder",
-            laboratory.folder.display()
-        );
+        let reason = format!("{} is a session; choose a new folder", laboratory.folder.display());
         return Err(RunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
-    let conditions = Conditions::of(
-        programme,
-        laboratory.rig,
-        &laboratory.limits,
-        &laboratory.calibration,
-    );
+    let conditions =
+        Conditions::of(programme, laboratory.rig, &laboratory.limits, &laboratory.calibration);
     let progress = Progress::of(&entries, programme, crc32, &conditions)?;
     let was_continued = !progress.runs.is_empty();
-    let mut work = Work {
-        programme,
-        journal,
-        progress,
-        is_remounting: was_continued,
-        laboratory,
-        tell,
-    };
+    let mut work =
+        Work { programme, journal, progress, is_remounting: was_continued, laboratory, tell };
     if entries.is_empty() {
         work.journal.push(&Entry::Programme {
             name: programme.name.clone(),
@@ -169,11 +156,7 @@ pub fn run(
     while let Some(place) = work.progress.next(programme) {
         work.one(place)?;
     }
-    Ok(Done {
-        progress: work.progress,
-        calibration: work.laboratory.calibration,
-        was_continued,
-    })
+    Ok(Done { progress: work.progress, calibration: work.laboratory.calibration, was_continued })
 }
 
 struct Work<'a> {
@@ -205,11 +188,7 @@ impl Work<'_> {
         if let Some(run) = self.progress.runs.last_mut() {
             run.2 = Some(outcome.clone());
         }
-        Ok(self.journal.push(&Entry::Ended {
-            place,
-            outcome,
-            reason,
-        })?)
+        Ok(self.journal.push(&Entry::Ended { place, outcome, reason })?)
     }
 
     /// One run, from its entry in the journal to the next.
@@ -217,18 +196,10 @@ impl Work<'_> {
         let programme = self.programme;
         let task = &programme.tasks[place.task];
         // A folder that is there without its line in the journal is what a crash left of an attempt.
-        while self
-            .laboratory
-            .folder
-            .join(session_folder(&task.name, &place))
-            .exists()
-        {
+        while self.laboratory.folder.join(session_folder(&task.name, &place)).exists() {
             place.attempt += 1;
         }
-        let refused = |reason: String| RunError::Refused {
-            task: task.name.clone(),
-            reason,
-        };
+        let refused = |reason: String| RunError::Refused { task: task.name.clone(), reason };
         let specimen = programme.specimen_at(place.task);
         let remount = specimen.filter(|_| std::mem::take(&mut self.is_remounting));
         let plan = task
@@ -260,10 +231,7 @@ impl Work<'_> {
         }
         let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some(FINISHED);
         let done = self.progress.runs.iter().filter(finished).count() as u32;
-        (self.tell)(Event::Begun {
-            place: &place,
-            count: (done, programme.session_count()),
-        });
+        (self.tell)(Event::Begun { place: &place, count: (done, programme.session_count()) });
         let (ending, reason) = self.wait(&folder, later)?;
         self.end(place.clone(), ending.clone(), reason.clone())?;
         if ending != FINISHED {
@@ -342,11 +310,8 @@ impl Work<'_> {
             return Ok(());
         }
         let session = Session::open(folder)?;
-        let calibration =
-            calibration_of(&session, &task.name).map_err(|source| RunError::Calibrating {
-                task: task.name.clone(),
-                source,
-            })?;
+        let calibration = calibration_of(&session, &task.name)
+            .map_err(|source| RunError::Calibrating { task: task.name.clone(), source })?;
         (self.tell)(Event::Calibrated(&calibration));
         self.laboratory.calibration = calibration;
         Ok(())
@@ -358,11 +323,7 @@ impl Work<'_> {
         let curve = curve.map_err(|err| err.to_string())?;
         let mut left = 0.0;
         for (index, task) in self.programme.tasks.iter().enumerate().skip(place.task) {
-            let first = if index == place.task {
-                place.repeat + 1
-            } else {
-                1
-            };
+            let first = if index == place.task { place.repeat + 1 } else { 1 };
             for repeat in first..=task.repeats {
                 let Some(plan) = task.plan(repeat, None) else {
                     continue;

@@ -111,22 +111,16 @@ fn pairs(table: &Table, prefix: &str, found: &mut Vec<Pair>, problems: &mut Prob
 /// Whether a thing can be told by a programme.
 fn check(key: &str, value: &str) -> Result<(), String> {
     if key.trim().starts_with("series.") {
-        return Err(format!(
-            "a programme counts its series itself; leave out {key}"
-        ));
+        return Err(format!("a programme counts its series itself; leave out {key}"));
     }
-    Labels::default()
-        .tell(key, value)
-        .map_err(|err| err.to_string())
+    Labels::default().tell(key, value).map_err(|err| err.to_string())
 }
 
 impl Programme {
     /// Tells of every session what the command line says; it holds over the file.
     pub fn tell(&mut self, key: &str, value: &str) -> Result<(), String> {
         check(key, value)?;
-        self.told
-            .over
-            .push((key.trim().to_owned(), value.to_owned()));
+        self.told.over.push((key.trim().to_owned(), value.to_owned()));
         Ok(())
     }
 

@@ -140,27 +140,16 @@ pub struct ReplayReport {
 
 /// The blessings of a session, from `blessed.json` in its folder; none if there is no such file.
 pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
-    let folder = if folder.is_file() {
-        folder.parent().unwrap_or(folder)
-    } else {
-        folder
-    };
+    let folder = if folder.is_file() { folder.parent().unwrap_or(folder) } else { folder };
     let path = folder.join("blessed.json");
     let Some(text) = palpate_sessions::text::read_if_present(&path)
         .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))?
     else {
         return Ok(Vec::new());
     };
-    let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {
-        format!(
-            "the blessings cannot be understood ({err}): {}",
-            path.display()
-        )
-    })?;
-    match blessings
-        .iter()
-        .find(|blessing| blessing.reason.trim().is_empty())
-    {
+    let blessings: Vec<Blessing> = serde_json::from_str(&text)
+        .map_err(|err| format!("the blessings cannot be understood ({err}): {}", path.display()))?;
+    match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
         Some(blessing) => Err(format!(
             "decision {} is blessed without a reason; write it down: {}",
             blessing.decision,
@@ -229,10 +218,7 @@ impl Replay<'_> {
                     self.expected_live.pop_front();
                 }
                 let recomputed = self.expected_live.pop_front();
-                if !recomputed
-                    .as_ref()
-                    .is_some_and(|again| is_same_fit(estimate, again))
-                {
+                if !recomputed.as_ref().is_some_and(|again| is_same_fit(estimate, again)) {
                     let (recorded, now) = (to_json(estimate), to_json(&recomputed));
                     self.differ(next.now, index, "live fit", None, recorded, now);
                 }
@@ -271,28 +257,14 @@ impl Replay<'_> {
                 (None, None) => continue,
                 _ => {}
             }
-            self.differ(
-                row.host,
-                index,
-                what,
-                None,
-                to_json(&recorded),
-                to_json(&now),
-            );
+            self.differ(row.host, index, what, None, to_json(&recorded), to_json(&now));
         }
         // Labels follow decisions: they are the engine's, not arithmetic.
         if self.report.is_same_engine
             && self.report.blessed == 0
             && (row.phase, row.cycle) != (phase, cycle)
         {
-            self.differ(
-                row.host,
-                index,
-                "phase",
-                None,
-                to_json(&row.phase),
-                to_json(&phase),
-            );
+            self.differ(row.host, index, "phase", None, to_json(&row.phase), to_json(&phase));
         }
     }
 
@@ -329,14 +301,7 @@ impl Replay<'_> {
         if is_blessed {
             self.report.blessed += 1;
         } else {
-            self.differ(
-                now,
-                after_sample,
-                "decision",
-                Some(index),
-                recorded,
-                decided,
-            );
+            self.differ(now, after_sample, "decision", Some(index), recorded, decided);
         }
     }
 
@@ -344,14 +309,7 @@ impl Replay<'_> {
         let decided = self.report.decisions;
         if let (true, Some(entry)) = (self.report.is_same_engine, self.recorded.get(decided)) {
             let (now, after_sample, body) = (entry.now, entry.after_sample, entry.body.clone());
-            self.differ(
-                now,
-                after_sample,
-                "decision",
-                Some(decided),
-                body,
-                Value::Null,
-            );
+            self.differ(now, after_sample, "decision", Some(decided), body, Value::Null);
         }
     }
 
@@ -414,8 +372,7 @@ fn agree(a: &Value, b: &Value, tolerance: f64) -> bool {
         }
         (Value::Object(x), Value::Object(y)) => {
             x.len() == y.len()
-                && x.iter()
-                    .all(|(key, x)| y.get(key).is_some_and(|y| agree(x, y, tolerance)))
+                && x.iter().all(|(key, x)| y.get(key).is_some_and(|y| agree(x, y, tolerance)))
         }
         _ => a == b,
     }
@@ -429,10 +386,7 @@ mod tests {
     #[test]
     fn numbers_agree_within_tolerance_and_words_exactly() {
         let check = |a, b| agree(&a, &b, 1e-9);
-        assert!(check(
-            json!({"x": 6.4, "n": [1, 2]}),
-            json!({"x": 6.4 + 1e-12, "n": [1, 2]})
-        ));
+        assert!(check(json!({"x": 6.4, "n": [1, 2]}), json!({"x": 6.4 + 1e-12, "n": [1, 2]})));
         assert!(!check(json!({"x": 6.4}), json!({"x": 6.4 + 1e-6})));
         assert!(!check(json!({"x": 1}), json!({"y": 1})));
         assert!(!check(json!("stop"), json!("halt")));

@@ -43,17 +43,10 @@ impl Player {
     pub fn new(session: Session, folder: PathBuf) -> Result<Self, ReplayError> {
         let config = config_of(&session)?;
         let inputs: Vec<RecordedInput> = inputs_of(&session)?.into();
-        let expected = preview(
-            &config.plan,
-            &config.rig,
-            &config.limits,
-            &config.curve,
-            config.is_homed,
-        );
+        let expected =
+            preview(&config.plan, &config.rig, &config.limits, &config.curve, config.is_homed);
         let last_row = session.rows.last().map_or(Nanos::ZERO, |row| row.host);
-        let end = inputs
-            .last()
-            .map_or(last_row, |input| input.now.max(last_row));
+        let end = inputs.last().map_or(last_row, |input| input.now.max(last_row));
         let here = Place {
             rows: 0,
             inputs: 0,
@@ -149,10 +142,7 @@ impl Player {
     pub fn snapshot(&self, sequence: u64) -> Option<Snapshot> {
         let Place { rows, board, .. } = &self.here;
         let state = self.here.state.as_ref()?;
-        let log = LogState {
-            saved_through: board.now(),
-            ..LogState::default()
-        };
+        let log = LogState { saved_through: board.now(), ..LogState::default() };
         let reading = rows.checked_sub(1).and_then(|last| self.rows.get(last));
         Some(Snapshot {
             rig: RigView {

@@ -35,9 +35,7 @@ pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
     Ok(Config {
         rig,
         limits: plan.limits.tighten(limits),
-        curve: calibration
-            .curve()
-            .map_err(|err| bad("calibration", err.to_string()))?,
+        curve: calibration.curve().map_err(|err| bad("calibration", err.to_string()))?,
         plan,
         is_homed,
     })
@@ -61,16 +59,10 @@ pub(super) fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, Re
         .iter()
         .filter(|entry| entry.kind != EntryKind::Decision)
         .map(|entry| {
-            let input =
-                serde_json::from_value(entry.body.clone()).map_err(|err| ReplayError::Input {
-                    order: entry.order,
-                    detail: err.to_string(),
-                })?;
-            Ok(RecordedInput {
-                after_sample: entry.after_sample,
-                now: entry.now,
-                input,
-            })
+            let input = serde_json::from_value(entry.body.clone()).map_err(|err| {
+                ReplayError::Input { order: entry.order, detail: err.to_string() }
+            })?;
+            Ok(RecordedInput { after_sample: entry.after_sample, now: entry.now, input })
         })
         .collect()
 }

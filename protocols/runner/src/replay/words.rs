@@ -11,12 +11,7 @@ pub(super) fn of_step(state: &State) -> String {
     let Some(planned) = steps.get(index) else {
         return format!("behind the last of {} steps", steps.len());
     };
-    let place = format!(
-        "step {} of {}, {}",
-        index + 1,
-        steps.len(),
-        planned.step.word()
-    );
+    let place = format!("step {} of {}, {}", index + 1, steps.len(), planned.step.word());
     match state.cycle() {
         0 => place,
         cycle => format!("{place}, cycle {cycle}"),

@@ -14,11 +14,7 @@ use palpate_runner::haptics::{Beat, Led, Simulated, Ticking};
 use palpate_test_support::wait::{Deadline, until};
 
 fn device(period: Period) -> Simulated {
-    let path = HandPath::RampHold {
-        from: 0.0,
-        to: 30.0,
-        speed: 50.0,
-    };
+    let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
     let settings = SimulationSettings::of(ModifiedKelvin::THESIS, period, Hand::firm(path));
     Simulated::new(&settings).expect("a device")
 }
@@ -61,9 +57,7 @@ fn waits() -> u64 {
     let status = std::fs::read_to_string("/proc/thread-self/status").expect("Linux has it");
     let mut lines = status.lines();
     let count = lines.find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
-    count
-        .and_then(|count| count.trim().parse().ok())
-        .expect("a count")
+    count.and_then(|count| count.trim().parse().ok()).expect("a count")
 }
 
 #[cfg(target_os = "linux")]
@@ -113,10 +107,7 @@ fn poked(method: Method) -> impl FnMut(usize) {
     move |tick| {
         let contacts: [Contact; 20] = std::array::from_fn(|tool| {
             let [column, row] = [7 * tick + 11 * tool, tick / 3 + 31 * tool].map(|at| at % 41);
-            let node = Node {
-                column: column as u16,
-                row: row as u16,
-            };
+            let node = Node { column: column as u16, row: row as u16 };
             let (z, side) = match tool % 3 {
                 0 => (1.5, Side::Pull),
                 _ => (-2.0, Side::Push),
@@ -231,10 +222,7 @@ fn ticks_that_were_missed_are_told_and_none_is_lost() {
     }
     let task = Sleepy { calls: 0, ticks: 0 };
     let mut beat = Beat::start(task, Period::MILLISECOND, (0, 0)).unwrap();
-    until(
-        || (beat.seen().0 >= 200).then_some(()),
-        || "200 calls".into(),
-    );
+    until(|| (beat.seen().0 >= 200).then_some(()), || "200 calls".into());
     let kept = beat.kept();
     assert!(beat.is_alive());
     let task = beat.end().unwrap();
@@ -242,10 +230,5 @@ fn ticks_that_were_missed_are_told_and_none_is_lost() {
     // A busy computer makes any of them long, and none shorter than it slept.
     assert!(kept.work.max.0 >= 0.005, "{kept:?}");
     // Calls and misses are all ticks that were due.
-    assert!(
-        task.ticks >= task.calls + kept.missed,
-        "{} {}",
-        task.ticks,
-        task.calls
-    );
+    assert!(task.ticks >= task.calls + kept.missed, "{} {}", task.ticks, task.calls);
 }

@@ -108,10 +108,7 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
     }
     assert!(deepest < -5.0, "{deepest}");
     // Then it follows who points.
-    live.point(Hand6 {
-        at: [20.0, 30.0, 5.0],
-        turn: [0.0; 3],
-    });
+    live.point(Hand6 { at: [20.0, 30.0, 5.0], turn: [0.0; 3] });
     until(
         || ((live.view().tick.device[0] - 20.0).abs() < 1.0).then_some(()),
         || "the device where the pointer is".into(),
@@ -122,13 +119,7 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
     assert_eq!(told.lost, 0);
     let found = Recording::read(&folder, COLUMNS).unwrap();
     assert_eq!(found.rows.len() as u64, told.ticks);
-    assert_eq!(
-        found.end,
-        End::Whole {
-            lost: 0,
-            left: end.scene.hash()
-        }
-    );
+    assert_eq!(found.end, End::Whole { lost: 0, left: end.scene.hash() });
     let differs = |change: fn(usize, &mut SceneRow)| {
         let mut again = LedScene::new(settings).unwrap();
         let mut first = None;
@@ -155,10 +146,8 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
 #[test]
 fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
     for hz in [250.0, 1000.0, 5000.0] {
-        let settings = SceneSettings {
-            period: Period::of_rate(hz).unwrap(),
-            ..SceneSettings::default()
-        };
+        let settings =
+            SceneSettings { period: Period::of_rate(hz).unwrap(), ..SceneSettings::default() };
         let (mut task, _) = task(settings, None, None);
         let shown = (0..hz as usize).filter(|_| {
             task.tick(1);
@@ -171,10 +160,7 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
 
 #[test]
 fn the_kept_recording_is_computed_again() {
-    let folder = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../tests/recordings/scene-poke"
-    );
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/scene-poke");
     let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
     let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
     let mut again = LedScene::new(file.settings(0).unwrap()).unwrap();
@@ -202,12 +188,7 @@ impl Scripted {
     fn new(script: fn(u64) -> [f64; 3]) -> (Box<Self>, std::sync::mpsc::Receiver<[f64; 3]>) {
         let (given, told) = std::sync::mpsc::sync_channel(4096);
         let settings = DeviceSettings::default();
-        let device = Self {
-            settings,
-            script,
-            ticks: 0,
-            given,
-        };
+        let device = Self { settings, script, ticks: 0, given };
         (Box::new(device), told)
     }
 }
@@ -219,10 +200,7 @@ impl HapticDevice for Scripted {
 
     fn sense(&mut self, elapsed: u64) -> Pose {
         self.ticks += elapsed;
-        Pose {
-            at: (self.script)(self.ticks),
-            turn: [0.0, -0.5, 0.0],
-        }
+        Pose { at: (self.script)(self.ticks), turn: [0.0, -0.5, 0.0] }
     }
 
     fn give(&mut self, force: [f64; 3]) {
@@ -257,10 +235,7 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     // A device that is nowhere is let go.
     assert_eq!(task.scene().last().force, [0.0; 3]);
     // Its numbers are those that the scene is guarded by, or there is no scene.
-    let stronger = DeviceSettings {
-        force_max_n: 8.0,
-        ..DeviceSettings::default()
-    };
+    let stronger = DeviceSettings { force_max_n: 8.0, ..DeviceSettings::default() };
     let (device, _given) = Scripted::new(pressed);
     let refused = SceneLoop::on(device, scene(settings.with_device(stronger)), None);
     assert!(refused.unwrap_err().contains("another device"));
@@ -275,10 +250,7 @@ fn a_recording_of_another_device_is_computed_again_from_where_it_was_sensed() {
     let (device, _given) = Scripted::new(pressed);
     let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
     assert!(live.is_over());
-    until(
-        || (live.view().tick.tick >= 1200).then_some(()),
-        || "1200 ticks".into(),
-    );
+    until(|| (live.view().tick.tick >= 1200).then_some(()), || "1200 ticks".into());
     let end = live.stop().unwrap();
     let found = Recording::read(&folder, SENSED_COLUMNS).unwrap();
     let mut again = scene(settings);

@@ -28,11 +28,7 @@ fn answer(relative: f64, is_identified: bool) -> Input {
 }
 
 fn rule(at_least: f64) -> HoldUntil {
-    HoldUntil {
-        parameter: BodyParameter::TauEps,
-        relative: 0.01,
-        at_least: Seconds(at_least),
-    }
+    HoldUntil { parameter: BodyParameter::TauEps, relative: 0.01, at_least: Seconds(at_least) }
 }
 
 /// Whether a hold of 0.2 s with a rule ends at the sample after an answer given at 0.1 s.
@@ -82,14 +78,8 @@ fn the_reason_is_recorded_once_and_says_what_was_reached() {
 #[test]
 fn an_answer_from_before_the_hold_ends_nothing() {
     let mut bench = Bench::new(vec![
-        Step::SelfTest(SelfTest {
-            duration: Seconds(0.1),
-        }),
-        Step::Hold(Hold {
-            duration: Seconds(0.1),
-            until: Some(rule(0.0)),
-            rate: None,
-        }),
+        Step::SelfTest(SelfTest { duration: Seconds(0.1) }),
+        Step::Hold(Hold { duration: Seconds(0.1), until: Some(rule(0.0)), rate: None }),
     ]);
     bench.start();
     assert_eq!(bench.give(answer(0.001, true)), []);
@@ -106,13 +96,6 @@ fn an_answer_from_before_the_hold_ends_nothing() {
 fn a_plan_without_a_rule_is_written_and_read_as_before() {
     let text = r#"{"step":"hold","duration":2.0}"#;
     let step: Step = serde_json::from_str(text).unwrap();
-    assert_eq!(
-        step,
-        Step::Hold(Hold {
-            duration: Seconds(2.0),
-            until: None,
-            rate: None,
-        })
-    );
+    assert_eq!(step, Step::Hold(Hold { duration: Seconds(2.0), until: None, rate: None }));
     assert_eq!(serde_json::to_string(&step).unwrap(), text);
 }

@@ -74,10 +74,7 @@ impl Default for FindContact {
 impl Default for Press {
     /// Reasons as for [`FindContact`].
     fn default() -> Self {
-        Self {
-            force: Newtons(0.42),
-            dwell: Seconds(6.0),
-        }
+        Self { force: Newtons(0.42), dwell: Seconds(6.0) }
     }
 }
 
@@ -137,10 +134,7 @@ fn read(args: &Args) -> Result<Step, String> {
     let usual = Press::default();
     let force = args.maybe("press_force").unwrap_or(usual.force.0);
     let dwell = args.maybe("press_dwell").unwrap_or(usual.dwell.0);
-    search.press = (force > 0.0).then_some(Press {
-        force: Newtons(force),
-        dwell: Seconds(dwell),
-    });
+    search.press = (force > 0.0).then_some(Press { force: Newtons(force), dwell: Seconds(dwell) });
     Ok(search.into())
 }
 

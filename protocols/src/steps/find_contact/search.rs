@@ -121,12 +121,7 @@ impl ContactSearch {
         }
         let end = Position(cx.limits().travel_max.0 - TRAVEL_MARGIN_MM);
         let way_mm = end.distance_from(cx.derived().position);
-        check_drift(
-            cx,
-            &unloaded,
-            Seconds(way_mm / plan.approach_speed.0),
-            criterion,
-        )?;
+        check_drift(cx, &unloaded, Seconds(way_mm / plan.approach_speed.0), criterion)?;
         cx.move_to(end, plan.approach_speed)?;
         Ok(Self {
             plan,
@@ -153,9 +148,7 @@ impl ContactSearch {
 
     /// What the first touch makes of a millisecond.
     fn first_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<(), String> {
-        let Felt {
-            reading, at_rest, ..
-        } = *now;
+        let Felt { reading, at_rest, .. } = *now;
         match self.stage {
             Stage::Approach => {
                 if self.is_first_triggered(now.force, now.filtered) {
@@ -205,9 +198,7 @@ impl ContactSearch {
 
     /// What the second touch and the way to depth zero make of it.
     fn second_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<Progress, String> {
-        let Felt {
-            reading, at_rest, ..
-        } = *now;
+        let Felt { reading, at_rest, .. } = *now;
         match self.stage.clone() {
             Stage::Recover { until_tick } if reading.tick >= until_tick => {
                 let overrun = self.first_trigger.moved_by(PASS_OVERRUN_MM);
@@ -290,9 +281,7 @@ impl ContactSearch {
         }
         let is_searching = matches!(self.stage, Stage::Approach | Stage::Press | Stage::SlowPass);
         if is_searching && filtered > FORCE_MAX {
-            return Err(format!(
-                "the force reached {filtered:.2} before contact was certain"
-            ));
+            return Err(format!("the force reached {filtered:.2} before contact was certain"));
         }
         // Tissue leaves time to stop. What does not is a base or a holder, whatever the fit would say of it.
         let is_stopping = matches!(
@@ -317,11 +306,7 @@ impl ContactSearch {
 
     /// Where the plan presses, so many raw forces in a row tell of the tissue; else filtered ones.
     fn is_first_triggered(&mut self, force: Newtons, filtered: Newtons) -> bool {
-        let judged = if self.plan.press.is_some() {
-            force
-        } else {
-            filtered
-        };
+        let judged = if self.plan.press.is_some() { force } else { filtered };
         self.is_triggered(judged, self.criterion)
     }
 
@@ -399,11 +384,7 @@ impl ContactSearch {
         let begun = points.first().map_or(Position(0.0), |point| point.position);
         // Three standard errors: a surface before the beginning was not approached. An estimate that
         // is too vague for the plan says nothing about that either, and is refused for what it is.
-        let ContactEstimate {
-            position,
-            std_error_mm,
-            ..
-        } = found.contact;
+        let ContactEstimate { position, std_error_mm, .. } = found.contact;
         let is_known = std_error_mm <= self.plan.std_error_mm_max;
         if is_known && position < begun.moved_by(3.0 * std_error_mm) {
             return Err(
@@ -437,10 +418,7 @@ impl ContactSearch {
                 found.std_error_mm
             ));
         }
-        Ok(Contact {
-            position: found.position,
-            std_error_mm: found.std_error_mm,
-        })
+        Ok(Contact { position: found.position, std_error_mm: found.std_error_mm })
     }
 }
 
@@ -455,15 +433,8 @@ impl InProgress for ContactSearch {
         let fast = Newtons(self.fast.push(force));
         let (felt_at, force) = (Position(felt_at), Newtons(force));
         self.remember(reading.tick, felt_at, force);
-        let now = Felt {
-            reading,
-            position,
-            felt_at,
-            force,
-            filtered,
-            fast,
-            at_rest: cx.at_rest()?,
-        };
+        let now =
+            Felt { reading, position, felt_at, force, filtered, fast, at_rest: cx.at_rest()? };
         self.check_force(filtered, fast)?;
         match self.stage {
             Stage::Approach

@@ -16,10 +16,7 @@ pub enum Kept {
 }
 
 pub(crate) fn io_error(path: &Path) -> impl Fn(io::Error) -> ExportError {
-    move |source| ExportError::Io {
-        path: path.to_owned(),
-        source,
-    }
+    move |source| ExportError::Io { path: path.to_owned(), source }
 }
 
 /// Refuses a file that is there.

@@ -93,13 +93,9 @@ impl Field {
                 "name of the session",
                 "given at the start, sorts by time",
             ),
-            Self::Specimen => (
-                "specimen",
-                "",
-                "text",
-                "what was indented",
-                "typed by the operator",
-            ),
+            Self::Specimen => {
+                ("specimen", "", "text", "what was indented", "typed by the operator")
+            }
             Self::Sample => (
                 "sample",
                 "1",
@@ -149,13 +145,7 @@ impl Field {
                 "commanded position in motor pulses from home; empty in an imported session",
                 "as received",
             ),
-            Self::Phase => (
-                "phase",
-                "",
-                "text",
-                "what the run was doing",
-                "decided by the engine",
-            ),
+            Self::Phase => ("phase", "", "text", "what the run was doing", "decided by the engine"),
             Self::Cycle => (
                 "cycle",
                 "1",
@@ -177,13 +167,9 @@ impl Field {
                 "arrival on the computer, since the start of the session",
                 "the computer's monotonic clock",
             ),
-            Self::Status => (
-                "status",
-                "1",
-                "whole number",
-                "bits of the axis' status",
-                "as received",
-            ),
+            Self::Status => {
+                ("status", "1", "whole number", "bits of the axis' status", "as received")
+            }
             Self::Age => (
                 "age_ns",
                 "ns",
@@ -201,14 +187,7 @@ impl Field {
             // Named by those who make them.
             Self::Beside(_) | Self::EveryNth => ("", "", "", "", ""),
         };
-        ColumnInfo {
-            field: self,
-            name: name.into(),
-            unit,
-            kind,
-            meaning: meaning.into(),
-            how,
-        }
+        ColumnInfo { field: self, name: name.into(), unit, kind, meaning: meaning.into(), how }
     }
 }
 
@@ -243,20 +222,16 @@ impl<'a> Layout<'a> {
         every: u64,
     ) -> Result<Self, String> {
         let mut known: Vec<ColumnInfo> = USUAL.map(Field::told).into();
-        known.extend(
-            beside
-                .columns
-                .iter()
-                .enumerate()
-                .map(|(number, (name, unit, _))| ColumnInfo {
-                    field: Field::Beside(number),
-                    name: (*name).into(),
-                    unit,
-                    kind: "number",
-                    meaning: "beside the session's own columns; empty where it is not known".into(),
-                    how: "computed at export; how is in the file's metadata",
-                }),
-        );
+        known.extend(beside.columns.iter().enumerate().map(|(number, (name, unit, _))| {
+            ColumnInfo {
+                field: Field::Beside(number),
+                name: (*name).into(),
+                unit,
+                kind: "number",
+                meaning: "beside the session's own columns; empty where it is not known".into(),
+                how: "computed at export; how is in the file's metadata",
+            }
+        }));
         let usual = known.len();
         known.extend(MORE.map(Field::told));
         let mut columns = Vec::new();
@@ -288,19 +263,13 @@ impl<'a> Layout<'a> {
             }
             columns.push(found.clone());
         }
-        Ok(Self {
-            columns,
-            beside,
-            manifest,
-        })
+        Ok(Self { columns, beside, manifest })
     }
 
     /// A frame of these columns to fill, with room for so many samples.
     pub fn filling(&self, room: usize) -> Vec<Cells> {
         let columns = self.columns.iter();
-        columns
-            .map(|column| Cells::new(column.field, self.manifest, room))
-            .collect()
+        columns.map(|column| Cells::new(column.field, self.manifest, room)).collect()
     }
 
     /// Adds samples to a frame.

@@ -62,9 +62,8 @@ impl<W: Write> Encoder<W> {
                 let schema = empty.schema().to_arrow(CompatLevel::oldest());
                 let options = WriteOptions { compression: None };
                 let mut writer = FileWriter::new(file, Arc::new(schema), None, options);
-                let pairs = metadata
-                    .iter()
-                    .map(|(key, text)| (key.as_str().into(), text.as_str().into()));
+                let pairs =
+                    metadata.iter().map(|(key, text)| (key.as_str().into(), text.as_str().into()));
                 writer.set_custom_schema_metadata(Arc::new(pairs.collect::<BTreeMap<_, _>>()));
                 writer.start()?;
                 Self::Arrow(writer)

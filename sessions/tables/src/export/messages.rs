@@ -147,8 +147,7 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
             publish_time: time,
         };
         self.written += 1;
-        self.container
-            .write_to_known_channel(&header, &message.encode_to_vec())
+        self.container.write_to_known_channel(&header, &message.encode_to_vec())
     }
 
     fn finish(mut self) -> mcap::McapResult<u64> {

@@ -124,8 +124,7 @@ impl Table<'_> {
             self.selection,
         );
         atomic::write(&beside, |file| {
-            file.write_all(text.as_bytes())
-                .map_err(atomic::io_error(&beside))
+            file.write_all(text.as_bytes()).map_err(atomic::io_error(&beside))
         })?;
         Ok(rows)
     }
@@ -135,8 +134,7 @@ impl Table<'_> {
     pub(crate) fn write_to_lake(&self, path: &Path, feed: Feed) -> Result<Kept, ExportError> {
         let layout = self.layout()?;
         atomic::write_or_same(path, |file| {
-            self.encode(&layout, Format::Parquet, path, file, feed)
-                .map(|_rows| ())
+            self.encode(&layout, Format::Parquet, path, file, feed).map(|_rows| ())
         })
     }
 
@@ -153,21 +151,15 @@ impl Table<'_> {
         file: impl Write,
         feed: Feed,
     ) -> Result<u64, ExportError> {
-        let failed = |source| ExportError::Table {
-            path: path.to_owned(),
-            source,
-        };
+        let failed = |source| ExportError::Table { path: path.to_owned(), source };
         let mut filling = Filling::new(self, layout, format, file).map_err(failed)?;
         feed(&mut |rows| filling.take(rows))?;
         filling.finish().map_err(failed)
     }
 
     fn metadata(&self, layout: &Layout) -> Metadata {
-        let units: serde_json::Map<String, serde_json::Value> = layout
-            .columns
-            .iter()
-            .map(|one| (one.name.clone(), one.unit.into()))
-            .collect();
+        let units: serde_json::Map<String, serde_json::Value> =
+            layout.columns.iter().map(|one| (one.name.clone(), one.unit.into())).collect();
         let manifest = self.manifest;
         let mut pairs = vec![
             ("columns", serde_json::Value::Object(units).to_string()),
@@ -184,9 +176,7 @@ impl Table<'_> {
             let hash = sha256(manifest.calibration.to_string().as_bytes());
             pairs.push(("calibration_sha256", hash));
         }
-        let own = pairs
-            .into_iter()
-            .map(|(key, text)| (format!("palpate.{key}"), text));
+        let own = pairs.into_iter().map(|(key, text)| (format!("palpate.{key}"), text));
         own.chain(self.beside.metadata.iter().cloned()).collect()
     }
 }
@@ -246,11 +236,7 @@ impl<'a, W: Write> Filling<'a, W> {
             self.select(now, first_tick);
             let samples = Samples {
                 numbers: &self.numbers,
-                rows: if self.numbers.len() == count {
-                    now
-                } else {
-                    &self.rows
-                },
+                rows: if self.numbers.len() == count { now } else { &self.rows },
                 first_tick,
             };
             self.layout.fill(&mut self.frame, samples);

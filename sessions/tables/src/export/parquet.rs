@@ -42,9 +42,7 @@ impl<W: Write> ParquetFile<W> {
         };
         let file = FileWriter::try_new(file, schema.clone(), options)?;
         let recipe = Arc::new(Recipe::new(&schema, &file));
-        let threads = std::thread::available_parallelism()
-            .map_or(1, usize::from)
-            .min(THREADS_MAX);
+        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(THREADS_MAX);
         // A frame is handed over when a thread is free for it, so none waits in a queue.
         let (jobs, receiver) = sync_channel(0);
         let receiver = Arc::new(Mutex::new(receiver));
@@ -54,12 +52,7 @@ impl<W: Write> ParquetFile<W> {
                 .name("row-groups".into())
                 .spawn(move || make_row_groups(&recipe, &receiver))?;
         }
-        Ok(Self {
-            file,
-            jobs,
-            threads,
-            under_way: VecDeque::new(),
-        })
+        Ok(Self { file, jobs, threads, under_way: VecDeque::new() })
     }
 
     /// Adds a frame.
@@ -90,10 +83,7 @@ impl<W: Write> ParquetFile<W> {
         while !self.under_way.is_empty() {
             self.write_first()?;
         }
-        let pairs = metadata.into_iter().map(|(key, value)| KeyValue {
-            key,
-            value: Some(value),
-        });
+        let pairs = metadata.into_iter().map(|(key, value)| KeyValue { key, value: Some(value) });
         self.file.end(Some(pairs.collect())).map(|_bytes| ())
     }
 }

@@ -64,9 +64,7 @@ impl RowGroup {
     pub fn write<W: Write>(self, file: &mut FileWriter<W>) -> PolarsResult<()> {
         let columns = self.columns.iter().map(|pages| {
             let pages = pages.iter().map(PolarsResult::Ok);
-            Ok(DynStreamingIterator::new(
-                fallible_streaming_iterator::convert(pages),
-            ))
+            Ok(DynStreamingIterator::new(fallible_streaming_iterator::convert(pages)))
         });
         file.write(self.rows, DynIter::new(columns))
     }

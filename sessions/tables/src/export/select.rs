@@ -42,10 +42,7 @@ impl Selection {
     /// Whether some samples are left out.
     #[must_use]
     pub fn is_part(&self) -> bool {
-        let all = Self {
-            columns: self.columns.clone(),
-            ..Self::default()
-        };
+        let all = Self { columns: self.columns.clone(), ..Self::default() };
         *self != all
     }
 

@@ -11,12 +11,9 @@ pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
             !is_quoted
         })
         .collect();
-    ['\t', ';', ',']
-        .into_iter()
-        .find(|delimiter| bare.contains(*delimiter))
-        .ok_or_else(|| {
-            "the first line names no columns; separate them by comma, semicolon or tab".into()
-        })
+    ['\t', ';', ','].into_iter().find(|delimiter| bare.contains(*delimiter)).ok_or_else(|| {
+        "the first line names no columns; separate them by comma, semicolon or tab".into()
+    })
 }
 
 /// The cells of line `number`, without quotes and surrounding space.
@@ -42,9 +39,7 @@ pub(super) fn split(line: &str, delimiter: char, number: usize) -> Result<Vec<St
         }
     }
     if is_quoted {
-        return Err(format!(
-            "line {number}: a quote is not closed; close it on the same line"
-        ));
+        return Err(format!("line {number}: a quote is not closed; close it on the same line"));
     }
     cells.push(cell.trim().to_owned());
     Ok(cells)

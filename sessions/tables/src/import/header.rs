@@ -18,10 +18,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    pub const ONE: Self = Self {
-        times: 1.0,
-        over: 1.0,
-    };
+    pub const ONE: Self = Self { times: 1.0, over: 1.0 };
 
     pub fn apply(self, value: f64) -> f64 {
         value * self.times / self.over
@@ -62,11 +59,8 @@ const FORCES: &[Unit] = &[
     (&["lbf"], 44_482_216_152_605.0, 1e13),
 ];
 
-const SIGNALS: &[Unit] = &[
-    (&["V", "volt", "volts"], 1.0, 1.0),
-    (&["mV"], 1.0, 1e3),
-    (&["µV", "uV", "μV"], 1.0, 1e6),
-];
+const SIGNALS: &[Unit] =
+    &[(&["V", "volt", "volts"], 1.0, 1.0), (&["mV"], 1.0, 1e3), (&["µV", "uV", "μV"], 1.0, 1e6)];
 
 impl Quantity {
     /// What a fit takes.
@@ -148,9 +142,7 @@ pub(super) fn meaning(cell: &str) -> Meaning {
         return Meaning::Other;
     };
     let name = name.to_lowercase();
-    let Some(quantity) = Quantity::FITTED
-        .into_iter()
-        .find(|q| q.words().contains(&name.as_str()))
+    let Some(quantity) = Quantity::FITTED.into_iter().find(|q| q.words().contains(&name.as_str()))
     else {
         return Meaning::Other;
     };
@@ -158,9 +150,7 @@ pub(super) fn meaning(cell: &str) -> Meaning {
         [] => Meaning::Bare(quantity),
         [unit] => quantity
             .scale(unit)
-            .map_or(Meaning::Unitless(quantity), |scale| {
-                Meaning::Known(quantity, scale)
-            }),
+            .map_or(Meaning::Unitless(quantity), |scale| Meaning::Known(quantity, scale)),
         _ => Meaning::Unitless(quantity),
     }
 }

@@ -74,14 +74,9 @@ impl std::str::FromStr for ColumnNames {
 
 /// Reads a table from a file; `columns` names the columns of one without a header.
 pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, TableError> {
-    let io_error = |source: io::Error| TableError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let not_text = |reason: &str| TableError::NotText {
-        path: path.to_owned(),
-        reason: reason.into(),
-    };
+    let io_error = |source: io::Error| TableError::Io { path: path.to_owned(), source };
+    let not_text =
+        |reason: &str| TableError::NotText { path: path.to_owned(), reason: reason.into() };
     let size = std::fs::metadata(path).map_err(io_error)?.len();
     if size > BYTES_MAX {
         return Err(not_text("it is larger than 1 GiB"));
@@ -91,10 +86,8 @@ pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, T
     if text.contains('\0') {
         return Err(not_text("it holds binary data"));
     }
-    parse_table(&text, columns).map_err(|reason| TableError::Content {
-        path: path.to_owned(),
-        reason,
-    })
+    parse_table(&text, columns)
+        .map_err(|reason| TableError::Content { path: path.to_owned(), reason })
 }
 
 /// Parses a table; `columns` names the columns of one without a header. The error is one sentence.
@@ -167,20 +160,14 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
     let last_cell = |line: &str| split(line, delimiter, 0).ok()?.pop();
     table.notes.extend(torn::remark(text, last_cell));
     if left_out > 0 {
-        table.notes.push(format!(
-            "{left_out} rows outside ramp, hold and unload are left out"
-        ));
+        table.notes.push(format!("{left_out} rows outside ramp, hold and unload are left out"));
     }
     Ok(table)
 }
 
 /// The number in a cell, written with the decimal sign of its table.
 fn number_in(cell: &str, has_decimal_comma: bool) -> Option<f64> {
-    if has_decimal_comma {
-        cell.replace(',', ".").parse().ok()
-    } else {
-        cell.parse().ok()
-    }
+    if has_decimal_comma { cell.replace(',', ".").parse().ok() } else { cell.parse().ok() }
 }
 
 fn is_number(cell: &str, has_decimal_comma: bool) -> bool {
@@ -244,9 +231,8 @@ impl Layout {
 
     fn values(&self, cells: &[String], number: usize) -> Result<[f64; 3], String> {
         let mut values = [0.0; 3];
-        for (value, ((column, scale), quantity)) in values
-            .iter_mut()
-            .zip(self.places.iter().zip(Quantity::FITTED))
+        for (value, ((column, scale), quantity)) in
+            values.iter_mut().zip(self.places.iter().zip(Quantity::FITTED))
         {
             let cell = &cells[*column];
             let read = number_in(cell, self.has_decimal_comma).map(|read| scale.apply(read));
@@ -267,11 +253,9 @@ mod tests {
 
     #[test]
     fn reads_units_order_and_foreign_columns() {
-        let table = parse_table(
-            "\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n",
-            None,
-        )
-        .unwrap();
+        let table =
+            parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n", None)
+                .unwrap();
         assert_eq!(table.t, [0.0, 0.1]);
         assert_eq!(table.depth, [0.0, 0.25]);
         assert_eq!(table.force, [0.0015, -0.002]);
@@ -317,10 +301,7 @@ mod tests {
     fn a_last_number_that_may_be_cut_off_is_told() {
         let notes = |text: &str| parse_table(text, None).unwrap().notes;
         let cut = notes("t_s,x_mm,F_N\n0,0,0.1034\n1,1,2.3310\n2,2,3.4");
-        assert!(
-            cut[0].contains("'3.4'") && cut[0].contains("cut off"),
-            "{cut:?}"
-        );
+        assert!(cut[0].contains("'3.4'") && cut[0].contains("cut off"), "{cut:?}");
         let whole = "t_s,x_mm,F_N\n0,0,0.1034\n1,1,2.3310\n2,2,3.4810";
         assert!(notes(whole).is_empty());
     }
@@ -345,14 +326,8 @@ mod tests {
         check("t_s depth_mm force_N\n", "names no columns");
         check("t_s,depth_mm\n0,0\n", "is a force");
         check("t_s,depth_mm,force\n0,0,0\n", "'force'");
-        check(
-            "t_s,depth_mm,x_mm,force_N\n0,0,0,0\n",
-            "'depth_mm' and 'x_mm'",
-        );
-        check(
-            "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n",
-            "line 3: the depth 'one'",
-        );
+        check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "'depth_mm' and 'x_mm'");
+        check("t_s,depth_mm,force_N\n0,0,0\n1,one,1\n", "line 3: the depth 'one'");
         check("t_s,depth_mm,force_N\n0,0,nan\n", "line 2: the force 'nan'");
         check("t_s,depth_mm,force_kN\n0,0,1e306\n", "line 2: the force");
         check("t_s,x_mm,F_N\n0,0,0\n1,0,0\n1,0,0\n", "line 4: the time");

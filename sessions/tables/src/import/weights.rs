@@ -86,10 +86,8 @@ struct Row {
 
 /// Reads a table of weights as the series of a calibration that has no name yet.
 pub fn read_weights(path: &Path) -> Result<Calibration, WeightsError> {
-    let text = std::fs::read_to_string(path).map_err(|source| WeightsError::Io {
-        path: path.into(),
-        source,
-    })?;
+    let text = std::fs::read_to_string(path)
+        .map_err(|source| WeightsError::Io { path: path.into(), source })?;
     parse_weights(&text)
 }
 
@@ -110,11 +108,7 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         .collect();
     let place = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
     let (Some(mass), Some(volts)) = (place(MASS), place(VOLTS)) else {
-        let wanted = if place(MASS).is_none() {
-            MASS[0]
-        } else {
-            VOLTS[0]
-        };
+        let wanted = if place(MASS).is_none() { MASS[0] } else { VOLTS[0] };
         return Err(WeightsError::NoColumn { wanted });
     };
     let optional = [DIRECTION, REPEAT, NOISE, SAMPLES, WAITED].map(place);
@@ -192,27 +186,17 @@ fn decimal_of(
     };
     let has = |sign| {
         let only = Evidence::Only(sign);
-        cells
-            .clone()
-            .any(|(_, cell)| decimal::evidence(cell) == only)
+        cells.clone().any(|(_, cell)| decimal::evidence(cell) == only)
     };
     match (has(Decimal::Point), has(Decimal::Comma)) {
         (true, false) => Ok(Decimal::Point),
         (false, true) => Ok(Decimal::Comma),
-        _ => Err(WeightsError::Comma {
-            line,
-            cell: cell.clone(),
-        }),
+        _ => Err(WeightsError::Comma { line, cell: cell.clone() }),
     }
 }
 
 fn wrong(line: usize, column: &'static str, cell: &str, wanted: &'static str) -> WeightsError {
-    WeightsError::Cell {
-        line,
-        column,
-        cell: cell.to_owned(),
-        wanted,
-    }
+    WeightsError::Cell { line, column, cell: cell.to_owned(), wanted }
 }
 
 /// Rows into series: a new one where direction or repeat change, or where the masses begin again.
@@ -242,10 +226,7 @@ fn series_of(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
             _ => false,
         };
         if !goes_on {
-            let before = series
-                .iter()
-                .filter(|one| one.direction == direction)
-                .count();
+            let before = series.iter().filter(|one| one.direction == direction).count();
             let number = u32::try_from(before + 1).unwrap_or(u32::MAX);
             series.push(Series {
                 direction,
@@ -280,17 +261,11 @@ mod tests {
             loading;0;1.0;2000;0.001\nloading;100;1.2;2000;0.001\n\n\
             unloading;100;1.21;2000;0.001\nunloading;0;1.01;;\nup;0;1;1;0.1\n";
         let whole = parse_weights(whole).unwrap();
-        assert_eq!(
-            shape(&whole),
-            [(Loading, 1, 2), (Unloading, 1, 2), (Loading, 2, 1)]
-        );
+        assert_eq!(shape(&whole), [(Loading, 1, 2), (Unloading, 1, 2), (Loading, 2, 1)]);
         assert_eq!(whole.series[0].steps[1].samples, Some(2000));
         assert_eq!(whole.series[1].steps[1].noise, None);
         let repeats = "mass_g\tvolts\trepeat\n0\t1\t1\n50\t2\t1\n100\t3\t2\n";
-        assert_eq!(
-            shape(&parse_weights(repeats).unwrap()),
-            [(Loading, 1, 2), (Loading, 2, 1)]
-        );
+        assert_eq!(shape(&parse_weights(repeats).unwrap()), [(Loading, 1, 2), (Loading, 2, 1)]);
     }
 
     #[test]
@@ -313,19 +288,12 @@ mod tests {
         for (text, line_wanted, cell_wanted, column_wanted) in [
             ("mass_g,volts\n0,1\n100,one", 3, "one", "volts"),
             ("mass_g,volts\n0", 2, "", "volts"),
-            (
-                "mass_g,volts,direction\n0,1,sideways",
-                2,
-                "sideways",
-                "direction",
-            ),
+            ("mass_g,volts,direction\n0,1,sideways", 2, "sideways", "direction"),
             ("mass_g,volts,repeat\n0,1,-1", 2, "-1", "repeat"),
             ("mass_g,volts\n0,nan", 2, "nan", "volts"),
         ] {
             match parse_weights(text) {
-                Err(WeightsError::Cell {
-                    line, column, cell, ..
-                }) => assert_eq!(
+                Err(WeightsError::Cell { line, column, cell, .. }) => assert_eq!(
                     (line, cell.as_str(), column),
                     (line_wanted, cell_wanted, column_wanted)
                 ),
@@ -349,11 +317,7 @@ mod tests {
         }
         assert!(matches!(
             parse_weights("mass_g,volts\n0,1\n100,2\n50,1.5"),
-            Err(WeightsError::Falling {
-                line: 4,
-                mass_g: 50.0,
-                before_g: 100.0
-            })
+            Err(WeightsError::Falling { line: 4, mass_g: 50.0, before_g: 100.0 })
         ));
         for (text, fact) in [
             ("mass_g,volts\n0,1.2\n140,1,600", "line 3 has 3 cells"),

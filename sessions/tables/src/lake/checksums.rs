@@ -68,13 +68,9 @@ impl Checksums {
 
     pub fn read(lake: &Path, partition: &Path, id: &str) -> Result<Self, LakeError> {
         let path = path_of(lake, partition, id);
-        let bytes = fs::read(&path).map_err(|source| LakeError::Io {
-            path: path.clone(),
-            source,
-        })?;
-        serde_json::from_slice(&bytes).map_err(|err| LakeError::Bad {
-            path,
-            reason: err.to_string(),
-        })
+        let bytes =
+            fs::read(&path).map_err(|source| LakeError::Io { path: path.clone(), source })?;
+        serde_json::from_slice(&bytes)
+            .map_err(|err| LakeError::Bad { path, reason: err.to_string() })
     }
 }

@@ -53,9 +53,7 @@ pub fn state_of_fit(file: &FitFile) -> Result<FitState, ExportError> {
     }
     let text = fs::read(&path).map_err(io_error(&path))?;
     let kept: Option<Value> = serde_json::from_slice(&text).ok();
-    let hash = kept
-        .as_ref()
-        .and_then(|kept| kept["settings_sha256"].as_str());
+    let hash = kept.as_ref().and_then(|kept| kept["settings_sha256"].as_str());
     match hash == Some(file.settings_sha256().as_str()) {
         true => Ok(FitState::There),
         false => Err(ExportError::Different { path }),

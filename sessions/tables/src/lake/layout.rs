@@ -98,10 +98,7 @@ pub struct ShardError {
 
 impl Shard {
     /// All of it.
-    pub const WHOLE: Self = Self {
-        number: NonZeroU32::MIN,
-        of: NonZeroU32::MIN,
-    };
+    pub const WHOLE: Self = Self { number: NonZeroU32::MIN, of: NonZeroU32::MIN };
 
     /// Whether a session is in this part.
     #[must_use]
@@ -133,9 +130,8 @@ mod tests {
     fn every_session_is_in_one_part_and_the_same_everywhere() {
         let ids: Vec<String> = (0..1000).map(|i| format!("20260305T1415{i:02}Z")).collect();
         for of in [1u32, 2, 7] {
-            let shards: Vec<Shard> = (1..=of)
-                .map(|number| format!("{number}/{of}").parse().unwrap())
-                .collect();
+            let shards: Vec<Shard> =
+                (1..=of).map(|number| format!("{number}/{of}").parse().unwrap()).collect();
             let mut sizes = vec![0; of as usize];
             for id in &ids {
                 let within: Vec<usize> = (0..shards.len()).filter(|&i| shards[i].has(id)).collect();

@@ -80,10 +80,9 @@ pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
         let id = id.and_then(|name| name.strip_suffix(".parquet"));
         let place = file.path().parent();
         let place = place.and_then(|folder| folder.strip_prefix(&top).ok());
-        found.extend(id.zip(place).map(|(id, place)| InLake {
-            id: id.to_owned(),
-            place: place.to_owned(),
-        }));
+        found.extend(
+            id.zip(place).map(|(id, place)| InLake { id: id.to_owned(), place: place.to_owned() }),
+        );
     }
     found.sort();
     Ok(found)
@@ -98,20 +97,14 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
     let checksums = Checksums::read(lake, &one.place, &one.id)?;
     let about = path(Part::Sessions);
     let sum = checksums.of_part(Part::Sessions);
-    let (manifest, mut session, rejection) = with(&about, sum, |frame| {
-        session_of(frame).map_err(|err| err.to_string())
-    })?;
+    let (manifest, mut session, rejection) =
+        with(&about, sum, |frame| session_of(frame).map_err(|err| err.to_string()))?;
     if manifest.record_version > RECORD_VERSION {
-        return Err(LakeError::Newer {
-            path: about,
-            version: manifest.record_version,
-        });
+        return Err(LakeError::Newer { path: about, version: manifest.record_version });
     }
     let samples = path(Part::Samples);
     let sum = checksums.of_part(Part::Samples);
-    let rows = with(&samples, sum, |frame| {
-        rows(frame).map_err(|err| err.to_string())
-    })?;
+    let rows = with(&samples, sum, |frame| rows(frame).map_err(|err| err.to_string()))?;
     if rows.len() as u64 != session.samples {
         return Err(LakeError::Bad {
             reason: format!("{} samples of {}", rows.len(), session.samples),
@@ -119,9 +112,8 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         });
     }
     let sum = checksums.of_part(Part::Events);
-    let entries = with(&path(Part::Events), sum, |frame| {
-        entries(frame).map_err(|err| err.to_string())
-    })?;
+    let entries =
+        with(&path(Part::Events), sum, |frame| entries(frame).map_err(|err| err.to_string()))?;
     let session = Session {
         path: samples,
         manifest,
@@ -142,27 +134,16 @@ fn with<T>(
     checksum: Option<u32>,
     take: impl FnOnce(&DataFrame) -> Result<T, String>,
 ) -> Result<T, LakeError> {
-    let failed = |source| LakeError::Io {
-        path: path.into(),
-        source,
-    };
+    let failed = |source| LakeError::Io { path: path.into(), source };
     let mut file = File::open(path).map_err(failed)?;
     if Some(crc32_of(&mut file).map_err(failed)?) != checksum {
-        return Err(LakeError::Bad {
-            path: path.into(),
-            reason: "its checksum is wrong".into(),
-        });
+        return Err(LakeError::Bad { path: path.into(), reason: "its checksum is wrong".into() });
     }
     file.rewind().map_err(failed)?;
-    let frame = ParquetReader::new(file)
-        .finish()
-        .map_err(|err| err.to_string());
+    let frame = ParquetReader::new(file).finish().map_err(|err| err.to_string());
     frame
         .and_then(|frame| take(&frame))
-        .map_err(|reason| LakeError::Bad {
-            path: path.into(),
-            reason,
-        })
+        .map_err(|reason| LakeError::Bad { path: path.into(), reason })
 }
 
 /// What the sessions table tells beside the manifest.

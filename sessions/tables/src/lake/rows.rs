@@ -61,9 +61,9 @@ pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
         });
     }
     match rows.iter().find_map(Row::non_finite) {
-        Some(what) => Err(PolarsError::ComputeError(
-            format!("the {what} of a sample is not a number").into(),
-        )),
+        Some(what) => {
+            Err(PolarsError::ComputeError(format!("the {what} of a sample is not a number").into()))
+        }
         None => Ok(rows),
     }
 }

@@ -40,10 +40,8 @@ pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Add
     }
     let place = |of| -> Result<PathBuf, ExportError> {
         let folder = part(lake, of).join(partition(manifest));
-        fs::create_dir_all(&folder).map_err(|source| ExportError::Io {
-            path: folder.clone(),
-            source,
-        })?;
+        fs::create_dir_all(&folder)
+            .map_err(|source| ExportError::Io { path: folder.clone(), source })?;
         Ok(folder.join(format!("{id}.parquet")))
     };
     let samples = place(Part::Samples)?;
@@ -61,27 +59,18 @@ pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Add
     };
     let mut kept = vec![table.write_to_lake(&samples, feed)?];
     let (of_events, of_session) = (place(Part::Events)?, place(Part::Sessions)?);
-    kept.push(write_bytes(
-        &of_events,
-        &encode(&of_events, events(outline))?,
-    )?);
+    kept.push(write_bytes(&of_events, &encode(&of_events, events(outline))?)?);
     let last = encode(&of_session, session(outline, told))?;
     let checksums = Checksums::of(&samples, &of_events, &last)?;
     kept.push(checksums.write(lake, &partition(manifest), id)?);
     // The last, for it is what a reader goes by: a session that is listed is there with all its files.
     kept.push(write_bytes(&of_session, &last)?);
-    Ok(Added {
-        samples,
-        was_there: kept.iter().all(|one| *one == Kept::Same),
-    })
+    Ok(Added { samples, was_there: kept.iter().all(|one| *one == Kept::Same) })
 }
 
 /// The bytes of a table's file.
 fn encode(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Vec<u8>, ExportError> {
-    let failed = |source| ExportError::Table {
-        path: path.to_owned(),
-        source,
-    };
+    let failed = |source| ExportError::Table { path: path.to_owned(), source };
     let frame = frame.map_err(failed)?;
     let metadata = vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())];
     let mut bytes = Vec::new();

@@ -33,10 +33,7 @@ pub fn read(target: &str) -> Vec<(String, Vec<u8>)> {
 
 /// Targets whose files [`make`] makes; those of crashes are kept beside them.
 pub fn made_targets() -> impl Iterator<Item = &'static str> {
-    let mut names: Vec<&str> = super::targets::ALL
-        .iter()
-        .map(|target| target.name)
-        .collect();
+    let mut names: Vec<&str> = super::targets::ALL.iter().map(|target| target.name).collect();
     names.sort_unstable();
     names.into_iter()
 }
@@ -148,9 +145,7 @@ pub fn seal_document(kind: &str, bytes: &[u8]) -> Vec<u8> {
         return bytes.into();
     };
     let checksum = crc32fast::hash(document.to_string().as_bytes());
-    serde_json::json!({"checksum": checksum, kind: document})
-        .to_string()
-        .into()
+    serde_json::json!({"checksum": checksum, kind: document}).to_string().into()
 }
 
 /// Lines of JSON as a file that belongs to `name`, with their right checksums.
@@ -210,11 +205,7 @@ pub fn make(folder: &Path) -> Vec<String> {
     }
     let end_record = serde_json::to_vec(&end(Nanos(1))).expect("JSON");
     add("mcap-records", "end", &message("/end", 0, &end_record));
-    let mut rewritten = message(
-        "/rewrite",
-        0,
-        b"{\"reason\":\"\",\"samples\":0,\"entries\":0}",
-    );
+    let mut rewritten = message("/rewrite", 0, b"{\"reason\":\"\",\"samples\":0,\"entries\":0}");
     rewritten.extend(records(&unfinished).swap_remove(1));
     add("mcap-records", "rewrite", &rewritten);
     let mut blocks = Vec::new();
@@ -251,40 +242,24 @@ pub fn make(folder: &Path) -> Vec<String> {
     add("mcap-records", "raw", &records(&wired).swap_remove(1));
     add("health", "state", br#"{"now_ns":5,"kind":"state","lateness_s":0.001,"queue_share":0.5,"sync_s":1e-3,"free_bytes":7,"missed_readings":0}"#);
     add("health", "anchor", br#"{"now_ns":5,"kind":"anchor","why":"jump","wall":"2026-03-05T14:15:07.5Z","shift_s":-1.5}"#);
-    add(
-        "health",
-        "event",
-        br#"{"now_ns":5,"kind":"event","text":"so"}"#,
-    );
+    add("health", "event", br#"{"now_ns":5,"kind":"event","text":"so"}"#);
     let told = serde_json::to_vec(&manifest()).expect("JSON");
     add("manifest", "manifest.json", &told);
     let thesis = serde_json::to_vec(&Calibration::thesis()).expect("JSON");
     add("calibration", "thesis.json", &thesis);
     let bench = serde_json::to_vec(&compliance()).expect("JSON");
     add("compliance", "bench.json", &bench);
-    add(
-        "lines",
-        "edits.jsonl",
-        &seal_lines("one", bodies().as_bytes()),
-    );
+    add("lines", "edits.jsonl", &seal_lines("one", bodies().as_bytes()));
     add("lines", "plain.jsonl", bodies().as_bytes());
     add("sealed-lines", "bodies.jsonl", bodies().as_bytes());
     let sums = br#"{"events_crc32":1,"samples_crc32":2,"sessions_crc32":3}"#;
     add("lake", "checksums.json", sums);
-    add(
-        "trade",
-        "curves.json",
-        br#"{"checksum":1,"curves":{"format":1}}"#,
-    );
+    add("trade", "curves.json", br#"{"checksum":1,"curves":{"format":1}}"#);
     add("table", "weights.csv", WEIGHTS.as_bytes());
     for (name, bytes) in seeds() {
         add("foreign", name, &bytes);
         if name == "table" {
-            add(
-                "table",
-                "table.csv",
-                b"t_s,x_mm,F_N\n0,0.1,0.2\n0.1,0.2,0.4\n0.2,0.3,0.6\n",
-            );
+            add("table", "table.csv", b"t_s,x_mm,F_N\n0,0.1,0.2\n0.1,0.2,0.4\n0.2,0.3,0.6\n");
         }
     }
     made.sort();

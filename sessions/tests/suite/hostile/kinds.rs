@@ -71,12 +71,7 @@ pub struct Kind {
 
 impl Kind {
     fn new(name: &'static str, place: &str, bytes: Vec<u8>, read: Read) -> Self {
-        Self {
-            name,
-            files: vec![(place.into(), bytes)],
-            read,
-            is_restored_whole: false,
-        }
+        Self { name, files: vec![(place.into(), bytes)], read, is_restored_whole: false }
     }
 
     /// All files of a folder that was filled with sound ones.
@@ -84,12 +79,7 @@ impl Kind {
         let mut files = Vec::new();
         collect(folder, folder, &mut files);
         files.sort();
-        Self {
-            name,
-            files,
-            read,
-            is_restored_whole: false,
-        }
+        Self { name, files, read, is_restored_whole: false }
     }
 }
 
@@ -177,11 +167,7 @@ fn session(name: &'static str, is_finished: bool) -> Kind {
     let entries = entries(&rows, 40);
     let ending = is_finished.then(|| end(Nanos::from_millis(1500)));
     let bytes = wired_log_bytes(&rows, &entries, ending);
-    let held = damage::Original {
-        rows,
-        entries,
-        bytes: bytes.clone(),
-    };
+    let held = damage::Original { rows, entries, bytes: bytes.clone() };
     let original = Original { held, is_finished };
     let read = move |folder: &Path| original.read(&folder.join(LOG_FILE));
     Kind::new(name, LOG_FILE, bytes, Box::new(read))
@@ -192,22 +178,10 @@ fn segments() -> Kind {
     let recording = Recording::new(1800, 12).by_log(7, &[16]);
     let folder = quick_folder();
     let last = recording.trace.len() - 1;
-    cut(
-        &recording.trace,
-        last,
-        Fate::Kept,
-        &mut Random(1),
-        folder.path(),
-    );
-    let held = damage::Original {
-        rows: recording.rows,
-        entries: recording.entries,
-        bytes: Vec::new(),
-    };
-    let original = Original {
-        held,
-        is_finished: true,
-    };
+    cut(&recording.trace, last, Fate::Kept, &mut Random(1), folder.path());
+    let held =
+        damage::Original { rows: recording.rows, entries: recording.entries, bytes: Vec::new() };
+    let original = Original { held, is_finished: true };
     let read = move |folder: &Path| original.read(&folder.join("session"));
     let mut kind = Kind::of_folder("session-in-segments", folder.path(), Box::new(read));
     assert_eq!(kind.files.len(), 5);
@@ -269,9 +243,7 @@ pub fn analysis(number: usize) -> Analysis {
         engine_version: 1,
         inputs: Vec::new(),
         what: match number % 2 {
-            0 => Analysed::Mask {
-                left_out_s: vec![[0.1 * number as f64, 17.25]],
-            },
+            0 => Analysed::Mask { left_out_s: vec![[0.1 * number as f64, 17.25]] },
             _ => Analysed::Fit {
                 based_on: None,
                 settings: serde_json::Value::Null,
@@ -357,10 +329,8 @@ fn catalog() -> Kind {
         let Ok(catalog) = Catalog::open(folder) else {
             return Outcome::Refused;
         };
-        let found = catalog.find(&palpate_sessions::catalog::Query {
-            limit: Some(100),
-            ..Default::default()
-        });
+        let found = catalog
+            .find(&palpate_sessions::catalog::Query { limit: Some(100), ..Default::default() });
         let mut count = 0;
         for entry in found.iter().flat_map(|found| &found.entries) {
             assert!(written.contains(entry), "a wrong entry was found");
@@ -379,10 +349,7 @@ fn catalog() -> Kind {
             (_, false) => Outcome::Refused,
         }
     };
-    Kind {
-        is_restored_whole: true,
-        ..Kind::new("catalog", CATALOG_FILE, bytes, Box::new(read))
-    }
+    Kind { is_restored_whole: true, ..Kind::new("catalog", CATALOG_FILE, bytes, Box::new(read)) }
 }
 
 /// A session put into a lake.
@@ -421,10 +388,7 @@ fn in_lake() -> Kind {
         let listed = lake::sessions(folder).expect("its folders are there");
         match lake::read_session(folder, &listed[0]) {
             Ok((read, None)) => {
-                let read = Session {
-                    path: PathBuf::new(),
-                    ..read
-                };
+                let read = Session { path: PathBuf::new(), ..read };
                 assert!(same_bits(&read.rows, &written.rows) && read == written);
                 Outcome::Whole
             }

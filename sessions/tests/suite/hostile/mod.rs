@@ -23,15 +23,9 @@ const MEMORY_MAX: u64 = 64 << 20;
 /// From now on this process may not take more than so many bytes more.
 pub fn limit_memory(more: u64) {
     let pages = fs::read_to_string("/proc/self/statm").expect("this is Linux");
-    let pages = pages
-        .split(' ')
-        .next()
-        .and_then(|pages| pages.parse::<u64>().ok());
+    let pages = pages.split(' ').next().and_then(|pages| pages.parse::<u64>().ok());
     let now = pages.expect("a number of pages") * rustix::param::page_size() as u64;
-    let limit = rustix::process::Rlimit {
-        current: Some(now + more),
-        maximum: Some(now + more),
-    };
+    let limit = rustix::process::Rlimit { current: Some(now + more), maximum: Some(now + more) };
     rustix::process::setrlimit(rustix::process::Resource::As, limit)
         .expect("a limit can be lowered");
 }
@@ -225,8 +219,5 @@ fn what_the_corpus_is_made_of_can_be_made() {
     let folder = chosen.unwrap_or_else(|| scratch.path().into());
     let made = corpus::make(&folder);
     let targets: std::collections::BTreeSet<&str> = made.iter().map(String::as_str).collect();
-    assert!(
-        targets.iter().copied().eq(corpus::made_targets()),
-        "{targets:?}"
-    );
+    assert!(targets.iter().copied().eq(corpus::made_targets()), "{targets:?}");
 }

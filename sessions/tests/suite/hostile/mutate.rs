@@ -61,16 +61,7 @@ pub fn input(corpus: &[(String, Vec<u8>)], words: &[&[u8]], random: &mut Random)
 const INPUT_MAX: usize = 64 << 10;
 
 /// Numbers at which lengths and counts go wrong.
-const EDGES: [u64; 8] = [
-    0,
-    1,
-    0x7f,
-    0xffff,
-    0x7fff_ffff,
-    0xffff_ffff,
-    u64::MAX >> 1,
-    u64::MAX,
-];
+const EDGES: [u64; 8] = [0, 1, 0x7f, 0xffff, 0x7fff_ffff, 0xffff_ffff, u64::MAX >> 1, u64::MAX];
 
 fn change(bytes: &mut Vec<u8>, corpus: &[(String, Vec<u8>)], words: &[&[u8]], random: &mut Random) {
     let place = random.below(bytes.len() + 1);

@@ -55,12 +55,7 @@ pub const ALL: &[Target] = &[
     },
     Target {
         name: "block",
-        words: &[
-            &[0x12],
-            &[0x1a, 0x80, 0x80, 0x04],
-            &[0xff; 10],
-            &[0x3a, 0x7f],
-        ],
+        words: &[&[0x12], &[0x1a, 0x80, 0x80, 0x04], &[0xff; 10], &[0x3a, 0x7f]],
         run: |bytes, folder| {
             // The first half is taken for raw samples, the second for what was made of them.
             let (raw, derived) = bytes.split_at(bytes.len() / 2);
@@ -74,10 +69,7 @@ pub const ALL: &[Target] = &[
         name: "raw-block",
         words: &[&[0x12], &[0x2a, 0x80, 0x80, 0x04], &[0xff; 10], &[0x32]],
         run: |bytes, folder| {
-            put(
-                &folder.join(LOG_FILE),
-                &file_with_chunk(&message("/raw", 0, bytes)),
-            );
+            put(&folder.join(LOG_FILE), &file_with_chunk(&message("/raw", 0, bytes)));
             read_log(&folder.join(LOG_FILE));
         },
     },
@@ -85,10 +77,7 @@ pub const ALL: &[Target] = &[
         name: "health",
         words: JSON_WORDS,
         run: |bytes, folder| {
-            put(
-                &folder.join(LOG_FILE),
-                &file_with_chunk(&message("/health", 0, bytes)),
-            );
+            put(&folder.join(LOG_FILE), &file_with_chunk(&message("/health", 0, bytes)));
             read_log(&folder.join(LOG_FILE));
         },
     },
@@ -96,10 +85,7 @@ pub const ALL: &[Target] = &[
         name: "manifest",
         words: JSON_WORDS,
         run: |bytes, folder| {
-            put(
-                &folder.join(LOG_FILE),
-                &super::corpus::file_with_manifest(bytes),
-            );
+            put(&folder.join(LOG_FILE), &super::corpus::file_with_manifest(bytes));
             read_log(&folder.join(LOG_FILE));
         },
     },
@@ -127,11 +113,7 @@ pub const ALL: &[Target] = &[
             }
         },
     },
-    Target {
-        name: "lines",
-        words: JSON_WORDS,
-        run: read_lines,
-    },
+    Target { name: "lines", words: JSON_WORDS, run: read_lines },
     Target {
         name: "sealed-lines",
         words: JSON_WORDS,
@@ -232,10 +214,7 @@ const TABLE_WORDS: &[&[u8]] = &[
 
 fn read_log(path: &Path) {
     if let Ok(session) = Session::open(path) {
-        let numbers = session
-            .rows
-            .iter()
-            .flat_map(|row| [row.volts, row.force, row.depth]);
+        let numbers = session.rows.iter().flat_map(|row| [row.volts, row.force, row.depth]);
         assert!(numbers.flatten().all(f64::is_finite));
     }
     let mut raw = 0;
@@ -247,9 +226,7 @@ fn read_log(path: &Path) {
     if let Ok(outline) = scanned {
         assert_eq!(outline.beside.raw_bytes, raw as u64);
     }
-    if let Ok(left) = salvage(path, &mut |block| {
-        assert_eq!(block.rows().count(), block.len())
-    }) {
+    if let Ok(left) = salvage(path, &mut |block| assert_eq!(block.rows().count(), block.len())) {
         assert!(!left.missing.sentences().iter().any(String::is_empty));
     }
     drop(Summary::read(path));

@@ -11,10 +11,7 @@ use serde_json::{Value, json};
 /// The object for all records; `fitted` says where the predicted body is from.
 #[must_use]
 pub fn object(reports: &[CycleReport], fitted: Option<&str>) -> Value {
-    let rule = reports
-        .first()
-        .map(|report| report.rule)
-        .unwrap_or_default();
+    let rule = reports.first().map(|report| report.rule).unwrap_or_default();
     json!({
         "command": "analyse",
         "steady_rule": { "percent": rule.percent, "in_a_row": rule.in_a_row },
@@ -53,9 +50,7 @@ fn number(estimate: Estimate<f64>) -> Value {
 
 fn cycle(report: &CycleReport, index: usize) -> Value {
     let one: &CycleAnalysis = &report.cycles[index];
-    let change = index
-        .checked_sub(1)
-        .map(|before| report.steadiness.changes[before]);
+    let change = index.checked_sub(1).map(|before| report.steadiness.changes[before]);
     let first = report.cycles[0].at_half();
     let levels = one.levels.map(|level| {
         level.map(|level| json!({ "force_n": level.force.0, "depth_mm": depth(level.depth) }))

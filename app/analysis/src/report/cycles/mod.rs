@@ -68,10 +68,7 @@ impl CycleReport {
             None => analyse(&source.samples, question.at, source.pulse),
         };
         let predictions = match &question.body {
-            Some(body) => cycles
-                .iter()
-                .map(|one| prediction(body, &source, one))
-                .collect(),
+            Some(body) => cycles.iter().map(|one| prediction(body, &source, one)).collect(),
             None => Vec::new(),
         };
         Self {
@@ -89,10 +86,7 @@ impl CycleReport {
     fn samples(&self, index: usize) -> impl Iterator<Item = &CycleSample> + Clone {
         let cycle = &self.cycles[index];
         let end = cycle.start.0 + cycle.duration.0;
-        self.source
-            .samples
-            .iter()
-            .filter(move |one| one.t.0 >= cycle.start.0 && one.t.0 <= end)
+        self.source.samples.iter().filter(move |one| one.t.0 >= cycle.start.0 && one.t.0 <= end)
     }
 }
 

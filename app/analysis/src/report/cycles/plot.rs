@@ -49,14 +49,7 @@ pub fn picture(report: &CycleReport) -> String {
     let first = report.cycles.first().and_then(|one| one.at_half());
     let peaks = report.cycles.iter().enumerate();
     let peaks = peaks.map(|(i, one)| Some([i as f64 + 1.0, one.force_peak.value.0]));
-    by_cycle(
-        &mut svg,
-        report,
-        place(0),
-        "peak (N)",
-        &peaks.collect::<Vec<_>>(),
-        uncertainty,
-    );
+    by_cycle(&mut svg, report, place(0), "peak (N)", &peaks.collect::<Vec<_>>(), uncertainty);
     let shifts = report.cycles.iter().enumerate().map(|(i, one)| {
         let shift = one.at_half()?.0 - first?.0;
         Some([i as f64 + 1.0, shift])
@@ -72,9 +65,8 @@ pub fn picture(report: &CycleReport) -> String {
     if panels == 3 {
         let curves: Vec<&[[f64; 2]]> = relaxations.iter().map(|(_, curve)| &curve[..]).collect();
         let ends = first_and_last(relaxations.len()).map(|i| &relaxations[i]);
-        let bands: Vec<(usize, Band)> = ends
-            .map(|(index, curve)| (*index, Band::around(curve, uncertainty)))
-            .collect();
+        let bands: Vec<(usize, Band)> =
+            ends.map(|(index, curve)| (*index, Band::around(curve, uncertainty))).collect();
         let mut inside = curves.clone();
         inside.extend(bands.iter().flat_map(|(_, band)| band.edges()));
         let panel = Panel::around(place(2), [0.0, longest(&curves)], &inside);
@@ -103,20 +95,15 @@ fn first_and_last(count: usize) -> impl Iterator<Item = usize> {
 
 fn loops(svg: &mut Svg, report: &CycleReport, uncertainty: Option<&ForceUncertainty>) {
     let count = report.cycles.len();
-    let curves: Vec<Vec<[f64; 2]>> = (0..count)
-        .map(|index| one_loop(report, index).concat())
-        .collect();
+    let curves: Vec<Vec<[f64; 2]>> =
+        (0..count).map(|index| one_loop(report, index).concat()).collect();
     let bands: Vec<(usize, Band)> = first_and_last(count)
         .flat_map(|index| one_loop(report, index).map(|part| (index, part)))
         .map(|(index, part)| (index, Band::around(&part, uncertainty)))
         .collect();
     let mut borrowed: Vec<&[[f64; 2]]> = curves.iter().map(Vec::as_slice).collect();
     borrowed.extend(bands.iter().flat_map(|(_, band)| band.edges()));
-    let depths = || {
-        borrowed
-            .iter()
-            .flat_map(|curve| curve.iter().map(|point| point[0]))
-    };
+    let depths = || borrowed.iter().flat_map(|curve| curve.iter().map(|point| point[0]));
     let (low, high) = (depths().fold(0.0, f64::min), depths().fold(0.0, f64::max));
     let range = [low, if high > low { high } else { low + 1.0 }];
     let panel = Panel::around([LEFT, LOOPS[0], RIGHT, LOOPS[1]], range, &borrowed);
@@ -127,19 +114,11 @@ fn loops(svg: &mut Svg, report: &CycleReport, uncertainty: Option<&ForceUncertai
     for (index, curve) in curves.iter().enumerate() {
         panel.line(svg, curve, color(index, count), 1.2);
     }
-    for (i, index) in [0, count.saturating_sub(1)]
-        .into_iter()
-        .enumerate()
-        .take(count.min(2))
-    {
+    for (i, index) in [0, count.saturating_sub(1)].into_iter().enumerate().take(count.min(2)) {
         let (x, y) = (LEFT + 20.0, LOOPS[0] + 20.0 + 20.0 * i as f64);
         svg.line(&[[x, y], [x + 24.0, y]], color(index, count), 2.5);
         let text = format!("cycle {}", report.cycles[index].cycle);
-        svg.text(
-            [x + 30.0, y + 4.0],
-            Ink::plain(LIGHT.text).anchored(Anchor::Start),
-            &text,
-        );
+        svg.text([x + 30.0, y + 4.0], Ink::plain(LIGHT.text).anchored(Anchor::Start), &text);
     }
 }
 
@@ -159,10 +138,7 @@ fn relaxations(report: &CycleReport) -> Vec<(usize, Vec<[f64; 2]>)> {
     let curve = |index: usize| {
         let held = report.samples(index).filter(|one| one.phase == Phase::Hold);
         let start = held.clone().next().map_or(0.0, |one| one.t.0);
-        thin(
-            held.map(move |one| [one.t.0 - start, one.force.0]),
-            COLUMNS / 3,
-        )
+        thin(held.map(move |one| [one.t.0 - start, one.force.0]), COLUMNS / 3)
     };
     indices.map(|index| (index, curve(index))).collect()
 }

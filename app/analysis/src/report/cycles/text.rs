@@ -14,12 +14,7 @@ pub fn whole(report: &CycleReport) -> String {
         parts.push(in_columns(&loops(report)));
         parts.push(steady(report));
     }
-    let sections = [
-        relaxation(report),
-        creep(report),
-        prediction(report),
-        sines(report),
-    ];
+    let sections = [relaxation(report), creep(report), prediction(report), sines(report)];
     for (title, lines) in sections.into_iter().filter(|(_, lines)| lines.len() > 1) {
         parts.push(title.to_owned());
         parts.push(in_columns(&lines));
@@ -33,9 +28,7 @@ pub fn whole(report: &CycleReport) -> String {
 const NONE: &str = "-";
 
 fn estimate<T: Copy>(one: Option<Estimate<T>>, number: impl Fn(T) -> f64) -> String {
-    one.map_or(NONE.into(), |one| {
-        with_error(number(one.value), number(one.std_error))
-    })
+    one.map_or(NONE.into(), |one| with_error(number(one.value), number(one.std_error)))
 }
 
 fn maybe(number: Option<f64>, decimals: usize) -> String {
@@ -64,9 +57,7 @@ fn loops(report: &CycleReport) -> Vec<Vec<String>> {
         &stiffness,
     ])];
     for (index, one) in report.cycles.iter().enumerate() {
-        let change = index
-            .checked_sub(1)
-            .map(|before| report.steadiness.changes[before]);
+        let change = index.checked_sub(1).map(|before| report.steadiness.changes[before]);
         lines.push(vec![
             one.cycle.to_string(),
             plain(one.speed.0),
@@ -178,10 +169,7 @@ fn prediction(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
             Err(err) => vec![one.cycle.to_string(), err.to_string()],
         });
     }
-    (
-        "prediction minus measurement, percent of the measured peak",
-        lines,
-    )
+    ("prediction minus measurement, percent of the measured peak", lines)
 }
 
 fn predicted(one: &CycleAnalysis, found: &Prediction) -> Vec<String> {

@@ -17,32 +17,19 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
             one.manifest.specimen.clone(),
             one.manifest.operator.clone(),
             said::at(&one.manifest.started_at),
-            one.manifest.plan["name"]
-                .as_str()
-                .unwrap_or("imported")
-                .to_owned(),
+            one.manifest.plan["name"].as_str().unwrap_or("imported").to_owned(),
             verdict.map_or("none".to_owned(), |(verdict, _)| verdict.to_string()),
         ]
     };
     let rows: Vec<Vec<String>> = subjects.iter().map(row).collect();
-    let heads = [
-        "session",
-        "read by",
-        "specimen",
-        "operator",
-        "started (UTC)",
-        "protocol",
-        "verdict",
-    ];
+    let heads =
+        ["session", "read by", "specimen", "operator", "started (UTC)", "protocol", "verdict"];
     body.table("Sessions compared", &heads, &rows);
     let traces: Vec<&Traces> = subjects.iter().map(|one| &one.traces).collect();
     let ([time, depth], lost) = overlays(&traces, align);
     let left_out = match lost.as_slice() {
         [] => String::new(),
-        lost => format!(
-            " Left out, for want of that beginning: {}.",
-            lost.join(", ")
-        ),
+        lost => format!(" Left out, for want of that beginning: {}.", lost.join(", ")),
     };
     body.figure(
         &time.svg(),
@@ -58,10 +45,8 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
 
 /// Every parameter, session by session.
 fn parameters(body: &mut Body, subjects: &[Subject]) {
-    let fitted: Vec<_> = subjects
-        .iter()
-        .filter_map(|one| Some((one, &one.fit.as_ref().ok()?.report)))
-        .collect();
+    let fitted: Vec<_> =
+        subjects.iter().filter_map(|one| Some((one, &one.fit.as_ref().ok()?.report))).collect();
     let mut rows = Vec::new();
     if let Some((_, first)) = fitted.first() {
         for parameter in &first.parameters {

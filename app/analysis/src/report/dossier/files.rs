@@ -74,15 +74,8 @@ pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
 }
 
 fn unescape(text: &str) -> String {
-    let plain = [
-        ("&lt;", "<"),
-        ("&gt;", ">"),
-        ("&quot;", "\""),
-        ("&apos;", "'"),
-    ];
-    let text = plain.iter().fold(text.to_owned(), |text, (code, plain)| {
-        text.replace(code, plain)
-    });
+    let plain = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&apos;", "'")];
+    let text = plain.iter().fold(text.to_owned(), |text, (code, plain)| text.replace(code, plain));
     text.replace("&amp;", "&")
 }
 
@@ -103,19 +96,16 @@ pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisEr
         let hash = sha256_of_file(&analyses);
         now.push(Input {
             what: ANALYSES_FILE.to_owned(),
-            sha256: hash.map_err(|source| AnalysisError::Input {
-                path: analyses,
-                source,
-            })?,
+            sha256: hash.map_err(|source| AnalysisError::Input { path: analyses, source })?,
         });
     }
     let mut compared = Compared::default();
     for claim in claims {
         match now.iter().find(|one| one.what == claim.file) {
             Some(one) if one.sha256 == claim.sha256 => compared.same += 1,
-            Some(_) => compared
-                .differences
-                .push(format!("{} is not as the page describes it", claim.file)),
+            Some(_) => {
+                compared.differences.push(format!("{} is not as the page describes it", claim.file))
+            }
             None => compared.differences.push(format!("{} is gone", claim.file)),
         }
     }
@@ -133,19 +123,14 @@ mod tests {
     use super::*;
 
     fn input(what: &str, sha256: &str) -> Input {
-        Input {
-            what: what.into(),
-            sha256: sha256.into(),
-        }
+        Input { what: what.into(), sha256: sha256.into() }
     }
 
     #[test]
     fn what_is_written_is_read_back_whatever_a_folder_is_called() {
         let folder = "a \"b\" <c> & 'd' &lt;";
         let row = attributes("id", folder, &input("000.mcap", "beef"));
-        let page = sealed(&format!(
-            "<p class=\"made\">now</p>\n<tr{row}><td></td></tr>\n"
-        ));
+        let page = sealed(&format!("<p class=\"made\">now</p>\n<tr{row}><td></td></tr>\n"));
         let (found, is_whole) = claims(&page).unwrap();
         let expected = Claim {
             session_id: "id".into(),

@@ -30,14 +30,8 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
     body.facts(
         "How well the run did what its plan said",
         &[
-            (
-                "samples",
-                format!("{}, {} missing, {late}", found.samples, found.dropped),
-            ),
-            (
-                "longest gap",
-                format!("{:.1} ms", found.longest_gap_s * 1e3),
-            ),
+            ("samples", format!("{}, {} missing, {late}", found.samples, found.dropped)),
+            ("longest gap", format!("{:.1} ms", found.longest_gap_s * 1e3)),
             (
                 "time",
                 format!(
@@ -45,10 +39,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
                     time.set_up_s, time.motion_s, time.hold_s, time.waiting_s
                 ),
             ),
-            (
-                "targets",
-                format!("{}, {missed} missed", found.targets.len()),
-            ),
+            ("targets", format!("{}, {missed} missed", found.targets.len())),
         ],
     );
     body.list(found.remarks.iter().map(String::as_str));
@@ -62,11 +53,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
         );
         vec![
             format!("{} {}", one.step_index + 1, one.step),
-            if one.cycle == 0 {
-                String::new()
-            } else {
-                one.cycle.to_string()
-            },
+            if one.cycle == 0 { String::new() } else { one.cycle.to_string() },
             one.quantity.to_owned(),
             format!("{:.4} {}", one.target, one.unit),
             format!("{:.4} {}", one.achieved, one.unit),
@@ -75,9 +62,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
         ]
     };
     let rows: Vec<Vec<String>> = found.targets.iter().map(row).collect();
-    let heads = [
-        "step", "cycle", "quantity", "target", "achieved", "error", "",
-    ];
+    let heads = ["step", "cycle", "quantity", "target", "achieved", "error", ""];
     body.table("Targets and what was done", &heads, &rows);
 }
 
@@ -140,9 +125,7 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
     }
     let analyses = &subject.analyses;
     let made = analyses.all.iter();
-    let made: Vec<_> = made
-        .filter(|one| one.what != Analysed::Withdrawal)
-        .collect();
+    let made: Vec<_> = made.filter(|one| one.what != Analysed::Withdrawal).collect();
     if made.is_empty() {
         body.paragraph("No analysis is kept beside it.");
         return;
@@ -163,16 +146,7 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
             ]
         })
         .collect();
-    let heads = [
-        "name",
-        "kind",
-        "when (UTC)",
-        "by",
-        "why",
-        "what",
-        "made with",
-        "state",
-    ];
+    let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses, in the order made", &heads, &rows);
     for one in made {
         let lines = kept::fit_lines(one);

@@ -79,10 +79,7 @@ fn summary(body: &mut Body, subject: &Subject, level: u8) {
     let mut facts = vec![
         ("session", manifest.session_id.clone()),
         ("folder", subject.name.clone()),
-        (
-            "read by analysis",
-            subject.analysis.clone().unwrap_or_default(),
-        ),
+        ("read by analysis", subject.analysis.clone().unwrap_or_default()),
         ("specimen", manifest.specimen.clone()),
         ("operator", manifest.operator.clone()),
         ("started", said::at(&manifest.started_at)),
@@ -127,11 +124,7 @@ fn worth(body: &mut Body, subject: &Subject, level: u8) {
     let tags: Vec<&str> = subject.edits.tags().into_iter().collect();
     body.facts(
         "Verdict and review",
-        &[
-            ("verdict", verdict),
-            ("review", review),
-            ("tags", tags.join(", ")),
-        ],
+        &[("verdict", verdict), ("review", review), ("tags", tags.join(", "))],
     );
     if !subject.notes.is_empty() {
         body.paragraph("What a reader of the data must know:");
@@ -145,10 +138,7 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     let thinning = capital(&traces.thinning());
     body.figure(
         &figures::force_time(traces).svg(),
-        &format!(
-            "Force over time, phases shaded. {thinning}.{}",
-            traces.limit_above()
-        ),
+        &format!("Force over time, phases shaded. {thinning}.{}", traces.limit_above()),
     );
     body.figure(
         &figures::force_depth(traces).svg(),
@@ -167,21 +157,11 @@ fn fit(body: &mut Body, subject: &Subject, level: u8) {
 fn fit_part(body: &mut Body, part: &FitPart) {
     let report = &part.report;
     body.paragraph(&format!("{}; {}.", capital(&report.model), quality(report)));
-    let heads = [
-        "parameter",
-        "value ± standard error",
-        "unit",
-        "95 % interval",
-        "systematic",
-    ];
+    let heads = ["parameter", "value ± standard error", "unit", "95 % interval", "systematic"];
     let rows: Vec<Vec<String>> = report.parameters.iter().map(cells).collect();
     let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty that calibration and compliance add, the same in every repeat.";
     body.table(caption, &heads, &rows);
-    body.list(
-        report
-            .sentences()
-            .chain(part.remarks.iter().map(String::as_str)),
-    );
+    body.list(report.sentences().chain(part.remarks.iter().map(String::as_str)));
     let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and what the fit leaves over. Drawn are the lowest and the highest of each column of pixels.";
     body.figure(&part.figure.svg(), caption);
 }
@@ -197,9 +177,7 @@ pub(super) fn cells(parameter: &Parameter) -> Vec<String> {
         text.value,
         typeset(&parameter.unit),
         ends.unwrap_or_default(),
-        systematic
-            .map(|error| format!("± {error}"))
-            .unwrap_or_default(),
+        systematic.map(|error| format!("± {error}")).unwrap_or_default(),
     ]
 }
 

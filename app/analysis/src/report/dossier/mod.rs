@@ -83,11 +83,7 @@ impl Subject {
         let path = &wanted.session;
         let files = inputs_of(path)?;
         let opened = analysed::open(path, wanted.analysis.as_deref())?;
-        let Opened {
-            edited,
-            analyses,
-            left_out_s,
-        } = opened;
+        let Opened { edited, analyses, left_out_s } = opened;
         let (session, edits) = (edited.session, edited.edits);
         // The review itself is among the edits; what came after it is told by their order.
         let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
@@ -135,10 +131,8 @@ pub fn name_of(path: &Path) -> String {
 fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
     let source = cycles_of(session).ok()?;
     let report = CycleReport::of(name.to_owned(), source, &Question::default());
-    (report.cycles.len() > 1 || !report.sines.is_empty()).then(|| CyclePart {
-        text: cycles_text(&report),
-        figure: cycles_picture(&report),
-    })
+    (report.cycles.len() > 1 || !report.sines.is_empty())
+        .then(|| CyclePart { text: cycles_text(&report), figure: cycles_picture(&report) })
 }
 
 /// The fit of a session, whatever the session is worth, with what its calibration adds.
@@ -175,12 +169,8 @@ pub enum Figure {
 
 impl Figure {
     /// Every one.
-    pub const ALL: [Self; 4] = [
-        Self::ForceTime,
-        Self::ForceDepth,
-        Self::Residual,
-        Self::Calibration,
-    ];
+    pub const ALL: [Self; 4] =
+        [Self::ForceTime, Self::ForceDepth, Self::Residual, Self::Calibration];
 
     /// Its name, as typed.
     #[must_use]
@@ -286,10 +276,7 @@ pub fn write(
 ) -> Result<String, ReportError> {
     let mut subjects = Vec::new();
     for (index, one) in wanted.iter().enumerate() {
-        if progress
-            .tell(index, wanted.len(), &name_of(&one.session))
-            .is_break()
-        {
+        if progress.tell(index, wanted.len(), &name_of(&one.session)).is_break() {
             return Err(ReportError::Cancelled);
         }
         let subject = Subject::of(one);

@@ -98,9 +98,7 @@ impl SpecimenPart {
 
     pub(super) fn text(&self) -> String {
         let told = self.told.iter();
-        let told: Vec<String> = told
-            .map(|(key, value)| format!("  {key}: {value}"))
-            .collect();
+        let told: Vec<String> = told.map(|(key, value)| format!("  {key}: {value}")).collect();
         let probe = match self.indenter.as_str() {
             "" => String::new(),
             indenter => format!(", with the {indenter}"),

@@ -131,8 +131,7 @@ impl Page {
                 let manifest = opened.as_ref().ok().map(|session| &session.manifest);
                 let told = manifest.map(SpecimenPart::of);
                 let told = told.filter(|one| !one.specimen.is_empty());
-                page.specimens
-                    .extend(told.filter(|one| !page.specimens.contains(one)));
+                page.specimens.extend(told.filter(|one| !page.specimens.contains(one)));
                 let word = |of: fn(&Manifest) -> &String| {
                     manifest.map_or(String::new(), |one| of(one).clone())
                 };
@@ -189,10 +188,8 @@ impl Page {
                 run.task.clone(),
                 format!("{}{attempt}", run.repeat),
                 run.ended_by(),
-                run.duration_s
-                    .map_or("-".into(), |duration| format!("{duration:.1}")),
-                run.force_peak_n
-                    .map_or("-".into(), |peak| format!("{peak:.3}")),
+                run.duration_s.map_or("-".into(), |duration| format!("{duration:.1}")),
+                run.force_peak_n.map_or("-".into(), |peak| format!("{peak:.3}")),
                 run.session.clone(),
                 run.operator.clone(),
                 run.specimen.clone(),
@@ -295,8 +292,7 @@ impl TaskPart {
         match Told::of(calibration) {
             Ok(told) => {
                 self.line(&calibration_text(calibration, None, &told, &[]));
-                self.figures
-                    .push(super::calibration_plot::picture(calibration, &told));
+                self.figures.push(super::calibration_plot::picture(calibration, &told));
             }
             Err(err) => self.line(&err.to_string()),
         }
@@ -351,8 +347,7 @@ impl TaskPart {
         if self.figures.is_empty() {
             let calibration = fitted.calibration.as_ref();
             let band = calibration.and_then(|one| ForceUncertainty::of(one).ok());
-            self.figures
-                .push(picture::of_report(name, samples, report, band.as_ref()));
+            self.figures.push(picture::of_report(name, samples, report, band.as_ref()));
         }
         if !bodies.known.iter().any(|(known, _)| *known == task.name) {
             let found = report.kelvin().map(|body| (task.name.clone(), body));
@@ -379,10 +374,9 @@ impl Bodies {
             let reasons: Vec<&str> = own.map(|(_, reason)| reason.as_str()).collect();
             match reasons.as_slice() {
                 [] => format!("no session of task '{task}' was fitted"),
-                reasons => format!(
-                    "no session of task '{task}' was fitted: {}",
-                    reasons.join("; ")
-                ),
+                reasons => {
+                    format!("no session of task '{task}' was fitted: {}", reasons.join("; "))
+                }
             }
         })
     }

@@ -189,11 +189,7 @@ impl Screen for CalibrationScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        if let Some(Shown {
-            told: Ok((_, curves)),
-            ..
-        }) = self.shown_one()
-        {
+        if let Some(Shown { told: Ok((_, curves)), .. }) = self.shown_one() {
             plots::curves_ui(ui, curves);
         }
     }
@@ -243,12 +239,7 @@ impl Screen for CalibrationScreen {
 
     fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
         if let Some(answer) = self.job.poll() {
-            if let Ok(Shelved {
-                kept: Some(Ok(id)),
-                shown,
-                ..
-            }) = &answer
-            {
+            if let Ok(Shelved { kept: Some(Ok(id)), shown, .. }) = &answer {
                 let place = shown.iter().position(|one| one.entry.id == *id);
                 self.chosen = place.unwrap_or(0);
             }
@@ -306,10 +297,6 @@ fn state_words(entry: &Entry, is_own: bool, is_used: bool) -> String {
         words.push(format!("rig {}", entry.rig));
     }
     words.extend(entry.age_days.map(|age| format!("{age} d old")));
-    words.push(if is_own {
-        "comes with the rig".into()
-    } else {
-        entry.state()
-    });
+    words.push(if is_own { "comes with the rig".into() } else { entry.state() });
     words.join(", ")
 }

@@ -5,17 +5,11 @@ use eframe::egui::{RichText, Ui, vec2};
 use palpate_figures::figure::Plot;
 
 /// How each looks: it is half as wide as the plots of a run.
-const LOOK: PlotLook = PlotLook {
-    steps_across: Some(4.0),
-    link: Some("calibration_force"),
-};
+const LOOK: PlotLook = PlotLook { steps_across: Some(4.0), link: Some("calibration_force") };
 
 /// Draws all four in the space there is, two beside each other.
 pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
-    let size = vec2(
-        (ui.available_width() - 12.0) * 0.5,
-        (ui.available_height() - 62.0) * 0.5,
-    );
+    let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 62.0) * 0.5);
     for row in plots.chunks(2) {
         ui.horizontal(|ui| {
             for plot in row {

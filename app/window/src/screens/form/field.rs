@@ -33,12 +33,7 @@ impl ParamField {
             What::List(_) => usual.text.clone(),
             _ => number,
         };
-        Self {
-            value: Ok(usual.text.clone()),
-            text,
-            unit,
-            parameter,
-        }
+        Self { value: Ok(usual.text.clone()), text, unit, parameter }
     }
 
     /// Reads the text again; a speed must be one that the rig makes.
@@ -83,11 +78,7 @@ impl ParamField {
     #[must_use]
     pub fn unit_beside(&self) -> &'static str {
         let text = self.text.trim();
-        if text.is_empty() || text.parse::<f64>().is_ok() {
-            self.unit
-        } else {
-            ""
-        }
+        if text.is_empty() || text.parse::<f64>().is_ok() { self.unit } else { "" }
     }
 
     /// What it is, its range and where the usual value comes from, a line each.
@@ -152,11 +143,7 @@ mod tests {
 
     fn fields(name: &str) -> Vec<ParamField> {
         let protocol = built_in(name).unwrap().unwrap();
-        protocol
-            .parameters
-            .into_iter()
-            .map(ParamField::new)
-            .collect()
+        protocol.parameters.into_iter().map(ParamField::new).collect()
     }
 
     fn read(field: &ParamField, text: &str) -> Result<String, String> {
@@ -178,10 +165,7 @@ mod tests {
         assert_eq!(read(&rest, " 2 ").unwrap(), "2 min");
         assert_eq!(read(&rest, "5 s").unwrap(), "5 s");
         assert_eq!(rest.unit_beside(), "min");
-        let own = ParamField {
-            text: "5 s".into(),
-            ..rest.clone()
-        };
+        let own = ParamField { text: "5 s".into(), ..rest.clone() };
         assert_eq!(own.unit_beside(), "");
         let masses = of("load-cell-calibration", "masses");
         assert_eq!(read(&masses, "500, 0.6 kg").unwrap(), "500 g, 0.6 kg");
@@ -199,10 +183,6 @@ mod tests {
             assert!(reason.contains(words), "{text}: {reason}");
         }
         assert!(rest.hint().contains("usual: 3 min (source thesis"));
-        assert!(
-            of("preconditioning", "cycles")
-                .hint()
-                .contains("from 1 to 200")
-        );
+        assert!(of("preconditioning", "cycles").hint().contains("from 1 to 200"));
     }
 }

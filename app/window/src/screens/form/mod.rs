@@ -205,24 +205,13 @@ impl ProtocolForm {
 
     /// The request for a run beside what stands in the form, or why there is none.
     pub fn aside(&self, aside: &Aside, rig: &RigView, bench: &Bench) -> Result<RunRequest, String> {
-        let words = |problems: &[Problem]| {
-            problems
-                .first()
-                .map_or_else(String::new, ToString::to_string)
-        };
+        let words =
+            |problems: &[Problem]| problems.first().map_or_else(String::new, ToString::to_string);
         let protocol = built_in(aside.protocol)
             .ok_or("the protocol is not built in")?
             .map_err(|problems| words(&problems))?;
-        let plan = protocol
-            .plan(&aside.values)
-            .map_err(|problems| words(&problems))?;
-        let preview = preview(
-            &plan,
-            &rig.description,
-            &bench.limits,
-            &bench.curve,
-            rig.is_homed,
-        );
+        let plan = protocol.plan(&aside.values).map_err(|problems| words(&problems))?;
+        let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // What must be acknowledged is not acknowledged by a button that is pressed in passing.
         if let (true, Some(reason)) = (is_gated(&plan), bench.to_acknowledge.first()) {
             return Err(format!(
@@ -343,10 +332,7 @@ impl ProtocolForm {
         }
         let numbered = |number: u32| Path::new(chosen).join(format!("session-{number:04}"));
         // If every number is taken, the runner refuses the last and says that it is not empty.
-        (1..SESSIONS_MAX)
-            .map(numbered)
-            .find(|path| !path.exists())
-            .or(Some(numbered(SESSIONS_MAX)))
+        (1..SESSIONS_MAX).map(numbered).find(|path| !path.exists()).or(Some(numbered(SESSIONS_MAX)))
     }
 }
 

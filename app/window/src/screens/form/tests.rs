@@ -19,10 +19,7 @@ fn bench() -> (RigDescription, Bench) {
 /// Types into fields by name and checks.
 fn type_into(form: &mut ProtocolForm, pairs: &[(&str, &str)]) {
     for (name, text) in pairs {
-        let field = form
-            .fields
-            .iter_mut()
-            .find(|one| one.parameter.name == *name);
+        let field = form.fields.iter_mut().find(|one| one.parameter.name == *name);
         match field {
             Some(field) => field.text = (*text).into(),
             None => {
@@ -75,11 +72,7 @@ fn wrong_fields_refuse_by_name() {
         ("depth", "-1", "depth"),
         ("depth", "1e4", "depth"),
         ("hold", "1e9", "1e9 s is not possible"),
-        (
-            "specimen.thickness_mm",
-            "0",
-            "correct the specimen.thickness_mm",
-        ),
+        ("specimen.thickness_mm", "0", "correct the specimen.thickness_mm"),
     ] {
         let (form, bench) = form_with(&[(name, text)]);
         let reason = form.verdict().unwrap_err();
@@ -140,14 +133,7 @@ fn what_a_protocol_asks_for_must_be_filled_in() {
     type_into(&mut form, &[("operator", "Ada")]);
     let reason = form.verdict().unwrap_err();
     assert_eq!(reason, "fill in specimen, specimen.source first");
-    type_into(
-        &mut form,
-        &[
-            ("specimen", "S-1"),
-            ("specimen.source", "pig"),
-            ("cycles", "2"),
-        ],
-    );
+    type_into(&mut form, &[("specimen", "S-1"), ("specimen.source", "pig"), ("cycles", "2")]);
     assert_eq!(form.verdict(), Ok(()));
     let request = form.request(&bench().1).unwrap();
     let cycles = request.plan.steps.iter().map(|planned| planned.cycle).max();
@@ -163,15 +149,8 @@ fn a_file_with_mistakes_tells_their_lines_and_does_not_start() {
     form.choose_file(Path::new("x.toml"), Ok(text.into()));
     type_into(&mut form, &[]);
     let words: Vec<String> = form.problems().iter().map(Problem::to_string).collect();
-    assert!(
-        words.iter().any(|one| one.starts_with("line 8: ")),
-        "{words:?}"
-    );
-    assert!(
-        form.verdict()
-            .unwrap_err()
-            .contains("correct the protocol file")
-    );
+    assert!(words.iter().any(|one| one.starts_with("line 8: ")), "{words:?}");
+    assert!(form.verdict().unwrap_err().contains("correct the protocol file"));
     form.choose_built_in("ramp-hold");
     type_into(&mut form, &[]);
     assert_eq!(form.verdict(), Ok(()));

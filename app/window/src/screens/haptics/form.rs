@@ -36,10 +36,7 @@ impl Default for HapticsForm {
             body: THESIS.into(),
             is_current: false,
             damping: QuantityField::new(0.0),
-            friction: QuantityField {
-                text: usual_friction(),
-                value: Err("not read yet".into()),
-            },
+            friction: QuantityField { text: usual_friction(), value: Err("not read yet".into()) },
             rate: QuantityField::new(usual.period.hz()),
             delay: QuantityField::new(0.0),
             depth: QuantityField::new(usual.deepest.0),
@@ -71,12 +68,10 @@ impl HapticsForm {
             period.map(|_| ()).map_err(|err| err.to_string())
         });
         let most = f64::from(Setting::DELAY_MAX);
-        self.delay.check(
-            |delay| match (0.0..=most).contains(&delay) && delay.fract() == 0.0 {
-                true => Ok(()),
-                false => Err(format!("must be a whole number from 0 to {most}")),
-            },
-        );
+        self.delay.check(|delay| match (0.0..=most).contains(&delay) && delay.fract() == 0.0 {
+            true => Ok(()),
+            false => Err(format!("must be a whole number from 0 to {most}")),
+        });
         self.depth.check(|depth| up_to(depth, Setting::DEPTH_MAX));
         self.speed.check(|speed| up_to(speed, Setting::SPEED_MAX));
     }
@@ -85,9 +80,7 @@ impl HapticsForm {
     pub fn wanted(&self) -> Result<(PathBuf, Setting), String> {
         let body = self.body.trim();
         if body.is_empty() {
-            return Err(format!(
-                "name a body: the folder of a session, a table, or '{THESIS}'"
-            ));
+            return Err(format!("name a body: the folder of a session, a table, or '{THESIS}'"));
         }
         let value = |name: &str, field: &QuantityField| {
             let value = field.value.clone();
@@ -117,21 +110,14 @@ impl HapticsForm {
     pub fn ui(&mut self, ui: &mut Ui, offered: &Offered<'_>) -> bool {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Body");
-        text_row(
-            ui,
-            "body",
-            "a session's folder, a table, or thesis",
-            &mut self.body,
-        );
+        text_row(ui, "body", "a session's folder, a table, or thesis", &mut self.body);
         let mut is_dialog_wanted = false;
         ui.horizontal_wrapped(|ui| {
             if ui.button("Source thesis").clicked() {
                 self.body = THESIS.into();
             }
-            for (name, session) in [
-                ("In review", offered.review),
-                ("In library", offered.library),
-            ] {
+            for (name, session) in [("In review", offered.review), ("In library", offered.library)]
+            {
                 let button = ui.add_enabled(session.is_some(), Button::new(name));
                 if let (true, Some(session)) = (button.clicked(), session) {
                     self.take(session);
@@ -142,10 +128,8 @@ impl HapticsForm {
         section_ui(ui, "Device");
         ui.horizontal(|ui| {
             form_label(ui, "drive");
-            ui.radio_value(&mut self.is_current, false, "voltage")
-                .place("voltage");
-            ui.radio_value(&mut self.is_current, true, "current")
-                .place("current");
+            ui.radio_value(&mut self.is_current, false, "voltage").place("voltage");
+            ui.radio_value(&mut self.is_current, true, "current").place("current");
         });
         let damps = match self.is_current {
             false => "the motor's back-EMF damps",
@@ -179,10 +163,7 @@ mod tests {
 
     #[test]
     fn every_field_reaches_the_setting_in_the_units_of_the_model() {
-        let mut form = HapticsForm {
-            is_current: true,
-            ..HapticsForm::default()
-        };
+        let mut form = HapticsForm { is_current: true, ..HapticsForm::default() };
         for (field, text) in [
             (&mut form.damping, "0.5"),
             (&mut form.friction, "0"),

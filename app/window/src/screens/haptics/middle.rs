@@ -55,11 +55,7 @@ impl HapticsScreen {
 fn before_ui(ui: &mut Ui, looked: &Looked, running: Option<&Feel>) {
     let checked = &looked.checked;
     let height = (ui.available_height() - 2.0 * HEAD) / 2.0;
-    ui.label(
-        RichText::new("Damping needed over depth")
-            .heading()
-            .strong(),
-    );
+    ui.label(RichText::new("Damping needed over depth").heading().strong());
     ui.allocate_ui(vec2(ui.available_width(), height + HEAD * 0.5), |ui| {
         let picture = MarginPicture {
             curve: &checked.curve,
@@ -69,11 +65,7 @@ fn before_ui(ui: &mut Ui, looked: &Looked, running: Option<&Feel>) {
         };
         margin_ui(ui, &picture);
     });
-    ui.label(
-        RichText::new("Show the buzz: the device simulated")
-            .heading()
-            .strong(),
-    );
+    ui.label(RichText::new("Show the buzz: the device simulated").heading().strong());
     // The same heights in both, so that they compare.
     let places = checked.tried.iter().flat_map(|tried| &tried.trace);
     let ends = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
@@ -104,11 +96,7 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, [low, high]: [f64; 2]) {
         axes: ["time from when the hand arrives (s)", "place (mm)"],
         shown: from..=to,
         least: low..=high,
-        curves: vec![Curve {
-            name: words,
-            ink,
-            points: tried.trace.clone(),
-        }],
+        curves: vec![Curve { name: words, ink, points: tried.trace.clone() }],
     };
     strip_ui(ui, strip);
 }

@@ -163,9 +163,7 @@ impl HapticsScreen {
         let mut place = feel.place();
         ui.horizontal(|ui| {
             let label = form_label(ui, "hand");
-            let slider = Slider::new(&mut place, -ABOVE..=deepest)
-                .step_by(0.1)
-                .suffix(" mm");
+            let slider = Slider::new(&mut place, -ABOVE..=deepest).step_by(0.1).suffix(" mm");
             let slider = ui.add(slider).labelled_by(label.id).place("hand");
             if slider.changed() {
                 feel.lead(place);
@@ -252,17 +250,11 @@ impl Screen for HapticsScreen {
             let tell = |share: f64, what: &str| progress.share(share, what);
             tell(0.0, "the body's fit");
             let body = body_of(&source)?;
-            let checked = check(body.body, &setting, &mut |share| {
-                tell(share, "the simulated device")
-            })?;
+            let checked =
+                check(body.body, &setting, &mut |share| tell(share, "the simulated device"))?;
             let mut notes = body.notes.clone();
             notes.extend(body.beyond(setting.deepest));
-            Ok(Looked {
-                source,
-                setting,
-                notes,
-                checked,
-            })
+            Ok(Looked { source, setting, notes, checked })
         });
     }
 

@@ -58,18 +58,12 @@ fn loop_ui(ui: &mut Ui, feel: &Feel) {
     let seen = &feel.last().snapshot;
     section_ui(ui, "Margin and guard");
     ui.add(Label::new(margin_text(&seen.margin)).wrap());
-    fact_ui(
-        ui,
-        "added",
-        format!("{:.2} N s/m of damping", 1e3 * seen.damping),
-    );
+    fact_ui(ui, "added", format!("{:.2} N s/m of damping", 1e3 * seen.damping));
     fact_ui(ui, "energy", format!("{:.2} mJ absorbed", seen.energy));
     match &seen.buzz {
         Some(buzz) => {
-            let words = format!(
-                "buzzes at {:.0} Hz by {:.3} mm",
-                buzz.frequency_hz, buzz.amplitude_mm
-            );
+            let words =
+                format!("buzzes at {:.0} Hz by {:.3} mm", buzz.frequency_hz, buzz.amplitude_mm);
             ui.label(RichText::new(words).strong().color(tokens.alarm_text));
         }
         None => {
@@ -78,11 +72,7 @@ fn loop_ui(ui: &mut Ui, feel: &Feel) {
     }
     section_ui(ui, "Loop");
     let kept = feel.kept();
-    fact_ui(
-        ui,
-        "wanted",
-        format!("{:.0} ticks a second", feel.rate_hz()),
-    );
+    fact_ui(ui, "wanted", format!("{:.0} ticks a second", feel.rate_hz()));
     fact_ui(ui, "priority", feel.priority());
     loop_times_ui(ui, kept);
 }

@@ -86,9 +86,8 @@ impl FilesPanel {
         if task_ui(ui, "Export", &self.task, &verdict) {
             let to = self.kind.destination(PathBuf::from(self.to.trim()));
             let sessions = sessions.to_vec();
-            self.task.start("export", &ctx, move |progress| {
-                Ok(export_all(sessions, &to, progress))
-            });
+            self.task
+                .start("export", &ctx, move |progress| Ok(export_all(sessions, &to, progress)));
         }
         if self.task.standing().is_none() {
             match self.task.answer() {
@@ -107,10 +106,7 @@ impl FilesPanel {
 const REMARKS: usize = 20;
 
 fn remarks_ui(ui: &mut Ui, remarks: &[String]) {
-    remarks
-        .iter()
-        .take(REMARKS)
-        .for_each(|remark| sentence(ui, remark, true));
+    remarks.iter().take(REMARKS).for_each(|remark| sentence(ui, remark, true));
     if remarks.len() > REMARKS {
         let text = format!("and {} more remarks", remarks.len() - REMARKS);
         sentence(ui, &text, true);

@@ -87,11 +87,7 @@ impl SearchForm {
 
     /// Asks for all sessions again; the order stays.
     pub fn clear(&mut self) {
-        *self = Self {
-            order: self.order,
-            is_reversed: self.is_reversed,
-            ..Self::default()
-        };
+        *self = Self { order: self.order, is_reversed: self.is_reversed, ..Self::default() };
     }
 
     /// Draws the fields.
@@ -111,10 +107,7 @@ impl SearchForm {
         self.review.ui(ui, "review is", &words(&REVIEWS));
         text_row(ui, "from", "2026-03-05", &mut self.since);
         text_row(ui, "until", "2026-03-31", &mut self.until);
-        for (text, read) in [
-            (&self.since, beginning as fn(&str) -> _),
-            (&self.until, ending),
-        ] {
+        for (text, read) in [(&self.since, beginning as fn(&str) -> _), (&self.until, ending)] {
             if let Err(err) = day(text, read) {
                 let text = RichText::new(format!("'{text}' is no day: {err}"));
                 ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());

@@ -50,10 +50,7 @@ impl ImportPanel {
 
     fn paths(&self) -> Vec<PathBuf> {
         let paths = self.files.split(BETWEEN).map(str::trim);
-        paths
-            .filter(|path| !path.is_empty())
-            .map(PathBuf::from)
-            .collect()
+        paths.filter(|path| !path.is_empty()).map(PathBuf::from).collect()
     }
 
     fn verdict(&self) -> Result<(), String> {
@@ -79,9 +76,7 @@ impl ImportPanel {
             ..Request::default()
         };
         self.was_dry_run = is_dry_run;
-        self.task.start("import", ctx, move |progress| {
-            import_and_tell(&request, progress)
-        });
+        self.task.start("import", ctx, move |progress| import_and_tell(&request, progress));
     }
 
     /// Draws the form; sessions go to this library.

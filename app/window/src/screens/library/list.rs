@@ -75,8 +75,7 @@ impl List {
             self.entries.retain(|_, (_, of)| *of == now);
         }
         let entries = entries.into_iter();
-        self.entries
-            .extend(entries.map(|entry| (entry.folder.clone(), (entry, now))));
+        self.entries.extend(entries.map(|entry| (entry.folder.clone(), (entry, now))));
     }
 
     /// Sessions in sight or chosen of which nothing new enough is known.
@@ -89,12 +88,7 @@ impl List {
             let known = self.entries.get(*folder);
             known.is_none_or(|(_, of)| *of != self.generation)
         };
-        in_sight
-            .iter()
-            .chain(chosen)
-            .filter(is_old)
-            .cloned()
-            .collect()
+        in_sight.iter().chain(chosen).filter(is_old).cloned().collect()
     }
 
     /// How many were found.
@@ -209,16 +203,9 @@ impl List {
 fn unread(folder: &str) -> Line {
     let mut cells = vec![Cell::default(); COLUMNS.len()];
     if let Some(last) = cells.last_mut() {
-        *last = Cell {
-            text: folder.to_owned(),
-            tone: Tone::Quiet,
-            mark: None,
-        };
+        *last = Cell { text: folder.to_owned(), tone: Tone::Quiet, mark: None };
     }
-    Line {
-        name: format!("Session {folder}"),
-        cells,
-    }
+    Line { name: format!("Session {folder}"), cells }
 }
 
 /// In which state a session's files are, as far as the catalog looks: a shape, a word, and what is wrong.
@@ -296,10 +283,7 @@ fn line(entry: &Entry) -> Line {
         Cell::text(or_dash(&entry.operator)),
         Cell::text(format!("{:.1} s", entry.duration_s)),
         Cell::text(one_line(&entry.tags.join(", "))),
-        Cell {
-            tone: Tone::Quiet,
-            ..Cell::text(one_line(&entry.folder))
-        },
+        Cell { tone: Tone::Quiet, ..Cell::text(one_line(&entry.folder)) },
     ];
     Line { name, cells }
 }
@@ -309,10 +293,7 @@ mod tests {
     use super::*;
 
     fn found(folders: &[&str]) -> Found {
-        let entry = |folder: &&str| Entry {
-            folder: (*folder).to_owned(),
-            ..Entry::default()
-        };
+        let entry = |folder: &&str| Entry { folder: (*folder).to_owned(), ..Entry::default() };
         Found {
             folders: folders.iter().map(ToString::to_string).collect(),
             first: folders.iter().take(2).map(entry).collect(),
@@ -338,10 +319,7 @@ mod tests {
         assert_eq!(list.chosen(), ["e", "b"]);
         list.take(&mut found(&["e"]));
         assert_eq!(list.chosen(), ["e"]);
-        assert_eq!(
-            list.only().map(|(entry, _)| entry.folder.as_str()),
-            Some("e")
-        );
+        assert_eq!(list.only().map(|(entry, _)| entry.folder.as_str()), Some("e"));
         list.choose(9, How::Only);
         assert_eq!(list.chosen(), ["e"]);
     }

@@ -129,8 +129,7 @@ impl LibraryScreen {
             && let Ok(library) = self.library.clone()
         {
             self.is_update_wanted = false;
-            self.update
-                .start("catalog", ctx, move |progress| update(&library, progress));
+            self.update.start("catalog", ctx, move |progress| update(&library, progress));
         }
     }
 
@@ -177,14 +176,7 @@ impl LibraryScreen {
         };
         self.asked = Some(query.clone());
         let library = library.clone();
-        self.search.ask(
-            Search {
-                library,
-                query,
-                page: PAGE,
-            },
-            ctx,
-        );
+        self.search.ask(Search { library, query, page: PAGE }, ctx);
     }
 
     /// Folders of the sessions chosen.

@@ -114,9 +114,7 @@ impl SayPanel {
     fn say(&mut self, ctx: &Context, sessions: &[PathBuf], saying: Saying) {
         let (sessions, by) = (sessions.to_vec(), self.by.trim().to_owned());
         self.doing = Doing::Say;
-        self.task.start("edits", ctx, move |progress| {
-            Ok(say(&saying, &sessions, &by, progress))
-        });
+        self.task.start("edits", ctx, move |progress| Ok(say(&saying, &sessions, &by, progress)));
     }
 
     fn turn_back(&mut self, ctx: &Context, doing: Doing) {
@@ -130,9 +128,7 @@ impl SayPanel {
         let Some(act) = stack.pop() else { return };
         let by = self.by.trim().to_owned();
         self.doing = doing;
-        self.task.start("undo", ctx, move |progress| {
-            Ok(take_back(&act, &by, progress))
-        });
+        self.task.start("undo", ctx, move |progress| Ok(take_back(&act, &by, progress)));
     }
 
     /// Ctrl+Z takes back, Ctrl+Shift+Z and Ctrl+Y do again, while no text is being typed.
@@ -229,10 +225,9 @@ impl SayPanel {
             let act = stack.last()?;
             Some(format!("{name}: {}", act.words))
         };
-        for (text, doing) in [
-            (words("Undo", &self.undo), Doing::Undo),
-            (words("Redo", &self.redo), Doing::Redo),
-        ] {
+        for (text, doing) in
+            [(words("Undo", &self.undo), Doing::Undo), (words("Redo", &self.redo), Doing::Redo)]
+        {
             let Some(text) = text else { continue };
             // The words may be many; under the pointer stands all of it.
             let button = eframe::egui::Button::new(&text).truncate();
@@ -276,10 +271,7 @@ mod tests {
     fn tags_are_given_and_taken_away_by_their_signs() {
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
         let line = " +pilot, good  -doubtful";
-        assert_eq!(
-            tags(line),
-            (words(&["pilot", "good"]), words(&["doubtful"]))
-        );
+        assert_eq!(tags(line), (words(&["pilot", "good"]), words(&["doubtful"])));
         assert_eq!(tags(" , "), (words(&[]), words(&[])));
     }
 }

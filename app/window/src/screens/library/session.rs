@@ -53,15 +53,10 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
     };
     fact("specimen", &entry.specimen);
     fact("operator", &entry.operator);
-    let version = entry
-        .protocol_version
-        .map_or(String::new(), |it| format!(", version {it}"));
+    let version = entry.protocol_version.map_or(String::new(), |it| format!(", version {it}"));
     fact("protocol", &format!("{}{version}", entry.protocol));
     fact("started", &format!("{} UTC", second(&entry.started_at)));
-    fact(
-        "length",
-        &format!("{:.1} s, {} samples", entry.duration_s, entry.samples),
-    );
+    fact("length", &format!("{:.1} s, {} samples", entry.duration_s, entry.samples));
     fact("probe", &entry.indenter);
     fact("rig", &entry.rig_identity);
     fact("calibrated", &entry.calibration);
@@ -85,13 +80,7 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
     let word = trouble.map_or(word.to_owned(), |why| format!("{word}: {}", one_line(why)));
     marked_ui(ui, "health", mark, &word, trouble.is_some());
     let (mark, word) = verdict(entry);
-    marked_ui(
-        ui,
-        "verdict",
-        mark,
-        &why(word, &entry.verdict_reason),
-        false,
-    );
+    marked_ui(ui, "verdict", mark, &why(word, &entry.verdict_reason), false);
     let (mark, word) = review(entry);
     let reviewed = entry.review.as_ref().map_or(word.to_owned(), |review| {
         let by = format!("{word}, by {}", review.by);
@@ -132,31 +121,24 @@ fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
         Some(Err(err)) => sentence(ui, err, true),
         Some(Ok(told)) => {
             for note in &told.notes {
-                fact_ui(
-                    ui,
-                    "noted",
-                    format!("{} ({})", one_line(&note.reason), note.by),
-                );
+                fact_ui(ui, "noted", format!("{} ({})", one_line(&note.reason), note.by));
             }
             if told.events.is_empty() {
                 return;
             }
             section_ui(ui, "History");
-            ScrollArea::vertical()
-                .id_salt("history")
-                .max_height(HISTORY)
-                .show(ui, |ui| {
-                    for event in &told.events {
-                        let words = format!(
-                            "{} {} {}: {}",
-                            second(&event.at),
-                            event.by,
-                            event.what,
-                            one_line(&event.sentence)
-                        );
-                        ui.add(Label::new(RichText::new(words).small()).wrap());
-                    }
-                });
+            ScrollArea::vertical().id_salt("history").max_height(HISTORY).show(ui, |ui| {
+                for event in &told.events {
+                    let words = format!(
+                        "{} {} {}: {}",
+                        second(&event.at),
+                        event.by,
+                        event.what,
+                        one_line(&event.sentence)
+                    );
+                    ui.add(Label::new(RichText::new(words).small()).wrap());
+                }
+            });
         }
     }
 }
@@ -167,11 +149,7 @@ fn values_ui(ui: &mut Ui, entry: &Entry) {
         (Source::Plan, "Protocol's values"),
         (Source::Fit, "Saved fits"),
     ] {
-        let values: Vec<_> = entry
-            .named
-            .iter()
-            .filter(|one| one.source == source)
-            .collect();
+        let values: Vec<_> = entry.named.iter().filter(|one| one.source == source).collect();
         if values.is_empty() {
             continue;
         }
@@ -199,11 +177,7 @@ pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<I
     }
     let names = |of: fn(&Entry) -> &str| {
         let names: BTreeSet<&str> = entries.iter().map(|entry| of(entry)).collect();
-        let mut words: Vec<String> = names
-            .iter()
-            .take(NAMES)
-            .map(|name| one_line(name))
-            .collect();
+        let mut words: Vec<String> = names.iter().take(NAMES).map(|name| one_line(name)).collect();
         if names.len() > NAMES {
             words.push(format!("and {} more", names.len() - NAMES));
         }
@@ -216,14 +190,9 @@ pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<I
     fact_ui(ui, "reviews", names(|entry| review(entry).1));
     fact_ui(ui, "health", names(|entry| health(entry).1));
     let of_all = entries.iter().skip(1).fold(
-        entries
-            .first()
-            .map_or(BTreeSet::new(), |one| one.tags.iter().collect()),
+        entries.first().map_or(BTreeSet::new(), |one| one.tags.iter().collect()),
         |common: BTreeSet<&String>, one| {
-            common
-                .into_iter()
-                .filter(|tag| one.tags.contains(tag))
-                .collect()
+            common.into_iter().filter(|tag| one.tags.contains(tag)).collect()
         },
     );
     let tags: Vec<String> = of_all.into_iter().map(|tag| one_line(tag)).collect();

@@ -46,19 +46,14 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
         .iter()
         .filter_map(|(head, width)| Some((heads.iter().position(|known| known == head)?, *width)))
         .collect();
-    let columns: Vec<Column> = places
-        .iter()
-        .map(|&(place, width)| column(&heads[place], width))
-        .collect();
+    let columns: Vec<Column> =
+        places.iter().map(|&(place, width)| column(&heads[place], width)).collect();
     let mut rows: Vec<Row> = selection
         .candidates
         .iter()
         .zip(table)
         .map(|(one, cells)| Row {
-            cells: places
-                .iter()
-                .map(|&(place, _)| cells[place].clone())
-                .collect(),
+            cells: places.iter().map(|&(place, _)| cells[place].clone()).collect(),
             look: look(selection, one),
             hint: Some(hint(one)),
         })
@@ -88,9 +83,7 @@ fn look(selection: &Selection, one: &Candidate) -> RowLook {
 
 /// The family in words and what to know of its fit.
 fn hint(one: &Candidate) -> String {
-    let lines = std::iter::once(&one.name)
-        .chain(&one.warnings)
-        .chain(&one.prediction_refused);
+    let lines = std::iter::once(&one.name).chain(&one.warnings).chain(&one.prediction_refused);
     lines.cloned().collect::<Vec<_>>().join("\n")
 }
 
@@ -108,10 +101,7 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
         ui.add_space(4.0);
     }
     if let Some(chosen) = &selection.verdict.family
-        && let Some(one) = selection
-            .candidates
-            .iter()
-            .find(|one| one.family == *chosen)
+        && let Some(one) = selection.candidates.iter().find(|one| one.family == *chosen)
         && let Ok(parameters) = one.model.parameters()
     {
         section_ui(ui, "Parameters");
@@ -130,12 +120,8 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
         let line = |words: RichText| Label::new(words.small()).wrap();
         ui.add(line(RichText::new(format!("{}: {}", step[0], step[1]))));
         let numbers = ladder[0].iter().zip(step).skip(2);
-        let numbers: Vec<String> = numbers
-            .map(|(head, cell)| format!("{head} {cell}"))
-            .collect();
-        ui.add(line(
-            RichText::new(numbers.join(", ")).color(tokens.text_quiet),
-        ));
+        let numbers: Vec<String> = numbers.map(|(head, cell)| format!("{head} {cell}")).collect();
+        ui.add(line(RichText::new(numbers.join(", ")).color(tokens.text_quiet)));
     }
     section_ui(ui, "Recordings");
     for text in [selection::records(selection), selection::tested(selection)] {

@@ -78,10 +78,7 @@ impl ModelsForm {
     fn tolerance(&self) -> Result<Option<Tolerance>, String> {
         match self.tolerance.trim() {
             "" => Ok(None),
-            text => text
-                .parse()
-                .map(Some)
-                .map_err(|err: BadTolerance| err.to_string()),
+            text => text.parse().map(Some).map_err(|err: BadTolerance| err.to_string()),
         }
     }
 
@@ -108,8 +105,7 @@ impl ModelsForm {
                 if button.clicked() {
                     dropped = Some(index);
                 }
-                ui.add(Label::new(name).truncate())
-                    .on_hover_text(path.display().to_string());
+                ui.add(Label::new(name).truncate()).on_hover_text(path.display().to_string());
             });
         }
         if let Some(index) = dropped {
@@ -178,22 +174,14 @@ impl ModelsForm {
             }
         }
         choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
-        tick_box(
-            ui,
-            &mut self.with_unload,
-            "the way back too, where recorded",
-        );
+        tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
     }
 }
 
 /// The last two parts of a path: enough to tell recordings apart.
 fn short(path: &Path) -> String {
-    let parts: Vec<String> = path
-        .iter()
-        .rev()
-        .take(2)
-        .map(|part| part.to_string_lossy().into_owned())
-        .collect();
+    let parts: Vec<String> =
+        path.iter().rev().take(2).map(|part| part.to_string_lossy().into_owned()).collect();
     parts.into_iter().rev().collect::<Vec<_>>().join("/")
 }
 
@@ -211,11 +199,7 @@ mod tests {
         assert_eq!(request.paths.len(), 1);
         assert!(request.options.tolerance.is_some());
         form.tolerance = "much".into();
-        assert!(
-            form.request()
-                .unwrap_err()
-                .contains("'much' is not a tolerance")
-        );
+        assert!(form.request().unwrap_err().contains("'much' is not a tolerance"));
         form.tolerance = " ".into();
         assert!(form.request().unwrap().options.tolerance.is_none());
     }

@@ -107,10 +107,6 @@ impl Screen for ModelsScreen {
 
 fn sentence_ui(ui: &mut Ui, text: &str, is_wrong: bool) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink = if is_wrong {
-        tokens.alarm_text
-    } else {
-        tokens.text_quiet
-    };
+    let ink = if is_wrong { tokens.alarm_text } else { tokens.text_quiet };
     ui.add(Label::new(RichText::new(text).color(ink)).wrap());
 }

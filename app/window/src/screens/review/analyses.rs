@@ -54,9 +54,7 @@ pub struct AnalysesPanel {
 
 impl std::fmt::Debug for AnalysesPanel {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("AnalysesPanel")
-            .field("asked", &self.asked)
-            .finish_non_exhaustive()
+        f.debug_struct("AnalysesPanel").field("asked", &self.asked).finish_non_exhaustive()
     }
 }
 
@@ -193,10 +191,7 @@ impl AnalysesPanel {
         section_ui(ui, "Make another");
         let others = self.shown.iter().filter(|one| one.session != known.session);
         let others: Vec<Wanted> = others
-            .map(|one| Wanted {
-                session: one.session.clone(),
-                analysis: one.analysis.clone(),
-            })
+            .map(|one| Wanted { session: one.session.clone(), analysis: one.analysis.clone() })
             .collect();
         let read_by = looked.analysis.as_deref();
         let name = self.form.ui(ui, known, read_by, &others);
@@ -242,15 +237,11 @@ impl AnalysesPanel {
     }
 
     fn start(&mut self, ctx: &Context, session: &Path, deed: Deed) {
-        let who = Who {
-            by: self.by.trim().to_owned(),
-            reason: self.reason.trim().to_owned(),
-        };
+        let who = Who { by: self.by.trim().to_owned(), reason: self.reason.trim().to_owned() };
         let session = session.to_path_buf();
         self.is_working = true;
         self.work.start("analysis", ctx, move |progress| {
-            deed.run(&session, &who, progress)
-                .map_err(|err| err.to_string())
+            deed.run(&session, &who, progress).map_err(|err| err.to_string())
         });
     }
 
@@ -258,11 +249,7 @@ impl AnalysesPanel {
         let session = session.to_path_buf();
         self.own.start("own-fit", ctx, move |progress| {
             let (parameters, sentences) = own(&session, progress)?;
-            Ok(Own {
-                session,
-                parameters,
-                sentences,
-            })
+            Ok(Own { session, parameters, sentences })
         });
     }
 

@@ -51,10 +51,7 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
             peak_n,
             peak_t,
             depth_mm: place.and_then(|place| track.value(Quantity::Depth as usize, place)),
-            t: [
-                stretch.t,
-                track.time_of(end.saturating_sub(1)).unwrap_or(stretch.t),
-            ],
+            t: [stretch.t, track.time_of(end.saturating_sub(1)).unwrap_or(stretch.t)],
             rows: [stretch.first, end],
         });
     }
@@ -91,15 +88,10 @@ fn rows_of(subject: &Subject) -> Vec<Row> {
             format!("{:.2}", cycle.t[0]),
             format!("{:.2}", cycle.t[1] - cycle.t[0]),
             format!("{:.4}", cycle.peak_n),
-            cycle
-                .depth_mm
-                .map_or("-".into(), |depth| format!("{depth:.4}")),
+            cycle.depth_mm.map_or("-".into(), |depth| format!("{depth:.4}")),
             share.map_or("-".into(), |share| format!("{share:.2}")),
         ];
-        Row {
-            cells,
-            ..Row::default()
-        }
+        Row { cells, ..Row::default() }
     };
     own.iter().map(row).collect()
 }
@@ -142,9 +134,8 @@ impl ReviewScreen {
             return;
         }
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let colors: Vec<Color32> = (0..all.len())
-            .map(|index| tokens.in_order(index, all.len()))
-            .collect();
+        let colors: Vec<Color32> =
+            (0..all.len()).map(|index| tokens.in_order(index, all.len())).collect();
         ui.horizontal_wrapped(|ui| {
             ui.label(format!("{}:", front.name));
             for (index, (cycle, color)) in all.iter().zip(&colors).enumerate() {
@@ -176,8 +167,7 @@ impl ReviewScreen {
             })
             .collect();
         let spans = [&self.depth, &self.force];
-        self.depth_lines
-            .update(ui.ctx(), &sources, spans, self.depth_pixels);
+        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
         let layers: Vec<Layer<'_>> = drawn
             .iter()
             .map(|(cycle, color)| Layer {

@@ -67,12 +67,7 @@ impl ReviewScreen {
             let events = input.events.iter();
             events
                 .filter_map(|event| match event {
-                    Event::Key {
-                        key,
-                        pressed: true,
-                        modifiers,
-                        ..
-                    } => Some((*key, *modifiers)),
+                    Event::Key { key, pressed: true, modifiers, .. } => Some((*key, *modifiers)),
                     _ => None,
                 })
                 .collect()

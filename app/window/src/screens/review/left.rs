@@ -72,8 +72,7 @@ impl ReviewScreen {
         }
         section_ui(ui, "Time zero at");
         for leader in Leader::ALL {
-            ui.radio_value(&mut self.leader, leader, leader.name())
-                .place(leader.name());
+            ui.radio_value(&mut self.leader, leader, leader.name()).place(leader.name());
         }
         self.leaders_missing_ui(ui);
         section_ui(ui, "Shown over time");
@@ -109,17 +108,13 @@ impl ReviewScreen {
     fn sessions_ui(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         if self.subjects.is_empty() {
-            quiet_ui(
-                ui,
-                "none yet: choose some in the library, or type the path of one",
-            );
+            quiet_ui(ui, "none yet: choose some in the library, or type the path of one");
         }
         let mut asked = None;
         for (index, subject) in self.subjects.iter().enumerate() {
             ui.horizontal(|ui| {
                 let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
-                ui.painter()
-                    .rect_filled(rect, 2.0, color_of(tokens, subject.id));
+                ui.painter().rect_filled(rect, 2.0, color_of(tokens, subject.id));
                 let mut name = RichText::new(&subject.name);
                 if index == 0 {
                     name = name.strong();
@@ -134,10 +129,7 @@ impl ReviewScreen {
                 }
             });
             ui.horizontal(|ui| {
-                if ui
-                    .add(small(&format!("remove: {}", subject.name)))
-                    .clicked()
-                {
+                if ui.add(small(&format!("remove: {}", subject.name))).clicked() {
                     asked = Some(Asked::Remove(index));
                 }
             });
@@ -175,11 +167,8 @@ impl ReviewScreen {
     fn leaders_missing_ui(&self, ui: &mut Ui) {
         for subject in &self.subjects {
             if subject.is_settled() && subject.moment(self.leader).is_none() {
-                let words = format!(
-                    "{} has no {}; it lies at its start",
-                    subject.name,
-                    self.leader.name()
-                );
+                let words =
+                    format!("{} has no {}; it lies at its start", subject.name, self.leader.name());
                 quiet_ui(ui, &words);
             }
         }
@@ -188,8 +177,7 @@ impl ReviewScreen {
     /// Draws the names of the views.
     pub(super) fn views_ui(&mut self, ui: &mut Ui) {
         for view in View::ALL {
-            ui.selectable_value(&mut self.view, view, view.name())
-                .place(view.name());
+            ui.selectable_value(&mut self.view, view, view.name()).place(view.name());
         }
     }
 }

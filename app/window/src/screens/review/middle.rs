@@ -104,9 +104,7 @@ impl ReviewScreen {
         let end = recording.track.span().map_or(0.0, |span| span[1]);
         let phases = Recording::ended(&recording.phases, end);
         let mut setting = Setting {
-            phases: phases
-                .map(|(from, to, phase)| (from - shift, to - shift, phase))
-                .collect(),
+            phases: phases.map(|(from, to, phase)| (from - shift, to - shift, phase)).collect(),
             cursors: self.cursors,
             ..Setting::default()
         };
@@ -227,8 +225,7 @@ impl ReviewScreen {
             })
             .collect();
         let spans = [&self.depth, &self.force];
-        self.depth_lines
-            .update(ui.ctx(), &sources, spans, self.depth_pixels);
+        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
         let layers: Vec<over_depth::Layer<'_>> = self
             .subjects
             .iter()

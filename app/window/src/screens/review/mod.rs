@@ -64,13 +64,8 @@ pub enum View {
 
 impl View {
     /// All, as they stand.
-    pub const ALL: [Self; 5] = [
-        Self::OverTime,
-        Self::OverDepth,
-        Self::Cycles,
-        Self::Parameters,
-        Self::Prediction,
-    ];
+    pub const ALL: [Self; 5] =
+        [Self::OverTime, Self::OverDepth, Self::Cycles, Self::Parameters, Self::Prediction];
 
     /// Its name.
     #[must_use]
@@ -165,17 +160,10 @@ impl ReviewScreen {
 
     /// Shows a session besides those there; one that is there already is not shown twice.
     pub fn add(&mut self, session: PathBuf, ctx: &Context) {
-        if self
-            .subjects
-            .iter()
-            .any(|one| one.looked.session == session)
-        {
+        if self.subjects.iter().any(|one| one.looked.session == session) {
             return;
         }
-        let looked = Looked {
-            session,
-            analysis: None,
-        };
+        let looked = Looked { session, analysis: None };
         self.subjects.push(Subject::new(looked, self.next_id));
         self.next_id += 1;
         self.fetch(ctx);
@@ -246,11 +234,7 @@ impl ReviewScreen {
 
     /// Begins to fit every session shown.
     fn start_fits(&mut self, ctx: &Context) {
-        let subjects: Vec<_> = self
-            .subjects
-            .iter()
-            .map(|one| one.for_fit(&self.model))
-            .collect();
+        let subjects: Vec<_> = self.subjects.iter().map(|one| one.for_fit(&self.model)).collect();
         self.are_fits_taken = false;
         self.fits.start("review-fit", ctx, move |progress| {
             crate::workers::review::fit::fit_sessions(&subjects, progress)
@@ -277,14 +261,10 @@ impl ReviewScreen {
             let room = 0.01 * (high - low);
             self.time.set_whole([low - room, high + room]);
         }
-        for (span, quantity) in [
-            (&mut self.depth, Quantity::Depth),
-            (&mut self.force, Quantity::Force),
-        ] {
-            let ends = self
-                .subjects
-                .iter()
-                .filter_map(|one| one.extremes(quantity));
+        for (span, quantity) in
+            [(&mut self.depth, Quantity::Depth), (&mut self.force, Quantity::Force)]
+        {
+            let ends = self.subjects.iter().filter_map(|one| one.extremes(quantity));
             if let Some([low, high]) = ends.reduce(join) {
                 let room = 0.04 * (high - low).max(1e-6);
                 span.set_whole([low - room, high + room]);

@@ -47,9 +47,7 @@ pub fn parameter_rows(screen: &ReviewScreen) -> Vec<ParameterRow> {
 fn by_specimen(subjects: &[Subject]) -> Vec<(&Subject, String)> {
     let specimen = |subject: &Subject| {
         let head = subject.recording.head.as_ref();
-        head.map_or(String::new(), |head| {
-            head.manifest.specimen.trim().to_owned()
-        })
+        head.map_or(String::new(), |head| head.manifest.specimen.trim().to_owned())
     };
     let mut all: Vec<(&Subject, String)> =
         subjects.iter().map(|one| (one, specimen(one))).collect();
@@ -71,10 +69,7 @@ impl ReviewScreen {
             refusals_ui(ui, &self.subjects);
             return;
         };
-        let mut columns = vec![
-            Column::words("specimen", 90.0),
-            Column::words("session", 190.0),
-        ];
+        let mut columns = vec![Column::words("specimen", 90.0), Column::words("session", 190.0)];
         for parameter in &first.report.parameters {
             let head = match parameter.unit.as_str() {
                 "" => parameter.name.clone(),
@@ -92,10 +87,7 @@ impl ReviewScreen {
                 let found = names.map(|name| report.parameter(name));
                 cells.extend(found.map(|one| one.map_or(String::new(), text::cell)));
                 cells.push(format!("{:.3}", report.rmse_n * 1e3));
-                Some(Row {
-                    cells,
-                    ..Row::default()
-                })
+                Some(Row { cells, ..Row::default() })
             })
             .collect();
         refusals_ui(ui, &self.subjects);

@@ -22,10 +22,9 @@ impl ReviewScreen {
 
     pub(super) fn prediction_ui(&mut self, ui: &mut Ui) {
         let words = match self.subjects.as_slice() {
-            [known, other, ..] => format!(
-                "{} is fitted, and its body is pressed as {} was",
-                known.name, other.name
-            ),
+            [known, other, ..] => {
+                format!("{} is fitted, and its body is pressed as {} was", known.name, other.name)
+            }
             _ => String::new(),
         };
         head_ui(ui, "Prediction against validation", &words);
@@ -37,9 +36,7 @@ impl ReviewScreen {
             let pair = [known, other].map(|one| one.for_fit(&self.model));
             self.prediction_of = Some([known.name.clone(), other.name.clone()]);
             self.prediction
-                .start("review-predict", ui.ctx(), move |progress| {
-                    predict(&pair, progress)
-                });
+                .start("review-predict", ui.ctx(), move |progress| predict(&pair, progress));
         }
         let (found, [known, other]) = match (self.prediction.answer(), &self.prediction_of) {
             (Some(Ok(found)), Some(names)) => (found.clone(), names.clone()),
@@ -80,16 +77,9 @@ impl ReviewScreen {
             color: color_of(tokens, subject.id),
             stretches: &subject.lines[Quantity::Force as usize],
         };
-        let foretold = Layer {
-            name: "foretold",
-            color: tokens.limit,
-            stretches: &*modelled,
-        };
-        let left = Layer {
-            name: "left",
-            color: color_of(tokens, subject.id),
-            stretches: &*residual,
-        };
+        let foretold = Layer { name: "foretold", color: tokens.limit, stretches: &*modelled };
+        let left =
+            Layer { name: "left", color: color_of(tokens, subject.id), stretches: &*residual };
         let (width, height) = (ui.available_width(), ui.available_height());
         for (panel, share, axis) in [
             (

@@ -45,11 +45,7 @@ impl Reading {
                 }
             }
             if let [Some(a), Some(b)] = ends {
-                let name = if name.len() == 1 {
-                    format!("d{name}")
-                } else {
-                    format!("d {name}")
-                };
+                let name = if name.len() == 1 { format!("d{name}") } else { format!("d {name}") };
                 words.push(format!("{name} {:+.digits$} {unit}", b - a));
             }
         };
@@ -99,12 +95,7 @@ mod tests {
     fn differences_are_told_where_both_ends_are_known() {
         let reading = Reading {
             t: [Some(1.0), Some(3.5)],
-            values: [
-                [Some(0.25), Some(1.0)],
-                [Some(0.1), None],
-                [None, None],
-                [None, None],
-            ],
+            values: [[Some(0.25), Some(1.0)], [Some(0.1), None], [None, None], [None, None]],
         };
         assert_eq!(
             reading.words(),

@@ -125,9 +125,7 @@ fn events_ui(ui: &mut Ui, front: &Subject) -> Option<f64> {
                     (_, true) => tokens.text,
                     _ => tokens.text_quiet,
                 };
-                let words = RichText::new(format!("{at}{}", event.text))
-                    .color(ink)
-                    .small();
+                let words = RichText::new(format!("{at}{}", event.text)).color(ink).small();
                 let label = Label::new(words).truncate().sense(Sense::click());
                 let hint = format!("{}\npress to set cursor A there", event.text);
                 if ui.add(label).on_hover_text(hint).clicked() {

@@ -167,10 +167,7 @@ impl Subject {
         let Some(Ok(fit)) = &self.fit else {
             return;
         };
-        for (line, column) in [
-            (LINE_MODELLED, fit::MODELLED),
-            (LINE_RESIDUAL, fit::RESIDUAL),
-        ] {
+        for (line, column) in [(LINE_MODELLED, fit::MODELLED), (LINE_RESIDUAL, fit::RESIDUAL)] {
             self.lines[line].update(&fit.track, column, wanted);
         }
     }
@@ -178,11 +175,6 @@ impl Subject {
     /// What a shown session wants of the plots.
     #[must_use]
     pub fn wanted(&self, window: [f64; 2], pixels: f64, leader: Leader) -> Wanted {
-        Wanted {
-            window,
-            pixels,
-            shift: self.shift(leader),
-            version: self.recording.version,
-        }
+        Wanted { window, pixels, shift: self.shift(leader), version: self.recording.version }
     }
 }

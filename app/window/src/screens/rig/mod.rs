@@ -34,10 +34,7 @@ pub struct RigScreen {
 
 impl Default for RigScreen {
     fn default() -> Self {
-        Self {
-            distance: QuantityField::new(1.0),
-            speed: QuantityField::new(3.0),
-        }
+        Self { distance: QuantityField::new(1.0), speed: QuantityField::new(3.0) }
     }
 }
 
@@ -63,23 +60,18 @@ impl Screen for RigScreen {
         let rig = &workbench.snapshot.rig;
         let facts = Facts {
             limits: &workbench.bench.limits,
-            force: rig
-                .reading
-                .map(|reading| curve.newtons_from_volts(reading.volts)),
+            force: rig.reading.map(|reading| curve.newtons_from_volts(reading.volts)),
             verdict: &workbench.aside_verdict(),
             refusal: workbench.refusal.as_deref(),
         };
-        ScrollArea::vertical()
-            .id_salt("rig")
-            .auto_shrink(false)
-            .show(ui, |ui| {
-                heading(ui, "Now");
-                values_ui(ui, rig, &facts);
-                heading(ui, "Move by hand");
-                self.move_ui(ui, rig, &facts, commands);
-                heading(ui, "Limits that no protocol can loosen");
-                limits_ui(ui, rig, facts.limits);
-            });
+        ScrollArea::vertical().id_salt("rig").auto_shrink(false).show(ui, |ui| {
+            heading(ui, "Now");
+            values_ui(ui, rig, &facts);
+            heading(ui, "Move by hand");
+            self.move_ui(ui, rig, &facts, commands);
+            heading(ui, "Limits that no protocol can loosen");
+            limits_ui(ui, rig, facts.limits);
+        });
     }
 
     fn has_right(&self) -> bool {
@@ -101,16 +93,14 @@ impl RigScreen {
             quantity_ui(ui, "distance", "mm", &mut self.distance);
             quantity_ui(ui, "jog speed", "mm/s", &mut self.speed);
         });
-        self.distance
-            .check(|mm| match mm != 0.0 && mm.abs() <= furthest {
-                true => Ok(()),
-                false => Err(format!("a distance of at most {furthest:.0} mm, and not 0")),
-            });
-        self.speed
-            .check(|speed| match speed > 0.0 && speed <= fastest {
-                true => Ok(()),
-                false => Err(format!("a speed above 0 and at most {fastest} mm/s")),
-            });
+        self.distance.check(|mm| match mm != 0.0 && mm.abs() <= furthest {
+            true => Ok(()),
+            false => Err(format!("a distance of at most {furthest:.0} mm, and not 0")),
+        });
+        self.speed.check(|speed| match speed > 0.0 && speed <= fastest {
+            true => Ok(()),
+            false => Err(format!("a speed above 0 and at most {fastest} mm/s")),
+        });
         let typed = self.distance.value.clone().and_then(|distance| {
             let speed = self.speed.value.clone()?;
             facts.verdict.clone()?;
@@ -173,21 +163,18 @@ fn values_ui(ui: &mut Ui, rig: &RigView, facts: &Facts<'_>) {
         true => "position from home",
         false => "counter, home not known",
     };
-    Grid::new("values")
-        .num_columns(3)
-        .spacing(vec2(40.0, 6.0))
-        .show(ui, |ui| {
-            for name in ["signal", "force, not tared", place] {
-                ui.label(RichText::new(name).color(tokens.text_quiet));
-            }
-            ui.end_row();
-            let signal = rig.reading.map(|reading| format!("{:.4}", reading.volts));
-            let force = facts.force.map(|force| format!("{force:.3}"));
-            for value in [signal, force, position] {
-                ui.label(RichText::new(value.unwrap_or_else(none)).text_style(reading_style()));
-            }
-            ui.end_row();
-        });
+    Grid::new("values").num_columns(3).spacing(vec2(40.0, 6.0)).show(ui, |ui| {
+        for name in ["signal", "force, not tared", place] {
+            ui.label(RichText::new(name).color(tokens.text_quiet));
+        }
+        ui.end_row();
+        let signal = rig.reading.map(|reading| format!("{:.4}", reading.volts));
+        let force = facts.force.map(|force| format!("{force:.3}"));
+        for value in [signal, force, position] {
+            ui.label(RichText::new(value.unwrap_or_else(none)).text_style(reading_style()));
+        }
+        ui.end_row();
+    });
     let health = match (&rig.link_error, &rig.link) {
         (Some(reason), _) => RichText::new(format!("Link lost: {reason}")).color(tokens.alarm_text),
         (None, Some(words)) => RichText::new(format!("link: {words}")),
@@ -210,39 +197,24 @@ fn limits_ui(ui: &mut Ui, rig: &RigView, limits: &Limits) {
     let silence =
         |speed: f64| Limits::sample_age_max(MmPerS(speed), about.unseen_max, apart).0 * 1e3;
     let fastest = about.speed_max.0;
-    Grid::new("limits")
-        .num_columns(2)
-        .spacing(vec2(24.0, 4.0))
-        .show(ui, |ui| {
-            for (name, value) in [
-                (
-                    "furthest position",
-                    format!("{:.1} mm from home", limits.travel_max.0),
+    Grid::new("limits").num_columns(2).spacing(vec2(24.0, 4.0)).show(ui, |ui| {
+        for (name, value) in [
+            ("furthest position", format!("{:.1} mm from home", limits.travel_max.0)),
+            ("force above tare", format!("{:.1} to {:.1}", limits.force_min, limits.force_max)),
+            ("change of force", format!("{:.0} N/s", limits.force_rate_max)),
+            ("signal", format!("{:.2} whatever the calibration says", limits.volts_max)),
+            (
+                "silence",
+                format!(
+                    "{:.0} ms at rest, {:.0} ms at {fastest} mm/s",
+                    silence(0.0),
+                    silence(fastest)
                 ),
-                (
-                    "force above tare",
-                    format!("{:.1} to {:.1}", limits.force_min, limits.force_max),
-                ),
-                (
-                    "change of force",
-                    format!("{:.0} N/s", limits.force_rate_max),
-                ),
-                (
-                    "signal",
-                    format!("{:.2} whatever the calibration says", limits.volts_max),
-                ),
-                (
-                    "silence",
-                    format!(
-                        "{:.0} ms at rest, {:.0} ms at {fastest} mm/s",
-                        silence(0.0),
-                        silence(fastest)
-                    ),
-                ),
-            ] {
-                ui.label(name);
-                ui.label(value);
-                ui.end_row();
-            }
-        });
+            ),
+        ] {
+            ui.label(name);
+            ui.label(value);
+            ui.end_row();
+        }
+    });
 }

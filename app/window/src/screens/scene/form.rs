@@ -72,12 +72,8 @@ impl SceneForm {
         if read.nodes.is_none() {
             notes.push("the file leaves the mesh to a plan: plan it on the screen Trade".into());
         }
-        *self = Self {
-            file: std::mem::take(&mut self.file),
-            path: self.path,
-            notes,
-            ..Self::of(read)
-        };
+        *self =
+            Self { file: std::mem::take(&mut self.file), path: self.path, notes, ..Self::of(read) };
     }
 
     /// Takes other numbers of the same scene.
@@ -102,8 +98,7 @@ impl SceneForm {
             false => Err("must be a whole number".into()),
         });
         self.slope.check(|slope| within(slope, [0.0, 1000.0]));
-        self.friction
-            .check(|friction| within(friction, [0.0, 10.0]));
+        self.friction.check(|friction| within(friction, [0.0, 10.0]));
         self.rate.check(|rate| {
             let period = Period::of_rate(rate);
             period.map(|_| ()).map_err(|err| err.to_string())
@@ -160,11 +155,9 @@ impl SceneForm {
         section_ui(ui, "Hand");
         ui.horizontal_wrapped(|ui| {
             for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name())
-                    .place(path.name());
+                ui.radio_value(&mut self.path, Some(path), path.name()).place(path.name());
             }
-            ui.radio_value(&mut self.path, None, "pointer and keys")
-                .place("pointer and keys");
+            ui.radio_value(&mut self.path, None, "pointer and keys").place("pointer and keys");
         });
         asked
     }
@@ -184,10 +177,7 @@ impl SceneForm {
             true => format!("; movements below {} mm go no further", self.read.cut_mm),
             false => String::new(),
         };
-        quiet_ui(
-            ui,
-            &format!("back to rest with a time constant of {recovery:.3} s{cut}"),
-        );
+        quiet_ui(ui, &format!("back to rest with a time constant of {recovery:.3} s{cut}"));
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
         tick_box(ui, &mut self.is_guarded, "guards and controller");

@@ -88,23 +88,19 @@ impl SceneScreen {
                 self.view.reset();
             }
         });
-        let Played {
-            moment,
-            trail,
-            shown,
-            title,
-        } = match played(self.side, self.touch.as_ref(), self.ahead.answer()) {
-            Ok(played) => played,
-            Err(None) => {
-                let words = match self.side {
-                    Side::Live => "the scene has not run yet",
-                    Side::Ahead => "nothing computed yet",
-                };
-                ui.label(RichText::new(words).color(tokens.text_quiet));
-                return;
-            }
-            Err(Some(reason)) => return alarm_ui(ui, reason),
-        };
+        let Played { moment, trail, shown, title } =
+            match played(self.side, self.touch.as_ref(), self.ahead.answer()) {
+                Ok(played) => played,
+                Err(None) => {
+                    let words = match self.side {
+                        Side::Live => "the scene has not run yet",
+                        Side::Ahead => "nothing computed yet",
+                    };
+                    ui.label(RichText::new(words).color(tokens.text_quiet));
+                    return;
+                }
+                Err(Some(reason)) => return alarm_ui(ui, reason),
+            };
         ui.label(RichText::new(title).color(tokens.text_quiet).small());
         let now = match moment.now() {
             Ok(now) => now,

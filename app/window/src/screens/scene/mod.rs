@@ -141,9 +141,7 @@ impl SceneScreen {
         self.side = Side::Ahead;
         self.look_at(&settings);
         self.ahead.start("scene-ahead", ctx, move |progress| {
-            ahead(settings, path, &mut |share| {
-                progress.share(share, "the path")
-            })
+            ahead(settings, path, &mut |share| progress.share(share, "the path"))
         });
     }
 
@@ -261,10 +259,7 @@ impl Screen for SceneScreen {
                 None => {}
             }
         }
-        let hand = Hand6 {
-            at: self.view.hand().at(),
-            turn: TURN,
-        };
+        let hand = Hand6 { at: self.view.hand().at(), turn: TURN };
         if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
             self.refusal = Some(reason);
             self.tape.cut_off();

@@ -22,11 +22,7 @@ pub(super) struct Planned {
 
 impl Planned {
     fn of(file: SceneFile, curves: &SceneCurves) -> Self {
-        Self {
-            plan: planned(&file, curves, 1.0),
-            curves: curves.clone(),
-            file,
-        }
+        Self { plan: planned(&file, curves, 1.0), curves: curves.clone(), file }
     }
 
     fn is_of(&self, file: &SceneFile, curves: &SceneCurves) -> bool {
@@ -41,11 +37,7 @@ impl SceneScreen {
             self.planned = None;
             return;
         };
-        if !self
-            .planned
-            .as_ref()
-            .is_some_and(|one| one.is_of(&file, curves))
-        {
+        if !self.planned.as_ref().is_some_and(|one| one.is_of(&file, curves)) {
             self.planned = Some(Planned::of(file, curves));
         }
     }
@@ -62,9 +54,7 @@ impl SceneScreen {
         }
         let verdict = match &self.planned {
             None => Err("measure what a scene costs on the screen Trade first".to_owned()),
-            Some(Planned {
-                plan: Err(none), ..
-            }) => Err(none.why.clone()),
+            Some(Planned { plan: Err(none), .. }) => Err(none.why.clone()),
             Some(_) if is_running => Err("the scene runs".to_owned()),
             Some(Planned { plan: Ok(_), .. }) => Ok(()),
         };
@@ -75,12 +65,7 @@ impl SceneScreen {
             }
         }
         let is_taken = reason_button(ui, "Take the plan", vec2(170.0, 26.0), &verdict);
-        if let Some(Planned {
-            file,
-            plan: Ok(plan),
-            ..
-        }) = &self.planned
-        {
+        if let Some(Planned { file, plan: Ok(plan), .. }) = &self.planned {
             for line in plan_text(plan).lines() {
                 quiet_ui(ui, line);
             }
@@ -138,30 +123,17 @@ mod tests {
 
     /// A fine mesh of 100 us, a coarse one of 10, and one way to step.
     fn curves(file: &SceneFile) -> SceneCurves {
-        let mesh = |(nodes, error_mm, cost_us)| MeshPoint {
-            nodes,
-            error_mm,
-            cost_us,
-        };
+        let mesh = |(nodes, error_mm, cost_us)| MeshPoint { nodes, error_mm, cost_us };
         SceneCurves {
             meshes: [(201, 0.01, 100.0), (51, 0.1, 10.0)].map(mesh).into(),
-            cuts: vec![CutPoint {
-                range: None,
-                threshold_mm: 0.0,
-                error_mm: 0.0,
-                cost_share: 1.0,
-            }],
+            cuts: vec![CutPoint { range: None, threshold_mm: 0.0, error_mm: 0.0, cost_share: 1.0 }],
             steps: vec![StepPoint {
                 scheme: file.scheme,
                 step_s: 1.0 / file.rate_hz,
                 error_n: 0.0,
                 cost_us: 0.1,
             }],
-            families: vec![FamilyPoint {
-                family: "series-3".into(),
-                error_n: 0.0,
-                cost_us: 0.1,
-            }],
+            families: vec![FamilyPoint { family: "series-3".into(), error_n: 0.0, cost_us: 0.1 }],
         }
     }
 
@@ -178,10 +150,7 @@ mod tests {
         let fine = made_after(&file, &plan);
         // Four times as slow as measured: only the coarse mesh keeps to the budget, and it is too coarse.
         let words = after_miss(&fine, &curves, 400.0);
-        assert!(
-            words.contains("within the budget, 51 nodes a side"),
-            "{words}"
-        );
+        assert!(words.contains("within the budget, 51 nodes a side"), "{words}");
         // A third slower still keeps to it.
         let words = after_miss(&fine, &curves, 130.0);
         assert!(
@@ -189,10 +158,7 @@ mod tests {
             "{words}"
         );
         // Of the time of a mesh that nobody planned nothing follows for those that were measured.
-        let own = SceneFile {
-            nodes: Some(801),
-            ..fine
-        };
+        let own = SceneFile { nodes: Some(801), ..fine };
         let words = after_miss(&own, &curves, 1000.0);
         assert!(words.contains("not made after its plan"), "{words}");
     }

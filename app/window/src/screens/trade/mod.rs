@@ -145,15 +145,8 @@ impl TradeScreen {
     }
 
     fn wanted(&self) -> Result<(Tolerance, f64, f64), String> {
-        let tolerance = self
-            .tolerance
-            .parse()
-            .map_err(|err: BadTolerance| err.to_string())?;
-        Ok((
-            tolerance,
-            self.rate.value.clone()?,
-            self.share.value.clone()?,
-        ))
+        let tolerance = self.tolerance.parse().map_err(|err: BadTolerance| err.to_string())?;
+        Ok((tolerance, self.rate.value.clone()?, self.share.value.clone()?))
     }
 
     fn recommendation(&self) -> Option<Recommendation> {
@@ -231,9 +224,8 @@ impl Screen for TradeScreen {
         section_ui(ui, "Wanted");
         ui.horizontal(|ui| {
             let label = form_label(ui, "tolerance");
-            let input = TextEdit::singleline(&mut self.tolerance)
-                .desired_width(96.0)
-                .char_limit(24);
+            let input =
+                TextEdit::singleline(&mut self.tolerance).desired_width(96.0).char_limit(24);
             ui.add(input).labelled_by(label.id).place("tolerance");
         });
         match self.tolerance.parse::<Tolerance>() {
@@ -271,10 +263,7 @@ impl Screen for TradeScreen {
         section_ui(ui, "Measured");
         let facts = [
             known.curves.machine.words(),
-            format!(
-                "{} by palpate {}",
-                known.curves.measured_at, known.curves.version
-            ),
+            format!("{} by palpate {}", known.curves.measured_at, known.curves.version),
             format!(
                 "even and odd rounds differ by {} at most",
                 percent(known.curves.worst_halves())
@@ -376,11 +365,7 @@ impl Screen for TradeScreen {
         }
         self.task.start("trade-read", ctx, move |_| {
             let curves = read_trade(&file).map_err(|err| err.to_string())?;
-            Ok(Known {
-                doubts: doubts(&curves),
-                stored: Ok(file.display().to_string()),
-                curves,
-            })
+            Ok(Known { doubts: doubts(&curves), stored: Ok(file.display().to_string()), curves })
         });
     }
 
@@ -396,17 +381,11 @@ impl Screen for TradeScreen {
         if workbench.measure_verdict().is_err() {
             return;
         }
-        let extent = if self.is_quick {
-            Extent::Quick
-        } else {
-            Extent::Full
-        };
+        let extent = if self.is_quick { Extent::Quick } else { Extent::Full };
         if self.view.is_scene() {
             self.scene.start("scene-curves", ctx, move |progress| {
                 let curves = trade::measure_scene(extent, progress)?;
-                curves
-                    .map(Arc::new)
-                    .ok_or_else(|| "ended before it was done".to_owned())
+                curves.map(Arc::new).ok_or_else(|| "ended before it was done".to_owned())
             });
             return;
         }
@@ -444,9 +423,5 @@ fn in_range(value: f64, high: f64) -> Result<(), String> {
 }
 
 fn doubts(curves: &TradeCurves) -> Vec<String> {
-    curves.doubts(
-        &trade::this_machine(),
-        trade::version(),
-        trade::age_days(curves),
-    )
+    curves.doubts(&trade::this_machine(), trade::version(), trade::age_days(curves))
 }

@@ -40,10 +40,7 @@ impl Shown {
         hint: Option<String>,
     ) {
         if let [Some(cost), Some(error)] = at {
-            self.marks.push(Mark {
-                at: [cost, error],
-                label: [String::new(), cells.join("\n")],
-            });
+            self.marks.push(Mark { at: [cost, error], label: [String::new(), cells.join("\n")] });
         }
         let look = match (is_front, at[1]) {
             (true, _) => RowLook::Marked,
@@ -73,12 +70,7 @@ pub(super) fn integrators(curves: &TradeCurves) -> Shown {
             time(row.cost.ns),
             error.map_or("unstable".into(), digits),
         ];
-        shown.add(
-            [Some(row.second_ns), error],
-            row.front,
-            cells,
-            row.refused.clone(),
-        );
+        shown.add([Some(row.second_ns), error], row.front, cells, row.refused.clone());
     }
     shown.finished()
 }
@@ -90,11 +82,8 @@ pub(super) fn families(curves: &TradeCurves) -> Shown {
     );
     for row in &curves.families {
         let error = 100.0 * row.error_n / row.peak_n;
-        let cells = vec![
-            format!("{}, {}", row.family, row.target),
-            time(row.cost.ns),
-            digits(error),
-        ];
+        let cells =
+            vec![format!("{}, {}", row.family, row.target), time(row.cost.ns), digits(error)];
         // Fronts belong to one target each and would cross in one picture.
         shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
         if let Some(last) = shown.rows.last_mut().filter(|_| row.front) {
@@ -105,10 +94,8 @@ pub(super) fn families(curves: &TradeCurves) -> Shown {
 }
 
 pub(super) fn fits(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
-        ["ns a fit", "error of tau (%)"],
-        &["recording or live fit", "time", "tau (%)"],
-    );
+    let mut shown =
+        Shown::new(["ns a fit", "error of tau (%)"], &["recording or live fit", "time", "tau (%)"]);
     for row in &curves.fit {
         let error = 100.0 * row.tau_error;
         let cells = vec![
@@ -183,11 +170,7 @@ pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
         is_planned: planned.is_some_and(|plan| plan.cut == *point),
     });
     let points: Vec<ScenePoint> = points.collect();
-    scene_shown(
-        ["% of the time", "error of shape (mm)"],
-        "influence ends",
-        &points,
-    )
+    scene_shown(["% of the time", "error of shape (mm)"], "influence ends", &points)
 }
 
 /// Integrators and steps of a scene.
@@ -199,11 +182,7 @@ pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown 
         is_planned: planned.is_some_and(|plan| plan.step == *point),
     });
     let points: Vec<ScenePoint> = points.collect();
-    scene_shown(
-        ["us a tick", "error of force (N)"],
-        "integrator and step",
-        &points,
-    )
+    scene_shown(["us a tick", "error of force (N)"], "integrator and step", &points)
 }
 
 /// A plan in words: what is used, what it costs, what was left out, what has no effect.
@@ -247,33 +226,19 @@ mod tests {
     use palpate_haptics::surface::MeshPoint;
 
     fn curves(points: &[(u32, f64, f64)]) -> SceneCurves {
-        let mesh = |&(nodes, error_mm, cost_us): &(u32, f64, f64)| MeshPoint {
-            nodes,
-            error_mm,
-            cost_us,
-        };
-        SceneCurves {
-            meshes: points.iter().map(mesh).collect(),
-            ..SceneCurves::default()
-        }
+        let mesh =
+            |&(nodes, error_mm, cost_us): &(u32, f64, f64)| MeshPoint { nodes, error_mm, cost_us };
+        SceneCurves { meshes: points.iter().map(mesh).collect(), ..SceneCurves::default() }
     }
 
     #[test]
     fn the_front_stands_first_and_what_is_exact_is_told_but_not_drawn() {
         // The second is dearer and worse than the third; the last is exact.
-        let all = curves(&[
-            (51, 0.5, 1.0),
-            (101, 0.4, 5.0),
-            (201, 0.2, 4.0),
-            (401, 0.0, 9.0),
-        ]);
+        let all = curves(&[(51, 0.5, 1.0), (101, 0.4, 5.0), (201, 0.2, 4.0), (401, 0.0, 9.0)]);
         let shown = meshes(&all, None);
         assert_eq!(shown.marks.len(), 3);
         let looks: Vec<RowLook> = shown.rows.iter().map(|row| row.look).collect();
-        let marked = looks
-            .iter()
-            .filter(|look| **look == RowLook::Marked)
-            .count();
+        let marked = looks.iter().filter(|look| **look == RowLook::Marked).count();
         assert_eq!(marked, 3, "{:?}", shown.rows);
         assert!(shown.rows[3].cells[0].starts_with("101 x 101"));
         assert_eq!(shown.chosen, None);

@@ -108,14 +108,8 @@ impl Facts {
             specimen: manifest.specimen.clone(),
             indenter: manifest.indenter.clone(),
             about: manifest.about.clone(),
-            protocol: manifest.plan["name"]
-                .as_str()
-                .unwrap_or_default()
-                .to_owned(),
-            rig: manifest
-                .rig
-                .as_ref()
-                .map_or(String::new(), |rig| rig.name.clone()),
+            protocol: manifest.plan["name"].as_str().unwrap_or_default().to_owned(),
+            rig: manifest.rig.as_ref().map_or(String::new(), |rig| rig.name.clone()),
             calibration: serde_json::from_value(manifest.calibration.clone()).ok(),
             verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.clone())),
             end: outline.end.clone(),
@@ -181,21 +175,15 @@ fn event(entry: &Entry) -> Option<Event> {
                 );
                 made(record.to_string(), is_alarm, false)
             }
-            Effect::Finished(outcome) => made(
-                format!("{}: {}", outcome.ending, outcome.reason),
-                false,
-                false,
-            ),
+            Effect::Finished(outcome) => {
+                made(format!("{}: {}", outcome.ending, outcome.reason), false, false)
+            }
             Effect::Command(_) | Effect::ByHand(_) => None,
         },
         EntryKind::Input => {
             let body = &entry.body;
             match body["input"].as_str()? {
-                "operator" => made(
-                    format!("operator: {}", words(&body["choice"])),
-                    false,
-                    false,
-                ),
+                "operator" => made(format!("operator: {}", words(&body["choice"])), false, false),
                 "fault" => made(format!("fault: {}", words(body)), true, false),
                 _ => None,
             }
@@ -209,9 +197,7 @@ fn words(value: &Value) -> String {
         Value::String(text) => text.replace('_', " "),
         Value::Object(fields) => {
             let told = fields.iter().filter(|(key, _)| *key != "input");
-            told.map(|(_, value)| words(value))
-                .collect::<Vec<_>>()
-                .join(" ")
+            told.map(|(_, value)| words(value)).collect::<Vec<_>>().join(" ")
         }
         Value::Array(values) => values.iter().map(words).collect::<Vec<_>>().join(" "),
         Value::Null => String::new(),

@@ -79,17 +79,11 @@ fn samples_of(subject: &Subject) -> Result<Fitted, String> {
 fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
     let mut track = Track::default();
     for (samples, modelled) in samples.chunks(SEGMENT).zip(modelled.chunks(SEGMENT)) {
-        let left = samples
-            .iter()
-            .zip(modelled)
-            .map(|(one, fit)| match one.is_measured() {
-                true => ((one.force.0 - fit.0) * 1e3) as f32,
-                false => f32::NAN,
-            });
-        let columns = [
-            modelled.iter().map(|fit| fit.0 as f32).collect(),
-            left.collect(),
-        ];
+        let left = samples.iter().zip(modelled).map(|(one, fit)| match one.is_measured() {
+            true => ((one.force.0 - fit.0) * 1e3) as f32,
+            false => f32::NAN,
+        });
+        let columns = [modelled.iter().map(|fit| fit.0 as f32).collect(), left.collect()];
         let times = samples.iter().map(|one| ramp_t + one.t.0).collect();
         track.push(Arc::new(Segment::new(times, &columns)));
     }
@@ -102,14 +96,9 @@ pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
     let report = fitted.result.clone().map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
     let options = subject.options()?;
-    let wanted = IntervalsWanted {
-        with_profile: true,
-        bootstrap: None,
-    };
+    let wanted = IntervalsWanted { with_profile: true, bootstrap: None };
     let found = fitted.intervals(&options, wanted, |_| ());
-    let profile = found
-        .map(|found| found.profile)
-        .map_err(|err| err.to_string());
+    let profile = found.map(|found| found.profile).map_err(|err| err.to_string());
     Ok(SessionFit {
         track: track_of(&fitted.samples, &modelled, subject.ramp_t),
         report,
@@ -150,19 +139,12 @@ pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Predictio
     }
     let samples = samples_of(other)?.samples;
     let modelled = fit.predict(&samples);
-    let pairs = || {
-        samples
-            .iter()
-            .zip(&modelled)
-            .filter(|(one, _)| one.is_measured())
-    };
+    let pairs = || samples.iter().zip(&modelled).filter(|(one, _)| one.is_measured());
     let count = pairs().count();
     if count == 0 {
         return Err("no force of the second session counts; there is nothing to compare".into());
     }
-    let squares: f64 = pairs()
-        .map(|(one, fit)| (one.force.0 - fit.0).powi(2))
-        .sum();
+    let squares: f64 = pairs().map(|(one, fit)| (one.force.0 - fit.0).powi(2)).sum();
     let highest = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::NEG_INFINITY, f64::max);
     Ok(Prediction {
         track: track_of(&samples, &modelled, other.ramp_t),
@@ -192,12 +174,8 @@ mod tests {
     #[test]
     fn what_is_left_is_what_the_report_says() {
         let found = fit_session(&recorded()).unwrap();
-        let values: Vec<f32> = found
-            .track
-            .segments()
-            .iter()
-            .flat_map(|one| one.values(RESIDUAL).to_vec())
-            .collect();
+        let values: Vec<f32> =
+            found.track.segments().iter().flat_map(|one| one.values(RESIDUAL).to_vec()).collect();
         let squares: f64 = values.iter().map(|one| f64::from(*one).powi(2)).sum();
         let rms_n = (squares / values.len() as f64).sqrt() * 1e-3;
         assert_eq!(values.len(), found.report.samples);
@@ -212,10 +190,7 @@ mod tests {
         let found = predict(&pair, &Unwatched).unwrap();
         assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
         assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
-        let gone = Subject {
-            path: "/nowhere/at-all".into(),
-            ..recorded()
-        };
+        let gone = Subject { path: "/nowhere/at-all".into(), ..recorded() };
         let refused = predict(&[gone.clone(), recorded()], &Unwatched);
         assert!(refused.unwrap_err().contains("/nowhere/at-all"));
         let answers = fit_sessions(&[gone, recorded()], &Unwatched).unwrap();

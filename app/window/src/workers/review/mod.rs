@@ -164,9 +164,7 @@ impl Recording {
                 let _ = tell(News::Failed(reason));
             }
         };
-        let started = std::thread::Builder::new()
-            .name("review-read".into())
-            .spawn(work);
+        let started = std::thread::Builder::new().name("review-read".into()).spawn(work);
         match started {
             Ok(_) => {
                 self.news = Some(receiver);
@@ -197,11 +195,7 @@ impl Recording {
             self.version += 1;
             match piece {
                 News::Head(head) => self.head = Some(head),
-                News::Samples {
-                    segment,
-                    phases,
-                    cycles,
-                } => {
+                News::Samples { segment, phases, cycles } => {
                     self.track.push(segment);
                     self.phases.extend(phases);
                     self.cycles.extend(cycles);
@@ -254,10 +248,7 @@ impl Recording {
     /// What it is called: its session's name without what all names have.
     #[must_use]
     pub fn name(&self) -> String {
-        let own = self
-            .head
-            .as_ref()
-            .map(|head| head.manifest.session_id.clone());
+        let own = self.head.as_ref().map(|head| head.manifest.session_id.clone());
         own.unwrap_or_else(|| {
             let name = self.path.file_name().unwrap_or(self.path.as_os_str());
             name.to_string_lossy().into_owned()
@@ -277,10 +268,7 @@ impl Recording {
         end: f64,
     ) -> impl Iterator<Item = (f64, f64, T)> {
         let ends = stretches.iter().skip(1).map(|next| next.t).chain([end]);
-        stretches
-            .iter()
-            .zip(ends)
-            .map(|(one, end)| (one.t, end, one.what))
+        stretches.iter().zip(ends).map(|(one, end)| (one.t, end, one.what))
     }
 }
 

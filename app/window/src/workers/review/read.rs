@@ -104,26 +104,16 @@ impl<'a> Builder<'a> {
         let t = self.manifest.time_of(row.tick.wrapping_sub(first) as i64).0;
         let (number, gap) = (self.samples, f64::NAN);
         if self.phase.replace(row.phase) != Some(row.phase) {
-            self.phases.push(Stretch {
-                first: number,
-                t,
-                what: row.phase,
-            });
+            self.phases.push(Stretch { first: number, t, what: row.phase });
         }
         if self.cycle.replace(row.cycle) != Some(row.cycle) {
-            self.cycles.push(Stretch {
-                first: number,
-                t,
-                what: row.cycle,
-            });
+            self.cycles.push(Stretch { first: number, t, what: row.cycle });
         }
         self.samples += 1;
         self.times.push(t);
         let position = row.pulses.map(|pulses| pulses as f64 * self.mm_per_pulse);
-        for (column, value) in self
-            .columns
-            .iter_mut()
-            .zip([row.force, row.depth, row.volts, position])
+        for (column, value) in
+            self.columns.iter_mut().zip([row.force, row.depth, row.volts, position])
         {
             column.push(value.unwrap_or(gap) as f32);
         }
@@ -157,9 +147,7 @@ mod tests {
     use std::path::PathBuf;
 
     fn recorded(name: &str) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../tests/sessions")
-            .join(name)
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions").join(name)
     }
 
     #[test]
@@ -176,11 +164,7 @@ mod tests {
         let mut facts = None;
         for piece in news.into_inner() {
             match piece {
-                News::Samples {
-                    segment,
-                    phases: own,
-                    ..
-                } => {
+                News::Samples { segment, phases: own, .. } => {
                     track.push(segment);
                     phases.extend(own);
                 }

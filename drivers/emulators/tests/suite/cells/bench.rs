@@ -30,30 +30,15 @@ pub struct CellBench<E> {
 
 impl<E> Clone for CellBench<E> {
     fn clone(&self) -> Self {
-        Self {
-            state: Arc::clone(&self.state),
-            now: Arc::clone(&self.now),
-        }
+        Self { state: Arc::clone(&self.state), now: Arc::clone(&self.now) }
     }
 }
 
 impl<E: EmulatedCell> CellBench<E> {
     pub fn new(cell: E) -> Self {
-        let felt = Felt {
-            volts: Volts(0.0),
-            force: Newtons(0.0),
-        };
-        let state = State {
-            cell,
-            felt,
-            out: Vec::new(),
-            is_unplugged: false,
-            is_mute: false,
-        };
-        Self {
-            state: Arc::new(Mutex::new(state)),
-            now: Arc::new(AtomicU64::new(1_000_000_000)),
-        }
+        let felt = Felt { volts: Volts(0.0), force: Newtons(0.0) };
+        let state = State { cell, felt, out: Vec::new(), is_unplugged: false, is_mute: false };
+        Self { state: Arc::new(Mutex::new(state)), now: Arc::new(AtomicU64::new(1_000_000_000)) }
     }
 
     pub fn clock(&self) -> HostClock {
@@ -62,10 +47,7 @@ impl<E: EmulatedCell> CellBench<E> {
     }
 
     pub fn feel(&self, volts: f64, force: f64) {
-        let felt = Felt {
-            volts: Volts(volts),
-            force: Newtons(force),
-        };
+        let felt = Felt { volts: Volts(volts), force: Newtons(force) };
         self.state.lock().expect("the bench").felt = felt;
     }
 
@@ -93,9 +75,7 @@ impl<E: EmulatedCell> CellBench<E> {
         let mut all = Vec::new();
         let mut buffer = [0_u8; 256];
         while self.now.load(Ordering::SeqCst) < end {
-            let count = self
-                .read(&mut buffer, Duration::from_millis(1))
-                .expect("the link");
+            let count = self.read(&mut buffer, Duration::from_millis(1)).expect("the link");
             all.extend_from_slice(&buffer[..count]);
         }
         String::from_utf8(all).expect("text")

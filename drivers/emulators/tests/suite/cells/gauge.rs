@@ -21,10 +21,7 @@ fn opened<E: EmulatedCell>(
 }
 
 fn refused<E: EmulatedCell>(bench: &CellBench<E>, settings: &GaugeSettings) -> String {
-    opened(bench, settings)
-        .err()
-        .expect("a refusal")
-        .to_string()
+    opened(bench, settings).err().expect("a refusal").to_string()
 }
 
 #[test]
@@ -40,10 +37,7 @@ fn the_emulator_answers_as_the_guides_say() {
     assert_eq!(bench.ask("NUM\r?\rFULL\r", 5), "4.285\r\n");
     bench.feel(0.0, -4.285);
     bench.ask("", 200);
-    assert_eq!(
-        bench.ask("?\rOPOL1\r?\rOPOL0\r", 5),
-        "-4.285 N\r\n4.285 N\r\n"
-    );
+    assert_eq!(bench.ask("?\rOPOL1\r?\rOPOL0\r", 5), "-4.285 N\r\n4.285 N\r\n");
     // Series 5 user's guide, page 19: LIST and errors.
     assert_eq!(
         bench.ask("LB\rLIST\r", 5),
@@ -72,23 +66,14 @@ fn the_description_is_what_was_found_and_set() {
     };
     let cell = opened(&bench, &settings).expect("a gauge");
     let found = &cell.description;
-    for part in [
-        "Series 5", "M5-5", "3519042", "V1.00", "125", "FLTC4", "FLTP4",
-    ] {
+    for part in ["Series 5", "M5-5", "3519042", "V1.00", "125", "FLTC4", "FLTP4"] {
         let part = part.trim_start_matches('V');
-        assert!(
-            found.identity.contains(part),
-            "{part} in {}",
-            found.identity
-        );
+        assert!(found.identity.contains(part), "{part} in {}", found.identity);
     }
     assert_eq!(found.rate, 125.0);
     assert_eq!(found.newtons_per_volt, Some(1.0));
     assert_eq!(found.adc.volts_per_count, 1e-3);
-    assert_eq!(
-        (found.adc.counts_min, found.adc.counts_max),
-        (-27_500, 27_500)
-    );
+    assert_eq!((found.adc.counts_min, found.adc.counts_max), (-27_500, 27_500));
     assert!((found.noise_expected.0 - 1e-3 / 12.0_f64.sqrt()).abs() < 1e-9);
     assert_eq!(cell.farewell, b"AOUT0\r");
     let sent: Vec<u8> = cell
@@ -125,10 +110,7 @@ fn readings_come_at_their_rate_and_the_farewell_ends_them() {
 #[test]
 fn a_reversed_gauge_counts_tension_as_pressing() {
     let mut bench = bench();
-    let settings = GaugeSettings {
-        is_reversed: true,
-        ..GaugeSettings::default()
-    };
+    let settings = GaugeSettings { is_reversed: true, ..GaugeSettings::default() };
     let mut cell = opened(&bench, &settings).expect("a gauge");
     bench.feel(0.0, -3.0);
     bench.run(cell.dialogue.as_mut(), 100);
@@ -142,10 +124,7 @@ fn one_a_second_is_fifty_on_a_7i() {
         is_7i: true,
         ..EmulatedGaugeSettings::default()
     }));
-    let settings = GaugeSettings {
-        per_second: 1,
-        ..GaugeSettings::default()
-    };
+    let settings = GaugeSettings { per_second: 1, ..GaugeSettings::default() };
     let cell = opened(&bench, &settings).expect("a gauge");
     assert_eq!(cell.description.rate, 50.0);
 }
@@ -157,12 +136,7 @@ fn an_overload_reads_the_end_of_the_range() {
     bench.feel(0.0, 40.0);
     let samples = bench.run(cell.dialogue.as_mut(), 200);
     assert_eq!(samples.last().expect("samples").counts, 27_500);
-    assert!(
-        cell.dialogue
-            .take_trouble()
-            .expect("a trouble")
-            .contains("range")
-    );
+    assert!(cell.dialogue.take_trouble().expect("a trouble").contains("range"));
     bench.feel(0.0, 1.0);
     bench.run(cell.dialogue.as_mut(), 100);
     bench.suffer(DeviceFault::Saturated, true);
@@ -191,10 +165,7 @@ fn a_stuck_a_restarted_and_an_unplugged_gauge() {
 
 #[test]
 fn who_does_not_fit_is_told_in_words() {
-    let other = GaugeSettings {
-        serial_number: Some("1".into()),
-        ..GaugeSettings::default()
-    };
+    let other = GaugeSettings { serial_number: Some("1".into()), ..GaugeSettings::default() };
     let err = refused(&bench(), &other);
     assert!(err.contains("3519042") && err.contains("says 1"), "{err}");
     for (says, name) in [
@@ -205,46 +176,19 @@ fn who_does_not_fit_is_told_in_words() {
         ("4.285 N\r\n", "hears nothing"),
         ("D,48332680,-152034*4E04\r\n", "HX711"),
     ] {
-        let err = refused(
-            &CellBench::new(Stranger(says, Vec::new())),
-            &GaugeSettings::default(),
-        );
+        let err = refused(&CellBench::new(Stranger(says, Vec::new())), &GaugeSettings::default());
         assert!(err.contains(name), "{says:?}: {err}");
     }
     let torque = "V1.00;LBIN;CUR;FLTC8;FLTP1;AOUT00;AOFF5;FULL;MIT;POL;B0\r\n";
-    let err = refused(
-        &CellBench::new(Stranger(torque, Vec::new())),
-        &GaugeSettings::default(),
-    );
+    let err = refused(&CellBench::new(Stranger(torque, Vec::new())), &GaugeSettings::default());
     assert!(err.contains("LBIN") && err.contains("newtons"), "{err}");
     let peak = "V1.00;N;PC;FLTC8;FLTP1;AOUT00;AOFF5;FULL;MIT;POL;B0\r\n";
-    let err = refused(
-        &CellBench::new(Stranger(peak, Vec::new())),
-        &GaugeSettings::default(),
-    );
+    let err = refused(&CellBench::new(Stranger(peak, Vec::new())), &GaugeSettings::default());
     assert!(err.contains("CUR"), "{err}");
     for (settings, word) in [
-        (
-            GaugeSettings {
-                per_second: 100,
-                ..GaugeSettings::default()
-            },
-            "choose one of 1, 2, 5",
-        ),
-        (
-            GaugeSettings {
-                filter: Some(11),
-                ..GaugeSettings::default()
-            },
-            "0 to 10",
-        ),
-        (
-            GaugeSettings {
-                capacity: Newtons(0.0),
-                ..GaugeSettings::default()
-            },
-            "capacity",
-        ),
+        (GaugeSettings { per_second: 100, ..GaugeSettings::default() }, "choose one of 1, 2, 5"),
+        (GaugeSettings { filter: Some(11), ..GaugeSettings::default() }, "0 to 10"),
+        (GaugeSettings { capacity: Newtons(0.0), ..GaugeSettings::default() }, "capacity"),
     ] {
         let err = refused(&bench(), &settings);
         assert!(err.contains(word), "{err}");

@@ -84,9 +84,7 @@ impl EmulatedCell for Emulated {
 }
 
 fn emulated() -> CellBench<Emulated> {
-    CellBench::new(Emulated(
-        emulated_cell("plain-numbers", 1).expect("it is emulated"),
-    ))
+    CellBench::new(Emulated(emulated_cell("plain-numbers", 1).expect("it is emulated")))
 }
 
 #[test]
@@ -98,21 +96,10 @@ fn emulated_cells_are_those_of_the_table() {
 #[test]
 fn numbers_follow_the_signal() {
     let mut bench = emulated();
-    let OpenedCell {
-        description,
-        mut dialogue,
-        raw,
-        farewell,
-    } = opened(&bench, USUAL).expect("a cell");
-    assert!(
-        (description.rate - 80.0).abs() < 1.0,
-        "{}",
-        description.rate
-    );
-    assert_eq!(
-        (description.adc.counts_min, description.adc.counts_max),
-        (-8_388_607, 8_388_607)
-    );
+    let OpenedCell { description, mut dialogue, raw, farewell } =
+        opened(&bench, USUAL).expect("a cell");
+    assert!((description.rate - 80.0).abs() < 1.0, "{}", description.rate);
+    assert_eq!((description.adc.counts_min, description.adc.counts_max), (-8_388_607, 8_388_607));
     assert_eq!(description.newtons_per_volt, None);
     assert!(raw.iter().all(|piece| !piece.is_sent) && farewell.is_empty());
     bench.feel(1.25, 0.0);
@@ -127,12 +114,7 @@ fn numbers_follow_the_signal() {
     bench.suffer(DeviceFault::WrongDevice, true);
     assert!(bench.run(dialogue.as_mut(), 1_200).is_empty());
     assert!(dialogue.garbled() > 50);
-    assert!(
-        dialogue
-            .is_dead(bench.clock()())
-            .expect("it is gone")
-            .contains("no number")
-    );
+    assert!(dialogue.is_dead(bench.clock()()).expect("it is gone").contains("no number"));
 }
 
 #[test]
@@ -153,16 +135,9 @@ fn words_at_the_start_and_the_rest_of_a_line_are_passed_over() {
     let script = Script::new(&lines, 20);
     let cell = opened(&CellBench::new(script), "unit = \"N\"\nfull_scale = 25\n").expect("a cell");
     let found = cell.description;
-    assert_eq!(
-        (found.adc.counts_max, found.newtons_per_volt),
-        (2_500, Some(1.0))
-    );
+    assert_eq!((found.adc.counts_max, found.newtons_per_volt), (2_500, Some(1.0)));
     assert!((found.rate - 50.0).abs() < 1.0, "{}", found.rate);
-    assert!(
-        found.identity.contains("in N, 2 digits behind the point"),
-        "{}",
-        found.identity
-    );
+    assert!(found.identity.contains("in N, 2 digits behind the point"), "{}", found.identity);
 }
 
 #[test]
@@ -175,11 +150,7 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
             if now >= self.0 {
                 self.1 += 1;
                 self.2.extend_from_slice(b"100\r\n");
-                let pause = if self.1 == 30 {
-                    1_600_000_000
-                } else {
-                    12_500_000
-                };
+                let pause = if self.1 == 30 { 1_600_000_000 } else { 12_500_000 };
                 self.0 = now + Nanos(pause);
             }
         }
@@ -201,21 +172,12 @@ fn what_is_not_as_the_rig_file_says_is_told() {
     assert!(mixed.contains("1 and now 2 digits"), "{mixed}");
     let timed = format!("{USUAL}time_column = \"us\"\n");
     let without = refused(Script::new(&["100\r\n"], 20), &timed);
-    assert!(
-        without.contains("a time, a comma and a number"),
-        "{without}"
-    );
+    assert!(without.contains("a time, a comma and a number"), "{without}");
     let words = refused(Script::new(&["hello\r\n"], 20), USUAL);
-    assert!(
-        words.contains("\"hello\"") && words.contains("a number alone"),
-        "{words}"
-    );
+    assert!(words.contains("\"hello\"") && words.contains("a number alone"), "{words}");
     let slow = refused(Script::new(&["100\r\n"], 1_500), USUAL);
     assert!(slow.contains("less than a number a second"), "{slow}");
-    let fine = refused(
-        Script::new(&["1.00000\r\n"], 20),
-        "unit = \"gF\"\nfull_scale = 100000\n",
-    );
+    let fine = refused(Script::new(&["1.00000\r\n"], 20), "unit = \"gF\"\nfull_scale = 100000\n");
     assert!(fine.contains("full_scale"), "{fine}");
     let gauge = refused(Script::new(&["4.285 N\r\n"], 20), USUAL);
     assert!(gauge.contains("a Mark-10 gauge"), "{gauge}");
@@ -223,8 +185,5 @@ fn what_is_not_as_the_rig_file_says_is_told() {
     assert!(matches!(silent, Some(DeviceError::Silent { .. })));
     let gone = CellBench::new(Stranger("", Vec::new()));
     gone.unplug();
-    assert!(matches!(
-        opened(&gone, USUAL).err(),
-        Some(DeviceError::Lost { .. })
-    ));
+    assert!(matches!(opened(&gone, USUAL).err(), Some(DeviceError::Lost { .. })));
 }

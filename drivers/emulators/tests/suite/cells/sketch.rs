@@ -26,12 +26,7 @@ fn speaks(gain: u8) {
     let copy = out.path().join("palpate_hx711.ino");
     std::fs::write(copy, sketch.replace(usual, &set)).expect("a copy");
     let compiler = Command::new("g++")
-        .args([
-            "-std=c++11",
-            "-funsigned-char",
-            "-Wall",
-            "-Wno-unused-function",
-        ])
+        .args(["-std=c++11", "-funsigned-char", "-Wall", "-Wno-unused-function"])
         .arg("-I")
         .arg(out.path())
         .arg("-I")
@@ -48,11 +43,7 @@ fn speaks(gain: u8) {
     // 2: it asked for another gain; 3: it held PD_SCK up so long that the chip slept.
     assert_eq!(run.status.code(), Some(0), "{text}");
 
-    let header = Header {
-        rate: 80,
-        gain,
-        board: "board-1".into(),
-    };
+    let header = Header { rate: 80, gain, board: "board-1".into() };
     let mut counts = Vec::new();
     let mut times = Vec::new();
     let (mut started, mut answered) = (0, 0);
@@ -75,18 +66,12 @@ fn speaks(gain: u8) {
     }
     assert_eq!((started, answered), (1, 1));
     let chip = [0, 8_388_607, -8_388_608, -1, 152_034, -152_034];
-    let first = counts
-        .iter()
-        .position(|count| *count == 0)
-        .expect("the first count");
+    let first = counts.iter().position(|count| *count == 0).expect("the first count");
     for (i, count) in counts[first..].iter().enumerate() {
         assert_eq!(*count, chip[i % 6], "{counts:?}");
     }
     assert!(counts.len() - first >= 8, "{counts:?}");
     // Stamped when it is ready, but while a question is answered.
-    let late = times
-        .windows(2)
-        .filter(|pair| (pair[1] - pair[0]).abs_diff(12_400) > 100)
-        .count();
+    let late = times.windows(2).filter(|pair| (pair[1] - pair[0]).abs_diff(12_400) > 100).count();
     assert!(late <= 2, "{times:?}");
 }

@@ -91,20 +91,12 @@ impl Dice {
 }
 
 fn gauge() -> GaugeDialogue {
-    let scale = GaugeScale {
-        unit: ForceUnit::Newton,
-        decimals: 3,
-        counts_max: 27_500,
-    };
+    let scale = GaugeScale { unit: ForceUnit::Newton, decimals: 3, counts_max: 27_500 };
     GaugeDialogue::new(scale, 250.0, Nanos::ZERO)
 }
 
 fn board() -> Hx711Dialogue {
-    let header = Header {
-        rate: 80,
-        gain: 128,
-        board: "a".into(),
-    };
+    let header = Header { rate: 80, gain: 128, board: "a".into() };
     Hx711Dialogue::new(header, 1e-6, Nanos::ZERO)
 }
 
@@ -118,11 +110,7 @@ fn told(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
     }
     let samples: Vec<CellSample> = std::iter::from_fn(|| dialogue.take_sample()).collect();
     let troubles = std::iter::from_fn(|| dialogue.take_trouble()).collect();
-    assert!(
-        samples
-            .windows(2)
-            .all(|w| w[0].device_time <= w[1].device_time)
-    );
+    assert!(samples.windows(2).all(|w| w[0].device_time <= w[1].device_time));
     assert!(samples.iter().all(|s| s.volts.0.is_finite()));
     (samples, troubles, dialogue.garbled(), dialogue.is_dead(at))
 }
@@ -132,10 +120,7 @@ fn told(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
 fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
     let streams = std::env::var("PALPATE_STREAMS");
     let streams = streams.map_or(20_000, |count| count.parse().expect("a number of streams"));
-    let felt = Felt {
-        volts: Volts(1.0),
-        force: Newtons(1.0),
-    };
+    let felt = Felt { volts: Volts(1.0), force: Newtons(1.0) };
     let mut emulators: [Box<dyn EmulatedCell>; 2] = [
         Box::new(EmulatedHx711::new(EmulatedHx711Settings::default())),
         Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default())),
@@ -144,16 +129,8 @@ fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
         let mut dice = Dice(Pcg64::new(u128::from(stream), 11));
         let bytes = dice.stream();
         let piece = 1 + dice.below(9);
-        assert_eq!(
-            told(gauge(), &bytes, piece),
-            told(gauge(), &bytes, 4096),
-            "{stream}"
-        );
-        assert_eq!(
-            told(board(), &bytes, piece),
-            told(board(), &bytes, 4096),
-            "{stream}"
-        );
+        assert_eq!(told(gauge(), &bytes, piece), told(gauge(), &bytes, 4096), "{stream}");
+        assert_eq!(told(board(), &bytes, piece), told(board(), &bytes, 4096), "{stream}");
         let now = Nanos::from_millis(stream);
         for emulator in &mut emulators {
             emulator.receive(now, &bytes);
@@ -166,10 +143,9 @@ fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
     }
     // They still answer.
     let now = Nanos::from_millis(streams + 1);
-    for (emulator, ask, answer) in [
-        (0, "?", "palpate-hx711"),
-        (1, "\rAOUT0\rFULL\rN\rLIST\r", "V1.00;N;"),
-    ] {
+    for (emulator, ask, answer) in
+        [(0, "?", "palpate-hx711"), (1, "\rAOUT0\rFULL\rN\rLIST\r", "V1.00;N;")]
+    {
         emulators[emulator].transmit();
         emulators[emulator].receive(now, ask.as_bytes());
         let said = String::from_utf8_lossy(&emulators[emulator].transmit()).into_owned();
@@ -185,11 +161,7 @@ impl EmulatedCell for Babbler {
     fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
     fn advance(&mut self, _now: Nanos, _felt: Felt) {}
     fn transmit(&mut self) -> Vec<u8> {
-        if self.0.below(20) == 0 {
-            self.0.stream()
-        } else {
-            Vec::new()
-        }
+        if self.0.below(20) == 0 { self.0.stream() } else { Vec::new() }
     }
     fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
 }
@@ -213,17 +185,11 @@ fn opening_comes_to_an_end_whoever_answers() {
 /// Half a minute is the end of anybody's patience; what was opened is sensible, what was not is told.
 fn check(bench: &CellBench<Babbler>, opened: Result<OpenedCell, DeviceError>, seed: u128) {
     let passed = bench.clock()().since(Nanos::from_millis(1_000));
-    assert!(
-        passed < Nanos::from_millis(30_000),
-        "seed {seed}: {passed:?}"
-    );
+    assert!(passed < Nanos::from_millis(30_000), "seed {seed}: {passed:?}");
     match opened {
         Ok(cell) => {
             let found = cell.description;
-            assert!(
-                found.rate > 0.0 && found.rate.is_finite(),
-                "seed {seed}: {found:?}"
-            );
+            assert!(found.rate > 0.0 && found.rate.is_finite(), "seed {seed}: {found:?}");
             assert!(found.adc.volts_per_count > 0.0);
         }
         Err(err) => assert!(err.to_string().len() > 20, "seed {seed}: {err}"),
@@ -240,10 +206,7 @@ fn what_nobody_takes_is_bounded() {
     assert_eq!(count, 4_800);
     let mut board = board();
     for micros in 1..100_000_u32 {
-        board.received(
-            Nanos(1),
-            line(&Message::Value { micros, count: 1 }).as_bytes(),
-        );
+        board.received(Nanos(1), line(&Message::Value { micros, count: 1 }).as_bytes());
     }
     assert_eq!(std::iter::from_fn(|| board.take_sample()).count(), 4_800);
 }

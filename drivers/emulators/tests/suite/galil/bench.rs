@@ -12,24 +12,13 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(settings: GalilSettings) -> Self {
-        Self {
-            emulator: GalilEmulator::new(settings),
-            now: Nanos::ZERO,
-        }
+        Self { emulator: GalilEmulator::new(settings), now: Nanos::ZERO }
     }
 
     /// On one serial line.
     pub fn serial(model: GalilModel) -> Self {
-        let converter = if model == GalilModel::Dmc2143 {
-            None
-        } else {
-            Some(16)
-        };
-        Self::new(GalilSettings {
-            model,
-            converter,
-            ..GalilSettings::default()
-        })
+        let converter = if model == GalilModel::Dmc2143 { None } else { Some(16) };
+        Self::new(GalilSettings { model, converter, ..GalilSettings::default() })
     }
 
     /// Bytes to a channel and what comes back at once.

@@ -12,70 +12,30 @@ const TRANSCRIPT: &[(&str, &str, &str)] = &[
         "DMC4143 Rev 1.3a\r\n:",
     ),
     ("DMC-40x0 user manual, page 61: accepted", "EO 0\r", ":"),
-    (
-        "DMC-2x00 user manual, page 65: lower case is refused",
-        "bg\r",
-        "?",
-    ),
-    (
-        "DMC-13x8 user manual, controller response to data",
-        "TC1\r",
-        "1 Unrecognized command\r\n:",
-    ),
+    ("DMC-2x00 user manual, page 65: lower case is refused", "bg\r", "?"),
+    ("DMC-13x8 user manual, controller response to data", "TC1\r", "1 Unrecognized command\r\n:"),
     ("telling clears it", "TC1\r", "0\r\n:"),
     (
         "M2FS galil.py, DMC-4183: MG _HXn, a blank before each number and none between",
         "MG \"HX=\",_HX0,_HX1\r",
         "HX= 0.0000 0.0000\r\n:",
     ),
-    (
-        "ESRF BLISS 2.4.0, DMC-30010: MG _BGA gives 0.0000",
-        "MG _BGA\r",
-        " 0.0000\r\n:",
-    ),
-    (
-        "ESRF BLISS 2.4.0: QZ; BLISS ends commands with ; alone",
-        "QZ;",
-        "4, 52, 26, 36\r\n:",
-    ),
-    (
-        "EPICS GalilController.cpp: range of an analog input",
-        "MG{Z10.0}_AQ1\r",
-        " 2\r\n:",
-    ),
+    ("ESRF BLISS 2.4.0, DMC-30010: MG _BGA gives 0.0000", "MG _BGA\r", " 0.0000\r\n:"),
+    ("ESRF BLISS 2.4.0: QZ; BLISS ends commands with ; alone", "QZ;", "4, 52, 26, 36\r\n:"),
+    ("EPICS GalilController.cpp: range of an analog input", "MG{Z10.0}_AQ1\r", " 2\r\n:"),
     ("EPICS: a 41x3 has no CO", "MG _CO\r", "?"),
-    (
-        "DMC-1700/1800 user manual, page 84",
-        "TP XY\r",
-        " 0, 0\r\n:",
-    ),
-    (
-        "the same with leading zeros, as printed there",
-        "LZ 0;TP X;LZ 1\r",
-        ": 0000000000\r\n::",
-    ),
+    ("DMC-1700/1800 user manual, page 84", "TP XY\r", " 0, 0\r\n:"),
+    ("the same with leading zeros, as printed there", "LZ 0;TP X;LZ 1\r", ": 0000000000\r\n::"),
     (
         "DMC-18x2 command reference, MG: formats in braces",
         "v1=10;MG \"x\",v1{F4.2},\"y\",v1{$4.0}{N}\r",
         ":x 0010.00y$000A:",
     ),
-    (
-        "M2FS galil.py: a return behind ; is one terminator more",
-        "ST;\r",
-        "::",
-    ),
+    ("M2FS galil.py: a return behind ; is one terminator more", "ST;\r", "::"),
     ("TMT galil-io: an empty line", "\r", ":"),
-    (
-        "several, the middle one wrong",
-        "a=1;bg;MG a\r",
-        ":? 1.0000\r\n:",
-    ),
+    ("several, the middle one wrong", "a=1;bg;MG a\r", ":? 1.0000\r\n:"),
     ("gclib.h: HX of each thread", "HX0;HX7\r", "::"),
-    (
-        "a thread that is none",
-        "HX8;TC1\r",
-        "?6 Number out of range\r\n:",
-    ),
+    ("a thread that is none", "HX8;TC1\r", "?6 Number out of range\r\n:"),
     (
         "DMC-40x0 command reference, BG with the motor off",
         "PR 100;BGA;TC1\r",
@@ -86,72 +46,28 @@ const TRANSCRIPT: &[(&str, &str, &str)] = &[
         "ACA=73422;ACA=?;MG _ACA\r",
         ": 72704\r\n: 72704.0000\r\n:",
     ),
-    (
-        "DMC-40x0 command reference, SP: 2 counts/s at TM 1000",
-        "SP 51.5;SP ?\r",
-        ": 50\r\n:",
-    ),
-    (
-        "axes left out and synonyms",
-        "SP ,,2000;SPZ=?;SP ?,,?\r",
-        ": 2000\r\n: 50, 2000\r\n:",
-    ),
-    (
-        "limits off",
-        "FLA=2147483647;MG _FLA\r",
-        ": 2147483647.0000\r\n:",
-    ),
-    (
-        "one open switch each",
-        "MG _LFA,_LRA,_HMA\r",
-        " 1.0000 1.0000 1.0000\r\n:",
-    ),
+    ("DMC-40x0 command reference, SP: 2 counts/s at TM 1000", "SP 51.5;SP ?\r", ": 50\r\n:"),
+    ("axes left out and synonyms", "SP ,,2000;SPZ=?;SP ?,,?\r", ": 2000\r\n: 50, 2000\r\n:"),
+    ("limits off", "FLA=2147483647;MG _FLA\r", ": 2147483647.0000\r\n:"),
+    ("one open switch each", "MG _LFA,_LRA,_HMA\r", " 1.0000 1.0000 1.0000\r\n:"),
     ("motor off, switches open", "TS A\r", " 47\r\n:"),
     ("stop codes", "SC A\r", " 1\r\n:"),
     ("a serial line", "WH\r", "RS232\r\n:"),
     ("DR is for networks (gclib.h)", "DR 2;DR 0\r", "?:"),
-    (
-        "array errors",
-        "DM d[3];d[3]=1;TC1\r",
-        ":?56 Array index invalid or out of range\r\n:",
-    ),
-    (
-        "array values",
-        "d[1]=2.5;MG d[1],d[-1]\r",
-        ": 2.5000 3.0000\r\n:",
-    ),
+    ("array errors", "DM d[3];d[3]=1;TC1\r", ":?56 Array index invalid or out of range\r\n:"),
+    ("array values", "d[1]=2.5;MG d[1],d[-1]\r", ": 2.5000 3.0000\r\n:"),
     (
         "DMC-1700/1800 user manual, QU: comma, then control-Z",
         "QU d[],0,2,1\r",
         " 0.0000, 2.5000, 0.0000\r\n\x1a:",
     ),
     ("QD ends with a backslash", "QD d[]\r1,2\r3\\", ":"),
-    (
-        "what it brought",
-        "QU d[],1,2\r",
-        " 2.0000\r\n 3.0000\r\n\x1a:",
-    ),
-    (
-        "more values than elements",
-        "QD d[]\r1,2,3,4\\TC1\r",
-        "?84 Too many elements\r\n:",
-    ),
-    (
-        "record errors of their own",
-        "RC 1;TC1\r",
-        "?81 No array or source specified\r\n:",
-    ),
+    ("what it brought", "QU d[],1,2\r", " 2.0000\r\n 3.0000\r\n\x1a:"),
+    ("more values than elements", "QD d[]\r1,2,3,4\\TC1\r", "?84 Too many elements\r\n:"),
+    ("record errors of their own", "RC 1;TC1\r", "?81 No array or source specified\r\n:"),
     ("no such array", "RA b[];TC1\r", "?82 Undefined Array\r\n:"),
-    (
-        "a name that is not known",
-        "MG nobody;TC1\r",
-        "?9 Variable error\r\n:",
-    ),
-    (
-        "no such operand",
-        "MG _GNX;TC1\r",
-        "?58 Bad command response (i.e._GNX)\r\n:",
-    ),
+    ("a name that is not known", "MG nobody;TC1\r", "?9 Variable error\r\n:"),
+    ("no such operand", "MG _GNX;TC1\r", "?58 Bad command response (i.e._GNX)\r\n:"),
     (
         "ESRF BLISS 2.4.0, get_axis_pid: eight axes asked of any board",
         "KP ?,?,?,?,?,?,?,?;TB ?\r",
@@ -163,11 +79,7 @@ const TRANSCRIPT: &[(&str, &str, &str)] = &[
         "?:",
     ),
     ("a number asked for by name", "b=3;b=\r", ": 3.0000\r\n:"),
-    (
-        "a string of six characters in a number",
-        "s=\"GOOD\";MG s{S4}\r",
-        ":GOOD\r\n:",
-    ),
+    ("a string of six characters in a number", "s=\"GOOD\";MG s{S4}\r", ":GOOD\r\n:"),
 ];
 
 #[test]
@@ -186,32 +98,17 @@ fn it_does_not_matter_how_bytes_are_split_or_lines_end() {
     let whole = ["a=1", "bg", "MG a", "ACA=73422", "ACA=?", "QZ"];
     for end in ["\r", "\r\n", ";", ";\r", "\r\r\n"] {
         let sent: String = whole.iter().map(|line| format!("{line}{end}")).collect();
-        let extra = if matches!(end, ";\r" | "\r\r\n") {
-            ":"
-        } else {
-            ""
-        };
-        let answered: String = [
-            ":",
-            "?",
-            " 1.0000\r\n:",
-            ":",
-            " 72704\r\n:",
-            "4, 52, 26, 36\r\n:",
-        ]
-        .iter()
-        .map(|answer| format!("{answer}{extra}"))
-        .collect();
+        let extra = if matches!(end, ";\r" | "\r\r\n") { ":" } else { "" };
+        let answered: String = [":", "?", " 1.0000\r\n:", ":", " 72704\r\n:", "4, 52, 26, 36\r\n:"]
+            .iter()
+            .map(|answer| format!("{answer}{extra}"))
+            .collect();
         for at in 0..=sent.len() {
             let mut bench = Bench::serial(GalilModel::Dmc4143);
             let mut answer = bench.raw(0, &sent.as_bytes()[..at]);
             bench.wait(0.01);
             answer.extend(bench.raw(0, &sent.as_bytes()[at..]));
-            assert_eq!(
-                String::from_utf8_lossy(&answer),
-                answered,
-                "{end:?} at {at}"
-            );
+            assert_eq!(String::from_utf8_lossy(&answer), answered, "{end:?} at {at}");
         }
     }
 }
@@ -237,10 +134,7 @@ fn what_clients_send_is_accepted() {
 
 #[test]
 fn echo_sends_back_what_came() {
-    let mut bench = Bench::new(GalilSettings {
-        has_echo: true,
-        ..GalilSettings::default()
-    });
+    let mut bench = Bench::new(GalilSettings { has_echo: true, ..GalilSettings::default() });
     assert_eq!(bench.ask("MG 1"), "MG 1\r 1.0000\r\n:");
     assert_eq!(bench.ask("EO 0"), "EO 0\r:");
     assert_eq!(bench.ask("MG 1"), " 1.0000\r\n:");
@@ -291,10 +185,7 @@ fn a_burn_takes_two_seconds_and_a_reset_forgets() {
 
 #[test]
 fn eight_clients_each_have_a_line_of_their_own() {
-    let mut bench = Bench::new(GalilSettings {
-        is_serial: false,
-        ..GalilSettings::default()
-    });
+    let mut bench = Bench::new(GalilSettings { is_serial: false, ..GalilSettings::default() });
     assert_eq!(bench.emulator.channels(), 8);
     for channel in 0..8 {
         bench.emulator.connect(bench.now, channel);

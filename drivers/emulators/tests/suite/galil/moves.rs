@@ -19,12 +19,7 @@ fn a_move_follows_its_trapezoid_and_pulses_come_later() {
     bench.tell("PRA=3000");
     bench.tell("BGA");
     // In counts: 1 count stands for 1 mm.
-    let exact = Profile::to_rest(
-        Position(0.0),
-        Position(3000.0),
-        MmPerS(1332.0),
-        MmPerS2(4096.0),
-    );
+    let exact = Profile::to_rest(Position(0.0), Position(3000.0), MmPerS(1332.0), MmPerS2(4096.0));
     let mut ended_before_pulses = false;
     let mut is_moving = true;
     let mut at = 0;
@@ -37,15 +32,10 @@ fn a_move_follows_its_trapezoid_and_pulses_come_later() {
             .split_whitespace()
             .map(|number| number.parse().unwrap())
             .collect();
-        let [rp, td, bg, sc] = told[..] else {
-            panic!("{line}")
-        };
+        let [rp, td, bg, sc] = told[..] else { panic!("{line}") };
         let place = exact.position(Seconds(f64::from(at) * SAMPLE)).0;
         // Whole counts below the place, and a corner of the trapezoid within a sample.
-        assert!(
-            rp <= place + 0.01 && rp >= place - 1.01,
-            "{at}: {rp} {place}"
-        );
+        assert!(rp <= place + 0.01 && rp >= place - 1.01, "{at}: {rp} {place}");
         // KS 1.313: behind by at most four samples of 1332 counts/s, and a count.
         assert!((-0.01..=6.2).contains(&(rp - td)), "{at}: {rp} {td}");
         assert_eq!(sc, if bg == 1.0 { 0.0 } else { 1.0 });
@@ -97,14 +87,8 @@ fn the_clock_counts_976_microseconds() {
 fn stops_brake_and_aborts_do_not() {
     let mut bench = ready();
     bench.tell("JGA=1332;BGA");
-    assert_eq!(
-        bench.ask("BGA;TC1"),
-        "?21 Begin not valid while running\r\n:"
-    );
-    assert_eq!(
-        bench.ask("DPA=0;TC1"),
-        "?7 Command not valid while running\r\n:"
-    );
+    assert_eq!(bench.ask("BGA;TC1"), "?21 Begin not valid while running\r\n:");
+    assert_eq!(bench.ask("DPA=0;TC1"), "?7 Command not valid while running\r\n:");
     bench.wait(1.0);
     let from = bench.number("_RPA");
     bench.tell("STA");
@@ -152,10 +136,7 @@ fn switches_end_a_move_and_let_it_go_back() {
     let at = bench.emulator.plant().axis().0;
     // 2 mm behind home, and 1332^2 / 204800 counts to brake.
     assert!((-2.4..=-2.0).contains(&at), "{at}");
-    assert_eq!(
-        bench.ask("BGA;TC1"),
-        "?22 Begin not possible due to Limit Switch\r\n:"
-    );
+    assert_eq!(bench.ask("BGA;TC1"), "?22 Begin not possible due to Limit Switch\r\n:");
     bench.tell("PRA=1000;BGA");
     bench.settle();
     assert_eq!((bench.number("_SCA"), bench.number("_LRA")), (1.0, 1.0));
@@ -182,10 +163,7 @@ fn software_limits_are_met_one_count_behind() {
 fn a_contour_is_followed_from_a_full_buffer() {
     let mut bench = ready();
     bench.tell("CMA;DT 2");
-    assert_eq!(
-        bench.ask("BGA;TC1"),
-        "?18 Command not valid when contouring\r\n:"
-    );
+    assert_eq!(bench.ask("BGA;TC1"), "?18 Command not valid when contouring\r\n:");
     // 4 cycles of 200 segments: a sine of 100 counts, whole increments of which nothing is lost.
     let place = |segment: u32| 100.0 * (f64::from(segment) * std::f64::consts::TAU / 200.0).sin();
     let mut sent = 0_u32;

@@ -17,20 +17,14 @@ fn with(program: &str) -> Bench {
 #[test]
 fn a_program_comes_back_as_it_was_sent() {
     let mut bench = with("#A;a=1\nMG \"x;y\",a\nEN\n");
-    assert_eq!(
-        bench.raw(0, b"UL\r"),
-        b"#A;a=1\r\nMG \"x;y\",a\r\nEN\r\n\x1a:"
-    );
+    assert_eq!(bench.raw(0, b"UL\r"), b"#A;a=1\r\nMG \"x;y\",a\r\nEN\r\n\x1a:");
     assert_eq!(bench.ask("LL"), "#A=0\r\n:");
     bench.tell("XQ #A,1");
     assert_eq!(bench.ask("DL;TC1").chars().next(), Some('?'));
     bench.sample();
     assert_eq!(bench.emulator.transmit(0), b"x;y 1.0000\r\n");
     assert_eq!(bench.number("_XQ1"), -1.0);
-    assert_eq!(
-        bench.ask("XQ #B;TC1"),
-        "?10 Empty program line or undefined label\r\n:"
-    );
+    assert_eq!(bench.ask("XQ #B;TC1"), "?10 Empty program line or undefined label\r\n:");
     // A line that is refused is told at once.
     assert_eq!(bench.raw(0, b"DL\r"), b"");
     let long = format!("{}\rEN\r", "a".repeat(81));
@@ -78,10 +72,7 @@ fn waits_are_in_samples_of_976_microseconds() {
     bench.wait(1.0);
     assert_eq!((bench.number("u"), bench.number("v")), (100.0, 150.0));
     assert_eq!(bench.number("w"), 0.0);
-    assert_eq!(
-        bench.ask("WT 10;TC1"),
-        "?2 Command only valid from program\r\n:"
-    );
+    assert_eq!(bench.ask("WT 10;TC1"), "?2 Command only valid from program\r\n:");
 }
 
 #[test]

@@ -33,15 +33,11 @@ fn a_cell_may_stick_or_saturate_and_come_back() {
         assert_eq!(bench.number("@AN[1]"), stuck);
     }
     bench.emulator.suffer(bench.now, DeviceFault::Stuck, false);
-    bench
-        .emulator
-        .suffer(bench.now, DeviceFault::Saturated, true);
+    bench.emulator.suffer(bench.now, DeviceFault::Saturated, true);
     bench.sample();
     // The last of 65536 counts.
     assert!((bench.number("@AN[1]") - 10.0).abs() < 0.001);
-    bench
-        .emulator
-        .suffer(bench.now, DeviceFault::Saturated, false);
+    bench.emulator.suffer(bench.now, DeviceFault::Saturated, false);
     bench.sample();
     assert!((bench.number("@AN[1]") - stuck).abs() < 0.02);
     assert_eq!(bench.number("_BGA"), 1.0);
@@ -51,14 +47,10 @@ fn a_cell_may_stick_or_saturate_and_come_back() {
 fn another_controller_has_another_name_and_number() {
     let mut bench = moving();
     let number = bench.number("_BN");
-    bench
-        .emulator
-        .suffer(bench.now, DeviceFault::WrongDevice, true);
+    bench.emulator.suffer(bench.now, DeviceFault::WrongDevice, true);
     assert_eq!(bench.ask("\x12\x16"), "RIO47120 Rev 1.1b\r\n:");
     assert_ne!(bench.number("_BN"), number);
-    bench
-        .emulator
-        .suffer(bench.now, DeviceFault::WrongDevice, false);
+    bench.emulator.suffer(bench.now, DeviceFault::WrongDevice, false);
     assert_eq!(bench.ask("\x12\x16"), "DMC4143 Rev 1.3a\r\n:");
 }
 

@@ -28,10 +28,8 @@ fn start(place: Place, is_serial: bool) -> Served {
     let thread = std::thread::Builder::new()
         .name("emulator".into())
         .spawn(move || {
-            let mut device = GalilEmulator::new(GalilSettings {
-                is_serial,
-                ..GalilSettings::default()
-            });
+            let mut device =
+                GalilEmulator::new(GalilSettings { is_serial, ..GalilSettings::default() });
             let options = ServeOptions {
                 place,
                 baud: None,
@@ -46,13 +44,7 @@ fn start(place: Place, is_serial: bool) -> Served {
     let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
-    Served {
-        address,
-        orders,
-        told,
-        stop,
-        thread: Some(thread),
-    }
+    Served { address, orders, told, stop, thread: Some(thread) }
 }
 
 impl Drop for Served {
@@ -69,12 +61,7 @@ impl Drop for Served {
 fn read_prompts(port: &mut impl Read, prompts: usize) -> String {
     let mut all = Vec::new();
     let mut part = [0_u8; 256];
-    while all
-        .iter()
-        .filter(|byte| matches!(byte, b':' | b'?'))
-        .count()
-        < prompts
-    {
+    while all.iter().filter(|byte| matches!(byte, b':' | b'?')).count() < prompts {
         match port.read(&mut part) {
             Ok(0) => break,
             Ok(count) => all.extend_from_slice(&part[..count]),

@@ -39,8 +39,7 @@ impl Wire {
         let bytes = self.emulator.transmit(0);
         let at = self.now + DELAY;
         for byte in bytes {
-            self.arriving
-                .extend((self.spoil)(byte).into_iter().map(|byte| (at, byte)));
+            self.arriving.extend((self.spoil)(byte).into_iter().map(|byte| (at, byte)));
         }
     }
 }
@@ -137,12 +136,7 @@ pub fn clock_of(wire: &Shared) -> HostClock {
 }
 
 pub fn try_connect(wire: &Shared, settings: &GalilSettings) -> Result<Connected, GalilOpenError> {
-    connect(
-        &mut wire.clone(),
-        &clock_of(wire),
-        settings,
-        &"galil".into(),
-    )
+    connect(&mut wire.clone(), &clock_of(wire), settings, &"galil".into())
 }
 
 /// The host's side after it has connected.
@@ -247,9 +241,5 @@ impl Host {
 }
 
 pub fn to(target_pulses: i64, speed: f64) -> RigCommand {
-    RigCommand::MoveTo(MoveTo {
-        target_pulses,
-        speed: MmPerS(speed),
-        acceleration: MmPerS2(61.44),
-    })
+    RigCommand::MoveTo(MoveTo { target_pulses, speed: MmPerS(speed), acceleration: MmPerS2(61.44) })
 }

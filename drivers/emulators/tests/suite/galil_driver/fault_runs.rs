@@ -1,10 +1,7 @@
 //! Random moves and stops over a pseudo-terminal while something goes wrong: every run ends safe.
 //!
 //! `PALPATE_GALIL_FAULTS` asks for more runs than the suite takes, `PALPATE_GALIL_SEED` for another first one.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "faults and moves meet in real time"
-)]
+#![expect(clippy::disallowed_methods, reason = "faults and moves meet in real time")]
 
 use super::bench::{thesis, to};
 use super::wires::opened;
@@ -118,10 +115,7 @@ impl Story {
 /// One run; `Err` says in words what was not safe.
 fn run(seed: u64) -> Result<(), String> {
     let mut random = SplitMix::seeded(seed);
-    let mut story = Story {
-        seed,
-        lines: Vec::new(),
-    };
+    let mut story = Story { seed, lines: Vec::new() };
     let (orders, received) = sync_channel(16);
     let (sender, told) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
@@ -150,22 +144,14 @@ fn run(seed: u64) -> Result<(), String> {
     let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         return Err("the emulator did not start".into());
     };
-    let place = Place::Serial {
-        port: address,
-        baud: 115_200,
-        has_handshake: false,
-    };
-    let settings = GalilSettings {
-        sampling: [Sampling::Poll, Sampling::Record][random.below(2)],
-        ..thesis()
-    };
-    let verdict = opened(&place, &settings)
-        .map_err(|err| err.to_string())
-        .and_then(|rig| {
-            drive(rig, &mut random, &mut story, &|order| {
-                drop(orders.try_send(order));
-            })
-        });
+    let place = Place::Serial { port: address, baud: 115_200, has_handshake: false };
+    let settings =
+        GalilSettings { sampling: [Sampling::Poll, Sampling::Record][random.below(2)], ..thesis() };
+    let verdict = opened(&place, &settings).map_err(|err| err.to_string()).and_then(|rig| {
+        drive(rig, &mut random, &mut story, &|order| {
+            drop(orders.try_send(order));
+        })
+    });
     // Whatever was still under way: two looks of the watchdog and the brake.
     std::thread::sleep(Duration::from_millis(1500));
     stop.store(true, Ordering::Relaxed);
@@ -267,10 +253,7 @@ fn every_run_ends_safe() {
         let given = std::env::var(variable).ok();
         given.and_then(|text| text.parse().ok()).unwrap_or(usual)
     };
-    let (runs, first) = (
-        number("PALPATE_GALIL_FAULTS", 20),
-        number("PALPATE_GALIL_SEED", 1),
-    );
+    let (runs, first) = (number("PALPATE_GALIL_FAULTS", 20), number("PALPATE_GALIL_SEED", 1));
     let next = AtomicUsize::new(first);
     let unsafe_ones: Vec<String> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..AT_ONCE.min(runs))
@@ -294,13 +277,8 @@ fn every_run_ends_safe() {
             })
             .collect();
         let done = workers.into_iter().map(|worker| worker.join());
-        done.flat_map(|bad| bad.expect("it does not panic"))
-            .collect()
+        done.flat_map(|bad| bad.expect("it does not panic")).collect()
     });
     println!("{runs} runs, {} not safe", unsafe_ones.len());
-    assert!(
-        unsafe_ones.is_empty(),
-        "{} of {runs} runs",
-        unsafe_ones.len()
-    );
+    assert!(unsafe_ones.is_empty(), "{} of {runs} runs", unsafe_ones.len());
 }

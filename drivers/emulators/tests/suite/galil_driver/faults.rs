@@ -55,9 +55,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
         let now = wire.now;
         wire.emulator.suffer(now, DeviceFault::Reset, true);
     }
-    host.until("noticed", |host| {
-        host.faults.contains(&Fault::ControllerReset)
-    });
+    host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     let before = host.faults.len();
     let now = host.now();
     host.session.command(now, RigCommand::EnableMotor);
@@ -117,11 +115,7 @@ fn spoilt_bytes_are_got_over() {
         host.pass(3.0);
         let before = host.readings.len();
         host.pass(0.5);
-        assert!(
-            host.readings.len() > before + 100,
-            "seed {seed}: {:?}",
-            host.faults
-        );
+        assert!(host.readings.len() > before + 100, "seed {seed}: {:?}", host.faults);
         assert!(host.is_at_rest(), "seed {seed}");
         assert!(host.acks.contains(&RigCommand::Stop), "seed {seed}");
         assert!(host.newest().status.has(AxisStatus::MOTOR_ON));
@@ -153,10 +147,7 @@ fn random_bytes_never_break_the_dialogue() {
     let streams = streams.and_then(|text| text.parse().ok());
     let streams: usize = streams.unwrap_or(2_000);
     for sampling in [Sampling::Poll, Sampling::Record] {
-        let mut host = Host::new(&GalilSettings {
-            sampling,
-            ..thesis()
-        });
+        let mut host = Host::new(&GalilSettings { sampling, ..thesis() });
         host.pass(0.1);
         let start = host.now();
         let mut random = SplitMix::seeded(11);
@@ -201,10 +192,7 @@ fn random_bytes_never_break_the_dialogue() {
 
 /// On the way to a place, on a controller that has no watchdog.
 fn unwatched() -> Host {
-    let mut host = Host::new(&GalilSettings {
-        has_watchdog: false,
-        ..thesis()
-    });
+    let mut host = Host::new(&GalilSettings { has_watchdog: false, ..thesis() });
     host.tell(RigCommand::EnableMotor);
     host.tell(to(6000, 20.0));
     host.pass(0.6);
@@ -290,10 +278,7 @@ fn an_axis_that_nobody_looks_after_is_stopped_without_a_watchdog_too() {
 
 #[test]
 fn a_reset_while_recording_is_told_as_one() {
-    let mut host = Host::new(&GalilSettings {
-        sampling: Sampling::Record,
-        ..thesis()
-    });
+    let mut host = Host::new(&GalilSettings { sampling: Sampling::Record, ..thesis() });
     host.pass(0.5);
     {
         let mut wire = host.wire.lock();

@@ -75,11 +75,7 @@ fn a_stop_is_followed_too() {
         tracker.on_reading(reading).unwrap();
     }
     assert!(host.newest().pulses < 2000);
-    assert!(
-        host.readings
-            .iter()
-            .any(|r| r.status.has(AxisStatus::STOPPING | AxisStatus::MOVING))
-    );
+    assert!(host.readings.iter().any(|r| r.status.has(AxisStatus::STOPPING | AxisStatus::MOVING)));
 }
 
 #[test]
@@ -113,10 +109,7 @@ fn a_place_gets_a_new_count_and_limits_go_with_it() {
 
 #[test]
 fn a_reversed_axis_moves_the_other_way() {
-    let settings = GalilSettings {
-        is_reversed: true,
-        ..thesis()
-    };
+    let settings = GalilSettings { is_reversed: true, ..thesis() };
     let mut host = enabled(&settings);
     host.tell(to(200, 5.0));
     host.settle();
@@ -133,9 +126,7 @@ fn a_reversed_axis_moves_the_other_way() {
 fn a_limit_switch_ends_a_move_and_is_shown() {
     let mut host = enabled(&thesis());
     host.tell(to(-3000, 20.0));
-    host.until("the limit", |host| {
-        host.newest().status.has(AxisStatus::REVERSE_LIMIT)
-    });
+    host.until("the limit", |host| host.newest().status.has(AxisStatus::REVERSE_LIMIT));
     host.settle();
     let before = host.faults.len();
     let now = host.now();
@@ -155,11 +146,9 @@ fn a_limit_switch_ends_a_move_and_is_shown() {
 fn what_cannot_be_done_is_refused_in_words() {
     let mut host = Host::new(&thesis());
     host.until("a sample", |host| !host.readings.is_empty());
-    for (command, words) in [
-        (to(10, 5.0), "TC 20"),
-        (to(10, 30.0), "rig file"),
-        (to(1 << 40, 5.0), "another target"),
-    ] {
+    for (command, words) in
+        [(to(10, 5.0), "TC 20"), (to(10, 30.0), "rig file"), (to(1 << 40, 5.0), "another target")]
+    {
         let before = host.faults.len();
         let now = host.now();
         host.session.command(now, command);

@@ -12,13 +12,7 @@ use palpate_model::Nanos;
 fn a_controller_tells_what_it_is() {
     let host = Host::new(&thesis());
     let rig = &host.connected.description;
-    for fact in [
-        "DMC4143 Rev 1.3a",
-        "no. 1820",
-        "axis A",
-        "input 1",
-        "watchdog",
-    ] {
+    for fact in ["DMC4143 Rev 1.3a", "no. 1820", "axis A", "input 1", "watchdog"] {
         assert!(rig.identity.contains(fact), "{fact}: {}", rig.identity);
     }
     assert_eq!(rig.tick_nanos, 976_563);
@@ -44,10 +38,7 @@ fn rates_are_those_read_back() {
 #[test]
 fn other_series_and_clocks_are_driven_too() {
     for model in [GalilModel::Dmc4183, GalilModel::Dmc4040] {
-        let wire = wired(galil::GalilSettings {
-            model,
-            ..galil::GalilSettings::default()
-        });
+        let wire = wired(galil::GalilSettings { model, ..galil::GalilSettings::default() });
         let found = try_connect(&wire, &thesis()).unwrap();
         assert_eq!(found.board.axes, model.axes());
     }
@@ -65,23 +56,11 @@ fn other_series_and_clocks_are_driven_too() {
 
 #[test]
 fn what_is_not_the_rig_of_the_file_is_refused_in_words() {
-    let serial = GalilSettings {
-        serial_number: Some(7),
-        ..thesis()
-    };
-    let axis = GalilSettings {
-        axis: 'F',
-        ..thesis()
-    };
-    let speed = GalilSettings {
-        speed_max: palpate_model::MmPerS(1e6),
-        ..thesis()
-    };
-    for (settings, words) in [
-        (serial, "serial number 1820"),
-        (axis, "no axis F"),
-        (speed, "SPA="),
-    ] {
+    let serial = GalilSettings { serial_number: Some(7), ..thesis() };
+    let axis = GalilSettings { axis: 'F', ..thesis() };
+    let speed = GalilSettings { speed_max: palpate_model::MmPerS(1e6), ..thesis() };
+    for (settings, words) in [(serial, "serial number 1820"), (axis, "no axis F"), (speed, "SPA=")]
+    {
         let wire = wired(galil::GalilSettings::default());
         let err = try_connect(&wire, &settings).unwrap_err().to_string();
         assert!(err.contains(words), "{err}");
@@ -98,10 +77,7 @@ fn a_controller_without_inputs_is_refused() {
     let err = try_connect(&wire, &thesis()).unwrap_err();
     assert!(err.to_string().contains("no analog inputs"), "{err}");
     let other = wired(galil::GalilSettings::default());
-    other
-        .lock()
-        .emulator
-        .suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+    other.lock().emulator.suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
     let err = try_connect(&other, &thesis()).unwrap_err();
     assert!(matches!(err, GalilOpenError::Unsupported { .. }), "{err}");
 }
@@ -120,10 +96,8 @@ fn another_range_has_other_counts() {
 #[test]
 fn echo_half_a_line_and_half_a_download_are_got_rid_of() {
     for left in [&b"PAA=10"[..], b"DL\r#X\rJP #", b"EO 1\rMG 1,2\r"] {
-        let wire = wired(galil::GalilSettings {
-            has_echo: true,
-            ..galil::GalilSettings::default()
-        });
+        let wire =
+            wired(galil::GalilSettings { has_echo: true, ..galil::GalilSettings::default() });
         {
             let mut wire = wire.lock();
             let now = wire.now;
@@ -145,12 +119,7 @@ fn nobody_on_the_wire_is_told() {
     assert_eq!(err, GalilOpenError::Silent);
     let wire = wired(galil::GalilSettings::default());
     wire.lock().is_cut = true;
-    let lost = connect(
-        &mut wire.clone(),
-        &clock_of(&wire),
-        &thesis(),
-        &"galil".into(),
-    );
+    let lost = connect(&mut wire.clone(), &clock_of(&wire), &thesis(), &"galil".into());
     assert!(matches!(lost, Err(GalilOpenError::Lost { .. })));
 }
 
@@ -158,10 +127,7 @@ fn nobody_on_the_wire_is_told() {
 #[test]
 fn the_identity_is_the_same_each_time() {
     for sampling in [Sampling::Poll, Sampling::Record] {
-        let settings = GalilSettings {
-            sampling,
-            ..thesis()
-        };
+        let settings = GalilSettings { sampling, ..thesis() };
         let wire = wired(galil::GalilSettings::default());
         let first = try_connect(&wire, &settings).unwrap();
         let second = try_connect(&wire, &settings).unwrap();

@@ -35,11 +35,7 @@ fn on_pty(latency: Nanos, baud: Option<u32>) -> Option<(Served, Place)> {
         return None;
     }
     let served = start(At::Pty(None), true, latency, baud);
-    let place = Place::Serial {
-        port: served.address.clone(),
-        baud: 115_200,
-        has_handshake: false,
-    };
+    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     Some((served, place))
 }
 
@@ -71,11 +67,8 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     let last = first + (seconds / tick) as u64;
     let (mut samples, mut gaps, mut newest) = (0_u64, 0_u64, first);
     let (mut age_max, mut uncertainty_max) = (Nanos::ZERO, Nanos::ZERO);
-    let step = if settings.sampling == Sampling::Record {
-        description.ticks_per_sample as u64
-    } else {
-        1
-    };
+    let step =
+        if settings.sampling == Sampling::Record { description.ticks_per_sample as u64 } else { 1 };
     // The time base: a straight line through the first and last times at which samples are said to have been taken.
     let mut line: Vec<(u64, Nanos)> = Vec::new();
     while newest < last {
@@ -141,11 +134,7 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
 }
 
 fn with(sampling: Sampling, sample_us: Option<u16>) -> GalilSettings {
-    GalilSettings {
-        sampling,
-        sample_us,
-        ..thesis()
-    }
+    GalilSettings { sampling, sample_us, ..thesis() }
 }
 
 #[test]
@@ -157,27 +146,15 @@ fn recording_loses_nothing_over_a_serial_port() {
 
 #[test]
 fn polling_over_a_serial_port() {
-    count(
-        &with(Sampling::Poll, None),
-        (Nanos::ZERO, None),
-        "polled, TM 1000",
-    );
-    count(
-        &with(Sampling::Poll, Some(500)),
-        (Nanos::ZERO, None),
-        "polled, TM 500",
-    );
+    count(&with(Sampling::Poll, None), (Nanos::ZERO, None), "polled, TM 1000");
+    count(&with(Sampling::Poll, Some(500)), (Nanos::ZERO, None), "polled, TM 500");
 }
 
 #[test]
 fn a_converter_with_a_latency_of_16_ms() {
     let late = (Nanos::from_millis(16), None);
     count(&with(Sampling::Auto, None), late, "auto, 16 ms latency");
-    count(
-        &with(Sampling::Record, None),
-        late,
-        "recorded, 16 ms latency",
-    );
+    count(&with(Sampling::Record, None), late, "recorded, 16 ms latency");
 }
 
 #[test]
@@ -198,11 +175,7 @@ fn stops_under_full_acquisition() {
         (Sampling::Poll, true),
     ];
     for (sampling, is_tcp) in ways {
-        let opened = if is_tcp {
-            Some(on_tcp())
-        } else {
-            on_pty(Nanos::ZERO, None)
-        };
+        let opened = if is_tcp { Some(on_tcp()) } else { on_pty(Nanos::ZERO, None) };
         let Some((_served, place)) = opened else {
             continue;
         };
@@ -214,18 +187,13 @@ fn stops_under_full_acquisition() {
         let mut late: Vec<u64> = Vec::with_capacity(stops);
         for at in 0..stops {
             // At any time of the acquisition's turn.
-            std::thread::sleep(std::time::Duration::from_micros(
-                300 + (at as u64 * 7919) % 3000,
-            ));
+            std::thread::sleep(std::time::Duration::from_micros(300 + (at as u64 * 7919) % 3000));
             runner.events.clear();
             drop(runner.rig.take_raw());
             let before = runner.rig.now();
             runner.rig.send(RigCommand::Stop);
             runner.until("acknowledged", |runner| {
-                runner
-                    .events
-                    .iter()
-                    .any(|event| matches!(event.body, RigEventBody::Ack(_)))
+                runner.events.iter().any(|event| matches!(event.body, RigEventBody::Ack(_)))
             });
             let written = runner
                 .rig
@@ -245,11 +213,7 @@ fn stops_under_full_acquisition() {
             at(1.0)
         );
         if is_soak("PALPATE_STOPS") {
-            assert!(
-                at(0.999) <= STOP_MAX_MS,
-                "{sampling:?} over {over}: {:.3} ms",
-                at(0.999)
-            );
+            assert!(at(0.999) <= STOP_MAX_MS, "{sampling:?} over {over}: {:.3} ms", at(0.999));
         }
     }
 }

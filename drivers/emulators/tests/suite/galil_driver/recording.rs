@@ -11,10 +11,7 @@ use palpate_model::random::SplitMix;
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};
 
 fn recorded() -> GalilSettings {
-    GalilSettings {
-        sampling: Sampling::Record,
-        ..thesis()
-    }
+    GalilSettings { sampling: Sampling::Record, ..thesis() }
 }
 
 /// Says something to the controller whose answer nobody hears.
@@ -34,30 +31,16 @@ fn enabled(settings: &GalilSettings) -> Host {
 #[test]
 fn every_second_sample_comes_and_none_is_lost() {
     for (sample_us, rate) in [(None, 512.0), (Some(500), 1024.0)] {
-        let mut host = enabled(&GalilSettings {
-            sample_us,
-            ..recorded()
-        });
+        let mut host = enabled(&GalilSettings { sample_us, ..recorded() });
         let identity = host.connected.description.identity.clone();
-        assert!(
-            identity.contains(&format!("{rate:.0} samples/s recorded")),
-            "{identity}"
-        );
+        assert!(identity.contains(&format!("{rate:.0} samples/s recorded")), "{identity}");
         assert_eq!(host.connected.description.ticks_per_sample, 2.0);
         let before = host.readings.len();
         // The ring of two thousand goes round.
         host.pass(5.0);
         let readings = &host.readings[before..];
-        assert!(
-            (readings.len() as f64 / 5.0 - rate).abs() < 0.01 * rate,
-            "{}",
-            readings.len()
-        );
-        assert!(
-            readings
-                .windows(2)
-                .all(|pair| pair[1].tick == pair[0].tick + 2)
-        );
+        assert!((readings.len() as f64 / 5.0 - rate).abs() < 0.01 * rate, "{}", readings.len());
+        assert!(readings.windows(2).all(|pair| pair[1].tick == pair[0].tick + 2));
         assert_eq!(host.session.stats().lost, 0);
         assert_eq!(host.faults, []);
         // The signal is noise around a small positive voltage, as polls give it too.
@@ -148,10 +131,7 @@ fn a_garbled_fetch_is_done_again() {
         let stats = host.session.stats();
         // A spoilt number that is still one goes unseen, the order of elements does not.
         let ticks: Vec<u64> = host.readings.iter().map(|one| one.tick).collect();
-        let skipped = ticks
-            .windows(2)
-            .filter(|pair| pair[1] != pair[0] + 2)
-            .count();
+        let skipped = ticks.windows(2).filter(|pair| pair[1] != pair[0] + 2).count();
         assert!(
             skipped == 0 || stats.lost > 0 || !host.faults.is_empty(),
             "seed {seed}: {stats:?}"
@@ -174,14 +154,8 @@ fn a_computer_that_is_late_loses_only_what_was_written_over() {
             wire.emulator.advance(now);
         }
         host.pass(1.0);
-        let ticks: Vec<u64> = host.readings[before - 1..]
-            .iter()
-            .map(|one| one.tick)
-            .collect();
-        let missing: u64 = ticks
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]) / 2 - 1)
-            .sum();
+        let ticks: Vec<u64> = host.readings[before - 1..].iter().map(|one| one.tick).collect();
+        let missing: u64 = ticks.windows(2).map(|pair| (pair[1] - pair[0]) / 2 - 1).sum();
         assert_eq!(missing > 0, is_lost, "{late_ms}");
         assert_eq!(host.session.stats().lost, missing);
         assert!(ticks.len() > 1_000, "{}", ticks.len());
@@ -214,38 +188,27 @@ fn a_reset_ends_the_recording() {
         let now = wire.now;
         wire.emulator.suffer(now, DeviceFault::Reset, true);
     }
-    host.until("noticed", |host| {
-        host.faults.contains(&Fault::ControllerReset)
-    });
+    host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     let before = host.readings.len();
     host.pass(0.5);
     assert!(host.readings.len() > before + 100);
 }
 
 fn board(model: GalilModel) -> Shared {
-    wired(galil::GalilSettings {
-        model,
-        ..galil::GalilSettings::default()
-    })
+    wired(galil::GalilSettings { model, ..galil::GalilSettings::default() })
 }
 
 #[test]
 fn all_models_record_and_a_full_memory_is_told() {
-    for model in [
-        GalilModel::Dmc4143,
-        GalilModel::Dmc4183,
-        GalilModel::Dmc4040,
-        GalilModel::Dmc2143,
-    ] {
+    for model in
+        [GalilModel::Dmc4143, GalilModel::Dmc4183, GalilModel::Dmc4040, GalilModel::Dmc2143]
+    {
         let host = Host::on(board(model), &recorded());
         assert!(host.connected.plan.is_some(), "{model}");
     }
     let wire = board(GalilModel::Dmc2143);
     unseen(&mut wire.lock().emulator, Nanos::ZERO, b"DM rest[7000]\r");
-    let auto = GalilSettings {
-        sampling: Sampling::Auto,
-        ..thesis()
-    };
+    let auto = GalilSettings { sampling: Sampling::Auto, ..thesis() };
     let host = Host::on(wire.clone(), &auto);
     let link = &host.connected.link;
     assert!(link.contains("polled") && link.contains("arrays"), "{link}");

@@ -7,12 +7,7 @@ use palpate_model::rig::{AxisStatus, Oscillation, PathTracker, RigCommand};
 use palpate_model::units::MmPerS2;
 
 fn sine(amplitude_pulses: i64, period_ticks: u32, cycles: u32) -> Oscillation {
-    Oscillation {
-        amplitude_pulses,
-        period_ticks,
-        cycles,
-        acceleration: MmPerS2(61.44),
-    }
+    Oscillation { amplitude_pulses, period_ticks, cycles, acceleration: MmPerS2(61.44) }
 }
 
 fn at_forty(settings: &GalilSettings) -> Host {
@@ -29,11 +24,7 @@ fn at_forty(settings: &GalilSettings) -> Host {
 fn a_sine_is_made_to_the_tick_and_ends_where_it_began() {
     for sampling in [Sampling::Poll, Sampling::Record] {
         for reversed in [false, true] {
-            let settings = GalilSettings {
-                sampling,
-                is_reversed: reversed,
-                ..thesis()
-            };
+            let settings = GalilSettings { sampling, is_reversed: reversed, ..thesis() };
             for (amplitude, period, cycles) in [(50, 2000, 2), (-20, 513, 5), (90, 1024, 3)] {
                 let mut host = at_forty(&settings);
                 let wanted = sine(amplitude, period, cycles);
@@ -133,11 +124,7 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
         wire.emulator.advance(now);
     }
     host.until("told", |host| !host.faults.is_empty());
-    assert!(
-        host.faults[0].to_string().contains("broken off"),
-        "{:?}",
-        host.faults
-    );
+    assert!(host.faults[0].to_string().contains("broken off"), "{:?}", host.faults);
     host.settle();
     host.tell(to(40, 4.98));
     host.settle();

@@ -1,9 +1,6 @@
 //! The rig over a TCP connection and over a pseudo-terminal, in real time. Waits are generous: nothing here is about
 //! speed.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the clock of a test stands for the runner's"
-)]
+#![expect(clippy::disallowed_methods, reason = "the clock of a test stands for the runner's")]
 
 use super::bench::{thesis, to};
 use palpate_drivers::device::OpenError;
@@ -37,17 +34,8 @@ pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> S
     let thread = std::thread::Builder::new()
         .name("emulator".into())
         .spawn(move || {
-            let mut device = GalilEmulator::new(Emulated {
-                is_serial,
-                ..Emulated::default()
-            });
-            let options = ServeOptions {
-                place,
-                baud,
-                latency,
-                faults: Vec::new(),
-                seed: 1,
-            };
+            let mut device = GalilEmulator::new(Emulated { is_serial, ..Emulated::default() });
+            let options = ServeOptions { place, baud, latency, faults: Vec::new(), seed: 1 };
             // Only where it is matters here.
             let mut tell = |told| drop(sender.try_send(told));
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
@@ -56,12 +44,7 @@ pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> S
     let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
-    Served {
-        address,
-        orders,
-        stop,
-        thread: Some(thread),
-    }
+    Served { address, orders, stop, thread: Some(thread) }
 }
 
 impl Drop for Served {
@@ -101,12 +84,7 @@ impl Runner {
     pub fn open(place: &Place, settings: &GalilSettings) -> Self {
         let rig = opened(place, settings).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
-        Self {
-            rig,
-            now: Nanos::ZERO,
-            newest: None,
-            events: Vec::new(),
-        }
+        Self { rig, now: Nanos::ZERO, newest: None, events: Vec::new() }
     }
 
     pub fn pass(&mut self) {
@@ -149,8 +127,7 @@ impl Runner {
     }
 
     pub fn is_at_rest(&self) -> bool {
-        self.newest
-            .is_some_and(|reading| !reading.status.has(AxisStatus::MOVING))
+        self.newest.is_some_and(|reading| !reading.status.has(AxisStatus::MOVING))
     }
 
     /// The plug is put back: the same controller, at rest, does what it is told.
@@ -242,11 +219,7 @@ fn a_controller_on_a_serial_port_that_only_one_program_has() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = At::Pty(Some(folder.path().join("galil")));
     let served = start(at, true, Nanos::ZERO, None);
-    let place = Place::Serial {
-        port: served.address.clone(),
-        baud: 115_200,
-        has_handshake: false,
-    };
+    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     let runner = Runner::open(&place, &thesis());
     let Err(err) = place.open() else {
         panic!("two programs have one port");
@@ -261,11 +234,7 @@ fn a_converter_that_waits_is_measured() {
         return;
     }
     let served = start(At::Pty(None), true, Nanos::from_millis(16), None);
-    let place = Place::Serial {
-        port: served.address.clone(),
-        baud: 115_200,
-        has_handshake: false,
-    };
+    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     let mut runner = Runner::open(&place, &thesis());
     runner.until("samples", |runner| runner.events.len() > 50);
     let stats = runner.rig.links()[0].1;

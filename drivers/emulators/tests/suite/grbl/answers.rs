@@ -20,15 +20,9 @@ impl Board {
         for (number, value) in values {
             eeprom.set(*number, *value).expect("it takes it");
         }
-        let settings = GrblSettings {
-            eeprom,
-            ..GrblSettings::default()
-        };
-        let mut board = Self {
-            grbl: Grbl::new(settings),
-            now: Nanos::ZERO,
-            switches: Switches::default(),
-        };
+        let settings = GrblSettings { eeprom, ..GrblSettings::default() };
+        let mut board =
+            Self { grbl: Grbl::new(settings), now: Nanos::ZERO, switches: Switches::default() };
         board.pass(1);
         board
     }
@@ -75,23 +69,11 @@ fn headers_of_post_processors_are_taken() {
     ] {
         assert_eq!(board.say(&format!("{line}\n")), "ok\r\n", "{line}");
     }
-    assert_eq!(
-        board.say("$G\n"),
-        "[GC:G0 G54 G17 G21 G90 G94 M3 M8 T0 F0 S1000]\r\nok\r\n"
-    );
-    assert_eq!(
-        board.say("?"),
-        "<Idle|MPos:0.000,0.000,0.000|FS:0,1000|WCO:0.000,0.000,0.000>\r\n"
-    );
-    assert_eq!(
-        board.say("?"),
-        "<Idle|MPos:0.000,0.000,0.000|FS:0,1000|Ov:100,100,100|A:SF>\r\n"
-    );
+    assert_eq!(board.say("$G\n"), "[GC:G0 G54 G17 G21 G90 G94 M3 M8 T0 F0 S1000]\r\nok\r\n");
+    assert_eq!(board.say("?"), "<Idle|MPos:0.000,0.000,0.000|FS:0,1000|WCO:0.000,0.000,0.000>\r\n");
+    assert_eq!(board.say("?"), "<Idle|MPos:0.000,0.000,0.000|FS:0,1000|Ov:100,100,100|A:SF>\r\n");
     assert_eq!(board.say("M30\n"), "[MSG:Pgm End]\r\nok\r\n");
-    assert_eq!(
-        board.say("$G\n"),
-        "[GC:G1 G54 G17 G21 G90 G94 M5 M9 T0 F0 S1000]\r\nok\r\n"
-    );
+    assert_eq!(board.say("$G\n"), "[GC:G1 G54 G17 G21 G90 G94 M5 M9 T0 F0 S1000]\r\nok\r\n");
 }
 
 #[test]
@@ -101,15 +83,9 @@ fn a_new_zero_is_told_with_the_next_report() {
     board.pass(1_000);
     board.say("??");
     assert_eq!(board.say("G10L20P1X0\n"), "ok\r\n");
-    assert_eq!(
-        board.say("?"),
-        "<Idle|MPos:2.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>\r\n"
-    );
+    assert_eq!(board.say("?"), "<Idle|MPos:2.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>\r\n");
     let said = board.say("$#\n");
-    assert!(
-        said.starts_with("[G54:2.000,0.000,0.000]\r\n[G55:0.000"),
-        "{said}"
-    );
+    assert!(said.starts_with("[G54:2.000,0.000,0.000]\r\n[G55:0.000"), "{said}");
     assert!(said.ends_with(
         "[G92:0.000,0.000,0.000]\r\n[TLO:0.000]\r\n[PRB:0.000,0.000,0.000:0]\r\nok\r\n"
     ));
@@ -139,10 +115,7 @@ fn a_full_planner_moves_and_a_reset_in_it_is_an_alarm() {
     assert_eq!(board.byte(0x18), "ALARM:3\r\n");
     // Half a second for the alarm to be read; the line that waited is answered.
     assert_eq!(board.pass(490), "");
-    assert_eq!(
-        board.pass(20),
-        format!("ok\r\n{HELLO}[MSG:'$H'|'$X' to unlock]\r\n")
-    );
+    assert_eq!(board.pass(20), format!("ok\r\n{HELLO}[MSG:'$H'|'$X' to unlock]\r\n"));
 }
 
 #[test]
@@ -157,16 +130,10 @@ fn lines_too_long_for_the_buffer_are_answered() {
 fn a_soft_limit_ends_in_a_reset_and_its_line_is_answered() {
     let mut board = Board::with(&[(22, 1.0), (20, 1.0)]);
     assert_eq!(board.say("$X\n"), "[MSG:Caution: Unlocked]\r\nok\r\n");
-    assert_eq!(
-        board.say("G0X500\n"),
-        "ALARM:2\r\n[MSG:Reset to continue]\r\n"
-    );
+    assert_eq!(board.say("G0X500\n"), "ALARM:2\r\n[MSG:Reset to continue]\r\n");
     assert_eq!(board.say("?$$\n"), "");
     board.pass(600);
-    assert_eq!(
-        board.byte(0x18),
-        format!("ok\r\n{HELLO}[MSG:'$H'|'$X' to unlock]\r\n")
-    );
+    assert_eq!(board.byte(0x18), format!("ok\r\n{HELLO}[MSG:'$H'|'$X' to unlock]\r\n"));
 }
 
 #[test]
@@ -186,19 +153,10 @@ fn a_limit_alarms_when_it_closes_and_when_it_opens() {
 fn what_resets_the_board_is_answered_before() {
     let mut board = Board::new();
     assert_eq!(board.say("$C\n"), "[MSG:Enabled]\r\nok\r\n");
-    assert_eq!(
-        board.say("$C\n"),
-        format!("[MSG:Disabled]\r\nok\r\n{HELLO}")
-    );
-    assert_eq!(
-        board.say("$RST=#\n"),
-        format!("[MSG:Restoring defaults]\r\nok\r\n{HELLO}")
-    );
+    assert_eq!(board.say("$C\n"), format!("[MSG:Disabled]\r\nok\r\n{HELLO}"));
+    assert_eq!(board.say("$RST=#\n"), format!("[MSG:Restoring defaults]\r\nok\r\n{HELLO}"));
     assert_eq!(board.say("$SLP\n"), "ok\r\n[MSG:Sleeping]\r\n");
-    assert_eq!(
-        board.byte(0x18),
-        format!("{HELLO}[MSG:'$H'|'$X' to unlock]\r\n")
-    );
+    assert_eq!(board.byte(0x18), format!("{HELLO}[MSG:'$H'|'$X' to unlock]\r\n"));
 }
 
 #[test]
@@ -234,12 +192,9 @@ fn startup_lines_are_tried_kept_and_done() {
 fn overrides_are_told_at_once() {
     let mut board = Board::new();
     board.say("?");
-    for (byte, told) in [
-        (0x91, "110,100,100"),
-        (0x96, "110,50,100"),
-        (0x9b, "110,50,90"),
-        (0x90, "100,50,90"),
-    ] {
+    for (byte, told) in
+        [(0x91, "110,100,100"), (0x96, "110,50,100"), (0x9b, "110,50,90"), (0x90, "100,50,90")]
+    {
         board.byte(byte);
         assert!(board.say("?").contains(&format!("|Ov:{told}>")));
     }
@@ -255,10 +210,7 @@ fn a_door_stops_and_is_closed_again() {
     assert!(board.say("?").starts_with("<Door:2|"));
     board.pass(500);
     let said = board.say("?");
-    assert!(
-        said.starts_with("<Door:0|MPos:") && !said.contains("MPos:5.000"),
-        "{said}"
-    );
+    assert!(said.starts_with("<Door:0|MPos:") && !said.contains("MPos:5.000"), "{said}");
     board.say("~");
     assert!(board.say("?").starts_with("<Run|"));
     board.pass(2_000);
@@ -271,9 +223,6 @@ fn a_probe_that_finds_nothing_is_an_alarm_before_its_place() {
     assert_eq!(board.say("G38.2X0.1F600\n"), "");
     assert_eq!(board.pass(400), "ALARM:5\r\n");
     assert_eq!(board.pass(600), "[PRB:0.000,0.000,0.000:0]\r\nok\r\n");
-    assert_eq!(
-        board.say("$X\nG38.3X0.2F600\n"),
-        "[MSG:Caution: Unlocked]\r\nok\r\n"
-    );
+    assert_eq!(board.say("$X\nG38.3X0.2F600\n"), "[MSG:Caution: Unlocked]\r\nok\r\n");
     assert_eq!(board.pass(1_000), "[PRB:0.200,0.000,0.000:0]\r\nok\r\n");
 }

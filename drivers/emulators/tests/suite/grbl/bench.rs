@@ -68,8 +68,7 @@ impl Wire {
             let at = now + DELAY;
             for byte in self.board.transmit() {
                 let bytes = (self.spoil)(byte);
-                self.arriving
-                    .extend(bytes.into_iter().map(|byte| (at, byte)));
+                self.arriving.extend(bytes.into_iter().map(|byte| (at, byte)));
             }
         }
     }
@@ -182,9 +181,7 @@ impl Host {
 
     pub fn on(wire: Shared, settings: &GrblSettings) -> Self {
         let connected = try_connect(&wire, settings).expect("it connects");
-        let track = Arc::new(Mutex::new(Track::at_rest(
-            settings.sign() * connected.facts.steps,
-        )));
+        let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * connected.facts.steps)));
         let now = wire.lock().now;
         let session = Session::new(
             settings.clone(),
@@ -267,20 +264,11 @@ impl Host {
     }
 
     pub fn pulses(&self) -> f64 {
-        self.track
-            .lock()
-            .expect("nobody panics with it")
-            .at(self.now())
-            .pulses
+        self.track.lock().expect("nobody panics with it").at(self.now()).pulses
     }
 
     pub fn has(&self, status: AxisStatus) -> bool {
-        self.track
-            .lock()
-            .expect("nobody panics with it")
-            .at(self.now())
-            .status
-            .has(status)
+        self.track.lock().expect("nobody panics with it").at(self.now()).status.has(status)
     }
 
     pub fn settle(&mut self) {
@@ -294,9 +282,5 @@ impl Host {
 }
 
 pub fn to(target_pulses: i64, speed: f64) -> RigCommand {
-    RigCommand::MoveTo(MoveTo {
-        target_pulses,
-        speed: MmPerS(speed),
-        acceleration: MmPerS2(60.0),
-    })
+    RigCommand::MoveTo(MoveTo { target_pulses, speed: MmPerS(speed), acceleration: MmPerS2(60.0) })
 }

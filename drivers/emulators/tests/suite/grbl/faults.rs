@@ -30,10 +30,7 @@ fn a_cut_cable_stops_the_axis_within_the_stated_way() {
         wire.is_cut = true;
         wire.pass(Nanos::from_millis(5_000));
         let way = wire.board.place_mm() - before;
-        assert!(
-            way > 0.0 && way <= host.connected.worst_case_mm,
-            "{speed}: {way}"
-        );
+        assert!(way > 0.0 && way <= host.connected.worst_case_mm, "{speed}: {way}");
         wire.pass(Nanos::from_millis(1_000));
         assert_eq!(wire.board.place_mm() - before, way);
     }
@@ -41,12 +38,9 @@ fn a_cut_cable_stops_the_axis_within_the_stated_way() {
 
 #[test]
 fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
-    for (speed, after, is_stopped) in [
-        (20.0, 0.3, false),
-        (0.75, 1.0, false),
-        (9.0, 0.05, false),
-        (9.0, 0.6, true),
-    ] {
+    for (speed, after, is_stopped) in
+        [(20.0, 0.3, false), (0.75, 1.0, false), (9.0, 0.05, false), (9.0, 0.6, true)]
+    {
         let mut host = Host::new(&slide());
         host.tell(to(40_000, speed));
         host.pass(after);
@@ -54,12 +48,7 @@ fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
             host.ask(RigCommand::Stop);
             host.pass(0.02);
         }
-        let Host {
-            wire,
-            session,
-            track,
-            ..
-        } = host;
+        let Host { wire, session, track, .. } = host;
         wire.lock().is_cut = true;
         drop(session);
         // What the board has of the stop and of the jogs is done.
@@ -131,18 +120,9 @@ fn a_stop_is_told_when_the_axis_stands() {
 fn a_stop_of_an_axis_that_brakes_slowly_is_answered_within_a_second() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(120, 5.0).expect("it takes it");
-    let wire = wired(grbl::GrblSettings {
-        eeprom,
-        ..grbl::GrblSettings::default()
-    });
+    let wire = wired(grbl::GrblSettings { eeprom, ..grbl::GrblSettings::default() });
     let acceleration = MmPerS2(5.0);
-    let mut host = Host::on(
-        wire,
-        &GrblSettings {
-            acceleration,
-            ..slide()
-        },
-    );
+    let mut host = Host::on(wire, &GrblSettings { acceleration, ..slide() });
     host.tell(RigCommand::MoveTo(MoveTo {
         target_pulses: 40_000,
         speed: MmPerS(9.0),
@@ -168,11 +148,7 @@ fn a_program_of_somebody_else_is_ended_by_a_reset() {
             wire.board.receive(now, b"G1X100F600\n");
         }
         host.until("noticed", |host| !host.faults.is_empty());
-        assert!(
-            host.faults[0].to_string().contains("Run"),
-            "{:?}",
-            host.faults
-        );
+        assert!(host.faults[0].to_string().contains("Run"), "{:?}", host.faults);
         host.tell(command);
         let there = host.truth();
         assert!(there < 20_000.0);
@@ -191,11 +167,7 @@ fn a_host_that_hangs_stops_the_axis() {
     let there = host.truth();
     host.pass(1.0);
     assert_eq!((host.truth(), host.pulses()), (there, there));
-    assert!(
-        host.faults[0].to_string().contains("half a second"),
-        "{:?}",
-        host.faults
-    );
+    assert!(host.faults[0].to_string().contains("half a second"), "{:?}", host.faults);
 }
 
 #[test]
@@ -203,10 +175,7 @@ fn what_waits_is_not_begun_when_nobody_attends_or_the_cell_has_failed() {
     for is_cell in [false, true] {
         let mut host = Host::new(&slide());
         if is_cell {
-            host.track
-                .lock()
-                .expect("nobody panics with it")
-                .is_stop_wanted = true;
+            host.track.lock().expect("nobody panics with it").is_stop_wanted = true;
         } else {
             host.is_attended = false;
             host.pass(0.6);
@@ -232,11 +201,7 @@ fn the_hold_button_ends_a_motion_and_none_begins_while_it_is_pressed() {
     // Noticed with the next report, 0.1 s later.
     let way = (host.truth() - before) * 0.0025;
     assert!(way < 0.2, "{way}");
-    assert!(
-        host.faults[0].to_string().contains("hold"),
-        "{:?}",
-        host.faults
-    );
+    assert!(host.faults[0].to_string().contains("hold"), "{:?}", host.faults);
     let there = host.truth();
     host.ask(to(0, 0.75));
     host.pass(2.0);
@@ -282,20 +247,11 @@ fn a_limit_switch_that_locks_the_board_is_told() {
         home: HomeWiring::Probe,
         ..grbl::GrblSettings::default()
     });
-    let mut host = Host::on(
-        wire,
-        &GrblSettings {
-            home: HomeSwitch::Probe,
-            ..slide()
-        },
-    );
+    let mut host = Host::on(wire, &GrblSettings { home: HomeSwitch::Probe, ..slide() });
     host.tell(to(90_000, 20.0));
     host.until("a fault", |host| !host.faults.is_empty());
     let said = host.faults[0].to_string();
-    assert!(
-        said.contains("ALARM:1") && said.contains("limit switch"),
-        "{said}"
-    );
+    assert!(said.contains("ALARM:1") && said.contains("limit switch"), "{said}");
     assert!(host.refused(to(0, 5.0)).contains("ALARM:1"));
     host.tell(RigCommand::Stop);
 }
@@ -311,9 +267,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
         let now = wire.now;
         wire.board.receive(now, &[0x18]);
     }
-    host.until("noticed", |host| {
-        host.faults.contains(&Fault::ControllerReset)
-    });
+    host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     host.pass(0.5);
     let there = host.truth();
     // By whatever words: nothing is done until the rig is opened again.
@@ -361,9 +315,6 @@ fn spoilt_bytes_end_at_rest_and_never_without_a_word() {
         host.pass(1.0);
         assert_eq!(host.truth(), there, "seed {seed}: it still moves");
         let is_done = there == 6_000.0 && host.pulses() == 6_000.0;
-        assert!(
-            is_done || !host.faults.is_empty(),
-            "seed {seed}: {there} and no word"
-        );
+        assert!(is_done || !host.faults.is_empty(), "seed {seed}: {there} and no word");
     }
 }

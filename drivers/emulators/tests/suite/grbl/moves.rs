@@ -9,13 +9,7 @@ use palpate_model::rig::{AxisStatus, RigCommand};
 
 #[test]
 fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
-    for (speed, target) in [
-        (0.75, 800),
-        (0.75, -900),
-        (6.0, 16_000),
-        (20.0, 32_000),
-        (9.0, 30),
-    ] {
+    for (speed, target) in [(0.75, 800), (0.75, -900), (6.0, 16_000), (20.0, 32_000), (9.0, 30)] {
         let mut host = Host::new(&slide());
         let command = to(target, speed);
         assert_eq!(host.tell(command), command);
@@ -27,10 +21,7 @@ fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
         // The start is known to half a round trip, 3 ms, and the steps of this emulation are 1 ms.
         let slack = 2.0 + 0.006 * speed / 0.0025;
         assert!(worst <= slack, "{speed} to {target}: {worst} of {slack}");
-        assert_eq!(
-            (host.pulses(), host.truth()),
-            (target as f64, target as f64)
-        );
+        assert_eq!((host.pulses(), host.truth()), (target as f64, target as f64));
         assert_eq!(host.faults, []);
     }
 }
@@ -39,10 +30,7 @@ fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
 fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
     for resonator in [0.995, 1.005] {
         let mut host = Host::on(
-            wired(grbl::GrblSettings {
-                resonator,
-                ..grbl::GrblSettings::default()
-            }),
+            wired(grbl::GrblSettings { resonator, ..grbl::GrblSettings::default() }),
             &slide(),
         );
         for (target, worst_s) in [(30_000, 0.03), (0, 0.015)] {
@@ -54,10 +42,7 @@ fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
             }
             // Unmended it would be half a second at the end of these 100 s, and the jogs sent ahead last 0.3.
             let slack = 2.0 + worst_s * 0.75 / 0.0025;
-            assert!(
-                worst <= slack,
-                "{resonator}, to {target}: {worst} of {slack}"
-            );
+            assert!(worst <= slack, "{resonator}, to {target}: {worst} of {slack}");
             assert_eq!(host.truth(), target as f64);
         }
         assert_eq!(host.faults, []);
@@ -66,10 +51,7 @@ fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
 
 #[test]
 fn a_board_that_a_cancel_left_suspended_goes_on() {
-    let settings = grbl::GrblSettings {
-        is_suspending: true,
-        ..grbl::GrblSettings::default()
-    };
+    let settings = grbl::GrblSettings { is_suspending: true, ..grbl::GrblSettings::default() };
     let mut host = Host::on(wired(settings), &slide());
     host.tell(to(8_000, 5.0));
     host.pass(1.0);
@@ -102,15 +84,9 @@ fn a_long_way_is_cut_and_never_too_much_is_sent() {
         .parse()
         .expect("a place");
     let ahead = newest - host.truth() * 0.0025;
-    assert!(
-        ahead > 3.4 && ahead <= host.connected.worst_case_mm,
-        "{ahead}"
-    );
+    assert!(ahead > 3.4 && ahead <= host.connected.worst_case_mm, "{ahead}");
     // Rounded up: it is a bound.
-    let stated = format!(
-        "{:.1} mm",
-        (host.connected.worst_case_mm * 10.0).ceil() / 10.0
-    );
+    let stated = format!("{:.1} mm", (host.connected.worst_case_mm * 10.0).ceil() / 10.0);
     assert!(host.connected.identity.contains(&stated), "{stated}");
 }
 
@@ -142,10 +118,7 @@ fn a_stop_overtakes_what_waits() {
     host.ask(RigCommand::Stop);
     host.until("stopped", |host| host.acks.contains(&RigCommand::Stop));
     host.pass(0.5);
-    assert_eq!(
-        (host.truth(), host.pulses(), host.faults.len()),
-        (0.0, 0.0, 2)
-    );
+    assert_eq!((host.truth(), host.pulses(), host.faults.len()), (0.0, 0.0, 2));
 }
 
 #[test]
@@ -175,11 +148,7 @@ fn a_halt_stands_at_once_and_the_rig_must_be_opened_again() {
     assert_eq!(host.tell(RigCommand::Halt), RigCommand::Halt);
     host.pass(0.2);
     assert!((host.truth() - before) * 0.0025 < 0.2);
-    assert!(
-        host.faults[0].to_string().contains("restarted"),
-        "{:?}",
-        host.faults
-    );
+    assert!(host.faults[0].to_string().contains("restarted"), "{:?}", host.faults);
     assert!(host.refused(to(0, 5.0)).contains("position is lost"));
     host.pass(1.0);
     assert_eq!(host.faults.len(), 2, "{:?}", host.faults);
@@ -199,10 +168,7 @@ fn a_place_gets_a_new_count() {
 
 #[test]
 fn a_reversed_axis_moves_the_other_way() {
-    let mut host = Host::new(&GrblSettings {
-        is_reversed: true,
-        ..slide()
-    });
+    let mut host = Host::new(&GrblSettings { is_reversed: true, ..slide() });
     host.tell(to(-500, 5.0));
     host.settle();
     assert_eq!((host.truth(), host.pulses()), (500.0, -500.0));
@@ -215,11 +181,7 @@ fn home_is_seen_and_the_far_limit_stops() {
     host.until("home", |host| host.has(AxisStatus::HOME));
     host.tell(RigCommand::Stop);
     host.settle();
-    assert!(
-        host.wire.lock().plant.axis().0 > -1.6,
-        "{:?}",
-        host.wire.lock().plant.axis()
-    );
+    assert!(host.wire.lock().plant.axis().0 > -1.6, "{:?}", host.wire.lock().plant.axis());
     let away = host.pulses() as i64 + 2_000;
     host.tell(to(away, 9.0));
     host.settle();

@@ -34,29 +34,17 @@ fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
         (10, 0.0, "$10=1"),
     ] {
         let said = refused(&[(number, value)], &slide());
-        assert!(
-            said.contains(words) && said.contains(&format!("${number}={value}")),
-            "{said}"
-        );
+        assert!(said.contains(words) && said.contains(&format!("${number}={value}")), "{said}");
     }
-    let probe = GrblSettings {
-        home: HomeSwitch::Probe,
-        ..slide()
-    };
+    let probe = GrblSettings { home: HomeSwitch::Probe, ..slide() };
     assert!(refused(&[], &probe).contains("$21=1"));
 }
 
 #[test]
 fn steps_that_are_finer_than_what_grbl_tells_are_refused() {
-    let fine = GrblSettings {
-        mm_per_pulse: 1.0 / 1_600.0,
-        ..slide()
-    };
+    let fine = GrblSettings { mm_per_pulse: 1.0 / 1_600.0, ..slide() };
     let said = refused(&[(100, 1_600.0)], &fine);
-    assert!(
-        said.contains("$100=1600") && said.contains("thousandths"),
-        "{said}"
-    );
+    assert!(said.contains("$100=1600") && said.contains("thousandths"), "{said}");
 }
 
 #[test]
@@ -71,10 +59,7 @@ fn a_closed_limit_pin_that_both_ends_share_is_refused() {
         let err = try_connect(&wire, &slide()).expect_err("refused");
         assert_eq!(err, GrblOpenError::OnASwitch { axis: 'X' });
         assert!(err.to_string().contains("closed_is_home = true"), "{err}");
-        let settings = GrblSettings {
-            is_closed_home: true,
-            ..slide()
-        };
+        let settings = GrblSettings { is_closed_home: true, ..slide() };
         try_connect(&wire, &settings).expect("it connects");
     }
 }
@@ -85,21 +70,14 @@ fn a_locked_board_is_unlocked_only_when_the_rig_file_says_so() {
     let said = refused(&locked, &slide());
     assert!(said.contains("unlock = true"), "{said}");
     let wire = wired(board(&locked));
-    let settings = GrblSettings {
-        is_unlocking: true,
-        ..slide()
-    };
+    let settings = GrblSettings { is_unlocking: true, ..slide() };
     try_connect(&wire, &settings).expect("it connects");
     assert!(String::from_utf8_lossy(&wire.lock().sent).contains("$X\n"));
 }
 
 /// On a limit switch of its own, the board locked and deaf for everything but a reset.
 fn on_a_limit() -> (Shared, GrblSettings) {
-    let settings = GrblSettings {
-        home: HomeSwitch::Probe,
-        is_unlocking: true,
-        ..slide()
-    };
+    let settings = GrblSettings { home: HomeSwitch::Probe, is_unlocking: true, ..slide() };
     let mut own = board(&[(21, 1.0)]);
     own.home = grbl::HomeWiring::Probe;
     let wire = wired(own);
@@ -138,21 +116,14 @@ fn a_board_that_is_held_is_told() {
 
 #[test]
 fn a_board_that_starts_is_waited_for() {
-    let wire = wired(grbl::GrblSettings {
-        is_unused: true,
-        ..grbl::GrblSettings::default()
-    });
+    let wire = wired(grbl::GrblSettings { is_unused: true, ..grbl::GrblSettings::default() });
     {
         let mut wire = wire.lock();
         let now = wire.now;
         wire.board.suffer(now, DeviceFault::Reset, true);
     }
     let connected = try_connect(&wire, &slide()).expect("it connects");
-    assert!(
-        connected.identity.contains("1.1h"),
-        "{}",
-        connected.identity
-    );
+    assert!(connected.identity.contains("1.1h"), "{}", connected.identity);
     assert!(connected.stats.round_trip_min >= Nanos(6_000_000));
 }
 
@@ -193,17 +164,13 @@ fn half_a_line_of_somebody_else_moves_nothing() {
 fn another_board_is_noticed() {
     let mut own = grbl::GrblSettings::default();
     own.eeprom.build_info = "LEFT".into();
-    let settings = GrblSettings {
-        build_info: Some("RIGHT".into()),
-        ..slide()
-    };
+    let settings = GrblSettings { build_info: Some("RIGHT".into()), ..slide() };
     let err = try_connect(&wired(own), &settings).expect_err("refused");
     assert!(matches!(err, GrblOpenError::OtherBoard { .. }), "{err}");
     let wire = wired(grbl::GrblSettings::default());
     {
         let mut wire = wire.lock();
-        wire.board
-            .suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+        wire.board.suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
         wire.board.receive(Nanos::ZERO, &[0x18]);
     }
     let err = try_connect(&wire, &slide()).expect_err("refused");
@@ -214,32 +181,18 @@ fn another_board_is_noticed() {
 fn nobody_and_somebody_else_are_told() {
     let wire = wired(grbl::GrblSettings::default());
     wire.lock().spoil = Box::new(|_| Vec::new());
-    assert_eq!(
-        try_connect(&wire, &slide()).unwrap_err(),
-        GrblOpenError::Silent
-    );
+    assert_eq!(try_connect(&wire, &slide()).unwrap_err(), GrblOpenError::Silent);
     let wire = wired(grbl::GrblSettings::default());
-    wire.lock().spoil = Box::new(|byte| {
-        if byte == b'\n' {
-            vec![byte]
-        } else {
-            vec![b'A' + byte % 16]
-        }
-    });
+    wire.lock().spoil =
+        Box::new(|byte| if byte == b'\n' { vec![byte] } else { vec![b'A' + byte % 16] });
     let err = try_connect(&wire, &slide()).unwrap_err();
     assert!(matches!(err, GrblOpenError::NotGrbl { .. }), "{err}");
     let wire = wired(grbl::GrblSettings::default());
     wire.lock().is_cut = true;
-    assert!(matches!(
-        try_connect(&wire, &slide()),
-        Err(GrblOpenError::Lost { .. })
-    ));
+    assert!(matches!(try_connect(&wire, &slide()), Err(GrblOpenError::Lost { .. })));
     let eeprom = Eeprom::factory();
     let err = try_connect(
-        &wired(grbl::GrblSettings {
-            eeprom,
-            ..grbl::GrblSettings::default()
-        }),
+        &wired(grbl::GrblSettings { eeprom, ..grbl::GrblSettings::default() }),
         &slide(),
     );
     assert!(matches!(err, Err(GrblOpenError::SetOtherwise { .. })));

@@ -90,11 +90,7 @@ fn streams() -> u64 {
 }
 
 fn switches() -> Switches {
-    Switches {
-        is_home: false,
-        is_forward: false,
-        is_reverse: false,
-    }
+    Switches { is_home: false, is_forward: false, is_reverse: false }
 }
 
 /// `PALPATE_STREAMS` asks for another number of streams than four thousand.

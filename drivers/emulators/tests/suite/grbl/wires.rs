@@ -145,18 +145,12 @@ impl Client {
     }
 
     fn is_moving(&self) -> bool {
-        self.readings
-            .last()
-            .is_some_and(|reading| reading.status.has(AxisStatus::MOVING))
+        self.readings.last().is_some_and(|reading| reading.status.has(AxisStatus::MOVING))
     }
 }
 
 fn to(target_pulses: i64, speed: f64) -> MoveTo {
-    MoveTo {
-        target_pulses,
-        speed: MmPerS(speed),
-        acceleration: MmPerS2(60.0),
-    }
+    MoveTo { target_pulses, speed: MmPerS(speed), acceleration: MmPerS2(60.0) }
 }
 
 const HX711: &str = "device = \"hx711\"";
@@ -165,11 +159,9 @@ const GAUGE: &str = "device = \"mark10\"\ncapacity_n = 25";
 
 #[test]
 fn samples_follow_the_path_with_every_cell() {
-    for (word, cell, newtons_per_volt) in [
-        ("hx711", HX711, None),
-        ("mark10", GAUGE, Some(1.0)),
-        ("plain-numbers", NUMBERS, None),
-    ] {
+    for (word, cell, newtons_per_volt) in
+        [("hx711", HX711, None), ("mark10", GAUGE, Some(1.0)), ("plain-numbers", NUMBERS, None)]
+    {
         let Some(served) = start(word, Vec::new()) else {
             return;
         };
@@ -187,10 +179,7 @@ fn samples_follow_the_path_with_every_cell() {
             tracker.on_move(wanted);
             client.tell(RigCommand::MoveTo(wanted));
             client.until("begun", |client| {
-                client
-                    .readings
-                    .iter()
-                    .any(|r| r.status.has(AxisStatus::MOVING))
+                client.readings.iter().any(|r| r.status.has(AxisStatus::MOVING))
             });
             client.until("at rest", |client| !client.is_moving());
             for reading in client.readings.drain(..) {
@@ -206,12 +195,7 @@ fn samples_follow_the_path_with_every_cell() {
         client.until("a sample", |client| client.readings.len() > before);
         assert_eq!(client.readings[before].pulses, -7);
         assert_eq!(client.faults, []);
-        assert!(
-            client
-                .readings
-                .windows(2)
-                .all(|pair| pair[0].tick < pair[1].tick)
-        );
+        assert!(client.readings.windows(2).all(|pair| pair[0].tick < pair[1].tick));
         assert!(!client.rig.take_raw().is_empty());
     }
 }
@@ -228,15 +212,9 @@ fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
     client.tell(RigCommand::Stop);
     client.until("at rest", |client| !client.is_moving());
     assert_eq!(client.faults, []);
-    served
-        .orders
-        .send("disconnect:60".into())
-        .expect("it listens");
+    served.orders.send("disconnect:60".into()).expect("it listens");
     client.until("told", |client| {
-        let lost = client
-            .faults
-            .iter()
-            .filter(|fault| matches!(fault, Fault::LinkLost { .. }));
+        let lost = client.faults.iter().filter(|fault| matches!(fault, Fault::LinkLost { .. }));
         lost.count() == 2
     });
 }
@@ -253,15 +231,10 @@ fn a_cell_that_falls_silent_stops_the_axis() {
     // Nothing comes from either device for as long as the cell may be silent, and from the board shorter than it may be.
     served.orders.send("mute:0.7".into()).expect("it listens");
     client.until("told", |client| {
-        client
-            .faults
-            .iter()
-            .any(|fault| fault.to_string().contains("load cell"))
+        client.faults.iter().any(|fault| fault.to_string().contains("load cell"))
     });
     let before = client.readings.len();
-    client.until("samples again", |client| {
-        client.readings.len() > before + 20
-    });
+    client.until("samples again", |client| client.readings.len() > before + 20);
     client.until("at rest", |client| !client.is_moving());
     assert!(client.readings.last().expect("one").pulses < 30_000);
 }
@@ -277,15 +250,9 @@ fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() 
     client.tell(RigCommand::EnableMotor);
     client.tell(RigCommand::MoveTo(to(40_000, 5.0)));
     client.until("moving", Client::is_moving);
-    served
-        .orders
-        .send("disconnect:2".into())
-        .expect("it listens");
+    served.orders.send("disconnect:2".into()).expect("it listens");
     client.until("told", |client| {
-        let lost = client
-            .faults
-            .iter()
-            .filter(|fault| matches!(fault, Fault::LinkLost { .. }));
+        let lost = client.faults.iter().filter(|fault| matches!(fault, Fault::LinkLost { .. }));
         lost.count() == 2
     });
     client.rig.reconnect().expect_err("nothing is there");
@@ -307,9 +274,6 @@ fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() 
     client.tell(RigCommand::EnableMotor);
     client.tell(RigCommand::MoveTo(to(first + 200, 5.0)));
     client.until("there", |client| {
-        client
-            .readings
-            .last()
-            .is_some_and(|reading| reading.pulses == first + 200)
+        client.readings.last().is_some_and(|reading| reading.pulses == first + 200)
     });
 }

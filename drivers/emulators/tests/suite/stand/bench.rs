@@ -42,8 +42,7 @@ impl Wire {
         let bytes = self.emulator.transmit(0);
         let at = self.now + self.delay;
         for byte in bytes {
-            self.arriving
-                .extend((self.spoil)(byte).into_iter().map(|byte| (at, byte)));
+            self.arriving.extend((self.spoil)(byte).into_iter().map(|byte| (at, byte)));
         }
     }
 }
@@ -129,10 +128,7 @@ pub fn usual() -> StandSettings {
         acceleration: MmPerS2(50.0),
         unseen: RigDescription::UNSEEN_USUAL,
         is_upwards: false,
-        gauge: GaugeSettings {
-            capacity: Newtons(25.0),
-            ..GaugeSettings::default()
-        },
+        gauge: GaugeSettings { capacity: Newtons(25.0), ..GaugeSettings::default() },
     }
 }
 
@@ -253,9 +249,7 @@ impl Host {
     }
 
     pub fn is_moving(&self) -> bool {
-        self.readings
-            .last()
-            .is_some_and(|newest| newest.status.has(AxisStatus::MOVING))
+        self.readings.last().is_some_and(|newest| newest.status.has(AxisStatus::MOVING))
     }
 
     /// Makes a whole move.
@@ -267,9 +261,5 @@ impl Host {
 }
 
 pub fn to(target_pulses: i64, speed: f64) -> RigCommand {
-    RigCommand::MoveTo(MoveTo {
-        target_pulses,
-        speed: MmPerS(speed),
-        acceleration: MmPerS2(50.0),
-    })
+    RigCommand::MoveTo(MoveTo { target_pulses, speed: MmPerS(speed), acceleration: MmPerS2(50.0) })
 }

@@ -56,11 +56,7 @@ fn somebody_stops_it_at_its_panel() {
     host.wire.lock().emulator.receive(now, 0, b"s");
     host.until("at rest", |host| !host.is_moving());
     assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.006);
-    assert!(
-        host.path.is_at_rest() && host.path_errors.is_empty(),
-        "{:?}",
-        host.path_errors
-    );
+    assert!(host.path.is_at_rest() && host.path_errors.is_empty(), "{:?}", host.path_errors);
 }
 
 #[test]
@@ -113,11 +109,7 @@ fn garbled_answers_are_not_taken() {
     });
     host.pass(10.0);
     assert!(host.readings.len() > 100, "{}", host.readings.len());
-    assert!(
-        host.readings
-            .iter()
-            .all(|r| r.volts.0.abs() < 0.05 && r.pulses == 0)
-    );
+    assert!(host.readings.iter().all(|r| r.volts.0.abs() < 0.05 && r.pulses == 0));
     assert!(host.session.stats().resynchronised > 0);
     assert!(host.session.is_dead(host.now()).is_none());
 }
@@ -128,21 +120,14 @@ fn a_key_of_the_gauge_is_noticed() {
     let now = host.now();
     host.wire.lock().emulator.receive(now, 0, b"/LB\r\\");
     host.pass(0.2);
-    assert!(
-        host.faults
-            .iter()
-            .any(|f| matches!(f, Fault::SignalInvalid { .. }))
-    );
+    assert!(host.faults.iter().any(|f| matches!(f, Fault::SignalInvalid { .. })));
 }
 
 #[test]
 fn an_overload_reads_the_end_of_the_range() {
     let mut host = Host::new();
     let now = host.now();
-    host.wire
-        .lock()
-        .emulator
-        .suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
     host.pass(0.2);
     assert!((host.newest().volts.0 - 27.5).abs() < 1e-9);
 }
@@ -154,10 +139,7 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     host.pass(1.0);
     let now = host.now();
     let before = host.travel();
-    host.wire
-        .lock()
-        .emulator
-        .suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
     host.pass(1.0);
     assert!(!host.wire.lock().emulator.is_moving());
     assert!((host.travel() - before).abs() < 0.5, "{}", host.travel());
@@ -169,10 +151,7 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     // Within the range and beyond it again.
     for is_on in [false, true] {
         let now = host.now();
-        host.wire
-            .lock()
-            .emulator
-            .suffer(now, DeviceFault::Saturated, is_on);
+        host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, is_on);
         host.pass(0.2);
     }
     assert_eq!(told(&host), 2, "{:?}", host.faults);
@@ -211,10 +190,7 @@ fn a_crosshead_that_falls_behind_is_told_where_it_is() {
     host.wire.lock().emulator.receive(now, 0, b"k");
     host.pass(0.5);
     let first = host.path_errors.first().expect("it is noticed");
-    assert!(
-        first.expected_pulses > first.reported_pulses as f64,
-        "{first}"
-    );
+    assert!(first.expected_pulses > first.reported_pulses as f64, "{first}");
     assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.011);
 }
 

@@ -18,11 +18,7 @@ fn a_move_down_is_a_limit_and_a_letter() {
     assert_eq!(begun, "e0045.0ag-005.00wd", "{sent}");
     assert!((host.travel() + 5.0).abs() < 0.006, "{}", host.travel());
     assert_eq!(host.newest().pulses, 500);
-    assert!(
-        host.path.is_at_rest() && host.path_errors.is_empty(),
-        "{:?}",
-        host.path_errors
-    );
+    assert!(host.path.is_at_rest() && host.path_errors.is_empty(), "{:?}", host.path_errors);
     assert_eq!(host.faults, []);
     host.wire.lock().sent.clear();
     host.go(120, 5.0);
@@ -35,13 +31,7 @@ fn a_move_down_is_a_limit_and_a_letter() {
 #[test]
 fn what_is_told_is_near_where_it_is() {
     let mut host = Host::new();
-    for (target, speed) in [
-        (50, 0.1),
-        (2_000, 10.0),
-        (1_990, 0.01),
-        (1_991, 1.0),
-        (1_000, 2.0),
-    ] {
+    for (target, speed) in [(50, 0.1), (2_000, 10.0), (1_990, 0.01), (1_991, 1.0), (1_000, 2.0)] {
         host.tell(to(target, speed));
         host.until("begun", Host::is_moving);
         while host.is_moving() {
@@ -71,16 +61,8 @@ fn a_stop_is_written_before_everything_and_repeated() {
     assert_eq!(host.acks.last(), Some(&RigCommand::Stop));
     // It braked within v^2/2a of 100 mm/s2 and told the truth about where it rests.
     assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.006);
-    assert!(
-        host.path.is_at_rest() && host.path_errors.is_empty(),
-        "{:?}",
-        host.path_errors
-    );
-    assert!(
-        host.readings
-            .iter()
-            .any(|r| r.status.has(AxisStatus::STOPPING))
-    );
+    assert!(host.path.is_at_rest() && host.path_errors.is_empty(), "{:?}", host.path_errors);
+    assert!(host.readings.iter().any(|r| r.status.has(AxisStatus::STOPPING)));
     // It can go on from there.
     host.go(100, 1.0);
     assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
@@ -97,11 +79,7 @@ fn a_stop_is_written_before_everything_and_repeated() {
     host.until("at rest", |host| !host.is_moving());
     assert!(host.sent().matches('s').count() >= 2);
     // A tenth of a second later, at 2 mm/s, and the brake.
-    assert!(
-        stopped_at - host.travel() < 0.3,
-        "{} {stopped_at}",
-        host.travel()
-    );
+    assert!(stopped_at - host.travel() < 0.3, "{} {stopped_at}", host.travel());
 }
 
 #[test]
@@ -122,11 +100,7 @@ fn a_stop_ends_a_move_before_it_has_begun() {
     host.tell(to(1_000, 1.0));
     host.send(RigCommand::Stop);
     host.pass(1.0);
-    assert!(
-        host.path.is_at_rest() && host.path_errors.is_empty(),
-        "{:?}",
-        host.path_errors
-    );
+    assert!(host.path.is_at_rest() && host.path_errors.is_empty(), "{:?}", host.path_errors);
     assert_eq!(host.faults, []);
     assert!(host.travel() > -0.1 && !host.is_moving());
 }
@@ -148,11 +122,7 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
         host.faults.clear();
         host.send(command);
         host.pass(0.5);
-        let told = host
-            .faults
-            .iter()
-            .map(ToString::to_string)
-            .collect::<String>();
+        let told = host.faults.iter().map(ToString::to_string).collect::<String>();
         assert!(told.contains(word), "{told}");
     }
     assert_eq!((host.acks.len(), host.travel()), (0, 0.0));
@@ -167,11 +137,7 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
 fn home_is_the_stands_own_zero_and_positions_are_defined_here() {
     let mut host = Host::new();
     host.pass(0.1);
-    assert!(
-        host.newest()
-            .status
-            .has(AxisStatus::HOME | AxisStatus::MOTOR_ON)
-    );
+    assert!(host.newest().status.has(AxisStatus::HOME | AxisStatus::MOTOR_ON));
     host.go(300, 2.0);
     assert!(!host.newest().status.has(AxisStatus::HOME));
     host.tell(RigCommand::DefinePosition { pulses: 0 });
@@ -184,11 +150,7 @@ fn home_is_the_stands_own_zero_and_positions_are_defined_here() {
     host.until("home", |host| host.newest().status.has(AxisStatus::HOME));
     host.tell(RigCommand::Stop);
     host.until("at rest", |host| !host.is_moving());
-    assert!(
-        host.travel() >= 0.0 && host.travel() < 0.2,
-        "{}",
-        host.travel()
-    );
+    assert!(host.travel() >= 0.0 && host.travel() < 0.2, "{}", host.travel());
     assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
     assert_eq!(host.tell(RigCommand::EnableMotor), RigCommand::EnableMotor);
 }
@@ -233,22 +195,12 @@ fn samples_come_as_the_description_says() {
         let span = (ticks[ticks.len() - 1] - ticks[0]) as f64;
         let per_sample = span / (ticks.len() - 1) as f64;
         let told = host.connected.description.ticks_per_sample;
-        assert!(
-            per_sample < 1.5 * told && per_sample > 0.5 * told,
-            "{per_sample} {told}"
-        );
+        assert!(per_sample < 1.5 * told && per_sample > 0.5 * told, "{per_sample} {told}");
         // In motion nothing else is asked: samples stay younger than the interlock allows at any speed, 20 ms, where the
         // link lets them.
-        let moving = host
-            .readings
-            .iter()
-            .filter(|r| r.status.has(AxisStatus::MOVING));
+        let moving = host.readings.iter().filter(|r| r.status.has(AxisStatus::MOVING));
         let moving: Vec<u64> = moving.map(|r| r.tick).collect();
-        let gap = moving
-            .windows(2)
-            .map(|w| w[1] - w[0])
-            .max()
-            .expect("samples");
+        let gap = moving.windows(2).map(|w| w[1] - w[0]).max().expect("samples");
         assert!(gap <= 5 + 2 * delay.0 / 1_000_000, "{gap} ms at {delay:?}");
         assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
         assert_eq!(host.newest().pulses, 200);
@@ -263,12 +215,7 @@ fn a_stand_that_takes_its_time_to_begin_is_no_stand_that_was_stopped() {
     }));
     host.go(300, 2.0);
     assert_eq!(host.newest().pulses, 300);
-    assert!(
-        !host
-            .readings
-            .iter()
-            .any(|r| r.status.has(AxisStatus::STOPPING))
-    );
+    assert!(!host.readings.iter().any(|r| r.status.has(AxisStatus::STOPPING)));
     assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
 }
 

@@ -1,8 +1,5 @@
 //! Opening a stand, and one whole rig on a thread, in real time. Waits are generous: nothing here is about speed.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the clock of a test stands for the runner's"
-)]
+#![expect(clippy::disallowed_methods, reason = "the clock of a test stands for the runner's")]
 
 use super::bench::{Shared, to, usual};
 use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
@@ -60,19 +57,11 @@ fn opening_stops_sets_and_reads_back() {
     assert!(sent.starts_with(expected), "{sent}");
     let found = &connected.description;
     for part in ["3519042", "target of the move", "100 mm", "0.05 mm"] {
-        assert!(
-            found.identity.contains(part),
-            "{part} in {}",
-            found.identity
-        );
+        assert!(found.identity.contains(part), "{part} in {}", found.identity);
     }
     assert_eq!((found.mm_per_pulse, found.tick_nanos), (0.01, 1_000_000));
     assert!((found.speed_quantum.0 * 600.0 - 1.0).abs() < 1e-12);
-    assert!(
-        found
-            .check_speed(palpate_model::units::MmPerS(0.75))
-            .is_ok()
-    );
+    assert!(found.check_speed(palpate_model::units::MmPerS(0.75)).is_ok());
     assert_eq!(found.adc.expect("a gauge").volts_per_count, 1e-3);
     assert!(connected.pace.has_status);
 }
@@ -115,11 +104,7 @@ fn who_does_not_fit_is_told_in_words() {
     let err = refused(&silent, &usual());
     assert!(err.contains("does not answer"), "{err}");
 
-    for (says, name) in [
-        ("error:1\r\n", "Grbl"),
-        ("?", "Galil"),
-        ("4.285 N\r\n", "together"),
-    ] {
+    for (says, name) in [("error:1\r\n", "Grbl"), ("?", "Galil"), ("4.285 N\r\n", "together")] {
         let wire = stand();
         wire.lock().spoil = Box::new(move |_| says.into());
         let err = refused(&wire, &usual());
@@ -164,10 +149,7 @@ fn a_rig_moves_stops_and_says_farewell() {
         }
         last
     };
-    let device = std::thread::Builder::new()
-        .name("stand".into())
-        .spawn(work)
-        .expect("a thread");
+    let device = std::thread::Builder::new().name("stand".into()).spawn(work).expect("a thread");
     let mut rig =
         DeviceRig::open(OnLink(Some(Box::new(ours))), Arc::clone(&clock)).expect("a stand");
     let begin = Instant::now();
@@ -186,10 +168,7 @@ fn a_rig_moves_stops_and_says_farewell() {
             Some(RigEventBody::Fault(fault)) => panic!("{fault}"),
             None => {}
         }
-        assert!(
-            begin.elapsed() < PATIENCE,
-            "it never came to rest after {readings} samples"
-        );
+        assert!(begin.elapsed() < PATIENCE, "it never came to rest after {readings} samples");
     }
     assert!(is_acknowledged, "{readings}");
     assert!(rig.links()[0].1.answers > 0);
@@ -202,10 +181,7 @@ fn a_rig_moves_stops_and_says_farewell() {
     };
     assert!(err.to_string().contains("the link was used"), "{err}");
     let raw = rig.take_raw();
-    assert!(
-        raw.iter().any(|piece| piece.is_sent && piece.bytes == b"s"),
-        "{raw:?}"
-    );
+    assert!(raw.iter().any(|piece| piece.is_sent && piece.bytes == b"s"), "{raw:?}");
     assert!(rig.links().is_empty());
     rig.send(to(50, 1.0));
     let until = Nanos(begin.elapsed().as_nanos() as u64);

@@ -115,11 +115,7 @@ fn meant(bytes: &[u8], piece: usize) -> Vec<String> {
     for part in bytes.chunks(piece) {
         for byte in part {
             if let Some(Taken::Line(line)) = lines.take(*byte) {
-                let read = (
-                    Status::parse(&line),
-                    travel(&line),
-                    number(&line).map(f64::to_bits),
-                );
+                let read = (Status::parse(&line), travel(&line), number(&line).map(f64::to_bits));
                 all.push(format!("{read:?} {:?}", pair.take(&line)));
             }
         }
@@ -176,10 +172,7 @@ fn opening_comes_to_an_end_whoever_answers() {
         });
         let opened = wire.connect(&usual());
         let passed = wire.lock().now;
-        assert!(
-            passed < Nanos::from_millis(30_000),
-            "seed {seed}: {passed:?}"
-        );
+        assert!(passed < Nanos::from_millis(30_000), "seed {seed}: {passed:?}");
         match opened {
             Ok(connected) => {
                 let found = connected.description;

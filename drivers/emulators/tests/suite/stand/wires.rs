@@ -1,8 +1,5 @@
 //! The stand over a pseudo-terminal, in real time. Waits are generous: nothing here is about speed.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the clock of a test stands for the runner's"
-)]
+#![expect(clippy::disallowed_methods, reason = "the clock of a test stands for the runner's")]
 
 use super::bench::{to, usual};
 use palpate_drivers::mark10::{StandDevice, StandRig};
@@ -66,18 +63,11 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
         let mut tell = |told| drop(sender.try_send(told));
         serve(&mut device, &options, &received, &is_over, &mut tell).is_ok()
     };
-    let thread = std::thread::Builder::new()
-        .name("stand".into())
-        .spawn(work)
-        .expect("a thread");
+    let thread = std::thread::Builder::new().name("stand".into()).spawn(work).expect("a thread");
     let Ok(Told::Ready(port)) = told.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
-    let place = Place::Serial {
-        port,
-        baud: 115_200,
-        has_handshake: false,
-    };
+    let place = Place::Serial { port, baud: 115_200, has_handshake: false };
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
     let open = || {

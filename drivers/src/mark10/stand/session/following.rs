@@ -42,14 +42,10 @@ impl StandSession {
         if self.settings.pulses(travel) <= 0 {
             status = status | AxisStatus::HOME;
         }
-        let (upper, lower) = self.status.map_or((false, false), |status| {
-            (status.is_at_upper, status.is_at_lower)
-        });
-        let (forward, reverse) = if self.settings.is_upwards {
-            (upper, lower)
-        } else {
-            (lower, upper)
-        };
+        let (upper, lower) =
+            self.status.map_or((false, false), |status| (status.is_at_upper, status.is_at_lower));
+        let (forward, reverse) =
+            if self.settings.is_upwards { (upper, lower) } else { (lower, upper) };
         if forward {
             status = status | AxisStatus::FORWARD_LIMIT;
         }
@@ -62,10 +58,7 @@ impl StandSession {
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
             status,
-            age: Some(Age {
-                by: now.since(at),
-                within: now.since(at),
-            }),
+            age: Some(Age { by: now.since(at), within: now.since(at) }),
         };
         self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
         self.report(now, RigEventBody::Reading(reading));
@@ -125,12 +118,9 @@ impl StandSession {
                 let stopping = stopped_tick.map_or(none, |_| AxisStatus::STOPPING);
                 (from, AxisStatus::MOVING | stopping)
             }
-            Motion::Moving {
-                going,
-                course,
-                start_tick,
-                stopped_tick,
-            } => self.follow_course(now, tick, going, course, (start_tick, stopped_tick)),
+            Motion::Moving { going, course, start_tick, stopped_tick } => {
+                self.follow_course(now, tick, going, course, (start_tick, stopped_tick))
+            }
         }
     }
 
@@ -165,21 +155,12 @@ impl StandSession {
                 let tolerance =
                     REST_TOLERANCE_MM + going.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
                 // The truth, where it is not the course: who checks the path sees it.
-                let told = if is_off(here, tolerance) {
-                    true_pulses
-                } else {
-                    here
-                };
+                let told = if is_off(here, tolerance) { true_pulses } else { here };
                 return (told, AxisStatus::MOVING);
             }
             let course = course.stopped_at(since);
             let here = pulses_of(course.position(Seconds(0.0)));
-            self.motion = Motion::Moving {
-                going,
-                course,
-                start_tick,
-                stopped_tick: Some(tick),
-            };
+            self.motion = Motion::Moving { going, course, start_tick, stopped_tick: Some(tick) };
             return (here, AxisStatus::MOVING | AxisStatus::STOPPING);
         }
         if is_still {
@@ -199,8 +180,7 @@ impl StandSession {
     }
 
     pub(super) fn has_status_moved(&self) -> bool {
-        self.status
-            .is_some_and(|status| status.crosshead != Crosshead::Stopped)
+        self.status.is_some_and(|status| status.crosshead != Crosshead::Stopped)
     }
 
     /// Longest time without a new travel of a crosshead that moves.

@@ -132,9 +132,7 @@ impl StandSession {
     /// With a stand that was set up just now.
     #[must_use]
     pub fn new(settings: StandSettings, connected: &ConnectedStand, now: Nanos) -> Self {
-        let ConnectedStand {
-            scale, pace, stats, ..
-        } = *connected;
+        let ConnectedStand { scale, pace, stats, .. } = *connected;
         Self {
             settings,
             scale,
@@ -165,10 +163,7 @@ impl StandSession {
             is_beyond: false,
             attended: None,
             events: VecDeque::new(),
-            stats: LinkStats {
-                in_flight: 1,
-                ..stats
-            },
+            stats: LinkStats { in_flight: 1, ..stats },
         }
     }
 
@@ -238,18 +233,11 @@ impl StandSession {
                 ),
             );
         };
-        let going = Going {
-            command: to,
-            target,
-            from: self.travel,
-        };
+        let going = Going { command: to, target, from: self.travel };
         let letter = if is_upper { "u" } else { "d" };
         let steps = VecDeque::from([
             (format!("{speed}a"), Some(Asked::Speed(tenths))),
-            (
-                format!("{limit}{}", ask_limit(is_upper)),
-                Some(Asked::Limit(target)),
-            ),
+            (format!("{limit}{}", ask_limit(is_upper)), Some(Asked::Limit(target))),
             (letter.to_owned(), None),
         ]);
         self.motion = Motion::Setting(going, steps);
@@ -326,9 +314,8 @@ impl Dialogue for StandSession {
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
         let is_unattended = self.attended.is_some_and(|at| now.since(at) > ATTENDED_MAX);
         let is_stopped = self.stopped_at.is_some();
-        let is_again = self
-            .stopped_at
-            .is_some_and(|at| now.since(at) >= STOP_AGAIN && self.is_going());
+        let is_again =
+            self.stopped_at.is_some_and(|at| now.since(at) >= STOP_AGAIN && self.is_going());
         if self.stop_due || is_again || is_unattended && self.is_going() && !is_stopped {
             return Some(self.write_stop(now));
         }

@@ -23,11 +23,8 @@ impl Forcing {
         psi: &[f64; PSI_COUNT],
         slope: &[f64; 4],
     ) -> Self {
-        let mut forcing = Self {
-            psi_0: [0.0; LANES],
-            weighted: [[0.0; LANES]; 4],
-            sloped: [[0.0; LANES]; 4],
-        };
+        let mut forcing =
+            Self { psi_0: [0.0; LANES], weighted: [[0.0; LANES]; 4], sloped: [[0.0; LANES]; 4] };
         let [w1, w2, w3, w4] = &mut forcing.weighted;
         let [s1, s2, s3, s4] = &mut forcing.sloped;
         for i in 0..LANES {

@@ -210,11 +210,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         for (i, sample) in samples.iter().enumerate() {
             let psi_0 = forcing.psi_0[i];
             if SLOPES {
-                self.slope(
-                    psi_0,
-                    r_slope_0,
-                    forcing.sloped.each_ref().map(|lane| lane[i]),
-                );
+                self.slope(psi_0, r_slope_0, forcing.sloped.each_ref().map(|lane| lane[i]));
                 let to = scale.depth(sample);
                 self.touch += psi_0 * (1.0 - self.touch);
                 self.speed += psi_0 * ((to - from) / dt - self.speed);
@@ -244,9 +240,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         let weights = self.table.near(dt[0]);
         let StepWeights { dt: kept, r, psi } = weights.step;
         let slope = weights.slope;
-        let uneven = dt
-            .iter()
-            .fold(0.0f64, |uneven, dt| uneven.max((dt - kept).abs()));
+        let uneven = dt.iter().fold(0.0f64, |uneven, dt| uneven.max((dt - kept).abs()));
         if shallowest < 0.0 || uneven > SAME_STEP * kept {
             return None;
         }

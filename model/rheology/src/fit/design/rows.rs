@@ -106,12 +106,5 @@ pub(in super::super) fn powers_from_legendre(at: &Coefficients) -> [f64; 3] {
 /// Legendre depth terms of bare powers, the other coefficients unchanged.
 pub(in super::super) fn legendre_from_powers(scaled: &Coefficients) -> Coefficients {
     let [a, b, c, viscous, initial, offset] = *scaled;
-    [
-        a + b / 2.0 + c / 3.0,
-        b / 2.0 + c / 2.0,
-        c / 6.0,
-        viscous,
-        initial,
-        offset,
-    ]
+    [a + b / 2.0 + c / 3.0, b / 2.0 + c / 2.0, c / 6.0, viscous, initial, offset]
 }

@@ -26,12 +26,7 @@ pub(super) struct StepTable {
 
 impl StepTable {
     pub fn new(tau: f64) -> Self {
-        Self {
-            tau,
-            kept: Vec::with_capacity(STEPS_KEPT),
-            newest: 0,
-            replaced: 0,
-        }
+        Self { tau, kept: Vec::with_capacity(STEPS_KEPT), newest: 0, replaced: 0 }
     }
 
     /// The weights last asked for.

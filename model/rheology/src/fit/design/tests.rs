@@ -6,25 +6,13 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 const AT: Coefficients = [0.7, -0.4, 0.3, 1.1, 0.2, 0.1];
 
 fn sample(t: f64, depth: f64) -> FitSample {
-    FitSample {
-        t: Seconds(t),
-        depth: Depth(depth),
-        force: Newtons(0.0),
-        sigma: Newtons(1.0),
-    }
+    FitSample { t: Seconds(t), depth: Depth(depth), force: Newtons(0.0), sigma: Newtons(1.0) }
 }
 
 /// A path in and out of contact with uneven steps, then 200 even ones.
 fn path() -> Vec<FitSample> {
-    let corners = [
-        (-0.2, 0.0),
-        (0.5, 1.0),
-        (0.5, 0.3),
-        (0.9, 0.31),
-        (0.9, 2.0),
-        (-0.2, 0.7),
-        (0.4, 0.8),
-    ];
+    let corners =
+        [(-0.2, 0.0), (0.5, 1.0), (0.5, 0.3), (0.9, 0.31), (0.9, 2.0), (-0.2, 0.7), (0.4, 0.8)];
     let mut samples = vec![sample(0.0, corners[0].0)];
     let (mut t, mut x) = (0.0, corners[0].0);
     for (to, span) in &corners[1..] {
@@ -42,10 +30,7 @@ fn path() -> Vec<FitSample> {
 
 /// Modelled force and its two derivatives at every sample.
 fn force(tau: f64, contact: f64) -> Vec<[f64; 3]> {
-    let scale = Scale {
-        depth_mm: 1.0,
-        contact,
-    };
+    let scale = Scale { depth_mm: 1.0, contact };
     let mut all = Vec::new();
     walk::<true>(&path(), scale, tau, |samples, rows| {
         let mut columns = [[0.0; LANES]; 6];
@@ -91,10 +76,7 @@ fn derivative_by_contact_is_exact() {
 #[test]
 fn blocks_agree_with_single_steps() {
     let samples = path();
-    let scale = Scale {
-        depth_mm: 1.0,
-        contact: 0.0,
-    };
+    let scale = Scale { depth_mm: 1.0, contact: 0.0 };
     let mut single = Columns::<true>::new(0.3, scale.depth(&samples[0]));
     let mut before = samples[0].t.0;
     let mut index = 0;

@@ -237,9 +237,7 @@ impl Bank {
     pub fn sums(&self) -> Vec<[f64; FILTERED]> {
         let node = |chunk: &Chunk, lane| std::array::from_fn(|k| chunk.with_one[k][lane]);
         let chunks = self.chunks.iter();
-        chunks
-            .flat_map(|chunk| (0..WIDTH).map(move |lane| node(chunk, lane)))
-            .collect()
+        chunks.flat_map(|chunk| (0..WIDTH).map(move |lane| node(chunk, lane))).collect()
     }
 
     /// Its relaxation times.

@@ -35,16 +35,8 @@ pub(super) struct Blocks {
 impl Blocks {
     /// No block yet of a bank with so many nodes.
     pub fn new(nodes: usize) -> Self {
-        let start = Mark {
-            t: 0.0,
-            shared: [0.0; 2],
-            sums: vec![[0.0; FILTERED]; nodes],
-        };
-        Self {
-            marks: vec![start],
-            length: BLOCK_FIRST,
-            since: 0,
-        }
+        let start = Mark { t: 0.0, shared: [0.0; 2], sums: vec![[0.0; FILTERED]; nodes] };
+        Self { marks: vec![start], length: BLOCK_FIRST, since: 0 }
     }
 
     /// Counts a sample the bank has taken, and marks the end of its block.
@@ -56,11 +48,7 @@ impl Blocks {
         self.since = 0;
         bank.flush();
         let [weight, force, _] = bank.shared();
-        self.marks.push(Mark {
-            t,
-            shared: [weight, force],
-            sums: bank.sums(),
-        });
+        self.marks.push(Mark { t, shared: [weight, force], sums: bank.sums() });
         if self.marks.len() > BLOCKS_MAX {
             let mut index = 0;
             self.marks.retain(|_| {
@@ -95,10 +83,7 @@ mod tests {
         for pair in blocks.marks.windows(2) {
             // Every weight is one, so sums of weights count samples; sums of ones are exact.
             assert_eq!(pair[1].shared[0] - pair[0].shared[0], blocks.length as f64);
-            assert_eq!(
-                pair[1].shared[1] - pair[0].shared[1],
-                2.0 * blocks.length as f64
-            );
+            assert_eq!(pair[1].shared[1] - pair[0].shared[1], 2.0 * blocks.length as f64);
         }
     }
 }

@@ -150,12 +150,7 @@ impl LiveFit {
     }
 
     fn report(&self, minimum: &Minimum, blind: &Blind, weight: f64) -> Option<LiveEstimate> {
-        let Minimum {
-            stencil,
-            place,
-            used,
-            ..
-        } = minimum;
+        let Minimum { stencil, place, used, .. } = minimum;
         let jet = stencil.jet(*place);
         let freedom = self.samples as f64 - 1.0 - used.iter().filter(|&&used| used).count() as f64;
         let at = |node: usize| minimum.at(node);
@@ -174,24 +169,17 @@ impl LiveFit {
             let error = (linear + through_tau * through_tau).sqrt();
             values.push((stencil.value(&jet, of), error));
         }
-        if values
-            .iter()
-            .any(|(value, error)| !(value.is_finite() && error.is_finite()))
-        {
+        if values.iter().any(|(value, error)| !(value.is_finite() && error.is_finite())) {
             return None;
         }
         let mut parameters = Vec::new();
         let mut verdicts = Vec::new();
-        let is_seen: Vec<bool> = (0..values.len())
-            .map(|k| blind.reason(k).is_none())
-            .collect();
+        let is_seen: Vec<bool> = (0..values.len()).map(|k| blind.reason(k).is_none()).collect();
         let inflations = self.inflations(&values, &is_seen, variance);
         for (index, (value, error)) in values.into_iter().enumerate() {
             let (inflation, uncertainty) = inflations[index];
             let error = error * inflation.sqrt();
-            let reason = blind
-                .reason(index)
-                .or_else(|| uncertain(index, value, error));
+            let reason = blind.reason(index).or_else(|| uncertain(index, value, error));
             let quantile = student_t975(freedom.min(2.0 / uncertainty));
             let known = reason.is_none().then_some((error, quantile));
             parameters.push(parameter(index, value, known));
@@ -237,9 +225,7 @@ impl LiveFit {
             let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
                 range.clone().map(|i| means.weights[i] * of(i)).sum()
             };
-            blocks
-                .residuals
-                .push(over_root * sum(&|i| means.residuals[i]));
+            blocks.residuals.push(over_root * sum(&|i| means.residuals[i]));
             for (column, &k) in blocks.columns.iter_mut().zip(&seen) {
                 column.push(over_root * sum(&|i| means.jacobian[i][k]));
             }
@@ -294,16 +280,10 @@ impl Minimum {
             high += 1;
         }
         let stencil = Stencil::around(best, (low, high))?;
-        let solutions: Vec<Solution> = (stencil.first..stencil.first + stencil.count)
-            .filter_map(solve)
-            .collect();
+        let solutions: Vec<Solution> =
+            (stencil.first..stencil.first + stencil.count).filter_map(solve).collect();
         let place = stencil.minimum(best, |node| solutions[node - stencil.first].residual)?;
-        Some(Self {
-            stencil,
-            solutions,
-            place,
-            used,
-        })
+        Some(Self { stencil, solutions, place, used })
     }
 
     fn at(&self, node: usize) -> &Solution {

@@ -55,28 +55,15 @@ impl Solution {
         }
         let mut coefficients = [0.0; COLUMNS];
         for i in (0..COLUMNS).rev().filter(|&i| used[i]) {
-            let known: f64 = (i + 1..COLUMNS)
-                .map(|k| factor[k][i] * coefficients[k])
-                .sum();
+            let known: f64 = (i + 1..COLUMNS).map(|k| factor[k][i] * coefficients[k]).sum();
             coefficients[i] = (factor[COLUMNS][i] - known) / factor[i][i];
         }
-        for (i, coefficient) in coefficients
-            .iter_mut()
-            .enumerate()
-            .filter(|(i, _)| used[*i])
-        {
+        for (i, coefficient) in coefficients.iter_mut().enumerate().filter(|(i, _)| used[*i]) {
             *coefficient *= scale[COLUMNS] / scale[i];
         }
         let residual = (factor[COLUMNS][COLUMNS] * scale[COLUMNS]).powi(2);
-        (residual.is_finite() && coefficients.iter().all(|value| value.is_finite())).then_some(
-            Self {
-                coefficients,
-                residual,
-                scale,
-                factor,
-                used,
-            },
-        )
+        (residual.is_finite() && coefficients.iter().all(|value| value.is_finite()))
+            .then_some(Self { coefficients, residual, scale, factor, used })
     }
 
     /// A combination of the coefficients.

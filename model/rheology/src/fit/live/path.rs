@@ -45,10 +45,7 @@ impl Path {
         let tolerance = TOLERANCE_SHARE.max(TOLERANCE_STEPS * self.step_sum / self.steps.max(1.0));
         let cone_from = |(t0, x0): (f64, f64)| {
             let over_run = 1.0 / (t - t0);
-            (
-                (x - x0 - tolerance) * over_run,
-                (x - x0 + tolerance) * over_run,
-            )
+            ((x - x0 - tolerance) * over_run, (x - x0 + tolerance) * over_run)
         };
         let here = cone_from(corner);
         let narrowed = (self.cone.0.max(here.0), self.cone.1.min(here.1));
@@ -109,10 +106,7 @@ mod tests {
         // 0.75 mm/s to 30 mm in steps of 15 micrometres, on a scale of 30 mm.
         let corners = drawn(|t| ((0.75 * t).min(30.0) / 0.015).floor() * 0.015 / 30.0);
         assert!((3..=5).contains(&corners.len()), "{corners:?}");
-        assert!(
-            corners.iter().any(|(t, _)| (t - 40.0).abs() < 0.5),
-            "{corners:?}"
-        );
+        assert!(corners.iter().any(|(t, _)| (t - 40.0).abs() < 0.5), "{corners:?}");
         let straight = drawn(|t| (0.75 * t / 0.015).floor() * 0.015 / 45.0);
         assert_eq!(straight.len(), 2, "{straight:?}");
     }

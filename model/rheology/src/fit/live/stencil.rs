@@ -98,11 +98,7 @@ impl Stencil {
                 high = place;
             }
             let newton = place - slope / curvature;
-            let next = if newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             let step = (next - place).abs();
             place = next;
             if step < 1e-13 * PLACES {

@@ -41,9 +41,7 @@ impl Blind {
             let group: Vec<usize> = blind.into_iter().map(|place| kept[place]).collect();
             // Without one of them the others may still be told apart; the viscous coefficient and
             // the levels go first, since a display can do without them.
-            let Some(&dropped) = group
-                .iter()
-                .max_by_key(|&&k| if k == 6 { 0 } else { k + 1 })
+            let Some(&dropped) = group.iter().max_by_key(|&&k| if k == 6 { 0 } else { k + 1 })
             else {
                 break;
             };
@@ -163,10 +161,7 @@ mod tests {
     fn says_so_in_words() {
         let blind = Blind::of(&[(0.0, 0.0), (40.0, 1.0)], 1.023, &SCALED);
         let reason = blind.reason(1).unwrap();
-        assert!(
-            reason.contains("mu1") && reason.contains("tau_sig"),
-            "{reason}"
-        );
+        assert!(reason.contains("mu1") && reason.contains("tau_sig"), "{reason}");
         assert_eq!(blind.reason(2), None);
         let still = Blind::of(&[(0.0, 0.0), (40.0, 0.0)], 1.023, &SCALED);
         assert!(still.reason(3).unwrap().contains("deeper"), "{still:?}");

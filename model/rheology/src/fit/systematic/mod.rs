@@ -118,9 +118,7 @@ pub fn systematic_joint(
         spread = Spread::of(records, &taken, &fitted)?;
     }
     let each = 0..records.len();
-    Ok(each
-        .map(|record| spread.told(records, &names, record * names.len()))
-        .collect())
+    Ok(each.map(|record| spread.told(records, &names, record * names.len())).collect())
 }
 
 /// Samples under the names of their records.
@@ -162,11 +160,7 @@ impl Spread {
                 let move_one = |one: &FitSample| {
                     let shift = own.1.shift(index, one.force);
                     let force = Newtons(one.force.0 + shift.0);
-                    if one.is_measured() {
-                        FitSample { force, ..*one }
-                    } else {
-                        *one
-                    }
+                    if one.is_measured() { FitSample { force, ..*one } } else { *one }
                 };
                 let moved = moved(
                     records,
@@ -197,16 +191,11 @@ impl Spread {
         let parameters = names.iter().zip(first..).filter(|_| is_told);
         Systematic {
             calibrations: calibrations.iter().copied().map(Stated::of).collect(),
-            compliances: compliances
-                .iter()
-                .map(|(name, _)| (*name).to_owned())
-                .collect(),
+            compliances: compliances.iter().map(|(name, _)| (*name).to_owned()).collect(),
             is_extrapolated: records.iter().any(|one| {
                 one.calibration.is_some_and(|(_, uncertainty)| {
                     let known = one.samples.iter().filter(|sample| sample.is_measured());
-                    known
-                        .map(|sample| sample.force)
-                        .any(|force| force > uncertainty.force_max())
+                    known.map(|sample| sample.force).any(|force| force > uncertainty.force_max())
                 })
             }),
             parameters: parameters
@@ -219,10 +208,7 @@ impl Spread {
                         terms: self
                             .terms
                             .iter()
-                            .map(|(term, sums)| TermError {
-                                term: *term,
-                                error: sums[k].sqrt(),
-                            })
+                            .map(|(term, sums)| TermError { term: *term, error: sums[k].sqrt() })
                             .collect(),
                         compliance: compliance.map(f64::sqrt),
                     }
@@ -271,10 +257,7 @@ fn bent(samples: &[FitSample], mm_per_newton: f64) -> Vec<FitSample> {
         if one.is_measured() {
             force = one.force.0;
         }
-        FitSample {
-            depth: Depth(one.depth.0 - mm_per_newton * force),
-            ..*one
-        }
+        FitSample { depth: Depth(one.depth.0 - mm_per_newton * force), ..*one }
     });
     each.collect()
 }

@@ -27,21 +27,13 @@ fn traced<'a>(
     name: &'a str,
     uncertainty: &'a ForceUncertainty,
 ) -> Traced<'a> {
-    Traced {
-        name,
-        samples,
-        calibration: Some((name, uncertainty)),
-        compliance: None,
-    }
+    Traced { name, samples, calibration: Some((name, uncertainty)), compliance: None }
 }
 
 /// The thesis's table as if it were printed with a digit more: small errors, so that the draws do not
 /// bend the curve.
 fn calibration() -> Calibration {
-    Calibration {
-        resolution: Some(Volts(0.001)),
-        ..Calibration::thesis()
-    }
+    Calibration { resolution: Some(Volts(0.001)), ..Calibration::thesis() }
 }
 
 #[test]
@@ -78,11 +70,7 @@ fn it_is_what_draws_of_whole_calibrations_scatter() {
         }
     }
     for (k, own) in found.parameters.iter().enumerate().take(5) {
-        let digits = own
-            .terms
-            .iter()
-            .find(|one| one.term == Term::Resolution)
-            .unwrap();
+        let digits = own.terms.iter().find(|one| one.term == Term::Resolution).unwrap();
         let drawn = squares[k].sqrt();
         // 600 draws know a standard deviation to 3 %, three times that and a little bend.
         assert!(
@@ -106,13 +94,7 @@ fn fewer_samples_tell_the_same() {
     // Of 18 000 samples every fifth is taken; 1800 are taken whole.
     let (long, short) = (of(&record(200.0)), of(&record(20.0)));
     for (a, b) in long.parameters.iter().zip(&short.parameters).take(5) {
-        assert!(
-            (a.error / b.error - 1.0).abs() < 0.01,
-            "{}: {} {}",
-            a.name,
-            a.error,
-            b.error
-        );
+        assert!((a.error / b.error - 1.0).abs() < 0.01, "{}: {} {}", a.name, a.error, b.error);
     }
 }
 
@@ -122,22 +104,13 @@ fn a_calibration_that_states_nothing_adds_nothing_and_says_so() {
     let uncertainty = ForceUncertainty::of(&line).unwrap();
     let (samples, options) = (record(5.0), FitOptions::default());
     let found = systematic(traced(&samples, "line", &uncertainty), &options).unwrap();
-    let report = super::super::fit(&samples, &options)
-        .unwrap()
-        .with_systematic(&found);
-    assert!(
-        report
-            .parameters
-            .iter()
-            .all(|one| one.systematic_error.is_none())
-    );
+    let report = super::super::fit(&samples, &options).unwrap().with_systematic(&found);
+    assert!(report.parameters.iter().all(|one| one.systematic_error.is_none()));
     let sentence = report.findings.last().unwrap();
     assert!(sentence.contains("\"line\" states nothing"), "{sentence}");
     let uncertainty = ForceUncertainty::of(&Calibration::thesis()).unwrap();
     let found = systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
-    let report = super::super::fit(&samples, &options)
-        .unwrap()
-        .with_systematic(&found);
+    let report = super::super::fit(&samples, &options).unwrap().with_systematic(&found);
     let terms = &found.calibrations[0];
     assert_eq!(terms.terms, [Term::Resolution, Term::Interpolation]);
     assert!(terms.not_stated.contains(&Term::Weights), "{terms:?}");
@@ -147,10 +120,7 @@ fn a_calibration_that_states_nothing_adds_nothing_and_says_so() {
     }
     assert!(!found.is_extrapolated);
     for parameter in &report.parameters {
-        assert_eq!(
-            parameter.systematic_error.is_some(),
-            parameter.std_error.is_some()
-        );
+        assert_eq!(parameter.systematic_error.is_some(), parameter.std_error.is_some());
     }
 }
 
@@ -171,17 +141,9 @@ fn records_of_one_calibration_move_together_and_of_two_apart() {
         // Each moves half of the body, and both are independent: 1 / sqrt(2). Differences of a fit that bends
         // are a few percent off.
         let ratio = apart[1].parameters[k].error / own.error;
-        assert!(
-            (ratio - 0.5f64.sqrt()).abs() < 0.05,
-            "{}: {ratio}",
-            own.name
-        );
+        assert!((ratio - 0.5f64.sqrt()).abs() < 0.05, "{}: {ratio}", own.name);
     }
-    let names: Vec<&str> = apart[0]
-        .calibrations
-        .iter()
-        .map(|one| one.name.as_str())
-        .collect();
+    let names: Vec<&str> = apart[0].calibrations.iter().map(|one| one.name.as_str()).collect();
     assert_eq!(names, ["a", "b"]);
 }
 
@@ -202,15 +164,8 @@ fn of_two_calibrations_it_is_told_which_states_what() {
     let found = told(&drifting);
     // Each of them is named, and what the second alone states is told once as stated and once as not.
     let sentence = found.sentence();
-    assert!(
-        sentence.contains("\"a\"") && sentence.contains("\"b\""),
-        "{sentence}"
-    );
-    assert_eq!(
-        sentence.matches(Term::ZeroDrift.word()).count(),
-        2,
-        "{sentence}"
-    );
+    assert!(sentence.contains("\"a\"") && sentence.contains("\"b\""), "{sentence}");
+    assert_eq!(sentence.matches(Term::ZeroDrift.word()).count(), 2, "{sentence}");
     assert!(found.calibrations[1].terms.contains(&Term::ZeroDrift));
     assert!(found.calibrations[0].not_stated.contains(&Term::ZeroDrift));
     assert_eq!(told(&straight).calibrations[1].terms, []);
@@ -231,10 +186,7 @@ fn every_family_tells_what_the_calibration_adds() {
         let found = systematic(traced, &options).unwrap();
         // The sensor offset moves with the zero, whatever the body is.
         let [own, other] = [&found, &known].map(|one| of("f_offset", one).unwrap());
-        assert!(
-            own > 0.1 * other && own < 30.0 * other,
-            "{key}: {own} {other}"
-        );
+        assert!(own > 0.1 * other && own < 30.0 * other, "{key}: {own} {other}");
         let told = super::super::fit(&samples, &options).unwrap();
         for one in &told.with_systematic(&found).parameters {
             let is_known = one.std_error.is_some();
@@ -258,14 +210,8 @@ fn a_compliance_known_badly_makes_stiffness_known_badly() {
     // 1 um/N moves a depth of 30 mm by some micrometres; twice of it, twice as far.
     let (one, two) = (with(1e-3), with(2e-3));
     for (one, two) in one.parameters.iter().zip(&two.parameters).take(5) {
-        assert!(
-            one.error > 0.0 && one.compliance == Some(one.error),
-            "{one:?}"
-        );
-        assert!(
-            (two.error / one.error - 2.0).abs() < 0.02,
-            "{one:?} {two:?}"
-        );
+        assert!(one.error > 0.0 && one.compliance == Some(one.error), "{one:?}");
+        assert!((two.error / one.error - 2.0).abs() < 0.02, "{one:?} {two:?}");
     }
     let sentence = one.sentence();
     assert!(sentence.contains("compliance stand"), "{sentence}");

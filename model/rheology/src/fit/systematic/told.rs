@@ -12,11 +12,7 @@ impl Stated {
             ([], _) => format!("\"{name}\" states nothing"),
             (terms, []) => format!("\"{name}\" states {}", words(terms)),
             (terms, others) => {
-                format!(
-                    "\"{name}\" states {}, but not {}",
-                    words(terms),
-                    words(others)
-                )
+                format!("\"{name}\" states {}, but not {}", words(terms), words(others))
             }
         }
     }
@@ -47,9 +43,7 @@ impl Systematic {
             };
             return format!("{names} {states} own errors, so a systematic part is not told");
         };
-        let bends = first
-            .compliance
-            .map(|_| "what the rig gives way".to_owned());
+        let bends = first.compliance.map(|_| "what the rig gives way".to_owned());
         let is_alike = |pair: &[Stated]| {
             (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
         };
@@ -57,11 +51,7 @@ impl Systematic {
             let terms: Vec<Term> = first.terms.iter().map(|one| one.term).collect();
             let stated = Some(words(&terms)).filter(|words| !words.is_empty());
             let stated: Vec<String> = stated.into_iter().chain(bends).collect();
-            match self
-                .calibrations
-                .first()
-                .map(|one| one.not_stated.as_slice())
-            {
+            match self.calibrations.first().map(|one| one.not_stated.as_slice()) {
                 None | Some([]) => stated.join(", "),
                 Some(terms) => format!("{}; not stated: {}", stated.join(", "), words(terms)),
             }

@@ -109,10 +109,7 @@ impl Differences {
     }
 
     fn told(&self) -> Difference {
-        Difference {
-            worst_n: self.worst,
-            rms_n: (self.squares / self.count.max(1) as f64).sqrt(),
-        }
+        Difference { worst_n: self.worst, rms_n: (self.squares / self.count.max(1) as f64).sqrt() }
     }
 }
 
@@ -188,9 +185,7 @@ impl Meter {
             self.model_less_cell.push(model - cell);
             self.handle_less_cell.push(handle - cell);
         }
-        let is_due = self
-            .lag_at
-            .is_none_or(|last| felt.at.since(last) >= LAG_EVERY);
+        let is_due = self.lag_at.is_none_or(|last| felt.at.since(last) >= LAG_EVERY);
         if is_due {
             self.lag_at = Some(felt.at);
             self.take_lag(felt, master.0.min(self.depth_max.0));
@@ -227,14 +222,8 @@ impl Meter {
         let at = Depth(self.deepest.max(0.0));
         let period = self.watch.period.seconds().0;
         let needed = |ticks: f64| {
-            let device = Device {
-                delay_ticks: ticks,
-                ..self.watch.device
-            };
-            let watch = Watch {
-                device,
-                ..self.watch
-            };
+            let device = Device { delay_ticks: ticks, ..self.watch.device };
+            let watch = Watch { device, ..self.watch };
             // N s/m as catalogues have it.
             1e3 * watch.at(at, MmPerS(0.0)).needed
         };

@@ -85,10 +85,7 @@ impl Master {
             heard: 0,
             quiet: 0,
             quiet_max: QUIET_MS * 1_000_000 / period.nanos(),
-            seen: Seen {
-                tick,
-                contact_changes: 0,
-            },
+            seen: Seen { tick, contact_changes: 0 },
         })
     }
 }
@@ -101,11 +98,7 @@ impl Ticking for Master {
             let _away = self.simulation.stalled();
         }
         let count = self.told.count.load(Ordering::Acquire);
-        self.quiet = if count == self.heard {
-            self.quiet.saturating_add(elapsed)
-        } else {
-            0
-        };
+        self.quiet = if count == self.heard { self.quiet.saturating_add(elapsed) } else { 0 };
         self.heard = count;
         let cell = Newtons(f64::from_bits(self.told.cell.load(Ordering::Relaxed)));
         let was_touching = self.seen.tick.snapshot.is_touching;
@@ -124,11 +117,7 @@ impl Ticking for Master {
 #[derive(Debug)]
 enum Going {
     /// With the samples, which come at times of the rig.
-    WithSamples {
-        master: Box<Master>,
-        begun: Nanos,
-        done: u64,
-    },
+    WithSamples { master: Box<Master>, begun: Nanos, done: u64 },
     /// By itself, in real time.
     ByItself(Beat<Master>),
 }
@@ -175,10 +164,8 @@ impl SlaveLeader {
     pub fn slaved(&self) -> Option<Slaved> {
         let mut slaved = self.meter.slaved()?;
         if let Some(Going::ByItself(beat)) = &self.going {
-            slaved.master_loop = Some(MasterLoop {
-                priority: beat.granted().to_string(),
-                kept: beat.kept(),
-            });
+            slaved.master_loop =
+                Some(MasterLoop { priority: beat.granted().to_string(), kept: beat.kept() });
         }
         Some(slaved)
     }
@@ -195,11 +182,7 @@ impl SlaveLeader {
         let period = master.system.law.period;
         let made = Master::new(&master, Arc::clone(&self.told)).map_err(|err| err.to_string())?;
         if self.settings.is_virtual {
-            return Ok(Going::WithSamples {
-                master: Box::new(made),
-                begun: felt.at,
-                done: 0,
-            });
+            return Ok(Going::WithSamples { master: Box::new(made), begun: felt.at, done: 0 });
         }
         let first = made.seen;
         let beat = Beat::start(made, period, first).map_err(|err| err.to_string())?;
@@ -215,11 +198,7 @@ impl SlaveLeader {
             }
         }
         match self.going.as_mut()? {
-            Going::WithSamples {
-                master,
-                begun,
-                done,
-            } => {
+            Going::WithSamples { master, begun, done } => {
                 let period = self.settings.master.system.law.period;
                 let due = felt.at.since(*begun).0 / period.nanos();
                 // Ticks of a silence that is longer are left out, as in a loop that was away.
@@ -241,8 +220,7 @@ impl Leading for SlaveLeader {
         self.told.count.fetch_add(1, Ordering::Release);
         let seen = self.see(felt)?;
         let master = &seen.tick.snapshot;
-        self.meter
-            .push(felt, master.depth, master.force, seen.contact_changes);
+        self.meter.push(felt, master.depth, master.force, seen.contact_changes);
         let is_new = master.tick != self.last_tick;
         self.last_tick = master.tick;
         is_new.then_some(master.depth.0)

@@ -91,9 +91,7 @@ fn words(quantity: Quantity) -> &'static [&'static str] {
 }
 
 fn is_known_unit(text: &str) -> bool {
-    Quantity::ALL
-        .into_iter()
-        .any(|one| one.scale(text).is_some())
+    Quantity::ALL.into_iter().any(|one| one.scale(text).is_some())
 }
 
 /// Names of columns that only one layout has.
@@ -108,31 +106,19 @@ fn quantity_in(name: &str, words: Words) -> Option<Quantity> {
 
 fn quantity_of(name: &str) -> Option<Quantity> {
     let name = name.trim().replace('_', " ").to_lowercase();
-    Quantity::ALL
-        .into_iter()
-        .find(|quantity| words(*quantity).contains(&name.as_str()))
+    Quantity::ALL.into_iter().find(|quantity| words(*quantity).contains(&name.as_str()))
 }
 
 /// A column's name and its unit, if the name ends in one: `Time, s`, `Force [mN]`, `x_mm`, `Weg in µm`.
 fn split_unit(cell: &str) -> (&str, Option<&str>) {
     let cell = cell.trim();
-    if let Some((name, unit)) = cell
-        .strip_suffix(']')
-        .and_then(|cell| cell.rsplit_once('['))
-    {
+    if let Some((name, unit)) = cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
         return (name.trim(), Some(unit.trim()));
     }
-    if let Some((name, unit)) = cell
-        .strip_suffix(')')
-        .and_then(|cell| cell.rsplit_once('('))
-    {
+    if let Some((name, unit)) = cell.strip_suffix(')').and_then(|cell| cell.rsplit_once('(')) {
         // `Position (z)` names an axis.
         let is_axis = matches!(unit.trim(), "x" | "y" | "z");
-        return if is_axis {
-            (cell, None)
-        } else {
-            (name.trim(), Some(unit.trim()))
-        };
+        return if is_axis { (cell, None) } else { (name.trim(), Some(unit.trim())) };
     }
     for mark in [",", " in ", "/"] {
         if let Some((name, unit)) = cell.rsplit_once(mark) {
@@ -239,10 +225,7 @@ fn column(
     let in_row = in_row.filter(|unit| !unit.is_empty());
     let in_name = split_unit(name).1;
     let told_unit = told.units.iter().rfind(|one| one.quantity == quantity);
-    let unit = told_unit
-        .map(|one| one.unit.as_str())
-        .or(in_row)
-        .or(in_name);
+    let unit = told_unit.map(|one| one.unit.as_str()).or(in_row).or(in_name);
     let (unit, is_assumed) = match unit {
         Some(unit) => (unit, false),
         // A time by its name alone is in seconds in every instrument's table we know.
@@ -267,11 +250,7 @@ fn column(
         Some(Some(value)) => Zero::At(value),
     };
     let turned = if is_turned { ", its sign turned" } else { "" };
-    let assumed = if is_assumed {
-        ", assumed for want of a unit"
-    } else {
-        ""
-    };
+    let assumed = if is_assumed { ", assumed for want of a unit" } else { "" };
     let from = match zero {
         Zero::AsItIs => String::new(),
         Zero::First => ", counted from the first row".into(),
@@ -279,19 +258,11 @@ fn column(
     };
     said.say(
         what,
-        format!(
-            "column {} '{name}' in {unit}{assumed}{turned}{from}",
-            index + 1
-        ),
+        format!("column {} '{name}' in {unit}{assumed}{turned}{from}", index + 1),
         choice.is_some() || told_unit.is_some() || zero != Zero::AsItIs,
         &format!("--column {what}=NAME --unit {what}=UNIT"),
     );
-    Ok(Some(Column {
-        index,
-        scale,
-        is_turned,
-        zero,
-    }))
+    Ok(Some(Column { index, scale, is_turned, zero }))
 }
 
 /// The column of a name or number, and whether its sign is to be turned.
@@ -302,10 +273,7 @@ fn chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
             same(cell.trim()) || same(split_unit(cell).0)
         };
         let names = header.names.iter().enumerate();
-        names
-            .filter(|(_, cell)| is_it(cell))
-            .map(|(i, _)| i)
-            .collect()
+        names.filter(|(_, cell)| is_it(cell)).map(|(i, _)| i).collect()
     };
     let (bare, is_turned) = match name.strip_prefix('-') {
         Some(bare) if find(name).is_empty() => (bare.trim(), true),
@@ -334,10 +302,7 @@ fn named(quantity: Quantity, header: &Header, words: Words) -> Result<Option<usi
         is_name(cell) || is_name(split_unit(cell).0)
     };
     let names = header.names.iter().enumerate();
-    let found: Vec<usize> = names
-        .filter(|(_, cell)| is_it(cell))
-        .map(|(i, _)| i)
-        .collect();
+    let found: Vec<usize> = names.filter(|(_, cell)| is_it(cell)).map(|(i, _)| i).collect();
     match found[..] {
         [] => Ok(None),
         [index] => Ok(Some(index)),

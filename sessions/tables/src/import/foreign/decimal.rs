@@ -105,10 +105,7 @@ pub(in crate::import) fn evidence(cell: &str) -> Evidence {
         [Some(point), Some(comma)] if point.to_bits() != comma.to_bits() => {
             // Nobody groups thousands behind a zero: 0,125 is an eighth.
             let digits = cell.trim_start_matches(['+', '-']);
-            match digits
-                .strip_prefix('0')
-                .and_then(|rest| rest.chars().next())
-            {
+            match digits.strip_prefix('0').and_then(|rest| rest.chars().next()) {
                 Some('.') => Evidence::Only(Decimal::Point),
                 Some(',') => Evidence::Only(Decimal::Comma),
                 _ => Evidence::Either,
@@ -144,11 +141,7 @@ mod tests {
             ("1e5,5", None, None),
             (",234", None, Some(0.234)),
         ] {
-            assert_eq!(
-                (parse(cell, Point), parse(cell, Comma)),
-                (point, comma),
-                "{cell}"
-            );
+            assert_eq!((parse(cell, Point), parse(cell, Comma)), (point, comma), "{cell}");
         }
     }
 

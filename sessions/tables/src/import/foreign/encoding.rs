@@ -10,13 +10,11 @@ impl std::str::FromStr for TextEncoding {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Encoding::for_label(text.as_bytes())
-            .map(Self)
-            .ok_or_else(|| {
-                format!(
-                    "no encoding is called '{text}'; give utf-8, utf-16le, utf-16be or windows-1252"
-                )
-            })
+        Encoding::for_label(text.as_bytes()).map(Self).ok_or_else(|| {
+            format!(
+                "no encoding is called '{text}'; give utf-8, utf-16le, utf-16be or windows-1252"
+            )
+        })
     }
 }
 
@@ -30,20 +28,12 @@ pub(super) fn decode(bytes: &[u8], told: Option<TextEncoding>) -> Result<(String
         (None, None) => match without_mark(bytes) {
             Some(encoding) => (encoding, ", by the zeros in every other byte"),
             None if std::str::from_utf8(bytes).is_ok() => (UTF_8, ""),
-            None => (
-                WINDOWS_1252,
-                ", for it is not UTF-8; other 8-bit encodings look alike",
-            ),
+            None => (WINDOWS_1252, ", for it is not UTF-8; other 8-bit encodings look alike"),
         },
     };
     let text = encoding
         .decode_without_bom_handling_and_without_replacement(body)
-        .ok_or_else(|| {
-            format!(
-                "it is not text in {}; say another encoding",
-                encoding.name()
-            )
-        })?;
+        .ok_or_else(|| format!("it is not text in {}; say another encoding", encoding.name()))?;
     let is_binary = |c: char| {
         c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{c}' | '\u{80}'..='\u{9f}')
     };
@@ -76,18 +66,9 @@ mod tests {
     fn every_encoding_gives_the_same_text() {
         let text = "Weg [µm];Kraft\n1;2\n";
         let wide = |swap: bool, mark: bool| -> Vec<u8> {
-            let units = mark
-                .then_some(0xfeff)
-                .into_iter()
-                .chain(text.encode_utf16());
+            let units = mark.then_some(0xfeff).into_iter().chain(text.encode_utf16());
             units
-                .flat_map(|unit: u16| {
-                    if swap {
-                        unit.to_be_bytes()
-                    } else {
-                        unit.to_le_bytes()
-                    }
-                })
+                .flat_map(|unit: u16| if swap { unit.to_be_bytes() } else { unit.to_le_bytes() })
                 .collect()
         };
         let latin: Vec<u8> = text.chars().map(|c| c as u8).collect();

@@ -99,12 +99,7 @@ pub fn keep(part: &ForeignPart, kept: Kept<'_>) -> Result<(), KeepError> {
     let samples = part.samples.chunks(ROWS_PER_BATCH);
     for (samples, ticks) in samples.zip(ticks.chunks(ROWS_PER_BATCH)) {
         batch.clear();
-        batch.extend(
-            samples
-                .iter()
-                .zip(ticks)
-                .map(|(sample, tick)| row(sample, *tick)),
-        );
+        batch.extend(samples.iter().zip(ticks).map(|(sample, tick)| row(sample, *tick)));
         log.append(&batch, &[])?;
     }
     let ended_at = batch.last().map_or(Nanos::ZERO, |last| last.host);
@@ -180,11 +175,7 @@ pub fn folder_name(imported: &Imported) -> String {
     let is_plain = |c: &char| c.is_alphanumeric() || "-_.".contains(*c);
     // Well below the 255 bytes that file systems take, whatever the letters.
     let name = stem.to_string_lossy().into_owned() + &part;
-    let name: String = name
-        .chars()
-        .take(60)
-        .map(|c| if is_plain(&c) { c } else { '-' })
-        .collect();
+    let name: String = name.chars().take(60).map(|c| if is_plain(&c) { c } else { '-' }).collect();
     match name.trim_matches('.') {
         "" => "imported".into(),
         name => name.into(),

@@ -24,10 +24,7 @@ pub(super) struct Header {
 const ROWS_OF_A_TABLE: usize = 3;
 
 fn width_of(cells: &[Cell]) -> usize {
-    cells
-        .iter()
-        .rposition(|cell| !cell.is_empty())
-        .map_or(0, |last| last + 1)
+    cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
 }
 
 /// The first row of the first table, or of the longest run of rows with numbers.
@@ -63,18 +60,13 @@ fn above(rows: &Rows<'_>, index: usize) -> Option<usize> {
 }
 
 fn is_units(cells: &[Cell]) -> bool {
-    let filled: Vec<String> = texts(cells)
-        .into_iter()
-        .filter(|text| !text.is_empty())
-        .collect();
+    let filled: Vec<String> = texts(cells).into_iter().filter(|text| !text.is_empty()).collect();
     filled.iter().all(|text| is_unit_cell(text))
         && filled.iter().any(|text| is_known_unit_cell(text))
 }
 
 fn is_names(cells: &[Cell]) -> bool {
-    cells
-        .iter()
-        .any(|cell| matches!(cell, Cell::Text(text) if is_named(text)))
+    cells.iter().any(|cell| matches!(cell, Cell::Text(text) if is_named(text)))
 }
 
 /// Finds header, units and the first row of numbers. The inner `None`: there are no numbers at all.
@@ -86,10 +78,7 @@ pub(super) fn find(
 ) -> Result<Option<Header>, String> {
     let row_told = |what: &str, number: usize| {
         rows.index_of(number).ok_or_else(|| {
-            format!(
-                "there is no {} {number} for the {what}, or it is blank",
-                rows.word()
-            )
+            format!("there is no {} {number} for the {what}, or it is blank", rows.word())
         })
     };
     let names = told.header_row.or(known.map(|head| head.names));
@@ -103,19 +92,13 @@ pub(super) fn find(
         return Ok(None);
     };
     let (header, units) = header_and_units(rows, told, first, header, units);
-    let is_header = |index: &usize| {
-        rows.words(*index)
-            .iter()
-            .any(|cell| matches!(cell, Cell::Text(_)))
-    };
+    let is_header =
+        |index: &usize| rows.words(*index).iter().any(|cell| matches!(cell, Cell::Text(_)));
     let header = header.filter(is_header);
     let word = rows.word();
     let (names, place) = match header {
         _ if !told.names.is_empty() => (told.names.clone(), "the names told".to_owned()),
-        Some(index) => (
-            texts(&rows.words(index)),
-            format!("{word} {}", rows.number(index)),
-        ),
+        Some(index) => (texts(&rows.words(index)), format!("{word} {}", rows.number(index))),
         None => {
             return Err(format!(
                 "no names of columns stand above the numbers that begin in {word} {}; name every column, as in t_s,depth_mm,force_N, or say the {word} of the names",
@@ -134,10 +117,7 @@ pub(super) fn find(
         None => "no row of their own".into(),
     };
     said.say("units", in_words, told.units_row.is_some(), "--units-row N");
-    let width = names
-        .iter()
-        .rposition(|name| !name.is_empty())
-        .map_or(0, |last| last + 1);
+    let width = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     let named = told.names.len();
     if named > 0 {
         let found = width_of(&rows.words(first));
@@ -233,12 +213,7 @@ pub(super) fn decimal(
     }
     match (found, either) {
         (Some((decimal, place)), _) => {
-            said.say(
-                "decimal sign",
-                format!("{}, from {place}", decimal.name()),
-                false,
-                option,
-            );
+            said.say("decimal sign", format!("{}, from {place}", decimal.name()), false, option);
             Ok(decimal)
         }
         (None, Some(place)) => Err(format!(

@@ -79,14 +79,8 @@ pub struct ForeignPart {
 
 /// Reads a foreign file.
 pub fn open_foreign(path: &Path, told: &Told) -> Result<Foreign, ForeignError> {
-    let failed = |source| ForeignError::Io {
-        path: path.into(),
-        source,
-    };
-    let refused = |reason| ForeignError::Content {
-        path: path.into(),
-        reason,
-    };
+    let failed = |source| ForeignError::Io { path: path.into(), source };
+    let refused = |reason| ForeignError::Content { path: path.into(), reason };
     let size = std::fs::metadata(path).map_err(failed)?;
     if !size.is_file() {
         return Err(refused("it is not a file; name a file of a tester".into()));
@@ -123,11 +117,7 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
         }
         _ => parse_text(file, &bytes, told)?,
     };
-    Ok(Foreign {
-        bytes,
-        parts,
-        left_out,
-    })
+    Ok(Foreign { bytes, parts, left_out })
 }
 
 /// What every part of a file says of where it comes from.
@@ -162,21 +152,13 @@ fn parse_text(file: &str, bytes: &[u8], told: &Told) -> Result<Understood, Strin
     said.layout(format, told);
     said.say("encoding", how, told.encoding.is_some(), "--encoding NAME");
     let option = "--delimiter NAME";
-    said.say(
-        "delimiter",
-        delimiter.name(),
-        told.delimiter.is_some(),
-        option,
-    );
+    said.say("delimiter", delimiter.name(), told.delimiter.is_some(), option);
     let parts = cut(lines, delimiter)?.into_iter().map(|part| RawPart {
         name: part.name,
         facts: part.facts,
         layout: format.0,
         head: part.head,
-        rows: Rows::Lines {
-            lines: part.lines,
-            delimiter,
-        },
+        rows: Rows::Lines { lines: part.lines, delimiter },
     });
     let origin = origin(file, bytes, format, said);
     let (mut parts, left_out) = understand(parts.collect(), &origin, told)?;
@@ -212,10 +194,7 @@ fn understand(cut: Vec<RawPart<'_>>, origin: &Imported, told: &Told) -> Result<U
         };
         if !cut.iter().enumerate().any(is_it) {
             let names: Vec<String> = cut.iter().map(|part| format!("'{}'", part.name)).collect();
-            return Err(format!(
-                "no part is called '{wanted}'; there are {}",
-                names.join(", ")
-            ));
+            return Err(format!("no part is called '{wanted}'; there are {}", names.join(", ")));
         }
     }
     let (mut parts, mut left_out) = (Vec::new(), Vec::new());

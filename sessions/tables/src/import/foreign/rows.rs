@@ -35,11 +35,7 @@ impl Cell {
     }
 
     fn of_text(text: String) -> Self {
-        if text.is_empty() {
-            Self::Empty
-        } else {
-            Self::Text(text)
-        }
+        if text.is_empty() { Self::Empty } else { Self::Text(text) }
     }
 }
 
@@ -66,10 +62,7 @@ impl Delimiter {
             let words = line.split_whitespace();
             return Ok(words.map(|word| Cell::Text(word.to_owned())).collect());
         }
-        Ok(split(line, self.0, number)?
-            .into_iter()
-            .map(Cell::of_text)
-            .collect())
+        Ok(split(line, self.0, number)?.into_iter().map(Cell::of_text).collect())
     }
 
     /// Told from the first lines that hold numbers.
@@ -122,10 +115,7 @@ impl std::str::FromStr for Delimiter {
 /// Rows with their numbers in the file, from 1.
 #[derive(Clone, Debug)]
 pub(super) enum Rows<'a> {
-    Lines {
-        lines: Vec<(usize, &'a str)>,
-        delimiter: Delimiter,
-    },
+    Lines { lines: Vec<(usize, &'a str)>, delimiter: Delimiter },
     Cells(Vec<(usize, Vec<Cell>)>),
 }
 

@@ -62,11 +62,7 @@ impl Reader<'_> {
         };
         let sign = if column.is_turned { -1.0 } else { 1.0 };
         let value = sign * column.scale.apply(raw);
-        if value.is_finite() {
-            Ok(Value::Number(value))
-        } else {
-            Ok(Value::Missing)
-        }
+        if value.is_finite() { Ok(Value::Number(value)) } else { Ok(Value::Missing) }
     }
 
     fn check_width(&self, cells: &[Cell], width: usize, number: usize) -> Result<(), String> {
@@ -97,38 +93,25 @@ impl Reader<'_> {
         let t = one(&columns.time, Quantity::Time)?;
         let depth = one(&columns.depth, Quantity::Depth)?;
         let force = one(&columns.force, Quantity::Force)?;
-        let signal = columns
-            .signal
-            .as_ref()
-            .map(|column| one(column, Quantity::Signal));
+        let signal = columns.signal.as_ref().map(|column| one(column, Quantity::Signal));
         let signal = signal.transpose()?.flatten();
         let phase = columns.phase.and_then(|place| cells.get(place));
         let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
-        let is_needed = matches!(
-            phase,
-            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
-        );
+        let is_needed =
+            matches!(phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
         let missing = |what: &str| (Fault::Missing, format!("there is no {what}"));
         let (fault, what) = match (t, depth, force, last) {
             (None, ..) => missing("time"),
             (_, None, ..) if is_needed => missing("depth"),
             (_, _, None, _) if is_needed => missing("force"),
-            (Some(t), .., Some(last)) if t == last => (
-                Fault::Repeated,
-                format!("the time {t} s is that of the row before"),
-            ),
-            (Some(t), .., Some(last)) if t < last => (
-                Fault::Backward,
-                format!("the time goes back from {last} to {t} s"),
-            ),
+            (Some(t), .., Some(last)) if t == last => {
+                (Fault::Repeated, format!("the time {t} s is that of the row before"))
+            }
+            (Some(t), .., Some(last)) if t < last => {
+                (Fault::Backward, format!("the time goes back from {last} to {t} s"))
+            }
             (Some(t), ..) => {
-                return Ok(Some(Sample {
-                    t,
-                    depth,
-                    force,
-                    signal,
-                    phase,
-                }));
+                return Ok(Some(Sample { t, depth, force, signal, phase }));
             }
         };
         self.fault(fault, number, &what).map(|()| None)
@@ -160,12 +143,7 @@ pub(super) fn read(
     decimal: Decimal,
     skip: &[Fault],
 ) -> Result<(Vec<Sample>, Vec<String>), String> {
-    let mut reader = Reader {
-        rows,
-        decimal,
-        skip,
-        skipped: [(0, 0); Fault::ALL.len()],
-    };
+    let mut reader = Reader { rows, decimal, skip, skipped: [(0, 0); Fault::ALL.len()] };
     let mut samples: Vec<Sample> = Vec::new();
     let mut numbers: Vec<usize> = Vec::new();
     for index in header.first..rows.len() {
@@ -202,10 +180,7 @@ pub(super) fn read(
 }
 
 fn phase_of(name: &str) -> Phase {
-    let known = Phase::ALL
-        .iter()
-        .copied()
-        .find(|phase| phase.name() == name);
+    let known = Phase::ALL.iter().copied().find(|phase| phase.name() == name);
     known.unwrap_or(Phase::Imported)
 }
 
@@ -236,17 +211,11 @@ const GAP: f64 = 1.5;
 
 /// Where rows seem to be missing, or how unevenly they are spaced.
 fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String> {
-    let steps: Vec<f64> = samples
-        .windows(2)
-        .map(|pair| pair[1].t - pair[0].t)
-        .collect();
+    let steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].t - pair[0].t).collect();
     let mut sorted = steps.clone();
     let middle = sorted.len() / 2;
     let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let even = steps
-        .iter()
-        .filter(|step| (*step - median).abs() <= EVEN * median)
-        .count();
+    let even = steps.iter().filter(|step| (*step - median).abs() <= EVEN * median).count();
     let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
     let longest = steps.iter().copied().fold(0.0, f64::max);
     // Where a tenth of the steps differ, that is how the instrument takes its samples.
@@ -268,10 +237,8 @@ fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String
 
 /// Whether the force falls where the depth grows, which compression does not do here.
 fn turned(samples: &[Sample]) -> Option<String> {
-    let both: Vec<(f64, f64)> = samples
-        .iter()
-        .filter_map(|one| Some((one.depth?, one.force?)))
-        .collect();
+    let both: Vec<(f64, f64)> =
+        samples.iter().filter_map(|one| Some((one.depth?, one.force?))).collect();
     let count = both.len() as f64;
     let mean = |pick: fn(&(f64, f64)) -> f64| both.iter().map(pick).sum::<f64>() / count;
     let (depth, force) = (mean(|one| one.0), mean(|one| one.1));

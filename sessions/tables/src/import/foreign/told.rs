@@ -71,10 +71,8 @@ fn quantity_and(text: &str, what: &str) -> Result<(Quantity, String), String> {
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
     let wrong = || format!("give QUANTITY={what}, the quantity one of {}", names());
     let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
-    let quantity = Quantity::ALL
-        .into_iter()
-        .find(|one| one.name() == name.trim())
-        .ok_or_else(wrong)?;
+    let quantity =
+        Quantity::ALL.into_iter().find(|one| one.name() == name.trim()).ok_or_else(wrong)?;
     match rest.trim() {
         "" => Err(wrong()),
         rest => Ok((quantity, rest.to_owned())),

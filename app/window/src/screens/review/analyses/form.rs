@@ -21,11 +21,8 @@ enum Kind {
 }
 
 impl Kind {
-    const ALL: [(Self, &'static str); 3] = [
-        (Self::Fit, "Fit"),
-        (Self::Recalibration, "Other calibration"),
-        (Self::Mask, "Leave out"),
-    ];
+    const ALL: [(Self, &'static str); 3] =
+        [(Self::Fit, "Fit"), (Self::Recalibration, "Other calibration"), (Self::Mask, "Leave out")];
 }
 
 /// The form.
@@ -85,8 +82,7 @@ impl Form {
     ) -> Result<Deed, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
-                ui.selectable_value(&mut self.kind, kind, words)
-                    .place(words);
+                ui.selectable_value(&mut self.kind, kind, words).place(words);
             }
         });
         text_row(ui, "name", "of the new analysis", &mut self.name);
@@ -115,11 +111,7 @@ impl Form {
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
         self.model.ui(ui, "model");
         if self.model.family.is_some() {
-            tick_box(
-                ui,
-                &mut self.with_unload,
-                "the way back too, where recorded",
-            );
+            tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
         }
         tick_box(ui, &mut self.with_profile, "profile intervals too");
         if others > 0 {
@@ -191,10 +183,7 @@ impl Form {
                 let [from, until] = self.span.each_ref().map(|field| field.value.clone());
                 let (from, until) = (from?, until?);
                 match from < until {
-                    true => Ok(Deed::Mask {
-                        name,
-                        left_out_s: vec![[from, until]],
-                    }),
+                    true => Ok(Deed::Mask { name, left_out_s: vec![[from, until]] }),
                     false => Err("give two times, the earlier first".to_owned()),
                 }
             }
@@ -211,15 +200,11 @@ impl Form {
             (Some(_), file) if !file.is_empty() => {
                 Err("choose one of the library or name a file, not both".to_owned())
             }
-            (Some(calibration), _) => Ok(Deed::Recalibrate {
-                name,
-                calibration: Box::new(calibration),
-            }),
+            (Some(calibration), _) => {
+                Ok(Deed::Recalibrate { name, calibration: Box::new(calibration) })
+            }
             (None, "") => Err("choose a calibration, or name its file".to_owned()),
-            (None, file) => Ok(Deed::RecalibrateFrom {
-                name,
-                file: PathBuf::from(file),
-            }),
+            (None, file) => Ok(Deed::RecalibrateFrom { name, file: PathBuf::from(file) }),
         }
     }
 }

@@ -18,8 +18,7 @@ const AS_MEASURED: &str = "as measured";
 
 /// Draws the list and the analysis chosen; true when the session's own fit is asked for.
 pub(super) fn list_ui(ui: &mut Ui, known: &Known, looked: &mut Looked, own: Option<&Own>) -> bool {
-    ui.radio_value(&mut looked.analysis, None, AS_MEASURED)
-        .place(AS_MEASURED);
+    ui.radio_value(&mut looked.analysis, None, AS_MEASURED).place(AS_MEASURED);
     for one in &known.analyses.all {
         if one.what != Analysed::Withdrawal {
             line_ui(ui, known, one, looked);
@@ -35,8 +34,7 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, looked: &mut Looked) {
     match kept::withdrawn(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());
-            ui.radio_value(&mut looked.analysis, choice, &one.name)
-                .place(&one.name);
+            ui.radio_value(&mut looked.analysis, choice, &one.name).place(&one.name);
         }
         Some(words) => {
             let name = RichText::new(&one.name).strikethrough();
@@ -62,16 +60,9 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
     };
     for parameter in kept::parameters(results) {
         let unit = text::typeset(&parameter.unit);
-        fact_ui(
-            ui,
-            &parameter.name,
-            format!("{} {unit}", text::cell(&parameter)),
-        );
+        fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(&parameter)));
         let own = own.and_then(|own| {
-            let same = own
-                .parameters
-                .iter()
-                .find(|own| own.name == parameter.name)?;
+            let same = own.parameters.iter().find(|own| own.name == parameter.name)?;
             Some(text::cell(same))
         });
         if let Some(own) = own {
@@ -132,7 +123,5 @@ pub(super) fn withdraw_ui(
     let is_pressed = reason_button(ui, "Undo the last", size, &own);
     let last = last?;
     quiet_ui(ui, &format!("the last is '{}', by {}", last.name, last.by));
-    is_pressed.then(|| Deed::Withdraw {
-        name: last.name.clone(),
-    })
+    is_pressed.then(|| Deed::Withdraw { name: last.name.clone() })
 }

@@ -57,19 +57,13 @@ impl Papers {
 
     /// Draws the form.
     pub fn ui(&mut self, ui: &mut Ui, looked: &Looked, shown: &[Looked]) {
-        let wanted = |one: &Looked| Wanted {
-            session: one.session.clone(),
-            analysis: one.analysis.clone(),
-        };
+        let wanted =
+            |one: &Looked| Wanted { session: one.session.clone(), analysis: one.analysis.clone() };
         section_ui(ui, "Report");
         text_row(ui, "report file", "a new .html file", &mut self.report);
         self.choose_ui(ui, Field::Report, looked);
         if shown.len() > 1 {
-            tick_box(
-                ui,
-                &mut self.is_of_all,
-                &format!("of all {} shown", shown.len()),
-            );
+            tick_box(ui, &mut self.is_of_all, &format!("of all {} shown", shown.len()));
         }
         let verdict = path_verdict(&self.report, &["html", "htm"]);
         if task_ui(ui, "Write report", &self.pages, &verdict) {
@@ -87,12 +81,7 @@ impl Papers {
         section_ui(ui, "Figure");
         let figures = Figure::ALL.map(|one| (one, one.word()));
         choice_ui(ui, "of", &mut self.of, &figures);
-        text_row(
-            ui,
-            "figure file",
-            "a new .svg or .png file",
-            &mut self.figure,
-        );
+        text_row(ui, "figure file", "a new .svg or .png file", &mut self.figure);
         self.choose_ui(ui, Field::Figure, looked);
         let is_over_samples = matches!(self.of, Figure::ForceTime | Figure::ForceDepth);
         if let Some([from, until]) = self.span.filter(|_| is_over_samples) {
@@ -105,9 +94,7 @@ impl Papers {
             let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
             let one = Paper::Figure(wanted(looked), self.of, window);
             let to = PathBuf::from(self.figure.trim());
-            self.figures.start("figure", ui.ctx(), move |progress| {
-                paper(&one, &to, progress)
-            });
+            self.figures.start("figure", ui.ctx(), move |progress| paper(&one, &to, progress));
         }
         answer_ui(ui, &self.figures);
     }

@@ -19,11 +19,7 @@ pub(super) struct Said {
 
 impl Default for Said {
     fn default() -> Self {
-        Self {
-            verdict: Verdict::Valid,
-            contact: 0,
-            position: QuantityField::new(0.0),
-        }
+        Self { verdict: Verdict::Valid, contact: 0, position: QuantityField::new(0.0) }
     }
 }
 
@@ -51,10 +47,9 @@ impl Said {
         };
         let is_pressed = reason_button(ui, "Correct contact", size, &own);
         let position = self.position.value.clone().ok();
-        position.filter(|_| is_pressed).map(|mm| Deed::Correct {
-            number: self.contact as u32 + 1,
-            position: Position(mm),
-        })
+        position
+            .filter(|_| is_pressed)
+            .map(|mm| Deed::Correct { number: self.contact as u32 + 1, position: Position(mm) })
     }
 
     fn contact_ui(&mut self, ui: &mut Ui, known: &Known) {

@@ -15,12 +15,7 @@ pub(super) const LAYOUT: Layout = Layout {
         (Quantity::Time, &["time measurement", "godzina", "时间"]),
         (
             Quantity::Depth,
-            &[
-                "compressive extension",
-                "compressive displacement",
-                "przemieszczenie",
-                "位移",
-            ],
+            &["compressive extension", "compressive displacement", "przemieszczenie", "位移"],
         ),
         (
             Quantity::Force,
@@ -130,14 +125,10 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
 impl Specimen {
     /// What a line says that is neither names nor numbers.
     fn fact(&mut self, texts: &[String], number: usize, line: &str) -> Result<(), String> {
-        let (key, values) = texts
-            .split_first()
-            .map_or(("", texts), |(key, values)| (key.as_str(), values));
-        let values: Vec<&str> = values
-            .iter()
-            .map(String::as_str)
-            .filter(|value| !value.is_empty())
-            .collect();
+        let (key, values) =
+            texts.split_first().map_or(("", texts), |(key, values)| (key.as_str(), values));
+        let values: Vec<&str> =
+            values.iter().map(String::as_str).filter(|value| !value.is_empty()).collect();
         let word = key.to_lowercase();
         let after = word.strip_prefix("specimen").map(str::trim);
         let is_number = |after: &str| after.bytes().all(|byte| byte.is_ascii_digit());
@@ -185,11 +176,8 @@ impl Specimen {
             } else if texts.iter().all(|cell| cell.is_empty() || is_unit(cell)) {
                 units = texts;
             } else {
-                for (place, value) in texts
-                    .iter()
-                    .enumerate()
-                    .skip(1)
-                    .filter(|(_, value)| !value.is_empty())
+                for (place, value) in
+                    texts.iter().enumerate().skip(1).filter(|(_, value)| !value.is_empty())
                 {
                     let of = |row: &[String]| row.get(place).cloned().unwrap_or_default();
                     let key = format!("{title}, {}: {}", texts[0], of(&names));
@@ -219,10 +207,7 @@ fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, Str
         let has_units = units.len() > 1 && units.iter().all(|cell| unit(cell).is_some());
         (second.0, has_units)
     } else {
-        (
-            first.0,
-            is_units(&units) && !is_row(&above) && !is_units(&above),
-        )
+        (first.0, is_units(&units) && !is_row(&above) && !is_units(&above))
     };
     if !has_units {
         return Ok(None);
@@ -236,10 +221,7 @@ fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, Str
             above.len(),
         ));
     }
-    let head = Head {
-        names,
-        units: own_line,
-    };
+    let head = Head { names, units: own_line };
     Ok(Some(Columns { head, units }))
 }
 
@@ -276,9 +258,7 @@ fn short(text: &str) -> String {
 }
 
 fn begins(cells: &[String], word: &str) -> bool {
-    cells
-        .first()
-        .is_some_and(|cell| cell.to_lowercase().starts_with(word))
+    cells.first().is_some_and(|cell| cell.to_lowercase().starts_with(word))
 }
 
 /// The unit that a cell ends in, in brackets.

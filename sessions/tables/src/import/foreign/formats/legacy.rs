@@ -56,10 +56,7 @@ fn chain(sectors: &[u8], size: usize, table: &[u32], start: u32) -> Option<Vec<u
 }
 
 fn numbers(bytes: &[u8]) -> Vec<u32> {
-    bytes
-        .chunks_exact(4)
-        .filter_map(|four| u32_at(four, 0))
-        .collect()
+    bytes.chunks_exact(4).filter_map(|four| u32_at(four, 0)).collect()
 }
 
 /// The stream named `Workbook`, or `Book` in files before 1997.
@@ -95,9 +92,7 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
     let entries: Vec<&[u8]> = folder.chunks_exact(128).collect();
     let is_called = |entry: &&&[u8], name: &str| {
         let length = u16_at(entry, 64).unwrap_or(0).clamp(2, 64) as usize - 2;
-        let units = entry[..length]
-            .chunks_exact(2)
-            .filter_map(|pair| u16_at(pair, 0));
+        let units = entry[..length].chunks_exact(2).filter_map(|pair| u16_at(pair, 0));
         let units: Vec<u16> = units.map(|unit| unit as u16).collect();
         String::from_utf16_lossy(&units).eq_ignore_ascii_case(name)
     };
@@ -200,19 +195,9 @@ fn check_dimensions(content: &[u8]) -> Result<(), String> {
         false => u16_at(content, at),
     };
     let ends = if is_old {
-        [
-            read(0, false),
-            read(2, false),
-            read(4, false),
-            read(6, false),
-        ]
+        [read(0, false), read(2, false), read(4, false), read(6, false)]
     } else {
-        [
-            read(0, true),
-            read(4, true),
-            read(8, false),
-            read(10, false),
-        ]
+        [read(0, true), read(4, true), read(8, false), read(10, false)]
     };
     let [Some(row), Some(rows), Some(column), Some(columns)] = ends else {
         return Err(damaged());

@@ -55,18 +55,11 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
                 }
                 let many = ramps.len() > 1;
                 for (index, lines) in ramps.into_iter().enumerate() {
-                    let ramp = if many {
-                        format!(" ramp {}", index + 1)
-                    } else {
-                        String::new()
-                    };
+                    let ramp = if many { format!(" ramp {}", index + 1) } else { String::new() };
                     parts.push(TextPart {
                         name: format!("{function} {nth}{ramp}"),
                         facts: facts.clone(),
-                        head: header.map(|(names, _)| Head {
-                            names: *names,
-                            units: None,
-                        }),
+                        head: header.map(|(names, _)| Head { names: *names, units: None }),
                         lines,
                     });
                 }
@@ -100,25 +93,13 @@ mod tests {
             <INFO>\r\n<END INFO>\r\n<Move Relative>\r\n<DATA>\r\nTime, s\r\n<END DATA>\r\n";
         let lines = lines_of(text);
         let parts = cut(&lines).unwrap();
-        let expected = [
-            ("Move Relative 1 ramp 1", 3),
-            ("Move Relative 1 ramp 2", 2),
-            ("Move Relative 2", 1),
-        ];
-        assert_eq!(
-            names(&parts),
-            expected.map(|(name, count)| (name.to_owned(), count))
-        );
+        let expected =
+            [("Move Relative 1 ramp 1", 3), ("Move Relative 1 ramp 2", 2), ("Move Relative 2", 1)];
+        assert_eq!(names(&parts), expected.map(|(name, count)| (name.to_owned(), count)));
         let facts = [("Date", "Monday"), ("Velocity, mm/s", "0.1")];
-        assert_eq!(
-            parts[0].facts,
-            facts.map(|(key, value)| (key.to_owned(), value.to_owned()))
-        );
+        assert_eq!(parts[0].facts, facts.map(|(key, value)| (key.to_owned(), value.to_owned())));
         assert_eq!(parts[1].lines[0], parts[0].lines[0]);
         let reason = cut(&lines[..14]).unwrap_err();
-        assert!(
-            reason.contains("line 11: <DATA> is never closed"),
-            "{reason}"
-        );
+        assert!(reason.contains("line 11: <DATA> is never closed"), "{reason}");
     }
 }

@@ -51,12 +51,7 @@ const TABLE: Layout = Layout {
     of: "delimited text",
     content: Content::Text {
         is_it: |_, _| false,
-        cut: |lines, _| {
-            Ok(vec![TextPart {
-                lines,
-                ..TextPart::default()
-            }])
-        },
+        cut: |lines, _| Ok(vec![TextPart { lines, ..TextPart::default() }]),
     },
     words: &[],
 };
@@ -108,9 +103,7 @@ impl std::str::FromStr for Format {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let found = ALL.iter().find(|one| one.name == text);
-        found
-            .map(Self)
-            .ok_or_else(|| format!("give {}", Self::names()))
+        found.map(Self).ok_or_else(|| format!("give {}", Self::names()))
     }
 }
 
@@ -159,12 +152,7 @@ pub(super) fn lines_of(text: &str) -> Vec<Line<'_>> {
 
 /// A line of the form `key: value` or `key<tab>value`.
 fn fact(line: &str) -> Option<(String, String)> {
-    let cut = |text: &str| {
-        text.trim()
-            .chars()
-            .take(FACT_LENGTH_MAX)
-            .collect::<String>()
-    };
+    let cut = |text: &str| text.trim().chars().take(FACT_LENGTH_MAX).collect::<String>();
     let (key, value) = line
         .split_once('\t')
         .or_else(|| line.split_once(':'))

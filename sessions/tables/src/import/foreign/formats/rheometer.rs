@@ -68,9 +68,8 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
 
 /// The value of a line that heads what follows, such as `Result:<tab>Relaxation 1`.
 fn heading(line: &str) -> Option<String> {
-    let after = ["Project:", "Test:", "Result:"]
-        .into_iter()
-        .find_map(|word| line.strip_prefix(word))?;
+    let after =
+        ["Project:", "Test:", "Result:"].into_iter().find_map(|word| line.strip_prefix(word))?;
     let is_separator = |c: char| c.is_whitespace() || c == ';' || c == ',';
     Some(after.trim_matches(is_separator).to_owned())
 }
@@ -93,17 +92,11 @@ mod tests {
         let lines = lines_of(text);
         let parts = cut(&lines).unwrap();
         let expected = [("Squeeze 1 interval 1", 4), ("Squeeze 1 interval 2", 3)];
-        assert_eq!(
-            names(&parts),
-            expected.map(|(name, count)| (name.to_owned(), count))
-        );
+        assert_eq!(names(&parts), expected.map(|(name, count)| (name.to_owned(), count)));
         assert!(parts[0].facts.contains(&("Test".into(), "gel 3".into())));
         let steps = "Filename\tx\n[step]\nAxial - 1\nTime\tGap\ns\tmm\n0\t1\n[step]\nAxial - 2\nTime\tGap\ns\tmm\n";
         let parts = cut(&lines_of(steps)).unwrap();
         let expected = [("Axial - 1", 3), ("Axial - 2", 2)];
-        assert_eq!(
-            names(&parts),
-            expected.map(|(name, count)| (name.to_owned(), count))
-        );
+        assert_eq!(names(&parts), expected.map(|(name, count)| (name.to_owned(), count)));
     }
 }

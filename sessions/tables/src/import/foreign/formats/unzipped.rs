@@ -69,16 +69,10 @@ fn claims_too_many(content: &[u8]) -> bool {
     let mut rest = content;
     while let Some(place) = rest.windows(COUNT.len()).position(|window| window == COUNT) {
         rest = &rest[place + COUNT.len()..];
-        let after = rest
-            .iter()
-            .skip_while(|byte| !byte.is_ascii_digit())
-            .take(20);
+        let after = rest.iter().skip_while(|byte| !byte.is_ascii_digit()).take(20);
         let claimed = after
             .take_while(|byte| byte.is_ascii_digit())
-            .fold(0u64, |sum, byte| {
-                sum.saturating_mul(10)
-                    .saturating_add(u64::from(byte - b'0'))
-            });
+            .fold(0u64, |sum, byte| sum.saturating_mul(10).saturating_add(u64::from(byte - b'0')));
         if claimed > content.len() as u64 {
             return true;
         }
@@ -92,11 +86,7 @@ mod tests {
 
     #[test]
     fn claims_are_compared_with_what_is_there() {
-        assert!(!claims_too_many(
-            b"<sst count=\"2\" uniqueCount=\"2\"><si/><si/></sst>"
-        ));
-        assert!(claims_too_many(
-            b"<sst uniqueCount = '99999999999999999999'></sst>"
-        ));
+        assert!(!claims_too_many(b"<sst count=\"2\" uniqueCount=\"2\"><si/><si/></sst>"));
+        assert!(claims_too_many(b"<sst uniqueCount = '99999999999999999999'></sst>"));
     }
 }

@@ -105,10 +105,7 @@ fn modern(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     let names = book.sheet_names();
     let mut sheets = Vec::with_capacity(names.len());
     for name in names {
-        let mut grid = Grid {
-            cells: total,
-            ..Grid::default()
-        };
+        let mut grid = Grid { cells: total, ..Grid::default() };
         // A sheet that holds no cells, such as a chart, has no reader.
         if let Ok(mut cells) = book.worksheet_cells_reader(&name) {
             while let Some(cell) = cells.next_cell().map_err(damaged)? {
@@ -135,10 +132,7 @@ fn old(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     let mut total = 0;
     let mut sheets = Vec::new();
     for name in book.sheet_names() {
-        let mut grid = Grid {
-            cells: total,
-            ..Grid::default()
-        };
+        let mut grid = Grid { cells: total, ..Grid::default() };
         if let Ok(range) = book.worksheet_range(&name) {
             let (first_row, first_column) = range.start().unwrap_or_default();
             for (row, column, value) in range.used_cells() {
