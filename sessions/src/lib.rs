@@ -36,7 +36,6 @@ pub mod schema;
 pub mod shelf;
 pub mod text;
 pub mod ticks;
-pub mod trade;
 
 pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
 pub use block::Block;

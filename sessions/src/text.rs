@@ -18,7 +18,8 @@ pub fn write(path: &Path, text: &str) -> Result<(), String> {
 }
 
 /// The JSON files of a folder that are not hidden, by name; none where there is no such folder.
-pub(crate) fn json_files(folder: &Path) -> Vec<PathBuf> {
+#[must_use]
+pub fn json_files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_whole = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

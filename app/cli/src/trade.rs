@@ -5,13 +5,13 @@ use super::new_file;
 use super::output::Output;
 use clap::Args;
 use palpate_analysis::progress::Progress;
+use palpate_analysis::trade::stored::{
+    TradeFileError, quick_trade_file, read_trade, trade_file, trade_files, write_trade,
+};
 use palpate_analysis::trade::{self, Extent};
 use palpate_rheology::tolerance::Tolerance;
 use palpate_rheology::trade::{Recommendation, TradeCurves};
 use palpate_sessions::library_folder;
-use palpate_sessions::trade::{
-    TradeFileError, quick_trade_file, read_trade, trade_file, trade_files, write_trade,
-};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -8,17 +8,17 @@ use std::path::{Path, PathBuf};
 
 /// The one file of curves in a library.
 fn stored(folder: &Path) -> PathBuf {
-    let files = palpate_sessions::trade::trade_files(&folder.join("library"));
+    let files = palpate_analysis::trade::stored::trade_files(&folder.join("library"));
     assert_eq!(files.len(), 1, "{files:?}");
     files[0].clone()
 }
 
 /// Changes stored curves with their checksum, so that only their content can be wrong.
 fn resealed(file: &Path, change: impl FnOnce(&mut palpate_rheology::trade::TradeCurves)) {
-    let mut curves = palpate_sessions::trade::read_trade(file).expect("curves");
+    let mut curves = palpate_analysis::trade::stored::read_trade(file).expect("curves");
     change(&mut curves);
     let library = file.ancestors().nth(2).expect("a library");
-    palpate_sessions::trade::write_trade(library, &curves).expect("a file");
+    palpate_analysis::trade::stored::write_trade(library, &curves).expect("a file");
 }
 
 #[test]

@@ -14,7 +14,7 @@ pub mod extremes;
 pub mod families;
 pub mod fit;
 pub mod integrators;
-#[cfg(feature = "extremes")]
+#[cfg(feature = "reference")]
 pub mod reference;
 pub mod select;
 pub mod tolerance;

@@ -5,7 +5,7 @@ use palpate_sessions::{Row, Session};
 use palpate_tables::export::{Beside, Format, Selection, Table, dictionary_path};
 use palpate_tables::{ExportError, read_table};
 use palpate_test_support::skip::{self, Need, skip};
-use polars::prelude::{ParquetReader, SerReader};
+use polars_io::prelude::{ParquetReader, SerReader};
 use std::path::Path;
 use std::process::Command;
 

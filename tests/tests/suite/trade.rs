@@ -1,9 +1,9 @@
 //! Recorded curves of the trade: their errors are found again, and a perturbed one is noticed.
 
 use palpate_analysis::progress::Unwatched;
+use palpate_analysis::trade::stored::read_trade;
 use palpate_analysis::trade::{Extent, errors};
 use palpate_rheology::trade::{TradeCurves, last_digits};
-use palpate_sessions::trade::read_trade;
 use palpate_tests::workspace;
 
 fn recorded() -> TradeCurves {

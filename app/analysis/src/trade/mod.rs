@@ -12,6 +12,7 @@ mod paths;
 mod picture;
 #[cfg(feature = "haptics")]
 mod scene;
+pub mod stored;
 pub mod text;
 mod timing;
 

@@ -2,9 +2,9 @@
 
 use palpate_sessions::manifest::Manifest;
 use palpate_sessions::record::Row;
-use polars::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
-use polars::prelude::{Series, StringChunked};
 use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, PrimitiveArray};
+use polars_core::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
+use polars_core::prelude::{Series, StringChunked};
 
 /// What stands in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

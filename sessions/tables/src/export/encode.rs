@@ -2,9 +2,10 @@
 
 use super::harmless::harmless_frame;
 use super::parquet::ParquetFile;
-use polars::io::csv;
-use polars::prelude::{CompatLevel, CsvWriter, DataFrame, PolarsResult, SchemaExt, SerWriter};
 use polars_arrow::io::ipc::write::{FileWriter, WriteOptions};
+use polars_core::prelude::{CompatLevel, DataFrame, PolarsResult, SchemaExt};
+use polars_io::csv::write::{BatchedWriter, CsvWriter};
+use polars_io::prelude::SerWriter;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::Arc;
@@ -38,7 +39,7 @@ impl Format {
 pub(crate) type Metadata = Vec<(String, String)>;
 
 pub(crate) enum Encoder<W: Write> {
-    Csv(csv::write::BatchedWriter<W>),
+    Csv(BatchedWriter<W>),
     Parquet(Box<ParquetFile<W>>, Metadata),
     Arrow(FileWriter<W>),
 }

@@ -1,6 +1,6 @@
 //! Text that no spreadsheet takes for a formula.
 
-use polars::prelude::{ChunkApply, Column, DataFrame, DataType, IntoColumn, PolarsResult};
+use polars_core::prelude::{ChunkApply, Column, DataFrame, DataType, IntoColumn, PolarsResult};
 use std::borrow::Cow;
 
 /// A text as it may stand in a cell of a CSV file. Spreadsheets run what begins with `=`, `+`, `-`, `@`, a

@@ -24,7 +24,7 @@ use palpate_sessions::log::ReadError;
 use palpate_sessions::manifest::Manifest;
 use palpate_sessions::record::Row;
 use palpate_sessions::text::sha256;
-use polars::prelude::{PolarsError, PolarsResult};
+use polars_core::prelude::{PolarsError, PolarsResult};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;

@@ -1,8 +1,8 @@
 //! A row group of a Parquet file, encoded and compressed apart from the file, so that several threads can each make one.
 
 use super::columns::TIME_COLUMN;
-use polars::prelude::{CompatLevel, DataFrame, PolarsError, PolarsResult};
 use polars_arrow::datatypes::ArrowSchema;
+use polars_core::prelude::{CompatLevel, DataFrame, PolarsError, PolarsResult};
 use polars_parquet::write::{
     CompressedPage, DynIter, DynStreamingIterator, Encoding, FileWriter, ParquetType, WriteOptions,
     array_to_columns, compress, fallible_streaming_iterator, get_dtype_encoding,

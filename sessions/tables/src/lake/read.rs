@@ -8,7 +8,8 @@ use palpate_model::Nanos;
 use palpate_sessions::log::Session;
 use palpate_sessions::manifest::{Manifest, RECORD_VERSION};
 use palpate_sessions::record::{Entry, EntryKind};
-use polars::prelude::{DataFrame, ParquetReader, PolarsError, PolarsResult, SerReader};
+use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
+use polars_io::prelude::{ParquetReader, SerReader};
 use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
@@ -180,7 +181,7 @@ fn entries(frame: &DataFrame) -> PolarsResult<Vec<Entry>> {
     let (order, now) = (number("order")?, number("now_ns")?);
     let after = number("after_sample")?;
     let each = |index: usize| {
-        let value = |column: &polars::prelude::UInt64Chunked| {
+        let value = |column: &polars_core::prelude::UInt64Chunked| {
             column.get(index).ok_or_else(|| bad("a number is missing"))
         };
         let kind = kind.get(index).unwrap_or_default();

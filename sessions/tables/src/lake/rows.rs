@@ -3,7 +3,7 @@
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use palpate_sessions::record::Row;
-use polars::prelude::{DataFrame, PolarsError, PolarsResult};
+use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 
 /// Columns of the samples, all that a [`Row`] holds but how long the link may have taken.
 pub(super) const SAMPLE_COLUMNS: [&str; 12] = [

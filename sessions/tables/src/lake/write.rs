@@ -9,7 +9,7 @@ use palpate_sessions::edits::Verdict;
 use palpate_sessions::log::Outline;
 use palpate_sessions::record::{Entry, EntryKind};
 use palpate_sessions::text::sha256;
-use polars::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
+use polars_core::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 use std::fs;
 use std::io::Write;

@@ -10,6 +10,7 @@ use crate::support::{
 };
 use crate::worker::edit;
 use chrono::DateTime;
+use palpate_analysis::trade::stored::read_trade;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
@@ -18,7 +19,6 @@ use palpate_sessions::catalog::CATALOG_FILE;
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, read_checks};
 use palpate_sessions::journal::Journal;
 use palpate_sessions::shelf::{self, Document};
-use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
     Beside, Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
 };

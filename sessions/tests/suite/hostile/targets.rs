@@ -4,13 +4,13 @@
 use super::corpus::{file_with_chunk, message, seal_document, seal_lines};
 use super::kinds::{check_foreign, check_table, check_weights};
 use crate::support::put;
+use palpate_analysis::trade::stored::read_trade;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use palpate_sessions::checks::read_checks;
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{examine, salvage};
 use palpate_sessions::shelf;
-use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
     ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, Part, Session, Summary,
 };

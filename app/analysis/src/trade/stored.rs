@@ -2,9 +2,9 @@
 //!
 //! A file is `{"checksum": CRC-32 of the compact JSON of the curves, "curves": ...}`.
 
-use crate::atomic;
-use crate::text::json_files;
 use palpate_rheology::trade::{CurveError, Machine, TRADE_FORMAT, TradeCurves};
+use palpate_sessions::atomic;
+use palpate_sessions::text::json_files;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
