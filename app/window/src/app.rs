@@ -21,7 +21,7 @@ use crate::theme;
 use crate::widgets::places::places;
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
-use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand};
+use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_protocols::engine::Operator;
 use palpate_runner::Snapshot;
 use std::sync::Arc;
@@ -235,6 +235,10 @@ fn set_text_size(ctx: &Context, size: TextSize) {
 }
 
 impl eframe::App for WorkbenchApp {
+    fn clear_color(&self, visuals: &Visuals) -> [f32; 4] {
+        visuals.extreme_bg_color.to_normalized_gamma_f32()
+    }
+
     fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut RawInput) {
         let mut stops = Commands::default();
         self.keys.read_early(ctx, &raw_input.events, &mut stops);

@@ -4,9 +4,12 @@
 //! `UPDATE_SNAPSHOTS=true cargo test -p palpate-tests gui_pictures` keeps the new ones; look at them before.
 use eframe::egui::{Key, Modifiers, Theme};
 use egui_kittest::kittest::Queryable;
-use egui_kittest::{Harness, SnapshotOptions, SnapshotResults};
+use egui_kittest::{
+    Harness, SnapshotOptions, SnapshotResult, SnapshotResults, try_image_snapshot_options,
+};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
+use palpate_figures::tokens::Tokens;
 use palpate_model::Nanos;
 use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
@@ -171,6 +174,24 @@ fn compute_poke(window: &mut Window) {
     panic!("the poke was never computed");
 }
 
+/// Compares what is drawn, on the colour in which the window is cleared.
+fn picture(
+    window: &mut Window,
+    name: String,
+    theme: &str,
+    options: &SnapshotOptions,
+) -> SnapshotResult {
+    let mut image = window.render().unwrap();
+    let canvas = Tokens::of(theme == "dark").canvas;
+    for pixel in image.pixels_mut() {
+        let through = 255 - pixel[3];
+        for (value, behind) in pixel.0.iter_mut().zip(canvas.to_array()) {
+            *value += (u16::from(behind) * u16::from(through) / 255) as u8;
+        }
+    }
+    try_image_snapshot_options(&image, name, options)
+}
+
 #[test]
 fn every_screen_looks_as_it_did() {
     if !has_renderer() {
@@ -225,11 +246,11 @@ fn every_screen_looks_as_it_did() {
                 _ => options.clone(),
             };
             let name = format!("{}-{theme}", screen.name.to_lowercase());
-            results.add(window.try_snapshot_options(name, &options));
+            results.add(picture(&mut window, name, theme, &options));
         }
         window.key_press(Key::F1);
         settle(&mut window);
-        results.add(window.try_snapshot_options(format!("palette-{theme}"), &options));
+        results.add(picture(&mut window, format!("palette-{theme}"), theme, &options));
         window.key_press(Key::F1);
         window.run_steps(2);
         let name = if theme == "light" { "Dark screen" } else { "Light screen" };

@@ -18,7 +18,7 @@ use crate::window::open_window;
 use crate::workers::fit::Refit;
 use crate::workers::player::PlayerThread;
 use eframe::egui::{
-    Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, vec2,
+    Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, Visuals, vec2,
 };
 use palpate_analysis::opening::PlaybackRequest;
 use palpate_model::Nanos;
@@ -120,6 +120,10 @@ impl PlaybackApp {
 }
 
 impl eframe::App for PlaybackApp {
+    fn clear_color(&self, visuals: &Visuals) -> [f32; 4] {
+        visuals.extreme_bg_color.to_normalized_gamma_f32()
+    }
+
     fn logic(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {
         self.snapshot = self.thread.snapshot();
         self.plots.update(self.snapshot.run.as_ref());

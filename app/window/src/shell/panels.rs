@@ -2,13 +2,15 @@
 
 use super::sizes::{Edge, Sizes};
 use crate::theme::Tokens;
-use eframe::egui::{Frame, Margin, Panel, ScrollArea, Stroke, Ui};
+use eframe::egui::{Color32, Frame, Margin, Panel, ScrollArea, Stroke, Ui};
 
 /// The frame of a panel; the canvas is what plots and tables stand on.
 pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     Frame::new()
-        .fill(if is_canvas { tokens.canvas } else { tokens.panel })
+        // The window is cleared in the colour of a canvas; filling it again would take a software renderer ten
+        // milliseconds, in which it reads no key.
+        .fill(if is_canvas { Color32::TRANSPARENT } else { tokens.panel })
         .inner_margin(Margin::symmetric(8, 6))
         .stroke(Stroke::NONE)
 }
