@@ -23,7 +23,9 @@ pub(super) fn band_of(tokens: &Tokens) -> Color32 {
 /// Gives a plot that fills the space there is the common look.
 pub(crate) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
     let [across, up] = steps(ui.available_size());
-    plot.allow_scroll(false)
+    // It would be filled a second time; see `shell::panels::frame`.
+    plot.show_background(false)
+        .allow_scroll(false)
         .set_margin_fraction(vec2(0.01, 0.03))
         .grid_color(tokens.line)
         // Points between two lines at which they begin to show and are drawn in full.
