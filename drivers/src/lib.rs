@@ -4,6 +4,7 @@
 //! with a reading is the engine's business, and nothing here starts a move by itself.
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
 //! no hardware.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod board_clock;
 pub mod cell;

@@ -7,6 +7,7 @@
 //! every result is a function of its arguments.
 //!
 //! Start reading at [`units`], then [`rig`] for the words every crate shares.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod about;
 pub mod calibration;

@@ -4,6 +4,7 @@
 //! will do. The manifest names the model and no other crate of ours, so nothing here can reach a rig, a file
 //! or a clock. What does is `palpate-runner`.
 //! Start reading at [`engine::step`].
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod engine;
 pub mod file;

@@ -9,6 +9,7 @@
 //!
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod analyses;
 pub mod atomic;

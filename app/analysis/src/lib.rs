@@ -4,6 +4,7 @@
 //! and no button, prints nothing and draws in no window. It never commands a rig.
 //!
 //! Start reading at [`source`], which makes samples of a session or a table, and [`fit`].
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod analyse;
 pub mod analysed;

@@ -2,6 +2,7 @@
 //!
 //! Arguments become requests to [`palpate_analysis`] and the runner; results become text or one JSON
 //! object. This crate knows no window: whoever has one hands it to [`main`].
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod analyse;
 mod asking;

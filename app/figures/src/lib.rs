@@ -5,6 +5,7 @@
 //!
 //! Start reading at [`figure`] for what a figure is, [`drawing`] for how one becomes a file, [`tokens`] for every
 //! colour.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod drawing;
 pub mod figure;

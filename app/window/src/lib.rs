@@ -4,6 +4,7 @@
 //! runner, holds no experiment logic and makes no analysis of its own.
 //!
 //! Start reading at [`app`] for what a frame does, [`screens::screen`] for what a screen is.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod app;
 pub mod command;

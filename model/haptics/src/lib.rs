@@ -13,6 +13,7 @@
 //!
 //! Units: mm, N, V, A, s. Energy is N mm = mJ, damping N s/mm, stiffness N/mm, torque N mm = mN m.
 //! Mass is given in kg; in N s^2/mm that is a thousandth ([`inertia`]).
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod buzz;
 mod calibrate;

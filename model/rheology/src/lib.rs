@@ -6,6 +6,7 @@
 //! function of its arguments.
 //!
 //! Start reading at [`families`] for the models and [`fit`] for their identification.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod cycles;
 pub mod expected;

@@ -3,6 +3,7 @@
 //! One named thread owns the rig. It feeds what the rig reports to the engine, does what the
 //! engine asks (stop commands first), writes the session log and publishes snapshots. It contains
 //! no experiment logic.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod active_run;
 pub mod base;

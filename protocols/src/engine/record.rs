@@ -281,6 +281,7 @@ pub struct Outcome {
 }
 
 impl fmt::Display for Record {
+    #[expect(clippy::too_many_lines, reason = "a table of sentences")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PhaseStarted { phase, .. } => write!(f, "{phase}"),

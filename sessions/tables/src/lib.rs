@@ -4,6 +4,7 @@
 //! wait for it to compile. This crate decides nothing about a run and draws nothing.
 //!
 //! Start reading at [`export::Selection`] for what leaves a session, [`import`] for what becomes one.
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod export;
 pub mod import;

@@ -84,6 +84,7 @@ pub struct Beside {
 }
 
 impl Field {
+    #[expect(clippy::too_many_lines, reason = "a table of columns")]
     fn told(self) -> ColumnInfo {
         let (name, unit, kind, meaning, how) = match self {
             Self::SessionId => (
