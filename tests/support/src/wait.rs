@@ -28,6 +28,24 @@ impl Deadline {
     }
 }
 
+/// Runs of a test that may end otherwise on a busy computer before it fails.
+const ATTEMPTS: usize = 20;
+
+/// What the first attempt gives that succeeds; each says why it did not.
+///
+/// # Panics
+/// If none of twenty does, with what each said.
+pub fn retry<T>(mut attempt: impl FnMut() -> Result<T, String>) -> T {
+    let mut failures = Vec::new();
+    for _ in 0..ATTEMPTS {
+        match attempt() {
+            Ok(found) => return found,
+            Err(why) => failures.push(why),
+        }
+    }
+    panic!("none of {ATTEMPTS} attempts succeeded: {failures:#?}");
+}
+
 /// Tries until something is there.
 ///
 /// # Panics

@@ -1,6 +1,6 @@
 //! A whole protocol on an emulated controller behind a pseudo-terminal, at real pace: what is in its session, and a link
 //! that is lost and made again. A computer that is busy with other tests may keep samples waiting until an interlock ends
-//! the run, as it must: such a run is checked as far as it went and made again, and one has to finish.
+//! the run, as it must: such a run is checked as far as it went and made again, and one of twenty has to finish.
 
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, open_wired};
@@ -19,8 +19,8 @@ use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
 use palpate_runner::replay::replay;
 use palpate_runner::{Request, Runner, TimeScale, driver_clock};
 use palpate_sessions::Session;
-use palpate_test_support::skip::{Need, lacks_terminals, skip};
-use palpate_test_support::wait::{Deadline, PATIENCE, until};
+use palpate_test_support::skip::lacks_terminals;
+use palpate_test_support::wait::{Deadline, PATIENCE, retry, until};
 use palpate_tests::lab::{retract, set_up};
 use palpate_tests::{recorded, shipped};
 use std::path::Path;
@@ -91,20 +91,6 @@ fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) 
     false
 }
 
-/// Runs that may end late before one finishes.
-const ATTEMPTS: usize = 10;
-
-/// What the first attempt that finishes gives. A computer that ends all of them late cannot do this test, which is
-/// counted as skipped.
-fn finished<T>(mut attempt: impl FnMut() -> Result<Option<T>, String>) -> Option<T> {
-    let found = (0..ATTEMPTS).find_map(|_| attempt().unwrap());
-    if found.is_none() {
-        let need = Need::System("a processor within 250 ms");
-        skip(need, "each run was ended by samples that came late, as it must be");
-    }
-    found
-}
-
 /// The rig of an emulated controller, by a rig file, and the calibration of its cell.
 fn bench(folder: &Path, port: &Path) -> Result<(Box<dyn Rig>, Calibration), String> {
     let file = folder.join("bench.toml");
@@ -121,14 +107,15 @@ fn bench(folder: &Path, port: &Path) -> Result<(Box<dyn Rig>, Calibration), Stri
     Ok((rig, calibration))
 }
 
-/// Whether a run finished. Samples that come late end one, as they must; nothing else may.
-fn is_finished(session: &Session) -> Result<bool, String> {
-    let end = session.end.as_ref().ok_or("the session has no end")?;
-    let is_late = LATE.iter().any(|words| end.reason.contains(words));
-    match end.outcome == "finish" {
-        false if !is_late => Err(format!("{}: {}", end.outcome, end.reason)),
-        is_finished => Ok(is_finished),
+/// Why a run ended before its end. Samples that come late end one, as they must; nothing else may.
+fn early_end(session: &Session) -> Option<String> {
+    let end = session.end.as_ref().expect("the session has an end");
+    if end.outcome == "finish" {
+        return None;
     }
+    let is_late = LATE.iter().any(|words| end.reason.contains(words));
+    assert!(is_late, "{}: {}", end.outcome, end.reason);
+    Some(format!("{} after {} samples", end.reason, session.rows.len()))
 }
 
 #[test]
@@ -136,9 +123,7 @@ fn a_slave_on_wires_follows_a_master_in_real_time() {
     if lacks_terminals() {
         return;
     }
-    let Some((slaved, session)) = finished(slave_once) else {
-        return;
-    };
+    let (slaved, session) = retry(slave_once);
     println!("{slaved:?}");
     let deepest = deepest_followed(&session);
     assert!(deepest > 1.0, "{deepest}");
@@ -160,8 +145,8 @@ fn deepest_followed(session: &Session) -> f64 {
     followed.filter_map(|row| row.depth).fold(0.0, f64::max)
 }
 
-/// One run of a slave, checked however it ended; what was followed if it finished.
-fn slave_once() -> Result<Option<(Slaved, Session)>, String> {
+/// One run of a slave, checked however it ended; what was followed, or why it ended early.
+fn slave_once() -> Result<(Slaved, Session), String> {
     let folder = tempfile::tempdir().unwrap();
     let port = folder.path().join("galil");
     let _emulator = Emulator::at(&port).unwrap();
@@ -192,13 +177,14 @@ fn slave_once() -> Result<Option<(Slaved, Session)>, String> {
     let plan = Plan::of("slave", 1, steps);
     let scale = TimeScale::Factor(1.0);
     let session = recorded::of_led_plan(rig, calibration, plan, scale, Arc::clone(&leader) as _);
-    let is_finished = is_finished(&session)?;
-    println!("finished: {is_finished}; {} samples", session.rows.len());
     let deepest = deepest_followed(&session);
     assert!(deepest <= 4.0 + 1e-9, "{deepest}");
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
     let slaved = leader.lock().unwrap().slaved();
-    Ok(is_finished.then(|| (slaved.unwrap(), session)))
+    match early_end(&session) {
+        None => Ok((slaved.unwrap(), session)),
+        Some(why) => Err(why),
+    }
 }
 
 #[test]
@@ -206,11 +192,11 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
     if lacks_terminals() {
         return;
     }
-    finished(protocol_once);
+    retry(protocol_once);
 }
 
-/// One run of a protocol and its link, checked however it ended; something if it finished.
-fn protocol_once() -> Result<Option<()>, String> {
+/// One run of a protocol and its link, checked however it ended; an error says why it ended early.
+fn protocol_once() -> Result<(), String> {
     let folder = tempfile::tempdir().unwrap();
     let port = folder.path().join("galil");
     let emulator = Emulator::at(&port).unwrap();
@@ -225,12 +211,11 @@ fn protocol_once() -> Result<Option<()>, String> {
     assert!(wait(&runner, &woken, has_ended), "the run does not end");
 
     let session = Session::open(&out).unwrap();
-    let is_finished = is_finished(&session)?;
-    println!("finished: {is_finished}; {} samples", session.rows.len());
+    let early_end = early_end(&session);
     let rig = session.manifest.rig.as_ref().unwrap();
     assert!(rig.identity.contains("watchdog"), "{}", rig.identity);
     // What was ended late may be short.
-    if is_finished {
+    if early_end.is_none() {
         assert!(session.rows.len() > 100, "{}", session.rows.len());
         assert!(session.beside.raw_bytes > 1000);
     }
@@ -241,7 +226,7 @@ fn protocol_once() -> Result<Option<()>, String> {
     assert!(session.rows.windows(2).all(|two| two[0].tick < two[1].tick));
     let report = replay(&session, &[]).unwrap();
     assert_eq!(report.first_difference, None);
-    assert!(report.decisions > 10 || !is_finished, "{report:?}");
+    assert!(report.decisions > 10 || early_end.is_some(), "{report:?}");
 
     // The plug is pulled, and put back.
     drop(emulator);
@@ -254,5 +239,5 @@ fn protocol_once() -> Result<Option<()>, String> {
         rig.link_error.is_none() && rig.reading.is_some() && !rig.is_homed
     };
     assert!(wait(&runner, &woken, is_back), "{:?}", runner.snapshot().rig.link_error);
-    Ok(is_finished.then_some(()))
+    early_end.map_or(Ok(()), Err)
 }
