@@ -8,25 +8,14 @@ use crate::worker::{Work, command, edit, told};
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{recover, recovered_folder, salvage};
 use palpate_sessions::{EDITS_FILE, Edit, Edits, LOG_FILE, Session, SessionFolder, segment_file};
-use palpate_test_support::skip::{self, Need, skip};
+use palpate_test_support::skip;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-/// Why processes cannot be killed at a system call here; `None` if they can.
+/// Whether processes cannot be killed at a system call here; if so the test is skipped.
 pub fn is_hindered() -> bool {
-    if skip::lacks_program("strace") {
-        return true;
-    }
-    let outcome = Command::new("strace")
-        .args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=write", "true"])
-        .output();
-    let output = outcome.unwrap();
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        skip(Need::System("tracing of processes"), &said);
-    }
-    !output.status.success()
+    skip::lacks_program("strace")
+        || skip::lacks_command("strace -f -qq -o /dev/null -e trace=write true")
 }
 
 /// What a killed process left.

@@ -11,11 +11,10 @@ use palpate_sessions::{
     Catalog, FolderError, LOG_FILE, LockError, Notice, Pace, Session, SessionFolder, SessionWriter,
     segment_file,
 };
-use palpate_test_support::skip::{Need, skip};
+use palpate_test_support::skip::{CAN_MOUNT, lacks_command};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Command;
 
 /// The work of a process: records on a disk, or under a limit, that will not take it all, with another place to go
 /// to; then reads it back.
@@ -84,17 +83,15 @@ fn reasons(output: &std::process::Output) -> String {
 
 #[test]
 fn a_disk_that_is_really_full_sends_the_recording_elsewhere() {
+    if lacks_command(CAN_MOUNT) {
+        return;
+    }
     let folder = tempfile::tempdir().unwrap();
     let mounted = folder.path().join("small");
     fs::create_dir(&mounted).unwrap();
     let script =
         format!("mount -t tmpfs -o size=256k none '{}' && exec \"$0\" \"$@\"", mounted.display());
     let own_disk = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"];
-    let possible = Command::new(own_disk[0]).args(&own_disk[1..]).args([&script, "true"]).output();
-    if !possible.is_ok_and(|output| output.status.success()) {
-        skip(Need::System("mount namespaces"), "unshare or mount is refused");
-        return;
-    }
     let program = [&own_disk[..], &[&script]].concat();
     let output = command(&program, "spare 40000", &mounted).output().unwrap();
     assert!(output.status.success(), "{output:?}");

@@ -1,8 +1,14 @@
 //! Tests that cannot run on a computer say so in one way, and are counted.
-#![expect(clippy::print_stdout, reason = "a test that is skipped says so where tests say things")]
 
 use std::io::Write;
 use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// A software renderer for Vulkan is here: Mesa's lavapipe.
+pub const HAS_RENDERER: &str = "ls /usr/share/vulkan/icd.d/lvp*";
+
+/// File systems can be mounted in a namespace of one's own.
+pub const CAN_MOUNT: &str = "unshare -Urm mount -t tmpfs none /tmp";
 
 /// Names the file that gets a line for every test that is skipped, as `scripts/skipped` reads them.
 const LIST: &str = "PALPATE_SKIPPED";
@@ -16,8 +22,8 @@ pub enum Need<'a> {
     Python(&'a str),
     /// A file or a folder.
     File(&'a Path),
-    /// A right or a service of the operating system, which only trying shows.
-    System(&'a str),
+    /// A command of the shell that succeeds.
+    Command(&'a str),
 }
 
 impl Need<'_> {
@@ -27,7 +33,7 @@ impl Need<'_> {
             Self::Program(name) => ("program", (*name).into()),
             Self::Python(name) => ("python", (*name).into()),
             Self::File(path) => ("file", path.display().to_string()),
-            Self::System(what) => ("system", (*what).into()),
+            Self::Command(line) => ("command", (*line).into()),
         }
     }
 }
@@ -40,7 +46,8 @@ pub fn skip(need: Need, reason: &str) {
     let (kind, name) = need.words();
     let thread = std::thread::current();
     let test = thread.name().unwrap_or("a test").to_owned();
-    println!("skipped: {test}: no {kind} {name}: {reason}");
+    // Written past what catches the words of a test that passes.
+    let _ = writeln!(std::io::stderr(), "skipped: {test}: no {kind} {name}: {reason}");
     let Some(list) = std::env::var_os(LIST) else {
         return;
     };
@@ -69,6 +76,21 @@ pub fn lacks_file(path: &Path) -> bool {
     let is_missing = !path.exists();
     if is_missing {
         skip(Need::File(path), "it is not here");
+    }
+    is_missing
+}
+
+/// Whether a command of the shell fails; if so the test is skipped.
+///
+/// # Panics
+/// If there is no shell.
+#[must_use]
+pub fn lacks_command(line: &str) -> bool {
+    let outcome = Command::new("sh").args(["-c", line]).stdin(Stdio::null()).output();
+    let output = outcome.expect("a shell");
+    let is_missing = !output.status.success();
+    if is_missing {
+        skip(Need::Command(line), &String::from_utf8_lossy(&output.stderr));
     }
     is_missing
 }

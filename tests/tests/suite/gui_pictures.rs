@@ -14,7 +14,7 @@ use palpate_model::Nanos;
 use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
 use palpate_runner::TimeScale;
-use palpate_test_support::skip::{Need, skip};
+use palpate_test_support::skip::{HAS_RENDERER, lacks_command};
 use palpate_tests::flow::screen_of;
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
@@ -26,13 +26,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 type Window = Harness<'static, WorkbenchApp>;
-
-/// Whether a software renderer is there.
-fn has_renderer() -> bool {
-    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-    let mut files = folders.iter().flat_map(std::fs::read_dir).flatten().flatten();
-    files.any(|file| file.file_name().to_string_lossy().starts_with("lvp"))
-}
 
 /// Most frames of a wait: five minutes.
 const FRAMES_MAX: usize = 60_000;
@@ -194,11 +187,7 @@ fn picture(
 
 #[test]
 fn every_screen_looks_as_it_did() {
-    if !has_renderer() {
-        skip(
-            Need::File(Path::new("/usr/share/vulkan/icd.d/lvp_icd.json")),
-            "no software renderer (mesa-vulkan-drivers) is installed",
-        );
+    if lacks_command(HAS_RENDERER) {
         return;
     }
     let library = library();

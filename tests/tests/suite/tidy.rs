@@ -225,6 +225,8 @@ fn gate_fails_where_a_test_was_skipped_without_reason() {
     for (line, code, count) in [
         ("program\tpython3\tsuite::one\tnot on the path\n", 1, 1),
         ("program\tno-such-program\tsuite::one\tgone\n", 0, 1),
+        ("command\ttrue\tsuite::one\tfailed\n", 1, 1),
+        ("command\tfalse\tsuite::one\tfailed\n", 0, 1),
         ("", 0, 0),
     ] {
         fs::write(&list, line).unwrap();
@@ -238,6 +240,12 @@ fn gate_fails_where_a_test_was_skipped_without_reason() {
         assert!(summary.contains(&format!("{count} tests skipped")), "{summary}");
         assert_eq!(summary.contains("suite::one"), count == 1, "{summary}");
     }
+}
+
+#[test]
+fn gate_expects_the_renderer_that_it_installs() {
+    assert!(read("scripts/skipped").contains(&format!("\"{}\"", skip::HAS_RENDERER)));
+    assert!(read("scripts/install-test-tools").contains("mesa-vulkan-drivers"));
 }
 
 #[test]
