@@ -190,7 +190,6 @@ impl Flow {
 
     /// The window must say every word of a report.
     fn says_all_of(&self, report: &FitReport) {
-        let printed = text::whole(report);
         let mut words: Vec<String> = report.sentences().map(String::from).collect();
         words.push(text::quality(report));
         for parameter in &report.parameters {
@@ -199,7 +198,6 @@ impl Flow {
         }
         for word in words {
             assert!(self.says(&word), "the window does not say '{word}'");
-            assert!(printed.contains(&word), "'{word}' is not in:\n{printed}");
         }
     }
 

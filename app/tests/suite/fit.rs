@@ -4,7 +4,8 @@ use crate::support::{
     assert_refused, command, json, palpate, short_run, split_words, stderr, stdout, succeeded,
     typed,
 };
-use palpate_analysis::fit::fit_source;
+use palpate_analysis::fit::{Intervals, fit_source};
+use palpate_analysis::report::fit_json::Overlay;
 use palpate_analysis::report::text;
 use palpate_analysis::source::Wanted;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -98,8 +99,13 @@ fn one_source_prints_what_the_window_shows() {
     succeeded(&output);
     let fitted =
         fit_source(&at.join("t.csv"), None, Wanted::default(), &FitOptions::default()).unwrap();
-    let report = fitted.result.unwrap();
-    assert_eq!(stdout(&output).trim_end(), text::whole(&report));
+    let report = fitted.result.as_ref().unwrap();
+    let (overlay, intervals) = (Overlay::of(report, &fitted.samples), Intervals::default());
+    let page = text::whole(report, fitted.beside(&overlay, &intervals));
+    assert_eq!(stdout(&output).trim_end(), page);
+    // Whether its family is named or not: the same body, the same page.
+    let named = palpate(at, &["fit", "t.csv", "--family", "series-3"]);
+    assert_eq!(stdout(&named).trim_end(), page);
     assert!(stdout(&output).contains("tau_eps    1.0"));
 }
 
@@ -112,7 +118,7 @@ fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
     let output = palpate(at, &["fit", "t.csv", "--picture", "t.svg"]);
     succeeded(&output);
     let picture = std::fs::read_to_string(at.join("t.svg")).unwrap();
-    let first = stdout(&output).lines().nth(1).unwrap().to_owned();
+    let first = stdout(&output).lines().nth(2).unwrap().to_owned();
     let interval = first.split("95 % ").nth(1).unwrap();
     assert!(picture.starts_with("<svg") && picture.contains(interval), "{interval}");
 

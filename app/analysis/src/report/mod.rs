@@ -9,7 +9,6 @@ pub mod cycles;
 pub mod dossier;
 #[cfg(feature = "extremes")]
 pub mod extremes;
-pub mod family;
 pub mod figures;
 pub mod fit_json;
 #[cfg(feature = "haptics")]

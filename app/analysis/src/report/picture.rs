@@ -2,11 +2,13 @@
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
 use super::band::{self, Band};
-use super::text::{ParameterText, quality};
+use super::fit_json::Overlay;
+use super::text::{ParameterText, energy, equation, limit, quality};
 use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink, Look, Panel, Svg};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
+use palpate_model::units::Newtons;
 use palpate_rheology::fit::{FitReport, FitSample};
 
 /// Width of a picture in px.
@@ -19,25 +21,43 @@ pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
 const LETTERS: usize = 120;
 
-/// The picture of a fit that was made. `source` is what was fitted, for the title; around the force lies the band
-/// of twice its calibration's standard uncertainty, where that is stated.
+/// The picture of a fit that was made: force over time, what is left over, force over depth, parameters and sentences.
+/// `source` is what was fitted, for the title; around the force lies the band of twice its calibration's standard
+/// uncertainty, where that is stated.
 #[must_use]
 pub fn of_report(
     source: &str,
-    samples: &[FitSample],
+    (samples, overlay): (&[FitSample], &Overlay),
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
     let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, samples, report, uncertainty);
-    let mut y = table(&mut svg, report, 580.0);
-    for sentence in report.sentences() {
-        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
+    let columns = (RIGHT - LEFT) as usize;
+    curves(&mut svg, source, (samples, &overlay.forces), report, uncertainty);
+    // Where the force is not known the fit is not drawn over depth: the probe may have left the tissue.
+    let pairs = samples.iter().zip(&overlay.forces);
+    let known = || pairs.clone().filter(|(one, _)| one.is_measured());
+    let measured = thin(known().map(|(one, _)| [one.depth.0, one.force.0]), columns);
+    let fitted = thin(known().map(|(one, fit)| [one.depth.0, fit.0]), columns);
+    let deepest = known().fold(0.0f64, |deepest, (one, _)| deepest.max(one.depth.0));
+    let inside = [LEFT, 576.0, RIGHT, 790.0];
+    let panel = Panel::around(inside, [0.0, deepest], &[&measured, &fitted]);
+    panel.axes(&mut svg, ["depth (mm)", "force (N)"], look());
+    panel.line(&mut svg, &measured, LIGHT.series, 2.6);
+    panel.line(&mut svg, &fitted, LIGHT.limit, 1.4);
+    let mut y = 860.0;
+    for text in equation(report).map(str::to_owned).into_iter().chain([energy(overlay)]) {
+        svg.text([LEFT, y], Ink::plain(LIGHT.text), &text);
+        y += LINE;
+    }
+    y = table(&mut svg, report, y + LINE);
+    for sentence in report.sentences().map(str::to_owned).chain(limit(report)) {
+        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), &sentence);
     }
     svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
 }
 
-/// The same without parameters and sentences, for pages that tell them in words.
+/// The same without depth, parameters and sentences, for pages that tell them in words.
 #[must_use]
 pub fn of_fit(
     source: &str,
@@ -46,7 +66,7 @@ pub fn of_fit(
     uncertainty: Option<&ForceUncertainty>,
 ) -> Drawing {
     let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, samples, report, uncertainty);
+    curves(&mut svg, source, (samples, &report.predict(samples)), report, uncertainty);
     svg.drawing(556.0, LIGHT.canvas, &format!("Fit of {source}"))
 }
 
@@ -54,15 +74,14 @@ pub fn of_fit(
 fn curves(
     svg: &mut Svg,
     source: &str,
-    samples: &[FitSample],
+    (samples, modelled): (&[FitSample], &[Newtons]),
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) {
-    let modelled = report.predict(samples);
     let span = span(samples);
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let columns = (RIGHT - LEFT) as usize;
-    let pairs = || samples.iter().zip(&modelled);
+    let pairs = || samples.iter().zip(modelled);
     // A force that is not known leaves nothing over.
     let known = || pairs().filter(|(one, _)| one.is_measured());
     let measured = thin(known().map(|(one, _)| [one.t.0 - start, one.force.0]), columns);
@@ -102,7 +121,7 @@ pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String
 }
 
 /// From the first sample to the last, in s. A refused record may have times out of order.
-pub(super) fn span(samples: &[FitSample]) -> [f64; 2] {
+fn span(samples: &[FitSample]) -> [f64; 2] {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let passed = samples.iter().map(|sample| sample.t.0 - start);
     let last = passed.filter(|t| t.is_finite()).fold(0.0, f64::max);
@@ -119,7 +138,7 @@ pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
     svg.text([LEFT, 50.0], Ink::plain(LIGHT.text_quiet), line);
 }
 
-pub(super) fn legend(svg: &mut Svg) {
+fn legend(svg: &mut Svg) {
     for (i, (name, color)) in
         [("measured", LIGHT.series), ("fitted", LIGHT.limit)].into_iter().enumerate()
     {
@@ -130,7 +149,7 @@ pub(super) fn legend(svg: &mut Svg) {
 }
 
 /// The parameters from `y` on; returns where what follows may begin.
-pub(super) fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
+fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
     let places = [LEFT, 180.0, 420.0, 540.0];
     let quiet = Ink::plain(LIGHT.text_quiet);
     let heads = ["parameter", "value ± standard error", "unit", "95 % interval"];
@@ -176,7 +195,6 @@ pub(super) fn wrap(text: &str, letters: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::units::Newtons;
     use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
     use palpate_model::{Depth, Seconds};
     use palpate_rheology::fit::{FitOptions, fit};
@@ -205,7 +223,8 @@ mod tests {
         let samples = record(|i, force| force + 0.05 * (i as f64 * 0.01).sin());
         let report = fit(&samples, &FitOptions::default()).unwrap();
         assert!(report.sentences().count() > 0);
-        let picture = of_report("S & T <1>", &samples, &report, None);
+        let overlay = Overlay::of(&report, &samples);
+        let picture = of_report("S & T <1>", (&samples, &overlay), &report, None);
         assert!(picture.contains("S &amp; T &lt;1&gt;"));
         for parameter in &report.parameters {
             let text = ParameterText::of(parameter);
@@ -218,12 +237,12 @@ mod tests {
         }
         assert!(!picture.contains("<polygon"));
         let thesis = ForceUncertainty::of(&palpate_model::calibration::Calibration::thesis());
-        let banded = of_report("S", &samples, &report, thesis.as_ref().ok());
+        let banded = of_report("S", (&samples, &overlay), &report, thesis.as_ref().ok());
         // Around the force, and in the legend.
         assert_eq!(banded.matches("<polygon").count(), 2);
-        // Three curves of at most two points a pixel, and nothing that is not a number.
+        // Five curves of at most two points a pixel, and nothing that is not a number.
         assert!(!picture.contains("NaN") && !picture.contains("inf"));
-        assert!(picture.len() < 3 * 2 * 860 * 14 + 20_000, "{}", picture.len());
+        assert!(picture.len() < 5 * 2 * 860 * 14 + 20_000, "{}", picture.len());
         let sizes = picture.split("font-size=\"").skip(1);
         for size in sizes.filter_map(|rest| rest.split('"').next()) {
             assert!(size.parse::<f64>().unwrap() >= 12.0, "{size}");

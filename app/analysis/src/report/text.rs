@@ -1,8 +1,11 @@
 //! The strings of a fit. Window, command line and picture print these and no others, so that a
 //! number never reads differently in two places.
 
+use super::fit_json::{Beside, Overlay};
+use crate::fit::{Intervals, Together};
 use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_interval};
-use palpate_rheology::fit::{FitReport, Parameter};
+use palpate_rheology::families::by_key;
+use palpate_rheology::fit::{FitReport, NamedReport, Parameter};
 
 /// One parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,14 +76,93 @@ pub fn quality(report: &FitReport) -> String {
     format!("R² {:.6}, rmse {:.3} mN, {} samples", report.r2, report.rmse_n * 1e3, report.samples)
 }
 
-/// A whole report: model, parameters, quality, then every sentence.
+/// What energy went in and how far the fit is off at worst.
 #[must_use]
-pub fn whole(report: &FitReport) -> String {
+pub fn energy(overlay: &Overlay) -> String {
+    format!(
+        "energy {:.3} N·mm measured, {:.3} fitted; at worst {:.1} mN off",
+        overlay.work_measured_n_mm,
+        overlay.work_fitted_n_mm,
+        overlay.worst_n * 1e3
+    )
+}
+
+/// What the family of a report is, as an equation; none of an unknown one.
+pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
+    Some(by_key(&report.body.family).ok()?.equation())
+}
+
+/// What no choice of its parameters can represent.
+pub(super) fn limit(report: &FitReport) -> Option<String> {
+    let family = by_key(&report.body.family).ok()?;
+    Some(format!("it cannot represent {}", family.cannot_represent()))
+}
+
+/// A whole fit, of every family the same: model, equation, parameters, how good it is, every sentence, further intervals.
+#[must_use]
+pub fn whole(report: &FitReport, beside: Beside<'_>) -> String {
     let mut lines = vec![report.model.clone()];
+    lines.extend(equation(report).map(|text| format!("  {text}")));
     lines.extend(parameter_lines(&report.parameters));
-    lines.push(quality(report));
-    lines.extend(report.sentences().map(|sentence| format!("- {sentence}")));
+    lines.extend([quality(report), energy(beside.overlay)]);
+    let sentences = report.sentences().map(str::to_owned).chain(limit(report));
+    lines.extend(sentences.map(|sentence| format!("- {sentence}")));
+    lines.extend(interval_lines(beside.intervals, report));
     lines.join("\n")
+}
+
+/// A fit of several recordings: what is shared once, then every recording with what is its own.
+#[must_use]
+pub fn together(fitted: &Together, beside: &[Beside<'_>]) -> String {
+    let (shared, records) = (&fitted.report.shared, &fitted.report.records);
+    let part = |named: &NamedReport, is_shared: bool| {
+        let mut chosen = named.report.parameters.clone();
+        chosen.retain(|parameter| shared.contains(&parameter.name) == is_shared);
+        parameter_lines(&chosen)
+    };
+    let mut lines = Vec::new();
+    let first = records.first();
+    if let Some(first) = first {
+        lines.push(format!("{}, {} records together", first.report.model, records.len()));
+        lines.extend(equation(&first.report).map(|text| format!("  {text}")));
+        lines.extend(part(first, true));
+    }
+    for (named, beside) in records.iter().zip(beside) {
+        lines.push(named.record.clone());
+        lines.extend(part(named, false));
+        let own = [quality(&named.report), energy(beside.overlay)].into_iter();
+        let own = own.chain(interval_lines(beside.intervals, &named.report));
+        let own = own.chain(named.report.sentences().map(|sentence| format!("- {sentence}")));
+        lines.extend(own.map(|line| format!("  {line}")));
+    }
+    let limit = first.and_then(|first| limit(&first.report));
+    let systematic = fitted.systematic.iter().flatten().next().map(|one| one.sentence());
+    lines.extend(limit.into_iter().chain(systematic).map(|sentence| format!("- {sentence}")));
+    lines.join("\n")
+}
+
+/// Intervals that take more than one pass, in the digits of the report.
+fn interval_lines(found: &Intervals, report: &FitReport) -> Vec<String> {
+    let line = |name: &str, ends: [Option<f64>; 2]| {
+        let known = report.parameter(name).and_then(|known| Some((known.value, known.std_error?)));
+        let text = match (ends, known) {
+            ([Some(low), Some(high)], Some((value, error))) => interval([low, high], value, error),
+            _ => {
+                let [low, high] = ends.map(|end| end.map_or("open".to_owned(), plain));
+                format!("[{low}, {high}]")
+            }
+        };
+        format!("  {name:<10} {text}")
+    };
+    let mut lines = Vec::new();
+    if !found.profile.is_empty() {
+        lines.push("95 % from the profile likelihood".to_owned());
+    }
+    lines.extend(found.profile.iter().map(|one| line(&one.name, [one.low, one.high])));
+    let seed = found.bootstrap_seed;
+    lines.extend(seed.map(|seed| format!("95 % from the bootstrap, seed {seed}")));
+    lines.extend(found.bootstrap.iter().map(|one| line(&one.name, one.ci95.map(Some))));
+    lines
 }
 
 /// One line per parameter, in columns.
@@ -177,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_whole_report_says_every_sentence() {
-        let report = FitReport {
+        let mut report = FitReport {
             model: "a model".into(),
             parameters: vec![parameter(Some(0.1), false), parameter(None, true)],
             r2: 0.999_123_4,
@@ -187,15 +269,22 @@ mod tests {
             findings: vec!["found".into()],
             ..FitReport::default()
         };
+        report.body.family = "maxwell".into();
+        let (overlay, intervals) = (Overlay::of(&FitReport::default(), &[]), Intervals::default());
+        let beside =
+            Beside { overlay: &overlay, intervals: &intervals, systematic: None, compliance: None };
         let lines = [
             "a model",
+            "  F + tau F' = k tau x'",
             "  tau_sig    1.50 ± 0.10  N·s/mm²  95 % [1.30, 1.70]",
             "  tau_sig    1.500 fixed  N·s/mm²",
             "R² 0.999123, rmse 3.450 mN, 900 samples",
+            "energy 0.000 N·mm measured, 0.000 fitted; at worst 0.0 mN off",
             "- beware",
             "- found",
+            "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",
         ];
-        assert_eq!(whole(&report), lines.join("\n"));
+        assert_eq!(whole(&report, beside), lines.join("\n"));
     }
 
     #[test]

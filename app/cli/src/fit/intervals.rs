@@ -3,9 +3,8 @@
 use super::super::Failure;
 use super::super::output::{Bar, Output};
 use super::FitArgs;
-use palpate_analysis::fit::{Intervals, IntervalsWanted};
-use palpate_figures::uncertain::{interval, plain};
-use palpate_rheology::fit::{Bootstrap, FitReport};
+use palpate_analysis::fit::IntervalsWanted;
+use palpate_rheology::fit::Bootstrap;
 
 /// Repeats below this say nothing of the ends of a 95 % interval.
 const REPEATS_MIN: usize = 40;
@@ -42,33 +41,4 @@ pub(super) fn bar(args: &FitArgs, output: &Output) -> Option<Bar> {
 /// Shows how many of them are done.
 pub(super) fn show(bar: &Option<Bar>, done: usize) {
     bar.iter().for_each(|bar| bar.set_position(done as u64));
-}
-
-/// Lines for people, in the digits of the report.
-pub(super) fn lines(found: &Intervals, report: &FitReport) -> Vec<String> {
-    let line = |name: &str, ends: [Option<f64>; 2]| {
-        let known = report.parameter(name).and_then(|known| Some((known.value, known.std_error?)));
-        let text = match (ends, known) {
-            ([Some(low), Some(high)], Some((value, error))) => interval([low, high], value, error),
-            _ => {
-                let [low, high] = ends.map(|end| end.map_or("open".to_owned(), plain));
-                format!("[{low}, {high}]")
-            }
-        };
-        format!("  {name:<10} {text}")
-    };
-    let mut lines = Vec::new();
-    if !found.profile.is_empty() {
-        lines.push("95 % from the profile likelihood".to_owned());
-    }
-    for one in &found.profile {
-        lines.push(line(&one.name, [one.low, one.high]));
-    }
-    if let Some(seed) = found.bootstrap_seed {
-        lines.push(format!("95 % from the bootstrap, seed {seed}"));
-    }
-    for one in &found.bootstrap {
-        lines.push(line(&one.name, one.ci95.map(Some)));
-    }
-    lines
 }

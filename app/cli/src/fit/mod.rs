@@ -13,7 +13,6 @@ use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
 use palpate_analysis::compliance::Corrections;
 use palpate_analysis::fit::{Recipe, remember};
-use palpate_analysis::report::family;
 use palpate_analysis::report::fit_json::{FitObject, Overlay};
 use palpate_analysis::report::{picture, text};
 use palpate_analysis::source::{Stretch, Wanted};
@@ -182,16 +181,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             return Err(Failure::failed(format!("{refusal}, in {name}")));
         }
     };
-    let family = recipe.options.family();
     let overlay = Overlay::of(report, &fitted.samples);
     new_file::write("picture", to, || {
         let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
         let band = uncertainty.and_then(Result::ok);
-        let (samples, band) = (fitted.samples.as_slice(), band.as_ref());
-        match args.family.is_some() {
-            true => family::picture(&short, family, (samples, &overlay), report, band),
-            false => picture::of_report(&short, samples, report, band),
-        }
+        picture::of_report(&short, (&fitted.samples, &overlay), report, band.as_ref())
     })?;
     if let Err((file, err)) = remember(report, source) {
         output.note(&format!(
@@ -205,17 +199,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     drop(bar);
     let intervals = intervals.map_err(Failure::failed)?;
     let beside = fitted.beside(&overlay, &intervals);
-    let object = FitObject::of(family, report, beside, fitted.seconds);
+    let object = FitObject::of(recipe.options.family(), report, beside, fitted.seconds);
     saved::keep(args, source, &object)?;
     output.result(&object, || {
-        let mut lines = vec![text::whole(report)];
-        if args.family.is_some() {
-            lines[0] = family::with_equation(family, &lines[0]);
-            lines.push(format!("- {}", family::energy(&overlay)));
-            lines.extend(family::limits(family).map(|sentence| format!("- {sentence}")));
-        }
+        let mut lines = vec![text::whole(report, beside)];
         lines.extend(fitted.compliance.as_ref().map(compliance::sentence));
-        lines.extend(intervals::lines(&intervals, report));
         let kept = args.save.iter();
         lines.extend(kept.map(|name| format!("kept as analysis '{name}'")));
         lines.join("\n")

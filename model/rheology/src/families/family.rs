@@ -28,13 +28,6 @@ pub trait Family: Debug + Send + Sync {
         Vec::new()
     }
 
-    /// Whether it can be fitted while a run goes on.
-    fn live(&self) -> Live {
-        Live::No(
-            "the live fit follows a bank of relaxation times for the modified Kelvin body of third order only",
-        )
-    }
-
     /// Parameters in which it is not linear.
     fn outer(&self) -> Vec<Outer>;
 
@@ -79,15 +72,6 @@ pub enum Kernel {
     Terms,
     /// From recursions over 64 samples at a time that are made for the modified Kelvin body of third order.
     ThirdOrder,
-}
-
-/// Whether a family can be fitted during a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Live {
-    /// Yes.
-    Yes,
-    /// No, and why.
-    No(&'static str),
 }
 
 /// A parameter in which a family is not linear.

@@ -28,7 +28,7 @@ mod unloading;
 mod voigt;
 
 pub use exponential::ExponentialKelvin;
-pub use family::{Family, Kernel, Live, Outer, OuterRange};
+pub use family::{Family, Kernel, Outer, OuterRange};
 pub use fractional::{FRACTIONAL_DIGITS, FractionalZener};
 pub use kelvin::Kelvin;
 pub use maxwell::Maxwell;

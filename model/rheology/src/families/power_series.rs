@@ -1,6 +1,6 @@
 //! Power series in the modified Kelvin body: the elastic part cut off after one to five terms.
 
-use super::family::{Family, Kernel, Live, Outer, OuterRange};
+use super::family::{Family, Kernel, Outer, OuterRange};
 use super::relaxation::{Drive, POWER_MAX, Relaxation};
 use super::table::Kind;
 use std::sync::Arc;
@@ -60,13 +60,6 @@ impl Family for PowerSeries {
 
     fn cannot_represent(&self) -> &'static str {
         "more than one relaxation time; unloading that differs from loading; anything deeper than the data, where a power series runs away"
-    }
-
-    fn live(&self) -> Live {
-        match self.order {
-            3 => Live::Yes,
-            _ => Live::No("the live fit keeps the columns of the third order only"),
-        }
     }
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {

@@ -6,6 +6,7 @@ pub use lines::{Lost, RunLine, SpecimenPart};
 
 use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
+use super::fit_json::Overlay;
 use super::picture;
 use super::text::{in_columns, parameter_lines};
 use crate::cycles::of_session;
@@ -347,7 +348,9 @@ impl TaskPart {
         if self.figures.is_empty() {
             let calibration = fitted.calibration.as_ref();
             let band = calibration.and_then(|one| ForceUncertainty::of(one).ok());
-            self.figures.push(picture::of_report(name, samples, report, band.as_ref()));
+            let overlay = Overlay::of(report, samples);
+            let drawn = picture::of_report(name, (samples, &overlay), report, band.as_ref());
+            self.figures.push(drawn);
         }
         if !bodies.known.iter().any(|(known, _)| *known == task.name) {
             let found = report.kelvin().map(|body| (task.name.clone(), body));
