@@ -4,7 +4,7 @@ use crate::support::{
     SHORT, answer, assert_prints, assert_refused, assert_says, background, json, log_file, palpate,
     short_run, stderr, stdout, succeeded, typed,
 };
-use palpate_test_support::wait::until;
+use palpate_test_support::wait::{retry, until};
 use std::path::Path;
 use std::process::Command;
 
@@ -251,10 +251,8 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
     assert_eq!(info["ending"], "stop");
 }
 
-#[test]
-fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
+/// A run that stands still twice for 0.7 s while it records, and how it ended; an error if it was over before.
+fn sleeping_run(at: &Path) -> Result<std::process::ExitStatus, String> {
     let mut child = background(at, "run ramp-hold --hold 5 --time-scale 50 --out slept");
     let pid = child.id();
     let signal = |name: &str| {
@@ -266,15 +264,26 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     let log = at.join("slept/000.mcap");
     let length = || log.metadata().map_or(0, |found| found.len());
     for _ in 0..2 {
-        // While it records.
         let before = length();
-        let is_longer = || (length() > before).then_some(());
-        until(is_longer, || format!("more than {before} bytes"));
+        let mut has_ended = || child.try_wait().unwrap().is_some();
+        let mut is_longer = || (length() > before || has_ended()).then_some(());
+        until(&mut is_longer, || format!("more than {before} bytes"));
+        if has_ended() {
+            std::fs::remove_dir_all(at.join("slept")).unwrap();
+            return Err("the run was over before it was put to sleep".into());
+        }
         signal("STOP");
         std::thread::sleep(std::time::Duration::from_millis(700));
         signal("CONT");
     }
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+    Ok(child.wait().unwrap())
+}
+
+#[test]
+fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert_eq!(retry(|| sleeping_run(at)).code(), Some(0));
     let session = palpate_sessions::Session::open(&at.join("slept")).unwrap();
     assert!(session.end.is_some());
     let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
