@@ -1,4 +1,5 @@
-//! The simulated rig through the crate's public door.
+//! The simulated rig, and messages, through the crate's public door.
 #![cfg(test)]
 
+mod messages;
 mod sim;

@@ -1,5 +1,6 @@
-//! Loops of the haptics through the crate's public door.
+//! Loops of the haptics, and messages, through the crate's public door.
 #![cfg(test)]
 
 mod haptic_loop;
 mod haptic_scene;
+mod messages;

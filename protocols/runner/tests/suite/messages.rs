@@ -1,0 +1,35 @@
+//! The words of what a replay and a programme refuse.
+
+use palpate_runner::programme::{CalibratingError, ProgressError, RunError};
+use palpate_runner::replay::ReplayError;
+use palpate_test_support::assert_messages;
+
+#[test]
+fn what_a_replay_refuses_is_worded() {
+    let detail = || "line 3".to_owned();
+    assert_messages! {
+        ReplayError::Imported { file: "old.csv".into() } => ["old.csv"],
+        ReplayError::Manifest { what: "plan", detail: detail() } => ["plan", "line 3"],
+        ReplayError::Input { order: 7, detail: detail() } => ["input 7", "line 3"],
+    }
+}
+
+#[test]
+fn what_a_programme_refuses_is_worded() {
+    let name = || "week".to_owned();
+    let task = || "ramp".to_owned();
+    let incomplete =
+        || CalibratingError::Incomplete { session: "s-1".into(), ending: "stop".into() };
+    assert_messages! {
+        ProgressError::Other(name()) => ["'week'"],
+        ProgressError::Changed(name()) => ["'week'"],
+        ProgressError::Conditions { programme: name(), changes: vec!["the rig was sim".into(), "the depth was 3 mm".into()] } => ["'week'", "sim", "3 mm"],
+        ProgressError::Headless => ["new folder"],
+        CalibratingError::NoReadings("s-1".into()) => ["s-1", "load-cell-calibration"],
+        incomplete() => ["s-1", "stop"],
+        RunError::Refused { task: task(), reason: "the depth is too great".into() } => ["'ramp'", "the depth is too great"],
+        RunError::Ended { task: task(), repeat: 2, ending: "stop".into(), reason: "by hand".into() } => ["'ramp'", "repeat 2", "stop", "by hand"],
+        RunError::Calibrating { task: task(), source: incomplete() } => ["'ramp'", "s-1"],
+        RunError::NoRunner => ["incomplete"],
+    }
+}
