@@ -14,6 +14,7 @@ pub mod calibration;
 pub mod contained;
 pub mod estimate;
 pub mod linalg;
+mod named;
 pub mod quantity;
 pub mod random;
 pub mod rig;

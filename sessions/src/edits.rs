@@ -10,7 +10,6 @@ use chrono::{DateTime, Utc};
 use palpate_model::units::Position;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
@@ -18,33 +17,17 @@ use thiserror::Error;
 /// Name of the file of edits in a session folder.
 pub const EDITS_FILE: &str = "edits.jsonl";
 
-/// What a session is worth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// Nothing speaks against it.
-    Valid,
-    /// Something does; it is used, and every reader is told.
-    Suspect,
-    /// It is not used unless asked for, and stays in the counts.
-    Rejected,
-}
-
-impl Verdict {
-    /// The word for it.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Valid => "valid",
-            Self::Suspect => "suspect",
-            Self::Rejected => "rejected",
-        }
-    }
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.word())
+palpate_model::named! {
+    /// What a session is worth.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Verdict {
+        /// Nothing speaks against it.
+        Valid = "valid",
+        /// Something does; it is used, and every reader is told.
+        Suspect = "suspect",
+        /// It is not used unless asked for, and stays in the counts.
+        Rejected = "rejected",
     }
 }
 
@@ -52,34 +35,22 @@ impl FromStr for Verdict {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        [Self::Valid, Self::Suspect, Self::Rejected]
-            .into_iter()
-            .find(|one| one.word() == text)
-            .ok_or_else(|| format!("'{text}' is no verdict; give valid, suspect or rejected"))
+        let found = Self::ALL.into_iter().find(|one| one.name() == text);
+        found.ok_or_else(|| format!("'{text}' is no verdict; give valid, suspect or rejected"))
     }
 }
 
-/// What a person who looked at a session decided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Decision {
-    /// It stands, with its analyses.
-    Accepted,
-    /// It does not.
-    Rejected,
-    /// It is to be done again.
-    Repeat,
-}
-
-impl Decision {
-    /// The word for it.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Accepted => "accepted",
-            Self::Rejected => "rejected",
-            Self::Repeat => "to be repeated",
-        }
+palpate_model::named! {
+    /// What a person who looked at a session decided.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Decision {
+        /// It stands, with its analyses.
+        Accepted = "accepted",
+        /// It does not.
+        Rejected = "rejected",
+        /// It is to be done again.
+        Repeat = "to be repeated",
     }
 }
 

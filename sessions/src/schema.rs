@@ -12,59 +12,31 @@ use prost_types::{
 };
 use std::collections::BTreeMap;
 
-/// A channel of a session log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Channel {
-    Manifest,
-    Daq,
-    Derived,
-    Input,
-    Decision,
-    Fit,
-    End,
-    /// The samples thinned out, one message each, for programs that draw messages.
-    View,
-    /// Says that what may be lost of the segments before is written again in this one.
-    Rewrite,
-    /// Bytes as exchanged with devices.
-    Raw,
-    /// How the computer kept up, and its clocks.
-    Health,
+palpate_model::named! {
+    /// A channel of a session log.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(crate) enum Channel {
+        Manifest = "/manifest",
+        Daq = "/daq/block",
+        Derived = "/derived/block",
+        Input = "/input",
+        Decision = "/decision",
+        Fit = "/fit",
+        End = "/end",
+        /// The samples thinned out, one message each, for programs that draw messages.
+        View = "/daq/view",
+        /// Says that what may be lost of the segments before is written again in this one.
+        Rewrite = "/rewrite",
+        /// Bytes as exchanged with devices.
+        Raw = "/raw",
+        /// How the computer kept up, and its clocks.
+        Health = "/health",
+    }
 }
 
 impl Channel {
-    pub const ALL: [Self; 11] = [
-        Self::Manifest,
-        Self::Daq,
-        Self::Derived,
-        Self::Input,
-        Self::Decision,
-        Self::Fit,
-        Self::End,
-        Self::View,
-        Self::Rewrite,
-        Self::Raw,
-        Self::Health,
-    ];
-
-    pub fn topic(self) -> &'static str {
-        match self {
-            Self::Manifest => "/manifest",
-            Self::Daq => "/daq/block",
-            Self::Derived => "/derived/block",
-            Self::Input => "/input",
-            Self::Decision => "/decision",
-            Self::Fit => "/fit",
-            Self::End => "/end",
-            Self::View => "/daq/view",
-            Self::Rewrite => "/rewrite",
-            Self::Raw => "/raw",
-            Self::Health => "/health",
-        }
-    }
-
     pub fn from_topic(topic: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|one| one.topic() == topic)
+        Self::ALL.into_iter().find(|one| one.name() == topic)
     }
 
     pub fn of_entry(kind: EntryKind) -> Self {
@@ -372,7 +344,7 @@ mod tests {
     #[test]
     fn schemas_are_what_they_claim_to_be() {
         for channel in Channel::ALL {
-            assert_eq!(Channel::from_topic(channel.topic()), Some(channel));
+            assert_eq!(Channel::from_topic(channel.name()), Some(channel));
             let schema = channel.schema();
             if channel.schema_encoding() == "protobuf" {
                 let set = FileDescriptorSet::decode(schema.as_slice()).unwrap();

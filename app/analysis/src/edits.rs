@@ -103,7 +103,7 @@ impl Saying {
             }
             Self::Note(_) => "note".into(),
             Self::Verdict(verdict, _) => format!("verdict {verdict}"),
-            Self::Review(decision, _) => format!("review, {}", decision.word()),
+            Self::Review(decision, _) => format!("review, {}", decision.name()),
         }
     }
 }

@@ -105,7 +105,7 @@ pub fn play(
         ticks: end.scene.ticks(),
         depth_max_mm,
         force_max_n,
-        why: seen.iter().map(|(why, count)| (why.words(), *count as f64 / frames)).collect(),
+        why: seen.iter().map(|(why, count)| (why.name(), *count as f64 / frames)).collect(),
         surface_hash: format!("{:016x}", end.scene.hash()),
         tick_us,
         is_within_budget: 1e6 * end.kept.work.p99_9.0 <= tick_us,

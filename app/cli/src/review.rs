@@ -83,7 +83,7 @@ pub(super) fn run(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
         format!(
             "{}: {} by {}: {}\nseen (SHA-256):\n{}",
             args.session.display(),
-            decision.word(),
+            decision.name(),
             edit.by,
             edit.reason,
             files.join("\n")

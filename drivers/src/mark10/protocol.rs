@@ -5,23 +5,25 @@
 
 pub use crate::text::Decimal;
 
-/// A unit of force. Gauges have units of torque and units that the user defines too; those are none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ForceUnit {
-    /// `mN`.
-    Millinewton,
-    /// `N`.
-    Newton,
-    /// `kN`.
-    Kilonewton,
-    /// `gF`.
-    Gram,
-    /// `kgF`.
-    Kilogram,
-    /// `ozF`.
-    Ounce,
-    /// `lbF`.
-    Pound,
+palpate_model::named! {
+    /// A unit of force. Gauges have units of torque and units that the user defines too; those are none.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum ForceUnit {
+        /// `mN`.
+        Millinewton = "mN",
+        /// `N`.
+        Newton = "N",
+        /// `kN`.
+        Kilonewton = "kN",
+        /// `gF`.
+        Gram = "gF",
+        /// `kgF`.
+        Kilogram = "kgF",
+        /// `ozF`.
+        Ounce = "ozF",
+        /// `lbF`.
+        Pound = "lbF",
+    }
 }
 
 /// Newtons of a kilogram-force, exactly (3rd CGPM, 1901).
@@ -33,16 +35,11 @@ impl ForceUnit {
     /// Reads it as readings and settings write it: `lbF`, `LBF`, `LB`.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
-        Some(match text.to_ascii_uppercase().as_str() {
-            "MN" => Self::Millinewton,
-            "N" => Self::Newton,
-            "KN" => Self::Kilonewton,
-            "G" | "GF" => Self::Gram,
-            "KG" | "KGF" => Self::Kilogram,
-            "OZ" | "OZF" => Self::Ounce,
-            "LB" | "LBF" => Self::Pound,
-            _ => return None,
-        })
+        let is_it = |unit: &Self| {
+            let name = unit.name();
+            [name, name.trim_end_matches('F')].iter().any(|word| word.eq_ignore_ascii_case(text))
+        };
+        Self::ALL.into_iter().find(is_it)
     }
 
     /// Newtons of one.
@@ -56,20 +53,6 @@ impl ForceUnit {
             Self::Kilogram => KILOGRAM_FORCE,
             Self::Ounce => POUND / 16.0 * KILOGRAM_FORCE,
             Self::Pound => POUND * KILOGRAM_FORCE,
-        }
-    }
-
-    /// As readings write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Millinewton => "mN",
-            Self::Newton => "N",
-            Self::Kilonewton => "kN",
-            Self::Gram => "gF",
-            Self::Kilogram => "kgF",
-            Self::Ounce => "ozF",
-            Self::Pound => "lbF",
         }
     }
 }

@@ -27,24 +27,15 @@ pub struct NamedWeight {
     pub tolerance_g: Option<f64>,
 }
 
-/// Which way the load went.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Direction {
-    /// Weight after weight is laid on.
-    Loading,
-    /// Weight after weight is taken off.
-    Unloading,
-}
-
-impl Direction {
-    /// In words.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Loading => "loading",
-            Self::Unloading => "unloading",
-        }
+crate::named! {
+    /// Which way the load went.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Direction {
+        /// Weight after weight is laid on.
+        Loading = "loading",
+        /// Weight after weight is taken off.
+        Unloading = "unloading",
     }
 }
 

@@ -259,7 +259,7 @@ fn findings(quality: &Quality, uncertainty: &ForceUncertainty) -> Vec<String> {
             quality.force_max_n, last.mass_g
         ));
     }
-    let missing: Vec<&str> = uncertainty.not_stated().iter().map(|term| term.word()).collect();
+    let missing: Vec<&str> = uncertainty.not_stated().iter().map(|term| term.name()).collect();
     if !missing.is_empty() {
         findings.push(format!(
             "the uncertainty leaves out what the calibration does not state: {}",

@@ -21,46 +21,23 @@ const GAP_SHARE: f64 = 0.25;
 /// small error is proportional to it.
 const HALVINGS: u32 = 20;
 
-/// Where an error comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Term {
-    /// Tolerance of the weights, a rectangular distribution; each weight is one error in all its steps.
-    Weights,
-    /// Scatter of repeats over the root of their number, at each weight by itself.
-    Repeatability,
-    /// Digits with which readings were written down, rectangular, at each weight by itself.
-    Resolution,
-    /// Loading against unloading: a force may have come from either side, rectangular between them.
-    Hysteresis,
-    /// Change of the empty cell's signal while the weights were laid on, rectangular.
-    ZeroDrift,
-    /// The curve between the weights, from those left out.
-    Interpolation,
-}
-
-impl Term {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Weights,
-        Self::Repeatability,
-        Self::Resolution,
-        Self::Hysteresis,
-        Self::ZeroDrift,
-        Self::Interpolation,
-    ];
-
-    /// In words.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Weights => "tolerance of the weights",
-            Self::Repeatability => "repeatability",
-            Self::Resolution => "digits of the readings",
-            Self::Hysteresis => "hysteresis",
-            Self::ZeroDrift => "zero drift",
-            Self::Interpolation => "interpolation",
-        }
+crate::named! {
+    /// Where an error comes from.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Term {
+        /// Tolerance of the weights, a rectangular distribution; each weight is one error in all its steps.
+        Weights = "tolerance of the weights",
+        /// Scatter of repeats over the root of their number, at each weight by itself.
+        Repeatability = "repeatability",
+        /// Digits with which readings were written down, rectangular, at each weight by itself.
+        Resolution = "digits of the readings",
+        /// Loading against unloading: a force may have come from either side, rectangular between them.
+        Hysteresis = "hysteresis",
+        /// Change of the empty cell's signal while the weights were laid on, rectangular.
+        ZeroDrift = "zero drift",
+        /// The curve between the weights, from those left out.
+        Interpolation = "interpolation",
     }
 }
 

@@ -179,7 +179,7 @@ impl Calibration {
                     volts,
                     before_g,
                     before_volts,
-                    way: direction.word(),
+                    way: direction.name(),
                 });
             }
         }

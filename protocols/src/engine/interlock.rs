@@ -7,54 +7,31 @@ use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Limits, Phase, Reading, RigDescription};
 use palpate_model::units::{MmPerS, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
-/// What tripped. The order of the variants is the order of judgement: the first that trips is
-/// the reason given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Interlock {
-    /// The signal is not a number: nothing below can be judged.
-    Signal,
-    /// A limit switch closed, or the position left the travel.
-    Travel,
-    /// Force above tare out of bounds.
-    Force,
-    /// Raw signal too high, whatever the calibration says.
-    Volts,
-    /// Force changes faster than tissue can.
-    ForceRate,
-    /// Samples arrive too late for the speed.
-    SampleAge,
-    /// The motor lost its current.
-    Motor,
-    /// Pulses and commanded path disagree.
-    Path,
-    /// The link or the controller failed.
-    Link,
-}
-
-impl Interlock {
-    /// The word for it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Signal => "signal",
-            Self::Travel => "travel",
-            Self::Force => "force",
-            Self::Volts => "raw signal",
-            Self::ForceRate => "force rate",
-            Self::SampleAge => "sample age",
-            Self::Motor => "motor",
-            Self::Path => "path",
-            Self::Link => "link",
-        }
-    }
-}
-
-impl fmt::Display for Interlock {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+palpate_model::named! {
+    /// What tripped. The order of the variants is the order of judgement: the first that trips is
+    /// the reason given.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Interlock {
+        /// The signal is not a number: nothing below can be judged.
+        Signal = "signal",
+        /// A limit switch closed, or the position left the travel.
+        Travel = "travel",
+        /// Force above tare out of bounds.
+        Force = "force",
+        /// Raw signal too high, whatever the calibration says.
+        Volts = "raw signal",
+        /// Force changes faster than tissue can.
+        ForceRate = "force rate",
+        /// Samples arrive too late for the speed.
+        SampleAge = "sample age",
+        /// The motor lost its current.
+        Motor = "motor",
+        /// Pulses and commanded path disagree.
+        Path = "path",
+        /// The link or the controller failed.
+        Link = "link",
     }
 }
 

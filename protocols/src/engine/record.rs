@@ -235,39 +235,21 @@ pub enum Recovery {
     Skip,
 }
 
-/// The five ways a run ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum EndingKind {
-    /// The plan ran to its end.
-    Finish,
-    /// Stopped by the operator; data kept.
-    Stop,
-    /// Given up: a step failed or the operator aborted.
-    Abort,
-    /// Motion cut at once.
-    Halt,
-    /// An interlock tripped.
-    Interlock,
-}
-
-impl EndingKind {
-    /// The word for it in logs and on screens.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Finish => "finish",
-            Self::Stop => "stop",
-            Self::Abort => "abort",
-            Self::Halt => "halt",
-            Self::Interlock => "interlock",
-        }
-    }
-}
-
-impl fmt::Display for EndingKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+palpate_model::named! {
+    /// The five ways a run ends.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum EndingKind {
+        /// The plan ran to its end.
+        Finish = "finish",
+        /// Stopped by the operator; data kept.
+        Stop = "stop",
+        /// Given up: a step failed or the operator aborted.
+        Abort = "abort",
+        /// Motion cut at once.
+        Halt = "halt",
+        /// An interlock tripped.
+        Interlock = "interlock",
     }
 }
 

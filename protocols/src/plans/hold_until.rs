@@ -4,35 +4,21 @@ use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A parameter of the body that a rule can wait for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyParameter {
-    /// Relaxation time.
-    TauEps,
-    /// First elastic coefficient.
-    Mu1,
-    /// Second elastic coefficient.
-    Mu2,
-    /// Third elastic coefficient.
-    Mu3,
-    /// Coefficient of depth times speed.
-    TauSig,
-}
-
-impl BodyParameter {
-    const ALL: [Self; 5] = [Self::TauEps, Self::Mu1, Self::Mu2, Self::Mu3, Self::TauSig];
-
-    /// Its name in every fit.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::TauEps => "tau_eps",
-            Self::Mu1 => "mu1",
-            Self::Mu2 => "mu2",
-            Self::Mu3 => "mu3",
-            Self::TauSig => "tau_sig",
-        }
+palpate_model::named! {
+    /// A parameter of the body that a rule can wait for.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum BodyParameter {
+        /// Relaxation time.
+        TauEps = "tau_eps",
+        /// First elastic coefficient.
+        Mu1 = "mu1",
+        /// Second elastic coefficient.
+        Mu2 = "mu2",
+        /// Third elastic coefficient.
+        Mu3 = "mu3",
+        /// Coefficient of depth times speed.
+        TauSig = "tau_sig",
     }
 }
 

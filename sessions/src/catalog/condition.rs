@@ -118,7 +118,7 @@ impl FromStr for Condition {
         let (sign, relation) = *sign.ok_or_else(form)?;
         let (name, value) = (name.trim(), rest[sign.len()..].trim());
         let of = |source: Source| {
-            let rest = name.strip_prefix(source.word())?.strip_prefix('.')?;
+            let rest = name.strip_prefix(source.name())?.strip_prefix('.')?;
             Some((source, rest))
         };
         let (source, name) = match Source::ALL.into_iter().find_map(of) {
@@ -207,7 +207,7 @@ impl Condition {
         }
         let mut sql = format!("({})", ways.join(" OR "));
         if let Some(source) = self.source {
-            values.push(source.word().to_owned().into());
+            values.push(source.name().to_owned().into());
             sql += " AND source = ?";
         }
         format!("id IN (SELECT session FROM named WHERE {sql})")
@@ -220,7 +220,7 @@ impl Condition {
         let mut sql = vec!["?"; self.ways.len()].join(", ");
         sql = format!("name IN ({sql})");
         if let Some(source) = self.source {
-            values.push(source.word().to_owned().into());
+            values.push(source.name().to_owned().into());
             sql += " AND source = ?";
         }
         sql

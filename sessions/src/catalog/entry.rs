@@ -113,30 +113,17 @@ pub enum Origin {
     Recovered,
 }
 
-/// Where a named value stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Source {
-    /// In the protocol.
-    Plan,
-    /// Among what was told of specimen, probe and series.
-    About,
-    /// A fitted parameter.
-    Fit,
-}
-
-impl Source {
-    /// All of them.
-    pub(super) const ALL: [Self; 3] = [Self::Plan, Self::About, Self::Fit];
-
-    /// The word for it, which stands before the name in a condition.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::Plan => "plan",
-            Self::About => "about",
-            Self::Fit => "fit",
-        }
+palpate_model::named! {
+    /// Where a named value stands.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Source {
+        /// In the protocol.
+        Plan = "plan",
+        /// Among what was told of specimen, probe and series.
+        About = "about",
+        /// A fitted parameter.
+        Fit = "fit",
     }
 }
 

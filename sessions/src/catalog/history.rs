@@ -150,7 +150,7 @@ impl Event {
                 };
                 ("tags", [signs("+", add), signs("-", remove)].concat().join(" "))
             }
-            Change::Review { decision, .. } => ("review", decision.word().to_owned()),
+            Change::Review { decision, .. } => ("review", decision.name().to_owned()),
             Change::Note => ("note", String::new()),
         };
         Self {

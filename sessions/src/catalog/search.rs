@@ -213,7 +213,7 @@ impl Query {
         }
         if let Some(verdict) = self.verdict {
             let word = match verdict {
-                VerdictIs::Given(verdict) => verdict.word(),
+                VerdictIs::Given(verdict) => verdict.name(),
                 VerdictIs::None => "",
             };
             parts.push("verdict = ?".to_owned());

@@ -191,7 +191,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     // Where it cannot be read nobody can say that there is none.
     let is_unread = entry.trouble.is_some();
     let verdict = match entry.verdict {
-        Some(verdict) => verdict.word(),
+        Some(verdict) => verdict.name(),
         None if is_unread => "?",
         None => "",
     };
@@ -223,7 +223,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         "INSERT INTO named (session, source, name, unit, number, text) VALUES (?, ?, ?, ?, ?, ?)",
     )?;
     for one in &entry.named {
-        let source = one.source.word();
+        let source = one.source.name();
         named.execute(params![id, source, one.name, one.unit, one.number, one.text])?;
     }
     let mut tags = db.prepare_cached("INSERT INTO tag (session, tag) VALUES (?, ?)")?;

@@ -228,7 +228,7 @@ impl<'v> Content<'v> {
                 self.has_raw &= channel == Channel::Derived;
             }
         } else if sequence != expected && !is_again {
-            return Err(format!("message {expected} of {} is missing", channel.topic()));
+            return Err(format!("message {expected} of {} is missing", channel.name()));
         }
         if !is_again {
             *next = Some(sequence.wrapping_add(1));

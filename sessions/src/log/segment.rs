@@ -95,7 +95,7 @@ impl<S: Sink> Segment<S> {
                 .and_then(|schema_id| {
                     self.container.add_channel(
                         schema_id,
-                        channel.topic(),
+                        channel.name(),
                         channel.message_encoding(),
                         &channel.metadata(),
                     )
@@ -114,7 +114,7 @@ impl<S: Sink> Segment<S> {
         data: &[u8],
     ) -> Result<(), LogError> {
         let header = MessageHeader { channel_id: self.channel_ids[channel as usize], ..header };
-        self.container.write_to_known_channel(&header, data).map_err(encode_error(channel.topic()))
+        self.container.write_to_known_channel(&header, data).map_err(encode_error(channel.name()))
     }
 
     /// Ends the chunk and hands everything so far to the sink.

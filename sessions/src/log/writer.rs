@@ -387,7 +387,7 @@ impl<S: Sink> LogWriter<S> {
     fn put(&mut self, channel: Channel, at: Nanos, data: &[u8]) -> Result<(), LogError> {
         if data.len() > MESSAGE_BYTES_MAX {
             return Err(LogError::Encode {
-                what: channel.topic(),
+                what: channel.name(),
                 reason: format!("it has {} bytes, {MESSAGE_BYTES_MAX} are the most", data.len()),
             });
         }

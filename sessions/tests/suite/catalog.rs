@@ -336,7 +336,7 @@ fn pages_and_orders_make_up_the_whole() {
         Order::Operator => entry.operator.clone(),
         Order::Protocol => entry.protocol.clone(),
         Order::Duration => format!("{:020.9}", entry.duration_s),
-        Order::Verdict => entry.verdict.map_or("", Verdict::word).to_owned(),
+        Order::Verdict => entry.verdict.map_or("", Verdict::name).to_owned(),
         // What cannot be read has no review that anybody knows of.
         Order::Review if entry.trouble.is_some() => "?".to_owned(),
         Order::Review => ReviewIs::of(entry.review.as_ref()).word().to_owned(),

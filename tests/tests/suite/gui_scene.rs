@@ -52,7 +52,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
         felt(window).is_some_and(|(depth, force)| depth > 2.0 && force > 0.05)
     });
     assert!(flow.says("the path leads the hand"));
-    assert!(!flow.says(WhyNoForce::NoContact.words()));
+    assert!(!flow.says(WhyNoForce::NoContact.name()));
     flow.window.check_accessibility();
     // Nothing else that keeps time is started beside it.
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num9);
@@ -65,7 +65,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     });
     flow.wait("the stylus above", |window| felt(window).is_some_and(|(depth, _)| depth == 0.0));
     flow.window.run_steps(2);
-    assert!(flow.says(WhyNoForce::NoContact.words()));
+    assert!(flow.says(WhyNoForce::NoContact.name()));
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(3);
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
@@ -88,7 +88,7 @@ fn keys_press_into_the_tissue_and_lift_again() {
     flow.wait("a force", |window| {
         felt(window).is_some_and(|(depth, force)| depth > 1.0 && force > 0.02)
     });
-    assert!(!flow.says(WhyNoForce::NoContact.words()));
+    assert!(!flow.says(WhyNoForce::NoContact.name()));
     for _ in 0..12 {
         flow.window.key_press(Key::PageUp);
         flow.window.step();
@@ -97,7 +97,7 @@ fn keys_press_into_the_tissue_and_lift_again() {
         felt(window).is_some_and(|(depth, force)| depth == 0.0 && force == 0.0)
     });
     flow.window.run_steps(2);
-    assert!(flow.says(WhyNoForce::NoContact.words()));
+    assert!(flow.says(WhyNoForce::NoContact.name()));
     flow.click("Stop the scene");
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
 }

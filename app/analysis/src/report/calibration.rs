@@ -300,7 +300,7 @@ fn budget(told: &Told) -> String {
         .filter(|term| !told.uncertainty.not_stated().contains(term))
         .collect();
     let mut heads = vec!["force (N)".to_owned(), "u (N)".to_owned()];
-    heads.extend(stated.iter().map(|term| term.word().to_owned()));
+    heads.extend(stated.iter().map(|term| term.name().to_owned()));
     let mut lines = vec![heads];
     lines.extend(told.budget.iter().map(|one| {
         let number = |value: Option<f64>| format!("{:.4}", value.unwrap_or_default());

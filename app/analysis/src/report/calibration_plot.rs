@@ -106,7 +106,7 @@ fn uncertainties(told: &Told, axis: Axis) -> Vec<Series> {
     let mut series: Vec<Series> = stated
         .map(|(term, ink)| {
             let line = axis.along(|force| in_mn(own.term_sigma(term, Newtons(force))));
-            Series::line(term.word(), ink, 1.2, line)
+            Series::line(term.name(), ink, 1.2, line)
         })
         .collect();
     let all = axis.along(|force| in_mn(own.sigma(Newtons(force))));

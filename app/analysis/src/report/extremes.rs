@@ -4,16 +4,12 @@ use super::text::capital;
 use palpate_rheology::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
-/// All verdicts, in the order of [`GroupSummary::counts`].
-pub const VERDICTS: [Verdict; 4] =
-    [Verdict::Right, Verdict::Refused, Verdict::Flagged, Verdict::Wrong];
-
 /// One group of cases in numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSummary {
     /// The group.
     pub group: &'static str,
-    /// Rows of each of [`VERDICTS`].
+    /// Rows of each of [`Verdict::ALL`].
     pub counts: [usize; 4],
     /// The right row that used most of its tolerance, in words.
     pub tightest: Option<String>,
@@ -26,7 +22,7 @@ pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
         .into_iter()
         .map(|(group, rows)| GroupSummary {
             group,
-            counts: VERDICTS
+            counts: Verdict::ALL
                 .map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count()),
             tightest: tightest(&rows).map(|(row, error)| {
                 format!("{error:.1e} of {:.0e}: {}, {}", row.tolerance, row.subject, row.case)
@@ -136,7 +132,7 @@ fn cell(rows: &[&Row]) -> String {
         Some(row) if row.verdict == Verdict::Right => {
             format!("{:.0e}", row.relative_error.unwrap_or_default())
         }
-        Some(row) => row.verdict.word().to_owned(),
+        Some(row) => row.verdict.name().to_owned(),
     }
 }
 
@@ -209,7 +205,7 @@ fn by_case(rows: &[&Row]) -> String {
 
 /// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&Row]) -> String {
-    let mut named: Vec<(Verdict, Vec<&str>)> = VERDICTS
+    let mut named: Vec<(Verdict, Vec<&str>)> = Verdict::ALL
         .into_iter()
         .map(|verdict| {
             let own = rows.iter().filter(|row| row.verdict == verdict);
@@ -220,9 +216,9 @@ fn verdicts(rows: &[&Row]) -> String {
     let others: Vec<String> = named[1..]
         .iter()
         .filter(|(_, subjects)| !subjects.is_empty())
-        .map(|(verdict, subjects)| format!("{}: {}", verdict.word(), subjects.join(" + ")))
+        .map(|(verdict, subjects)| format!("{}: {}", verdict.name(), subjects.join(" + ")))
         .collect();
-    let most = named[0].0.word();
+    let most = named[0].0.name();
     if others.is_empty() {
         format!("all {most}")
     } else {

@@ -21,7 +21,7 @@ pub fn change(change: &Change) -> String {
             let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
             format!("tags {}", signs.collect::<Vec<_>>().join(" "))
         }
-        Change::Review { decision, .. } => format!("review, {}", decision.word()),
+        Change::Review { decision, .. } => format!("review, {}", decision.name()),
         Change::Contact { number, position_mm, was_mm } => {
             format!("contact {number} at {:.3} mm instead of {:.3} mm", position_mm.0, was_mm.0)
         }
@@ -35,7 +35,7 @@ pub fn review(review: &Review) -> String {
         [] => "everything is as it was seen".to_owned(),
         changed => format!("but {} changed since; it is to be reviewed again", changed.join(", ")),
     };
-    let decision = review.decision.word();
+    let decision = review.decision.name();
     format!("{decision} by {}, {stands}", review.by)
 }
 

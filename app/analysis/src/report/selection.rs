@@ -128,7 +128,7 @@ pub fn tested(selection: &Selection) -> String {
                 .filter(|kind| has(*kind))
                 .map(|kind| {
                     let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
-                    format!("{} in {count}", kind.words())
+                    format!("{} in {count}", kind.name())
                 })
                 .collect();
             format!(

@@ -22,7 +22,7 @@ pub(super) fn run(
     let drawing = drawing.map_err(Failure::failed)?;
     let bytes = ending.bytes(&drawing).map_err(Failure::failed)?;
     new_file::write_bytes("figure", to, &bytes)?;
-    let object = serde_json::json!({ "figure": to, "of": dossier::Figure::from(args.of).word(),
+    let object = serde_json::json!({ "figure": to, "of": dossier::Figure::from(args.of).name(),
         "session": session,
     });
     output.answer("report", &object, || format!("{}: drawn", to.display()));

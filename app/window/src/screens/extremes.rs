@@ -12,7 +12,7 @@ use crate::workbench::Workbench;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
-use palpate_analysis::report::extremes::{GroupSummary, VERDICTS, summary};
+use palpate_analysis::report::extremes::{GroupSummary, summary};
 use palpate_rheology::extremes::{Extent, Row, Verdict};
 
 /// The screen's line in the table.
@@ -75,7 +75,7 @@ impl Screen for ExtremesScreen {
             let groups = found.groups.iter().map(|one| (Some(one.group), one.group));
             let groups: Vec<_> = std::iter::once((None, "all groups")).chain(groups).collect();
             choice_ui(ui, "group", &mut self.group, &groups);
-            let verdicts = VERDICTS.iter().map(|one| (Some(*one), one.word()));
+            let verdicts = Verdict::ALL.iter().map(|one| (Some(*one), one.name()));
             let verdicts: Vec<_> =
                 std::iter::once((None, "all verdicts")).chain(verdicts).collect();
             choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
@@ -134,9 +134,9 @@ impl Screen for ExtremesScreen {
             let counts: Vec<String> = facts
                 .counts
                 .iter()
-                .zip(VERDICTS)
+                .zip(Verdict::ALL)
                 .filter(|(count, _)| **count > 0)
-                .map(|(count, verdict)| format!("{count} {}", verdict.word()))
+                .map(|(count, verdict)| format!("{count} {}", verdict.name()))
                 .collect();
             ui.label(counts.join(", "));
             if let Some(tightest) = &facts.tightest {
@@ -173,7 +173,7 @@ fn table_row(row: &Row) -> TableRow {
         cells: vec![
             row.subject.clone(),
             row.case.clone(),
-            row.verdict.word().to_owned(),
+            row.verdict.name().to_owned(),
             row.relative_error.map_or_else(|| "-".to_owned(), |error| format!("{error:.1e}")),
             format!("{:.0e}", row.tolerance),
             row.group.to_owned(),

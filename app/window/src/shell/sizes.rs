@@ -3,31 +3,20 @@
 use crate::theme::Tokens;
 use eframe::egui::{CursorIcon, Id, Panel, Rect, Response, Sense, Stroke, Ui};
 
-/// A panel whose size can be changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Edge {
-    /// What is asked for.
-    Left,
-    /// What is known.
-    Right,
-    /// The event log.
-    Log,
+palpate_model::named! {
+    /// A panel whose size can be changed.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Edge {
+        /// What is asked for.
+        Left = "left panel",
+        /// What is known.
+        Right = "right panel",
+        /// The event log.
+        Log = "event log",
+    }
 }
 
 impl Edge {
-    /// All.
-    pub const ALL: [Self; 3] = [Self::Left, Self::Right, Self::Log];
-
-    /// How it is called.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Left => "left panel",
-            Self::Right => "right panel",
-            Self::Log => "event log",
-        }
-    }
-
     /// Smallest, usual and largest size in points: the rows of the forms are made for the usual one, what is smaller
     /// cuts them, and the plots of the smallest window are to stay wider than a panel.
     const fn sizes(self) -> [f32; 3] {

@@ -5,17 +5,19 @@ use eframe::egui::{
     Align2, Color32, FontId, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
-/// Where a step stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StepState {
-    /// Finished.
-    Done,
-    /// In progress.
-    Now,
-    /// To come.
-    Next,
-    /// Was in progress when the run ended early, or never came.
-    Skipped,
+palpate_model::named! {
+    /// Where a step stands.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum StepState {
+        /// Finished.
+        Done = "done",
+        /// In progress.
+        Now = "now",
+        /// To come.
+        Next = "next",
+        /// Was in progress when the run ended early, or never came.
+        Skipped = "not done",
+    }
 }
 
 impl StepState {
@@ -30,15 +32,6 @@ impl StepState {
             _ => Self::Skipped,
         }
     }
-
-    const fn word(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Now => "now",
-            Self::Next => "next",
-            Self::Skipped => "not done",
-        }
-    }
 }
 
 /// Draws one step with its expected duration.
@@ -47,7 +40,7 @@ pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
     let size = vec2(ui.available_width(), 19.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| {
-        WidgetInfo::labeled(Role::Label, true, format!("Step {name}: {}", state.word()))
+        WidgetInfo::labeled(Role::Label, true, format!("Step {name}: {}", state.name()))
     });
     let painter = ui.painter();
     let ink = if state == StepState::Now { tokens.text } else { tokens.text_quiet };
@@ -55,7 +48,7 @@ pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
     mark(ui, state, rect.left() + 8.0, y, ink);
     let font = FontId::proportional(13.5);
     painter.text(pos2(rect.left() + 24.0, y), Align2::LEFT_CENTER, name, font.clone(), ink);
-    painter.text(pos2(rect.left() + 110.0, y), Align2::LEFT_CENTER, state.word(), font, ink);
+    painter.text(pos2(rect.left() + 110.0, y), Align2::LEFT_CENTER, state.name(), font, ink);
     painter.text(
         pos2(rect.right() - 2.0, y),
         Align2::RIGHT_CENTER,

@@ -1,21 +1,22 @@
 //! Which controllers are emulated and how they differ.
 
-use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// A controller of Galil's DMC series.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum GalilModel {
-    /// Four axes, 41x3 series.
-    #[default]
-    Dmc4143,
-    /// Eight axes, 41x3 series.
-    Dmc4183,
-    /// Four axes, 40x0 series.
-    Dmc4040,
-    /// Four axes, 21x3 series.
-    Dmc2143,
+palpate_model::named! {
+    /// A controller of Galil's DMC series.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum GalilModel {
+        /// Four axes, 41x3 series.
+        #[default]
+        Dmc4143 = "dmc4143",
+        /// Eight axes, 41x3 series.
+        Dmc4183 = "dmc4183",
+        /// Four axes, 40x0 series.
+        Dmc4040 = "dmc4040",
+        /// Four axes, 21x3 series.
+        Dmc2143 = "dmc2143",
+    }
 }
 
 /// A model's name is none of those emulated.
@@ -105,24 +106,11 @@ impl GalilModel {
     }
 }
 
-impl fmt::Display for GalilModel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Dmc4143 => "dmc4143",
-            Self::Dmc4183 => "dmc4183",
-            Self::Dmc4040 => "dmc4040",
-            Self::Dmc2143 => "dmc2143",
-        })
-    }
-}
-
 impl FromStr for GalilModel {
     type Err = GalilModelError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        [Self::Dmc4143, Self::Dmc4183, Self::Dmc4040, Self::Dmc2143]
-            .into_iter()
-            .find(|model| text.eq_ignore_ascii_case(&model.to_string()))
-            .ok_or_else(|| GalilModelError(text.to_owned()))
+        let found = Self::ALL.into_iter().find(|model| text.eq_ignore_ascii_case(model.name()));
+        found.ok_or_else(|| GalilModelError(text.to_owned()))
     }
 }

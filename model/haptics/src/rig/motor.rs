@@ -4,26 +4,16 @@ use super::thermal::Thermal;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Where a motor's numbers come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MotorOrigin {
-    /// A catalogue or the user's own.
-    Given,
-    /// The source's 12 V winding, scaled to twice the voltage: twice the turns of half the section.
-    ScaledFrom12V,
-}
-
-impl MotorOrigin {
-    /// In words.
-    #[must_use]
-    pub fn says(self) -> &'static str {
-        match self {
-            Self::Given => "as given",
-            Self::ScaledFrom12V => {
-                "Faulhaber 3863H024C, scaled from the catalogue of the 12 V winding, to 5 %; its inertia is assumed"
-            }
-        }
+palpate_model::named! {
+    /// Where a motor's numbers come from.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum MotorOrigin {
+        /// A catalogue or the user's own.
+        Given = "as given",
+        /// The source's 12 V winding, scaled to twice the voltage: twice the turns of half the section.
+        ScaledFrom12V =
+            "Faulhaber 3863H024C, scaled from the catalogue of the 12 V winding, to 5 %; its inertia is assumed",
     }
 }
 
@@ -180,7 +170,7 @@ mod tests {
         let amps = motor.continuous / motor.torque_constant;
         let hot = motor.thermal.settled(amps * amps * motor.resistance).winding_c;
         assert!((60.0..125.0).contains(&hot), "{hot}");
-        assert!(motor.origin.says().contains("scaled"));
+        assert!(motor.origin.name().contains("scaled"));
     }
 
     #[test]

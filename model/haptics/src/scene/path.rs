@@ -5,37 +5,25 @@ use super::settings::SceneSettings;
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
-/// What a hand does, from the scene's start and back to it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScenePath {
-    /// Down to 8 mm and up again, once.
-    Poke,
-    /// To 5 mm and held there.
-    Press,
-    /// To 4 mm, a third of the side along x, and up.
-    Drag,
-    /// Down to 3 mm and up again, four times in two seconds, at four places.
-    Taps,
+palpate_model::named! {
+    /// What a hand does, from the scene's start and back to it.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum ScenePath {
+        /// Down to 8 mm and up again, once.
+        Poke = "poke",
+        /// To 5 mm and held there.
+        Press = "press",
+        /// To 4 mm, a third of the side along x, and up.
+        Drag = "drag",
+        /// Down to 3 mm and up again, four times in two seconds, at four places.
+        Taps = "taps",
+    }
 }
 
 /// From the start to the surface and from the surface to the start, in s.
 const WAY_S: f64 = 0.5;
 
 impl ScenePath {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Poke, Self::Press, Self::Drag, Self::Taps];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Poke => "poke",
-            Self::Press => "press",
-            Self::Drag => "drag",
-            Self::Taps => "taps",
-        }
-    }
-
     /// How long it takes in s.
     #[must_use]
     pub fn seconds(self) -> f64 {

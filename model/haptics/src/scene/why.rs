@@ -5,57 +5,36 @@ use crate::Flags;
 use crate::surface::TouchState;
 use serde::Serialize;
 
-/// What takes force away in a tick; the first that applies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum WhyNoForce {
-    /// Nothing does.
-    None,
-    /// The stylus is above the surface.
-    #[default]
-    NoContact,
-    /// The stylus is beside the mesh.
-    Outside,
-    /// The place is no number.
-    NotANumber,
-    /// The model has no force.
-    NoModel,
-    /// The tissue follows more slowly than the stylus leaves.
-    Leaving,
-    /// The force rises after start, stall or contact.
-    RampingIn,
-    /// The device gives all it has.
-    Saturated,
-    /// A guard changes the force: it changes too fast, or the loop made energy.
-    Guarded,
-    /// The force is less than the device's friction.
-    BelowThreshold,
+palpate_model::named! {
+    /// What takes force away in a tick; the first that applies.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum WhyNoForce {
+        /// Nothing does.
+        None = "the force is the model's",
+        /// The stylus is above the surface.
+        #[default]
+        NoContact = "the stylus is above the surface",
+        /// The stylus is beside the mesh.
+        Outside = "the stylus is beside the tissue",
+        /// The place is no number.
+        NotANumber = "the device reports no place",
+        /// The model has no force.
+        NoModel = "the model has no force for this move",
+        /// The tissue follows more slowly than the stylus leaves.
+        Leaving = "the stylus leaves faster than the tissue follows; tissue does not pull",
+        /// The force rises after start, stall or contact.
+        RampingIn = "the force rises slowly after start, stall or contact",
+        /// The device gives all it has.
+        Saturated = "the device gives its largest force; the model asks for more",
+        /// A guard changes the force: it changes too fast, or the loop made energy.
+        Guarded = "a guard holds the force: it would change too fast, or the loop made energy",
+        /// The force is less than the device's friction.
+        BelowThreshold = "the force is less than the device's own friction, so it cannot be felt",
+    }
 }
 
 impl WhyNoForce {
-    /// In words.
-    #[must_use]
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::None => "the force is the model's",
-            Self::NoContact => "the stylus is above the surface",
-            Self::Outside => "the stylus is beside the tissue",
-            Self::NotANumber => "the device reports no place",
-            Self::NoModel => "the model has no force for this move",
-            Self::Leaving => {
-                "the stylus leaves faster than the tissue follows; tissue does not pull"
-            }
-            Self::RampingIn => "the force rises slowly after start, stall or contact",
-            Self::Saturated => "the device gives its largest force; the model asks for more",
-            Self::Guarded => {
-                "a guard holds the force: it would change too fast, or the loop made energy"
-            }
-            Self::BelowThreshold => {
-                "the force is less than the device's own friction, so it cannot be felt"
-            }
-        }
-    }
-
     pub(super) fn of(
         state: TouchState,
         flags: Flags,

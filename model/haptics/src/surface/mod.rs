@@ -40,31 +40,20 @@ use envelope::Envelope;
 use sorted::Sorted;
 use thiserror::Error;
 
-/// How the shape is found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// The closed form: the fast one.
-    Envelope,
-    /// First moved first processed.
-    Chain,
-    /// Largest violation first.
-    Sorted,
+palpate_model::named! {
+    /// How the shape is found.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Method {
+        /// The closed form: the fast one.
+        Envelope = "closed form",
+        /// First moved first processed.
+        Chain = "first moved first",
+        /// Largest violation first.
+        Sorted = "largest violation first",
+    }
 }
 
 impl Method {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Envelope, Self::Chain, Self::Sorted];
-
-    /// Its name in words.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Envelope => "closed form",
-            Self::Chain => "first moved first",
-            Self::Sorted => "largest violation first",
-        }
-    }
-
     /// The fastest that is right for a field.
     #[must_use]
     pub fn fastest(field: &HeightField) -> Self {

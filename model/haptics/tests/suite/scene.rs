@@ -226,7 +226,7 @@ fn why_there_is_no_force_is_told() {
         for _ in 0..ticks {
             last = scene.feel(pose(x, 30.0, z), 1);
         }
-        assert!(!last.why.words().is_empty());
+        assert!(!last.why.name().is_empty());
         (last.why, last.force[2])
     };
     assert_eq!(why(30.0, 1.0, 1), (WhyNoForce::NoContact, 0.0));

@@ -13,30 +13,19 @@ const FORCE_MIN: f64 = 1e-180;
 /// Forces in N beyond this may be refused, numbers though they are: a sum of terms may not be one.
 const FORCE_MAX: f64 = 1e299;
 
-/// What became of one case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Verdict {
-    /// The right number.
-    Right,
-    /// No number, and the reason in words.
-    Refused,
-    /// Numbers of a fit, with a warning in words not to rely on them.
-    Flagged,
-    /// Anything else.
-    Wrong,
-}
-
-impl Verdict {
-    /// The word.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Right => "right",
-            Self::Refused => "refused",
-            Self::Flagged => "flagged",
-            Self::Wrong => "WRONG",
-        }
+palpate_model::named! {
+    /// What became of one case.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Verdict {
+        /// The right number.
+        Right = "right",
+        /// No number, and the reason in words.
+        Refused = "refused",
+        /// Numbers of a fit, with a warning in words not to rely on them.
+        Flagged = "flagged",
+        /// Anything else.
+        Wrong = "WRONG",
     }
 }
 

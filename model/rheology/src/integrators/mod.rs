@@ -68,48 +68,38 @@ pub struct Start<R> {
     pub force: Option<R>,
 }
 
-/// Width of the numbers an integrator computes with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Precision {
-    /// 53 binary digits.
-    F64,
-    /// 24 binary digits.
-    F32,
-}
-
-impl Precision {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::F64, Self::F32];
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::F64 => "f64",
-            Self::F32 => "f32",
-        }
+palpate_model::named! {
+    /// Width of the numbers an integrator computes with.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Precision {
+        /// 53 binary digits.
+        F64 = "f64",
+        /// 24 binary digits.
+        F32 = "f32",
     }
 }
 
-/// The integrators by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scheme {
-    /// [`ExplicitEuler`].
-    ExplicitEuler,
-    /// [`ImplicitEuler`].
-    ImplicitEuler,
-    /// [`Trapezoid`].
-    Trapezoid,
-    /// [`ExponentialLeft`].
-    ExponentialLeft,
-    /// [`ExponentialFirstOrder`].
-    ExponentialFirstOrder,
-    /// [`Exact`].
-    Exact,
-    /// [`RungeKutta`].
-    RungeKutta,
+palpate_model::named! {
+    /// The integrators by name.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Scheme {
+        /// [`ExplicitEuler`].
+        ExplicitEuler = "explicit Euler",
+        /// [`ImplicitEuler`].
+        ImplicitEuler = "implicit Euler",
+        /// [`Trapezoid`].
+        Trapezoid = "trapezoid",
+        /// [`ExponentialLeft`].
+        ExponentialLeft = "exponential, forcing held",
+        /// [`ExponentialFirstOrder`].
+        ExponentialFirstOrder = "exponential, forcing straight",
+        /// [`Exact`].
+        Exact = "exact, depth straight",
+        /// [`RungeKutta`].
+        RungeKutta = "Runge-Kutta 4",
+    }
 }
 
 /// A body cannot be integrated so.
@@ -145,31 +135,6 @@ pub enum IntegratorError {
 const RUNGE_KUTTA_LIMIT: f64 = 2.785_293_563_405_282;
 
 impl Scheme {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::ExplicitEuler,
-        Self::ImplicitEuler,
-        Self::Trapezoid,
-        Self::ExponentialLeft,
-        Self::ExponentialFirstOrder,
-        Self::Exact,
-        Self::RungeKutta,
-    ];
-
-    /// Name in words.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ExplicitEuler => "explicit Euler",
-            Self::ImplicitEuler => "implicit Euler",
-            Self::Trapezoid => "trapezoid",
-            Self::ExponentialLeft => "exponential, forcing held",
-            Self::ExponentialFirstOrder => "exponential, forcing straight",
-            Self::Exact => "exact, depth straight",
-            Self::RungeKutta => "Runge-Kutta 4",
-        }
-    }
-
     /// Power of the step with which its error falls; `None` for the exact step.
     #[must_use]
     pub fn order(self) -> Option<u32> {

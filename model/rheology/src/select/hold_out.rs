@@ -16,20 +16,22 @@ const REST_MIN: usize = 10;
 /// Share of what follows the ramp that a single record's fit sees.
 const SEEN: f64 = 1.0 / 3.0;
 
-/// What is held out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum HoldOut {
-    /// Each record in turn; of a single record its last part.
-    #[default]
-    Auto,
-    /// All records of one speed in turn.
-    Speed,
-    /// All records of one depth in turn.
-    Depth,
-    /// Each record in turn, taken for a specimen of its own.
-    Specimen,
-    /// Nothing.
-    None,
+palpate_model::named! {
+    /// What is held out.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum HoldOut {
+        /// Each record in turn; of a single record its last part.
+        #[default]
+        Auto = "auto",
+        /// All records of one speed in turn.
+        Speed = "speed",
+        /// All records of one depth in turn.
+        Depth = "depth",
+        /// Each record in turn, taken for a specimen of its own.
+        Specimen = "specimen",
+        /// Nothing.
+        None = "none",
+    }
 }
 
 /// What cannot be held out, and why.
@@ -62,44 +64,26 @@ impl FromStr for HoldOut {
     type Err = HoldOutError;
 
     fn from_str(text: &str) -> Result<Self, HoldOutError> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            "speed" => Ok(Self::Speed),
-            "depth" => Ok(Self::Depth),
-            "specimen" => Ok(Self::Specimen),
-            "none" => Ok(Self::None),
-            _ => Err(HoldOutError::Unknown(text.to_owned())),
-        }
+        let found = Self::ALL.into_iter().find(|one| one.name() == text);
+        found.ok_or_else(|| HoldOutError::Unknown(text.to_owned()))
     }
 }
 
-/// What is new to the body in a record held out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Unseen {
-    /// Its speed.
-    Speed,
-    /// Its depth.
-    Depth,
-    /// Both.
-    SpeedAndDepth,
-    /// Neither speed nor depth: another specimen, or a repetition.
-    Specimen,
-    /// The last part of a record whose first part was seen: nothing but time.
-    Rest,
-}
-
-impl Unseen {
-    /// In words.
-    #[must_use]
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Speed => "an unseen speed",
-            Self::Depth => "an unseen depth",
-            Self::SpeedAndDepth => "an unseen speed and depth",
-            Self::Specimen => "another specimen or a repetition",
-            Self::Rest => "the rest of the record",
-        }
+palpate_model::named! {
+    /// What is new to the body in a record held out.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Unseen {
+        /// Its speed.
+        Speed = "an unseen speed",
+        /// Its depth.
+        Depth = "an unseen depth",
+        /// Both.
+        SpeedAndDepth = "an unseen speed and depth",
+        /// Neither speed nor depth: another specimen, or a repetition.
+        Specimen = "another specimen or a repetition",
+        /// The last part of a record whose first part was seen: nothing but time.
+        Rest = "the rest of the record",
     }
 }
 

@@ -1,12 +1,14 @@
 //! Which column of a table is which, and in which unit, from its name alone; and every unit that is known.
 
-/// What a fit needs from a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Quantity {
-    Time,
-    Depth,
-    Force,
-    Signal,
+palpate_model::named! {
+    /// What a fit needs from a table.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(super) enum Quantity {
+        Time = "time",
+        Depth = "depth",
+        Force = "force",
+        Signal = "signal",
+    }
 }
 
 /// A unit as a quotient, each part of which is a float without error where the unit has a decimal or whole
@@ -65,17 +67,6 @@ const SIGNALS: &[Unit] =
 impl Quantity {
     /// What a fit takes.
     pub const FITTED: [Self; 3] = [Self::Time, Self::Depth, Self::Force];
-    /// Everything that can be told from a file.
-    pub const ALL: [Self; 4] = [Self::Time, Self::Depth, Self::Force, Self::Signal];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Depth => "depth",
-            Self::Force => "force",
-            Self::Signal => "signal",
-        }
-    }
 
     /// A header that would be understood.
     pub fn example(self) -> &'static str {

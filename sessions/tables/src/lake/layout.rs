@@ -14,23 +14,14 @@ pub const LAKE_VERSION: u32 = 1;
 /// What readers of partitioned folders take for a missing value (Apache Hive).
 const NO_VALUE: &str = "__HIVE_DEFAULT_PARTITION__";
 
-/// The kinds of file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
-    Samples,
-    Sessions,
-    Events,
-    Checksums,
-}
-
-impl Part {
-    const fn folder(self) -> &'static str {
-        match self {
-            Self::Samples => "samples",
-            Self::Sessions => "sessions",
-            Self::Events => "events",
-            Self::Checksums => "checksums",
-        }
+palpate_model::named! {
+    /// The kinds of file.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub(super) enum Part {
+        Samples = "samples",
+        Sessions = "sessions",
+        Events = "events",
+        Checksums = "checksums",
     }
 }
 
@@ -39,7 +30,7 @@ pub(super) fn root(lake: &Path) -> PathBuf {
 }
 
 pub(super) fn part(lake: &Path, part: Part) -> PathBuf {
-    root(lake).join(part.folder())
+    root(lake).join(part.name())
 }
 
 /// Folder of a session's files below that of a part.

@@ -153,34 +153,19 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
     })
 }
 
-/// The figures of a session, each by itself.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Figure {
-    /// Force over time.
-    #[default]
-    ForceTime,
-    /// Force over depth.
-    ForceDepth,
-    /// The fit and what it leaves over.
-    Residual,
-    /// The calibration with its uncertainty.
-    Calibration,
-}
-
-impl Figure {
-    /// Every one.
-    pub const ALL: [Self; 4] =
-        [Self::ForceTime, Self::ForceDepth, Self::Residual, Self::Calibration];
-
-    /// Its name, as typed.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::ForceTime => "force-time",
-            Self::ForceDepth => "force-depth",
-            Self::Residual => "residual",
-            Self::Calibration => "calibration",
-        }
+palpate_model::named! {
+    /// The figures of a session, each by itself.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Figure {
+        /// Force over time.
+        #[default]
+        ForceTime = "force-time",
+        /// Force over depth.
+        ForceDepth = "force-depth",
+        /// The fit and what it leaves over.
+        Residual = "residual",
+        /// The calibration with its uncertainty.
+        Calibration = "calibration",
     }
 }
 

@@ -12,28 +12,19 @@ use palpate_analysis::exports::{Destination, Exported, export_all};
 use palpate_tables::export::Format;
 use std::path::PathBuf;
 
-/// What sessions are written as.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Kind {
-    #[default]
-    Csv,
-    Parquet,
-    Arrow,
-    Lake,
+palpate_model::named! {
+    /// What sessions are written as.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    enum Kind {
+        #[default]
+        Csv = "CSV, a file each",
+        Parquet = "Parquet, a file each",
+        Arrow = "Arrow, a file each",
+        Lake = "one data set (lake)",
+    }
 }
 
 impl Kind {
-    const ALL: [Self; 4] = [Self::Csv, Self::Parquet, Self::Arrow, Self::Lake];
-
-    const fn words(self) -> &'static str {
-        match self {
-            Self::Csv => "CSV, a file each",
-            Self::Parquet => "Parquet, a file each",
-            Self::Arrow => "Arrow, a file each",
-            Self::Lake => "one data set (lake)",
-        }
-    }
-
     fn destination(self, to: PathBuf) -> Destination {
         match self {
             Self::Csv => Destination::Tables(Format::Csv(b','), to),
@@ -76,7 +67,7 @@ impl FilesPanel {
     pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
         let ctx: Context = ui.ctx().clone();
         section_ui(ui, "Export the sessions chosen");
-        let kinds = Kind::ALL.map(|kind| (kind, kind.words()));
+        let kinds = Kind::ALL.map(|kind| (kind, kind.name()));
         choice_ui(ui, "as", &mut self.kind, &kinds);
         text_row(ui, "to folder", "made if there is none", &mut self.to);
         self.dialog.button_ui(ui, "Choose folder...", |dialog| {

@@ -46,37 +46,21 @@ pub struct Looked {
     pub analysis: Option<String>,
 }
 
-/// What of the sessions is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum View {
-    /// Quantities over time, above each other.
-    #[default]
-    OverTime,
-    /// Force over depth.
-    OverDepth,
-    /// The loops of the cycles over each other, and every peak.
-    Cycles,
-    /// The fits' parameters.
-    Parameters,
-    /// What the fit of one session says of another.
-    Prediction,
-}
-
-impl View {
-    /// All, as they stand.
-    pub const ALL: [Self; 5] =
-        [Self::OverTime, Self::OverDepth, Self::Cycles, Self::Parameters, Self::Prediction];
-
-    /// Its name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::OverTime => "Over time",
-            Self::OverDepth => "Over depth",
-            Self::Cycles => "Cycles",
-            Self::Parameters => "Parameters",
-            Self::Prediction => "Prediction",
-        }
+palpate_model::named! {
+    /// What of the sessions is shown.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum View {
+        /// Quantities over time, above each other.
+        #[default]
+        OverTime = "Over time",
+        /// Force over depth.
+        OverDepth = "Over depth",
+        /// The loops of the cycles over each other, and every peak.
+        Cycles = "Cycles",
+        /// The fits' parameters.
+        Parameters = "Parameters",
+        /// What the fit of one session says of another.
+        Prediction = "Prediction",
     }
 }
 

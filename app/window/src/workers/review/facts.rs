@@ -26,30 +26,17 @@ pub struct Event {
     pub is_note: bool,
 }
 
-/// Where sessions laid over each other have their time zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Leader {
-    /// The first sample.
-    #[default]
-    Start,
-    /// Where contact was found first.
-    Contact,
-    /// Where the first ramp begins.
-    Ramp,
-}
-
-impl Leader {
-    /// All, in the order in which they happen.
-    pub const ALL: [Self; 3] = [Self::Start, Self::Contact, Self::Ramp];
-
-    /// Its name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Start => "session start",
-            Self::Contact => "contact",
-            Self::Ramp => "ramp start",
-        }
+palpate_model::named! {
+    /// Where sessions laid over each other have their time zero.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum Leader {
+        /// The first sample.
+        #[default]
+        Start = "session start",
+        /// Where contact was found first.
+        Contact = "contact",
+        /// Where the first ramp begins.
+        Ramp = "ramp start",
     }
 }
 

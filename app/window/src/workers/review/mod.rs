@@ -15,34 +15,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
-/// A quantity of a session over time; its place is that of its column in a track.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Quantity {
-    /// Force above tare.
-    Force,
-    /// Depth below contact.
-    Depth,
-    /// The raw signal of the load cell.
-    Volts,
-    /// Position from home.
-    Position,
+palpate_model::named! {
+    /// A quantity of a session over time; its place is that of its column in a track.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum Quantity {
+        /// Force above tare.
+        Force = "Force",
+        /// Depth below contact.
+        Depth = "Depth",
+        /// The raw signal of the load cell.
+        Volts = "Raw signal",
+        /// Position from home.
+        Position = "Position",
+    }
 }
 
 impl Quantity {
-    /// All, in the order of the columns.
-    pub const ALL: [Self; 4] = [Self::Force, Self::Depth, Self::Volts, Self::Position];
-
-    /// Its name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Force => "Force",
-            Self::Depth => "Depth",
-            Self::Volts => "Raw signal",
-            Self::Position => "Position",
-        }
-    }
-
     /// What stands at its axis.
     #[must_use]
     pub const fn axis(self) -> &'static str {

@@ -116,7 +116,7 @@ fn a_calibration_that_states_nothing_adds_nothing_and_says_so() {
     assert!(terms.not_stated.contains(&Term::Weights), "{terms:?}");
     let sentence = report.findings.last().unwrap();
     for term in [Term::Resolution, Term::Interpolation, Term::Weights] {
-        assert!(sentence.contains(term.word()), "{sentence}");
+        assert!(sentence.contains(term.name()), "{sentence}");
     }
     assert!(!found.is_extrapolated);
     for parameter in &report.parameters {
@@ -165,7 +165,7 @@ fn of_two_calibrations_it_is_told_which_states_what() {
     // Each of them is named, and what the second alone states is told once as stated and once as not.
     let sentence = found.sentence();
     assert!(sentence.contains("\"a\"") && sentence.contains("\"b\""), "{sentence}");
-    assert_eq!(sentence.matches(Term::ZeroDrift.word()).count(), 2, "{sentence}");
+    assert_eq!(sentence.matches(Term::ZeroDrift.name()).count(), 2, "{sentence}");
     assert!(found.calibrations[1].terms.contains(&Term::ZeroDrift));
     assert!(found.calibrations[0].not_stated.contains(&Term::ZeroDrift));
     assert_eq!(told(&straight).calibrations[1].terms, []);

@@ -20,7 +20,7 @@ impl Stated {
 
 /// Terms in words.
 fn words(terms: &[Term]) -> String {
-    let words: Vec<&str> = terms.iter().map(|term| term.word()).collect();
+    let words: Vec<&str> = terms.iter().map(|term| term.name()).collect();
     words.join(", ")
 }
 

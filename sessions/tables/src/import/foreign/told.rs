@@ -35,26 +35,16 @@ pub struct Told {
     pub skip: Vec<Fault>,
 }
 
-/// A row that is not as it should be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// A value is empty or NaN.
-    Missing,
-    /// The time is that of the row before.
-    Repeated,
-    /// The time is before that of a row before.
-    Backward,
-}
-
-impl Fault {
-    pub(super) const ALL: [Self; 3] = [Self::Missing, Self::Repeated, Self::Backward];
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Missing => "missing",
-            Self::Repeated => "repeated",
-            Self::Backward => "backward",
-        }
+palpate_model::named! {
+    /// A row that is not as it should be.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Fault {
+        /// A value is empty or NaN.
+        Missing = "missing",
+        /// The time is that of the row before.
+        Repeated = "repeated",
+        /// The time is before that of a row before.
+        Backward = "backward",
     }
 }
 

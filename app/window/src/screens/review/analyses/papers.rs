@@ -79,7 +79,7 @@ impl Papers {
         answer_ui(ui, &self.pages);
 
         section_ui(ui, "Figure");
-        let figures = Figure::ALL.map(|one| (one, one.word()));
+        let figures = Figure::ALL.map(|one| (one, one.name()));
         choice_ui(ui, "of", &mut self.of, &figures);
         text_row(ui, "figure file", "a new .svg or .png file", &mut self.figure);
         self.choose_ui(ui, Field::Figure, looked);

@@ -33,7 +33,7 @@ impl Said {
         };
         quiet_ui(ui, &words);
         let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
-        let verdicts = verdicts.map(|one| (one, one.word()));
+        let verdicts = verdicts.map(|one| (one, one.name()));
         choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
         let size = vec2(170.0, 26.0);
         if reason_button(ui, "Give verdict", size, verdict) {
