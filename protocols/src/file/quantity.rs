@@ -35,28 +35,28 @@ pub enum Kind {
     Text,
 }
 
-/// Kinds that have units: name with its article, and the unit numbers are kept in.
-const QUANTITIES: [(Kind, &str, &str); 9] = [
-    (Kind::Speed, "a speed", "mm/s"),
-    (Kind::Length, "a length", "mm"),
-    (Kind::Force, "a force", "N"),
-    (Kind::Time, "a time", "s"),
-    (Kind::Mass, "a mass", "g"),
-    (Kind::Frequency, "a frequency", "Hz"),
-    (Kind::ForceRate, "a force over time", "N/s"),
-    (Kind::Voltage, "a voltage", "V"),
-    (Kind::Temperature, "a temperature", "°C"),
+/// Every kind in the order of its variants: name with its article, the unit numbers are kept in where it has one, and
+/// a value as one would write it.
+const KINDS: [(Kind, &str, &str, &str); 12] = [
+    (Kind::Speed, "a speed", "mm/s", "\"0.75 mm/s\""),
+    (Kind::Length, "a length", "mm", "\"20 mm\""),
+    (Kind::Force, "a force", "N", "\"1.5 N\""),
+    (Kind::Time, "a time", "s", "\"50 s\" or \"3 min\""),
+    (Kind::Mass, "a mass", "g", "\"240 g\""),
+    (Kind::Frequency, "a frequency", "Hz", "\"0.5 Hz\""),
+    (Kind::ForceRate, "a force over time", "N/s", "\"0.01 N/min\""),
+    (Kind::Voltage, "a voltage", "V", "\"1.8 V\""),
+    (Kind::Temperature, "a temperature", "°C", "\"37 °C\""),
+    (Kind::Count, "a whole number", "", "10"),
+    (Kind::Flag, "true or false", "", "true"),
+    (Kind::Text, "a text", "", "\"words\""),
 ];
 
 impl Kind {
-    fn entry(self) -> Option<&'static (Kind, &'static str, &'static str)> {
-        QUANTITIES.iter().find(|(kind, ..)| *kind == self)
-    }
-
     /// The unit numbers of this kind are kept in; empty for a count and for words.
     #[must_use]
     pub fn unit(self) -> &'static str {
-        self.entry().map_or("", |(_, _, unit)| unit)
+        KINDS[self as usize].2
     }
 
     /// Every unit of this kind.
@@ -68,38 +68,20 @@ impl Kind {
     /// Its name with an article.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Count => "a whole number",
-            Self::Flag => "true or false",
-            Self::Text => "a text",
-            _ => self.entry().map_or("a value", |(_, name, _)| name),
-        }
+        KINDS[self as usize].1
     }
 
     /// A value of this kind as one would write it.
     #[must_use]
     pub fn example(self) -> &'static str {
-        match self {
-            Self::Speed => "\"0.75 mm/s\"",
-            Self::Length => "\"20 mm\"",
-            Self::Force => "\"1.5 N\"",
-            Self::Time => "\"50 s\" or \"3 min\"",
-            Self::Mass => "\"240 g\"",
-            Self::Frequency => "\"0.5 Hz\"",
-            Self::ForceRate => "\"0.01 N/min\"",
-            Self::Voltage => "\"1.8 V\"",
-            Self::Temperature => "\"37 °C\"",
-            Self::Count => "10",
-            Self::Flag => "true",
-            Self::Text => "\"words\"",
-        }
+        KINDS[self as usize].3
     }
 
     /// The kind that a unit belongs to.
     #[must_use]
     pub fn of_unit(unit: &str) -> Option<Self> {
         let base = base_unit(unit)?;
-        let found = QUANTITIES.iter().find(|(_, _, own)| *own == base);
+        let found = KINDS.iter().find(|(_, _, own, _)| *own == base);
         found.map(|(kind, ..)| *kind)
     }
 }
