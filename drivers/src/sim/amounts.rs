@@ -71,44 +71,19 @@ amount!(
     SimPreconditioning, "preconditioning", 0, (0..=30), "0 to 30 (whole percent)"
 );
 
-/// Samples a second in thousands. A tick of either clock divides by each of them into whole nanoseconds.
-const KILOHERTZ: [u32; 8] = [1, 2, 4, 5, 8, 10, 16, 20];
+amount!(
+    /// Samples a second that the controller takes, one a tick. Each has the same noise. A tick of either clock divides by
+    /// each of the choices into whole nanoseconds.
+    SimRate, "rate", 1000, RATES, "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)"
+);
 
-/// Samples a second that the controller takes, one a tick; usually 1000. Each has the same noise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SimRate {
-    kilohertz: u32,
-}
+const RATES: [u32; 8] = [1000, 2000, 4000, 5000, 8000, 10_000, 16_000, 20_000];
 
 impl SimRate {
     /// Samples where the usual rig takes one.
     #[must_use]
     pub const fn per_usual_tick(self) -> u64 {
-        self.kilohertz as u64
-    }
-}
-
-impl Default for SimRate {
-    fn default() -> Self {
-        Self { kilohertz: 1 }
-    }
-}
-
-impl fmt::Display for SimRate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        (1000 * self.kilohertz).fmt(f)
-    }
-}
-
-impl FromStr for SimRate {
-    type Err = SimSettingError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let rate: Option<u32> = text.parse().ok();
-        let kilohertz = KILOHERTZ.into_iter().find(|one| rate == Some(1000 * one));
-        kilohertz.map(|kilohertz| Self { kilohertz }).ok_or_else(|| {
-            let choices = "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)";
-            SimSettingError::new("rate", text, choices)
-        })
+        self.0 as u64 / 1000
     }
 }
 
@@ -240,9 +215,9 @@ mod tests {
             assert!(wrong.parse::<SimNoise>().is_err(), "{wrong}");
             assert!(wrong.parse::<SimThickness>().is_err(), "{wrong}");
         }
-        for kilohertz in KILOHERTZ {
-            let rate: SimRate = format!("{kilohertz}000").parse().unwrap();
-            assert_eq!(rate.to_string(), format!("{kilohertz}000"));
+        for samples in RATES {
+            let rate: SimRate = samples.to_string().parse().unwrap();
+            assert_eq!(rate.to_string(), samples.to_string());
             for clock in [SimClock::Nominal, SimClock::Galil] {
                 assert_eq!(clock.tick_nanos() % rate.per_usual_tick(), 0);
             }
