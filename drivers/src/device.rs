@@ -18,7 +18,6 @@ const TURN: Nanos = Nanos::from_millis(1);
 
 /// A device that a rig file describes cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum OpenError {
     /// A Galil controller.
     #[error(transparent)]

@@ -39,7 +39,6 @@ pub enum RigEventBody {
 
 /// A rig could not be opened.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum RigError {
     /// The name does not stand for a rig.
     #[error(

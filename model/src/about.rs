@@ -87,7 +87,6 @@ pub const KEYS: &[Key] = &[
 
 /// Something cannot be told about a session.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum AboutError {
     /// No such key.
     #[error("nothing is called '{key}'; choose from {}", names())]

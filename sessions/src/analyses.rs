@@ -98,7 +98,6 @@ pub struct Analysis {
 
 /// Analyses could not be read or made.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum AnalysisError {
     /// The file is not as it was written, or the disk refuses.
     #[error(transparent)]

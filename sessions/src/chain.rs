@@ -23,7 +23,6 @@ use thiserror::Error;
 
 /// A file of lines could not be read or added to.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ChainError {
     /// The disk refused.
     #[error("{} cannot be {what} ({source}); check its permissions and the disk", path.display())]

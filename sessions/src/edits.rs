@@ -126,7 +126,6 @@ pub struct Edit {
 
 /// Edits could not be read or made.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum EditError {
     /// The file is not as it was written, or the disk refuses.
     #[error(transparent)]

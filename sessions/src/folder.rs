@@ -16,7 +16,6 @@ pub const LOCK_FILE: &str = "lock";
 
 /// A session folder could not be had.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum FolderError {
     /// Something is in the folder already.
     #[error("{} is not empty; choose a new folder", path.display())]

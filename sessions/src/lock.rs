@@ -10,7 +10,6 @@ use thiserror::Error;
 
 /// A lock could not be taken.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum LockError {
     /// Another process, or another part of this one, holds it.
     #[error("{} is in use by process {holder}; wait for it to end, or close it", path.display())]

@@ -43,7 +43,6 @@ pub trait Document: Clone + Serialize + DeserializeOwned {
 
 /// A document could not be kept or had.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum LibraryError {
     /// The disk refused.
     #[error("the {kind} cannot be {what} ({source}), {}", path.display())]

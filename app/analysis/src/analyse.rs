@@ -10,7 +10,6 @@ use thiserror::Error;
 
 /// A recording shows no cycles.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum AnalyseFailure {
     /// It cannot be read.
     #[error(transparent)]

@@ -26,7 +26,6 @@ pub const LAST: &str = "last";
 
 /// A session tells no compliance.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum MeasureError {
     /// The session cannot be used.
     #[error(transparent)]
@@ -114,7 +113,6 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
 
 /// A compliance cannot be used on a record.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum CorrectionError {
     /// It cannot be read or found.
     #[error(transparent)]

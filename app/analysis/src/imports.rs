@@ -16,7 +16,6 @@ use thiserror::Error;
 
 /// No session was made.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ImportFailure {
     /// A file cannot be read or is not understood.
     #[error(transparent)]

@@ -57,7 +57,6 @@ pub struct PlanRequest<'a> {
 
 /// There is no plan.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum PlanFailure {
     /// The rig is not as fast.
     #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]

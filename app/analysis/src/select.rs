@@ -40,7 +40,6 @@ pub struct Selected {
 
 /// No comparison.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum SelectFailure {
     /// The recordings cannot be read.
     #[error(transparent)]

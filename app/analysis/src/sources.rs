@@ -24,7 +24,6 @@ const LOG: &str = "mcap";
 
 /// Recordings cannot be looked at together.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum SourcesError {
     /// There is nothing of this name.
     #[error(transparent)]

@@ -70,7 +70,6 @@ pub enum Told {
 
 /// A device cannot be put on a wire.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ServeError {
     /// The place cannot be had.
     #[error("the emulator cannot be reached at {place} ({detail}); choose another --pty or --tcp")]

@@ -60,7 +60,6 @@ impl fmt::Display for GalilBoard {
 
 /// A controller cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum GalilOpenError {
     /// The link was lost while the controller was set up.
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]

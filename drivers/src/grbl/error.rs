@@ -5,7 +5,6 @@ use thiserror::Error;
 
 /// A board cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum GrblOpenError {
     /// It was unplugged.
     #[error("the link was lost while the board was set up ({detail}); check the cable")]

@@ -14,7 +14,6 @@ pub struct PortInfo {
 
 /// The serial ports cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum SerialError {
     /// The operating system did not list its ports.
     #[error(

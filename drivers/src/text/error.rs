@@ -7,7 +7,6 @@ use thiserror::Error;
 
 /// A device cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum DeviceError {
     /// Nothing comes.
     #[error("the {device} does not answer; {hint}")]

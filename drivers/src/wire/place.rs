@@ -39,7 +39,6 @@ impl fmt::Display for Place {
 
 /// A device cannot be reached.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum WireError {
     /// No such port.
     #[error("there is no serial port {port}; this computer has {present}")]

@@ -4,7 +4,6 @@ use thiserror::Error;
 
 /// A document makes no calibration.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum CalibrationError {
     /// One point or none.
     #[error(

@@ -69,7 +69,6 @@ pub struct CheckResult {
 
 /// A check could not be judged.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum CheckError {
     /// The calibration is none.
     #[error(transparent)]

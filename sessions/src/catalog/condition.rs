@@ -77,7 +77,6 @@ enum With {
 
 /// Something is no condition.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum ConditionError {
     /// No sign of comparison in it, or no name or value beside it.
     #[error(

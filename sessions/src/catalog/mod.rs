@@ -40,7 +40,6 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The catalog could not be made or read.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum CatalogError {
     /// The disk refused.
     #[error("the catalog cannot be {what} ({source}), {}; check the permissions of its folder", path.display())]

@@ -7,7 +7,6 @@ use thiserror::Error;
 
 /// Something is no day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum DayError {
     /// Neither a day nor a time.
     #[error("write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z")]

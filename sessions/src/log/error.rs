@@ -9,7 +9,6 @@ use thiserror::Error;
 
 /// A session could not be written.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum LogError {
     /// The disk refused. The file is not written to again: what a failed write or sync left
     /// behind is unknown.
@@ -83,7 +82,6 @@ pub(crate) fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> Lo
 
 /// A session could not be opened.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ReadError {
     /// Nothing is at the path.
     #[error("there is no session at {}; check the path", path.display())]

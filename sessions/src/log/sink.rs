@@ -9,7 +9,6 @@ use thiserror::Error;
 
 /// How a file differs from what was written to it. Only another program can have done that, or a disk that lies.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum Alteration {
     /// No file has its name.
     #[error("it is not there any more")]

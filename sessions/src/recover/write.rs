@@ -32,7 +32,6 @@ pub struct Recovered {
 
 /// A session was not recovered.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum RecoverError {
     /// Nothing of it can be used.
     #[error(transparent)]

@@ -23,7 +23,6 @@ use thiserror::Error;
 
 /// Nothing was written beside a session.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum DeedFailure {
     /// The session, its edits or its analyses cannot be read or added to.
     #[error(transparent)]

@@ -11,7 +11,6 @@ use thiserror::Error;
 
 /// A source among many has no fit.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum NotFitted {
     /// It cannot be read, or was rejected.
     #[error(transparent)]

@@ -55,7 +55,6 @@ pub enum Outcome {
 
 /// A session of a lake has no fit.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum LakeFailure {
     /// The lake cannot be read.
     #[error(transparent)]

@@ -32,7 +32,6 @@ struct Remembered<'a> {
 
 /// A fit in a file cannot be used.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum KnownFitError {
     /// It is none.
     #[error("this is not a fit: {reason}, {}", path.display())]

@@ -13,7 +13,6 @@ use thiserror::Error;
 
 /// Curves could not be stored or read.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum TradeFileError {
     /// The disk refused.
     #[error("the curves cannot be {what}: {source}, {}", path.display())]

@@ -28,7 +28,6 @@ const Z975: f64 = 1.959_963_984_540_054;
 
 /// Nothing could be expected; the text says what to change.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum ExpectedError {
     /// The body is none.
     #[error(transparent)]

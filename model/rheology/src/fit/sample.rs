@@ -31,7 +31,6 @@ impl FitSample {
 
 /// A fit could not be made; the text says what to change.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum FitError {
     /// Fewer samples than free parameters, or none at all.
     #[error(

@@ -42,7 +42,6 @@ const HAND_ROWS: usize = 1 << 10;
 
 /// A table could not be written.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ExportError {
     /// Exports never replace a file.
     #[error("{} exists already; move it away or export to another folder", path.display())]

@@ -28,7 +28,6 @@ pub struct Table {
 
 /// A table could not be understood.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum TableError {
     /// The file cannot be read.
     #[error("cannot read the table {} ({source})", path.display())]

@@ -19,7 +19,6 @@ const WAITED: &[&str] = &["waited_s"];
 
 /// A table of weights could not be read.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum WeightsError {
     /// The disk refused.
     #[error("cannot read {} ({source}); check the path", path.display())]

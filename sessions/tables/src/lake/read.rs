@@ -18,7 +18,6 @@ use walkdir::{DirEntry, WalkDir};
 
 /// A lake, or a session in it, could not be read.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum LakeError {
     /// The folder is none.
     #[error("{} is not a lake: it has no v1/samples and v1/sessions; export sessions to a lake first", path.display())]

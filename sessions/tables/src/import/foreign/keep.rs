@@ -23,7 +23,6 @@ const BYTES_PER_ROW: u64 = 64;
 
 /// A session could not be made of a file.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum KeepError {
     /// No folder for it.
     #[error(transparent)]

@@ -37,7 +37,6 @@ const TEXT_BYTES_MAX: u64 = 256 << 20;
 
 /// A foreign file could not be read.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum ForeignError {
     /// The disk refused.
     #[error("cannot read {} ({source}); check the path", path.display())]
