@@ -1,7 +1,7 @@
 //! Touch the home switch again and say how many pulses were missed.
 
 use super::home::{Home, Homing, KEYS, Purpose};
-use super::{Executable, Facts, Known, Need, Pausing, StepKind};
+use super::{Executable, Facts, Need, Pausing, StepKind};
 use crate::engine::Context;
 use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
 use palpate_model::rig::Phase;
@@ -25,6 +25,7 @@ pub(super) const FACTS: Facts = Facts {
         Ok(CheckHome { speed, touch_speed }.into())
     }),
     needs: &[Need::Motor, Need::Home],
+    gives: &[Need::Outside],
     may_touch: false,
     label: "home",
     ..Facts::of("check-home", Phase::CheckHome, Pausing::Repeat)
@@ -37,10 +38,6 @@ impl CheckHome {
 }
 
 impl StepKind for CheckHome {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = false;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         let travel = walk.limits.travel_max.0;
         self.search().check_speeds(walk);

@@ -4,7 +4,7 @@
 //! A stiff surface gives no time: both touches are slow, and the rig's own compliance is all that softens them.
 
 use super::find_contact::{above_noise, not_felt};
-use super::{Executable, Facts, InProgress, Known, Need, Pausing, Progress, StepKind};
+use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
 use crate::engine::{Contact, Context, Millisecond, NOT_TARED, Record};
 use crate::file::{Key, Kind};
 use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
@@ -55,6 +55,7 @@ pub(super) const FACTS: Facts = Facts {
         .into())
     }),
     needs: &[Need::Motor, Need::Home, Need::Tare, Need::Outside],
+    gives: &[Need::Contact],
     label: "base",
     ..Facts::of("find-base", Phase::Contact, Pausing::RepeatFromStart)
 };
@@ -90,10 +91,6 @@ impl Default for FindBase {
 }
 
 impl StepKind for FindBase {
-    fn pass(&self, known: &mut Known) {
-        known.contact = true;
-    }
-
     fn rate_advice(&self) -> &'static str {
         "; what the search for the base met hardly gives way: give find-base a lower speed, or let a simulated rig give way (compliance 30)"
     }

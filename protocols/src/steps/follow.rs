@@ -4,7 +4,7 @@
 //! In doubt it stops: a lead that stops coming leaves it where it is, and after a while the step ends.
 
 use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, InProgress, Known, Pausing, Progress, StepEvent, StepKind};
+use super::{Done, Executable, Facts, InProgress, Need, Pausing, Progress, StepEvent, StepKind};
 use crate::engine::{Context, Record};
 use crate::preview::{Reach, SETTLE_SECS, Span, Walk};
 use palpate_model::Nanos;
@@ -29,6 +29,7 @@ pub struct Follow {
 pub(super) const FACTS: Facts = Facts {
     about: "Go where a lead from outside says.",
     needs: FROM_SURFACE,
+    gives: &[Need::Inside],
     is_measuring: true,
     label: "follow",
     // What leads may be elsewhere by then, and the slave goes there.
@@ -36,10 +37,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Follow {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth_max);

@@ -1,7 +1,7 @@
 //! Constant force: the probe follows the tissue in small steps while the force is kept.
 
 use super::target::doubt_force;
-use super::{Done, Executable, Facts, InProgress, Known, Need, Pausing, Progress, StepKind};
+use super::{Done, Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Reach, SETTLE_SECS, Span, Walk};
@@ -41,16 +41,13 @@ pub(super) const FACTS: Facts = Facts {
         .into())
     }),
     needs: &[Need::Motor, Need::Home, Need::Contact, Need::Inside],
+    gives: &[Need::Inside],
     is_measuring: true,
     label: "creep",
     ..Facts::of("hold-force", Phase::Creep, Pausing::Control)
 };
 
 impl StepKind for HoldForce {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth_max);

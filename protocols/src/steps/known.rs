@@ -88,7 +88,7 @@ impl Known {
         }
     }
 
-    /// What is missed is missed once: the steps behind would only repeat it.
+    /// Takes it to hold: a step gave it, or it was missed, which the steps behind would only repeat.
     pub fn assume(&mut self, need: Need) {
         match need {
             Need::Motor => self.motor = true,

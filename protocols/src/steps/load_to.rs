@@ -3,7 +3,7 @@
 use super::known::FROM_SURFACE;
 use super::ramp::INTERRUPTED;
 use super::target::doubt_force;
-use super::{Done, Executable, Facts, InProgress, Known, MeterSample, Pausing, Progress, StepKind};
+use super::{Done, Executable, Facts, InProgress, MeterSample, Need, Pausing, Progress, StepKind};
 use crate::engine::{Context, Record};
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -49,6 +49,7 @@ pub(super) const FACTS: Facts = Facts {
         .into())
     }),
     needs: FROM_SURFACE,
+    gives: &[Need::Inside],
     is_measuring: true,
     label: "load",
     ..Facts::of("load", Phase::Ramp, Pausing::Measure(INTERRUPTED))
@@ -69,10 +70,6 @@ impl LoadTo {
 }
 
 impl StepKind for LoadTo {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = true;
-    }
-
     fn deepest(&self) -> Option<Depth> {
         Some(self.depth_max)
     }

@@ -62,6 +62,8 @@ pub(crate) struct Facts {
     /// What a pause does to it.
     pub pausing: Pausing,
     pub needs: &'static [Need],
+    /// What holds behind it, where it differs from before.
+    pub gives: &'static [Need],
     /// See [`StepKind::may_touch`].
     pub may_touch: bool,
     /// Whether it is the measurement itself, which indents or leaves tissue while it is recorded.
@@ -82,6 +84,7 @@ impl Facts {
             phase,
             pausing,
             needs: &[],
+            gives: &[],
             may_touch: true,
             is_measuring: false,
             label: "",
@@ -103,7 +106,9 @@ pub(crate) trait StepKind: OfKind {
     }
 
     /// What holds behind it, where it differs from before.
-    fn pass(&self, _known: &mut Known) {}
+    fn pass(&self, known: &mut Known) {
+        self.facts().gives.iter().for_each(|need| known.assume(*need));
+    }
 
     /// Whether it may move the probe towards the tissue, where it can touch. Homing and leaving cannot.
     fn may_touch(&self) -> bool {

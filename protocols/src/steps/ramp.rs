@@ -1,7 +1,7 @@
 //! Indent to a depth at constant speed.
 
 use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, Known, MeterSample, Moving, Pausing, StepKind};
+use super::{Done, Executable, Facts, MeterSample, Moving, Need, Pausing, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -28,6 +28,7 @@ pub(super) const FACTS: Facts = Facts {
         Ok(Ramp { speed: args.speed("speed")?, depth: Depth(args.number("depth")?) }.into())
     }),
     needs: FROM_SURFACE,
+    gives: &[Need::Inside],
     is_measuring: true,
     ..Facts::of("ramp", Phase::Ramp, Pausing::Measure(INTERRUPTED))
 };
@@ -36,10 +37,6 @@ pub(super) const FACTS: Facts = Facts {
 pub(super) const INTERRUPTED: &str = "an interrupted indentation is another experiment";
 
 impl StepKind for Ramp {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = true;
-    }
-
     fn deepest(&self) -> Option<Depth> {
         Some(self.depth)
     }

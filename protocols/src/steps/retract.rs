@@ -1,7 +1,7 @@
 //! Leave the tissue.
 
 use super::known::FROM_SURFACE;
-use super::{Executable, Facts, Known, Moving, Pausing, StepKind};
+use super::{Executable, Facts, Moving, Need, Pausing, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -29,15 +29,12 @@ pub(super) const FACTS: Facts = Facts {
         Ok(Retract { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())
     }),
     needs: FROM_SURFACE,
+    gives: &[Need::Outside],
     may_touch: false,
     ..Facts::of("retract", Phase::Retract, Pausing::Repeat)
 };
 
 impl StepKind for Retract {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = false;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_sizes(&[self.clearance_mm]);
         walk.check_speed(self.speed);

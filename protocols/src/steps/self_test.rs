@@ -2,7 +2,7 @@
 //! is alive, quiet and unloaded, the motor is energised.
 
 use super::stats::RunningStats;
-use super::{Executable, Facts, InProgress, Known, Pausing, Progress, StepKind};
+use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -26,14 +26,11 @@ pub(super) const FACTS: Facts = Facts {
     }),
     may_touch: false,
     label: "self-test",
+    gives: &[Need::Motor],
     ..Facts::of("self-test", Phase::SelfTest, Pausing::Complete)
 };
 
 impl StepKind for SelfTest {
-    fn pass(&self, known: &mut Known) {
-        known.motor = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(self.duration);
         Span(self.duration.0, self.duration.0, false)

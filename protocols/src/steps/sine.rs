@@ -1,7 +1,7 @@
 //! A sine from where the probe stands to deeper and back, beginning and ending at rest.
 
 use super::known::FROM_SURFACE;
-use super::{Done, Executable, FORCE_FLOOR, Facts, Known, Moving, Pausing, StepKind};
+use super::{Done, Executable, FORCE_FLOOR, Facts, Moving, Need, Pausing, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -36,6 +36,7 @@ pub(super) const FACTS: Facts = Facts {
         .into())
     }),
     needs: FROM_SURFACE,
+    gives: &[Need::Inside],
     is_measuring: true,
     ..Facts::of(
         "sine",
@@ -64,10 +65,6 @@ impl Sine {
 }
 
 impl StepKind for Sine {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(Seconds(f64::from(self.cycles) / self.frequency_hz));
         walk.check_sizes(&[self.amplitude_mm]);

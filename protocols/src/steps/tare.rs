@@ -2,7 +2,7 @@
 
 use super::self_test::check_unloaded;
 use super::stats::{RunningLine, RunningStats};
-use super::{Executable, Facts, InProgress, Known, Need, Pausing, Progress, StepKind};
+use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
 use crate::engine::{Context, Drift, Record, UnloadedSignal};
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -30,16 +30,13 @@ pub(super) const FACTS: Facts = Facts {
         Ok(Tare { duration }.into())
     }),
     needs: &[Need::Outside],
+    gives: &[Need::Tare],
     may_touch: false,
     label: "tare",
     ..Facts::of("tare", Phase::Tare, Pausing::Complete)
 };
 
 impl StepKind for Tare {
-    fn pass(&self, known: &mut Known) {
-        known.tare = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(self.duration);
         walk.wait(self.duration)

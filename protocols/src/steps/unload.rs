@@ -1,7 +1,7 @@
 //! Come back to the surface at constant speed, as carefully recorded as the way in.
 
 use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, Known, MeterSample, Moving, Pausing, StepKind};
+use super::{Done, Executable, Facts, MeterSample, Moving, Need, Pausing, StepKind};
 use crate::engine::Context;
 use crate::file::{Key, Kind};
 use crate::preview::{Span, Walk};
@@ -29,6 +29,7 @@ pub(super) const FACTS: Facts = Facts {
         Ok(Unload { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())
     }),
     needs: FROM_SURFACE,
+    gives: &[Need::Outside],
     may_touch: false,
     is_measuring: true,
     ..Facts::of(
@@ -39,10 +40,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Unload {
-    fn pass(&self, known: &mut Known) {
-        known.is_inside = false;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_sizes(&[self.clearance_mm]);
         walk.check_speed(self.speed);

@@ -7,7 +7,7 @@ mod touch_log;
 
 pub(super) use noise::{above_noise, not_felt};
 
-use super::{Executable, Facts, Known, Need, Pausing, Step, StepKind};
+use super::{Executable, Facts, Need, Pausing, Step, StepKind};
 use crate::engine::Context;
 use crate::file::{Args, Key, Kind};
 use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
@@ -107,13 +107,8 @@ pub(super) const FACTS: Facts = Facts {
     ],
     build: Some(read),
     note: Some(usual_search),
-    needs: &[
-            Need::Motor,
-            Need::Home,
-            Need::Tare,
-            Need::Specimen,
-            Need::Outside,
-        ],
+    needs: &[Need::Motor, Need::Home, Need::Tare, Need::Specimen, Need::Outside],
+    gives: &[Need::Contact],
     label: "contact",
     ..Facts::of("find-contact", Phase::Contact, Pausing::RepeatFromStart)
 };
@@ -179,10 +174,6 @@ impl Press {
 }
 
 impl StepKind for FindContact {
-    fn pass(&self, known: &mut Known) {
-        known.contact = true;
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_sizes(&[
             self.retreat_mm,
