@@ -42,7 +42,6 @@ impl Found {
     }
 
     /// The word for it in a rig file, if palpate drives it.
-    #[must_use]
     pub const fn device(&self) -> Option<&'static str> {
         match self {
             Self::Device(word, ..) => Some(word),

@@ -96,13 +96,11 @@ impl<D: RigDevice> DeviceRig<D> {
     }
 
     /// What was opened.
-    #[must_use]
     pub const fn device(&self) -> &D {
         &self.device
     }
 
     /// The time that [`Rig::take_raw`] tells, now.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         self.time.of((self.clock)())
     }

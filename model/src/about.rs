@@ -175,19 +175,16 @@ pub struct About {
 
 impl About {
     /// Whether nothing was told.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.told.is_empty()
     }
 
     /// The value of a key, if it was told.
-    #[must_use]
     pub fn get(&self, key: &str) -> Option<&Value> {
         self.told.get(key)
     }
 
     /// What was told, in the order of [`KEYS`], then what this version does not know. Text without quotes.
-    #[must_use]
     pub fn lines(&self) -> Vec<(&str, String)> {
         let place = |name: &str| KEYS.iter().position(|key| key.name == name);
         let mut told: Vec<(&str, &Value)> =
@@ -236,7 +233,6 @@ impl Labels {
     }
 
     /// Whether a thing of [`KEYS`] was told.
-    #[must_use]
     pub fn is_told(&self, name: &str) -> bool {
         let is_there = |text: &str| !text.trim().is_empty();
         match name {

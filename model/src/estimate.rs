@@ -54,7 +54,6 @@ pub struct LiveEstimate {
 
 impl LiveEstimate {
     /// A parameter by name, if the record so far identifies it.
-    #[must_use]
     pub fn identified(&self, name: &str) -> Option<&Parameter> {
         let is_refused =
             self.verdicts.iter().any(|verdict| verdict.parameter == name && !verdict.is_identified);

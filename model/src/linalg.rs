@@ -32,7 +32,6 @@ impl<const N: usize> Triangle<N> {
     }
 
     /// Squared length of one column.
-    #[must_use]
     pub fn length_squared(&self, column: usize) -> f64 {
         self.r.iter().map(|row| row[column].powi(2)).sum()
     }

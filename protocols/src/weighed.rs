@@ -20,13 +20,11 @@ pub struct Weighed {
 
 impl Weighed {
     /// The mass in g, platform included.
-    #[must_use]
     pub fn mass_g(&self) -> f64 {
         self.step.mass_g
     }
 
     /// The mean signal.
-    #[must_use]
     pub fn volts(&self) -> Volts {
         self.step.volts
     }
@@ -86,7 +84,6 @@ impl Readings {
     }
 
     /// Those that count so far.
-    #[must_use]
     pub fn all(&self) -> &[Weighed] {
         &self.all
     }

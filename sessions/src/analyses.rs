@@ -63,7 +63,6 @@ pub enum Analysed {
 
 impl Analysed {
     /// The word for it.
-    #[must_use]
     pub const fn word(&self) -> &'static str {
         match self {
             Self::Fit { .. } => "fit",
@@ -187,14 +186,12 @@ impl Analyses {
     }
 
     /// The file as an input; none where there is no analysis.
-    #[must_use]
     pub fn input(&self) -> Option<Input> {
         (!self.all.is_empty())
             .then(|| Input { what: ANALYSES_FILE.to_owned(), sha256: self.sha256.clone() })
     }
 
     /// The withdrawal of an analysis, if there is one.
-    #[must_use]
     pub fn withdrawal(&self, name: &str) -> Option<&Analysis> {
         let is_it = |one: &&Analysis| one.name == name && one.what == Analysed::Withdrawal;
         self.all.iter().find(is_it)

@@ -64,7 +64,6 @@ impl Draft {
     }
 
     /// Where it is while it is written.
-    #[must_use]
     pub fn hidden_path(&self) -> &Path {
         self.file.path()
     }

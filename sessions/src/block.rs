@@ -110,49 +110,41 @@ pub struct Block {
 
 impl Block {
     /// Number of the first sample in the session.
-    #[must_use]
     pub fn first_sample(&self) -> u64 {
         self.daq.first_sample
     }
 
     /// How many samples there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.daq.tick_delta.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.daq.tick_delta.is_empty()
     }
 
     /// Load-cell signal in V; empty where an imported file has none.
-    #[must_use]
     pub fn volts(&self) -> &[f64] {
         &self.daq.volts
     }
 
     /// Force above tare in N; 0 where [`Row::force`] is `None`.
-    #[must_use]
     pub fn force(&self) -> &[f64] {
         &self.derived.force_newtons
     }
 
     /// Depth below contact in mm; 0 where [`Row::depth`] is `None`.
-    #[must_use]
     pub fn depth(&self) -> &[f64] {
         &self.derived.depth_mm
     }
 
     /// Session time of the last sample.
-    #[must_use]
     pub fn last_time(&self) -> Option<Nanos> {
         self.daq.host_delta_ns.last().map(|ns| Nanos(*ns as u64))
     }
 
     /// One sample. Panics if there is none of that number.
-    #[must_use]
     pub fn row(&self, index: usize) -> Row {
         let (daq, derived) = (&self.daq, &self.derived);
         let validity = derived.validity[index];

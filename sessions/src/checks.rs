@@ -37,7 +37,6 @@ pub struct DailyCheck {
 
 impl DailyCheck {
     /// What failed, in one sentence; empty if nothing did.
-    #[must_use]
     pub fn failures(&self) -> String {
         let failed = self.parts.iter().filter(|part| !part.is_passed);
         let sentences: Vec<&str> = failed.map(|part| part.sentence.as_str()).collect();

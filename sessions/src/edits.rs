@@ -186,7 +186,6 @@ impl Edits {
     }
 
     /// The verdict that counts, with the edit that says why.
-    #[must_use]
     pub fn verdict(&self) -> Option<(Verdict, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
             Change::Verdict { verdict } => Some((verdict, edit)),
@@ -195,7 +194,6 @@ impl Edits {
     }
 
     /// The correction that counts of a contact, numbered from 1.
-    #[must_use]
     pub fn contact(&self, number: u32) -> Option<(Position, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
             Change::Contact { number: own, position_mm, .. } if own == number => {
@@ -206,7 +204,6 @@ impl Edits {
     }
 
     /// The tags it has.
-    #[must_use]
     pub fn tags(&self) -> BTreeSet<&str> {
         let mut tags = BTreeSet::new();
         for edit in &self.all {
@@ -228,7 +225,6 @@ impl Edits {
 
     /// The last review. `now` are the files that were seen as they are now: the analyses and, unless only
     /// those are to be compared, every file of the log.
-    #[must_use]
     pub fn review(&self, now: &[Input]) -> Option<Review> {
         let place = |edit: &Edit| matches!(edit.change, Change::Review { .. });
         let at = self.all.iter().rposition(place)?;

@@ -92,13 +92,11 @@ impl SessionFolder {
     }
 
     /// The folder.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// The log in the folder, or its first segment.
-    #[must_use]
     pub fn log_path(&self) -> PathBuf {
         self.path.join(LOG_FILE)
     }

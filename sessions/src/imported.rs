@@ -46,7 +46,6 @@ pub struct Imported {
 
 impl Imported {
     /// File, part, layout and checksum in words.
-    #[must_use]
     pub fn source(&self) -> String {
         let part = match self.part.as_str() {
             "" => String::new(),

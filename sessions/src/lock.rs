@@ -160,7 +160,6 @@ impl HolderLock {
     }
 
     /// The lock file.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -70,13 +70,11 @@ pub struct Manifest {
 
 impl Manifest {
     /// Length of one tick of the samples.
-    #[must_use]
     pub fn tick(&self) -> Seconds {
         self.rig.as_ref().map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
     }
 
     /// The length of so many ticks. Of an imported session it is the float that the file's decimal number is.
-    #[must_use]
     pub fn time_of(&self, ticks: i64) -> Seconds {
         Seconds(match &self.rig {
             Some(rig) => ticks as f64 * rig.tick().0,
@@ -85,7 +83,6 @@ impl Manifest {
     }
 
     /// The start as an RFC 3339 text in UTC, to the millisecond.
-    #[must_use]
     pub fn started_at_text(&self) -> String {
         self.started_at.to_rfc3339_opts(SecondsFormat::Millis, true)
     }

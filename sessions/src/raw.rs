@@ -97,25 +97,21 @@ pub struct RawPiece<'a> {
 
 impl<'a> RawBlock<'a> {
     /// Raw bytes of the session before this block, over all devices.
-    #[must_use]
     pub fn first_byte(&self) -> u64 {
         self.first_byte
     }
 
     /// Name of the device.
-    #[must_use]
     pub fn device(&self) -> &'a str {
         self.device
     }
 
     /// How many bytes there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.data.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.data.is_empty()
     }

@@ -33,7 +33,6 @@ pub struct Row {
 
 impl Row {
     /// The first value of this row that is not a number, named; `None` when all are.
-    #[must_use]
     pub fn non_finite(&self) -> Option<&'static str> {
         if self.volts.is_some_and(|volts| !volts.is_finite()) {
             Some("signal")

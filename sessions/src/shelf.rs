@@ -145,7 +145,6 @@ pub struct Kept<D> {
 
 impl<D: Document> Kept<D> {
     /// CRC-32 of the document as its file has it, eight hexadecimal digits.
-    #[must_use]
     pub fn checksum(&self) -> Option<String> {
         let value = serde_json::to_value(&self.document).ok()?;
         Some(format!("{:08x}", checksum(&value).ok()?))
@@ -186,14 +185,12 @@ impl<D: Document> Shelf<D> {
     }
 
     /// The id of the one that took the place of this one.
-    #[must_use]
     pub fn successor(&self, id: &str) -> Option<&str> {
         let by = |one: &&Kept<D>| one.document.supersedes() == Some(id);
         self.kept.iter().find(by).map(|one| one.id.as_str())
     }
 
     /// The one in force for a rig: of those taken on it that nothing supersedes, the latest by its date.
-    #[must_use]
     pub fn in_force(&self, rig: &str) -> Option<&Kept<D>> {
         let own = self.kept.iter().filter(|one| one.document.rig() == rig);
         let open = own.filter(|one| self.successor(&one.id).is_none());

@@ -39,7 +39,6 @@ pub struct Row<const W: usize, const R: usize> {
 
 impl<const W: usize, const R: usize> Row<W, R> {
     /// The column where this differs from another in any bit; whole numbers come first.
-    #[must_use]
     pub fn differs(&self, other: &Self) -> Option<usize> {
         let whole = self.whole.iter().zip(&other.whole).map(|(a, b)| a != b);
         let real = self.real.iter().zip(&other.real);

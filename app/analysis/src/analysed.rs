@@ -239,7 +239,6 @@ pub fn of_outline(
 
 impl Passing {
     /// Whether samples are other than those recorded.
-    #[must_use]
     pub fn is_changed(&self) -> bool {
         self.anew.is_some() || self.edited.is_changed()
     }

@@ -275,7 +275,6 @@ impl Correction {
     }
 
     /// In a sentence.
-    #[must_use]
     pub fn sentence(&self) -> String {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {

@@ -34,7 +34,6 @@ pub struct CycleSource {
 
 impl CycleSource {
     /// The depth of a sample from the contact its own cycle began from.
-    #[must_use]
     pub fn own_depth(&self, index: usize) -> Depth {
         let offset = self.contact_offsets.get(index);
         self.samples[index].depth - offset.copied().unwrap_or_default()

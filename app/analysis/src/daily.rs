@@ -247,7 +247,6 @@ impl Gate {
     }
 
     /// What has to be acknowledged.
-    #[must_use]
     pub fn to_acknowledge(&self) -> Vec<String> {
         match self {
             Self::Acknowledge(sentence) => vec![sentence.clone()],

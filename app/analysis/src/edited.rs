@@ -25,7 +25,6 @@ pub struct Edited {
 
 impl Edited {
     /// Why the session was rejected, if it was.
-    #[must_use]
     pub fn rejection(&self) -> Option<&str> {
         match self.edits.verdict() {
             Some((Verdict::Rejected, edit)) => Some(&edit.reason),
@@ -82,7 +81,6 @@ pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceEr
 
 impl Passing {
     /// Whether depths are other than those recorded.
-    #[must_use]
     pub fn is_changed(&self) -> bool {
         !self.shifts.is_empty()
     }

@@ -93,7 +93,6 @@ pub enum Saying {
 
 impl Saying {
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         match self {
             Self::Tags { add, remove } => {

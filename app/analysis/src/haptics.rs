@@ -75,7 +75,6 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
 
 impl Source {
     /// That a stroke goes beyond what was measured, if it does by more than a pulse of the source's slider.
-    #[must_use]
     pub fn beyond(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
@@ -128,7 +127,6 @@ impl Setting {
     }
 
     /// The simulation of a body with a firm hand that presses to the end of the stroke and holds there.
-    #[must_use]
     pub fn simulation(&self, body: ModifiedKelvin, is_guarded: bool) -> SimulationSettings {
         let path = HandPath::RampHold { from: 0.0, to: self.deepest.0, speed: self.speed.0 };
         let hand = Hand { damping: GRIP_DAMPING, ..Hand::firm(path) };

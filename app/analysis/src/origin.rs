@@ -29,7 +29,6 @@ impl Origin {
     }
 
     /// Whether anything is known.
-    #[must_use]
     pub fn is_known(&self) -> bool {
         self.calibration.is_some() || self.compliance.is_some()
     }

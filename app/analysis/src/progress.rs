@@ -65,13 +65,11 @@ impl TaskProgress {
     }
 
     /// Whether the work was asked to end.
-    #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
     /// Pieces done, pieces in all, and what comes next.
-    #[must_use]
     pub fn read(&self) -> (usize, usize, String) {
         let what = self.what.lock().unwrap_or_else(PoisonError::into_inner);
         let count = |pieces: &AtomicUsize| pieces.load(Ordering::Relaxed);

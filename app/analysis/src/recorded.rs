@@ -31,7 +31,6 @@ impl From<Recorded> for RecordedTicks {
 
 impl RecordedTicks {
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         match self.lost {
             0 => format!("{} ticks recorded, none lost", self.ticks),
@@ -77,7 +76,6 @@ pub struct Different {
 
 impl Replayed {
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         let how = match (self.is_identical, self.is_whole) {
             (true, true) => "every number bit for bit as recorded",
@@ -95,7 +93,6 @@ impl Replayed {
     }
 
     /// Why it is not as recorded, or not all of it, if so.
-    #[must_use]
     pub fn failure(&self) -> Option<String> {
         let Some(first) = &self.first else {
             let cut_off = format!(

@@ -81,7 +81,6 @@ pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String
 
 impl Found {
     /// What a user must know of what was left out.
-    #[must_use]
     pub fn note(&self) -> Option<String> {
         copied_sentence(self.copied.iter().map(|path| path.display().to_string()))
     }
@@ -226,7 +225,6 @@ impl Recording {
     }
 
     /// As fits take it.
-    #[must_use]
     pub fn borrowed(&self) -> (&str, &[FitSample]) {
         (&self.name, &self.samples)
     }
@@ -284,7 +282,6 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
 
 impl Recordings {
     /// As fits take them.
-    #[must_use]
     pub fn borrowed(&self) -> Vec<(&str, &[FitSample])> {
         self.all.iter().map(Recording::borrowed).collect()
     }

@@ -68,7 +68,6 @@ impl Default for BenchArgs {
 
 impl BenchArgs {
     /// The settings, with the usual clock.
-    #[must_use]
     pub fn settings(&self) -> SimSettings {
         SimSettings {
             profile: self.profile,
@@ -127,7 +126,6 @@ impl Default for RigArgs {
 
 impl RigArgs {
     /// The settings of the simulated rig.
-    #[must_use]
     pub fn settings(&self) -> SimSettings {
         SimSettings { clock: self.clock, rate: self.rate, ..self.bench.settings() }
     }

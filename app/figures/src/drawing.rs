@@ -74,7 +74,6 @@ pub struct Drawing {
 
 impl Drawing {
     /// The picture as a document of SVG.
-    #[must_use]
     pub fn svg(&self) -> String {
         let [width, height] = self.size;
         let mut text = format!(

@@ -125,7 +125,6 @@ impl Tokens {
     }
 
     /// The line of one of `count` things that have an order, such as cycles.
-    #[must_use]
     pub fn in_order(&self, index: usize, count: usize) -> Color32 {
         let [first, last] = self.ordered;
         let share = index as f32 / count.saturating_sub(1).max(1) as f32;

@@ -81,13 +81,11 @@ impl WorkbenchApp {
     }
 
     /// The newest snapshot taken for drawing.
-    #[must_use]
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.workbench.snapshot
     }
 
     /// A screen by its type.
-    #[must_use]
     pub fn screen<T: Screen>(&self) -> Option<&T> {
         self.screens.get()
     }

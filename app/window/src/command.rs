@@ -96,7 +96,6 @@ pub enum Command {
 
 impl Command {
     /// Whether it stops motion: nothing may come before it.
-    #[must_use]
     pub const fn is_stop(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
     }

@@ -120,7 +120,6 @@ impl Kept {
     }
 
     /// Whether this is kept anywhere.
-    #[must_use]
     pub fn is_kept(&self) -> bool {
         self.path.is_some()
     }

@@ -118,19 +118,16 @@ impl Workbench {
     }
 
     /// The run in progress or the last one.
-    #[must_use]
     pub fn run(&self) -> Option<&RunView> {
         self.snapshot.run.as_ref()
     }
 
     /// How many runs were started from this window.
-    #[must_use]
     pub fn starts(&self) -> u64 {
         self.starts
     }
 
     /// What the window is in the middle of.
-    #[must_use]
     pub fn intent(&self) -> Intent {
         match (self.is_closing, &self.start) {
             (true, _) => Intent::Closing,
@@ -140,7 +137,6 @@ impl Workbench {
     }
 
     /// Whether a run is in progress or about to start.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None
     }
@@ -154,7 +150,6 @@ impl Workbench {
     }
 
     /// Whether nothing moves, is about to move or runs.
-    #[must_use]
     pub fn is_quiet(&self) -> bool {
         !self.is_busy() && !is_motion_possible(&self.snapshot) && self.occupation.running.is_empty()
     }
@@ -258,7 +253,6 @@ impl Workbench {
     }
 
     /// The protocol that stands ready as a run, if it may start.
-    #[must_use]
     pub fn ready_run(&self) -> Option<RunRequest> {
         self.start_verdict().ok()?;
         self.form.request(&self.bench)
@@ -282,7 +276,6 @@ impl Workbench {
     }
 
     /// Whether a run is wanted.
-    #[must_use]
     pub fn is_run_wanted(&self) -> bool {
         self.run_wanted.is_some()
     }
@@ -347,7 +340,6 @@ impl Workbench {
     }
 
     /// Whether a window that waited for the axis to rest may close now.
-    #[must_use]
     pub fn may_close(&self) -> bool {
         self.is_closing && (self.is_at_rest() || !self.runner.is_alive())
     }

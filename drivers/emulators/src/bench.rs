@@ -63,7 +63,6 @@ impl Bench {
     }
 
     /// The slide, for tests.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }

@@ -178,7 +178,6 @@ impl FaultPlan {
     }
 
     /// Whether a fault is under way.
-    #[must_use]
     pub fn is_on(&self, kind: FaultKind) -> bool {
         self.active.iter().any(|fault| fault.kind == kind)
     }
@@ -188,7 +187,6 @@ impl FaultPlan {
     }
 
     /// How much later what is sent now arrives.
-    #[must_use]
     pub fn lateness(&self) -> Nanos {
         if self.has(LineFault::Late) { LATENESS } else { Nanos::ZERO }
     }

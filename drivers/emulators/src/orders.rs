@@ -58,7 +58,6 @@ impl Order {
     }
 
     /// What is told when it is done; nothing of a fault, which tells itself when it begins.
-    #[must_use]
     pub fn told(&self) -> Option<String> {
         match self {
             Self::Fault(_) => None,

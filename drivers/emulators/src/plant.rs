@@ -78,43 +78,36 @@ impl Plant {
     }
 
     /// The cell's amplified signal at the newest step.
-    #[must_use]
     pub fn volts(&self) -> Volts {
         self.volts
     }
 
     /// Force on the probe at the newest step.
-    #[must_use]
     pub fn force(&self) -> Newtons {
         self.force
     }
 
     /// Force on the cell at the newest step: that on the probe, and weights that a person has put on.
-    #[must_use]
     pub fn on_cell(&self) -> Newtons {
         self.on_cell
     }
 
     /// True position of the axis, in mm from the edge of the home switch.
-    #[must_use]
     pub fn axis(&self) -> Position {
         self.axis
     }
 
     /// Whether the home switch is closed.
-    #[must_use]
     pub fn is_home(&self) -> bool {
         self.axis.0 <= 0.0
     }
 
     /// Whether the limit switch at the far end is closed.
-    #[must_use]
     pub fn is_forward_limit(&self) -> bool {
         self.axis.0 >= TRAVEL.0 + SWITCH_MARGIN_MM
     }
 
     /// Whether the limit switch behind home is closed.
-    #[must_use]
     pub fn is_reverse_limit(&self) -> bool {
         self.axis.0 <= -SWITCH_MARGIN_MM
     }

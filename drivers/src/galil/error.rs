@@ -14,7 +14,6 @@ pub struct GalilError {
 
 impl GalilError {
     /// What to do about it (DMC-40x0 command reference, `TC`); empty where only the controller's own words help.
-    #[must_use]
     pub fn remedy(&self) -> &'static str {
         use ErrorCode as E;
         let Ok(code) = u8::try_from(self.code) else {

@@ -37,14 +37,12 @@ pub struct Reply {
 
 impl Reply {
     /// Its text; what is not ASCII stays visible as question marks in diamonds.
-    #[must_use]
     pub fn text(&self) -> String {
         String::from_utf8_lossy(&self.bytes).trim().to_owned()
     }
 
     /// Whether it begins with a number as `{F2.4}` writes it, with one or two digits, a point and four decimals: one
     /// with a digit lost or too many is none.
-    #[must_use]
     pub fn begins_with_volts(&self) -> bool {
         let text = self.bytes.trim_ascii_start();
         let unsigned = text.strip_prefix(b"-").unwrap_or(text);
@@ -55,7 +53,6 @@ impl Reply {
     }
 
     /// The numbers of its text; `None` when anything else stands there.
-    #[must_use]
     pub fn numbers(&self) -> Option<Vec<f64>> {
         std::str::from_utf8(&self.bytes).ok().and_then(numbers)
     }
@@ -75,7 +72,6 @@ impl Parser {
     }
 
     /// Bytes of the reply under way.
-    #[must_use]
     pub fn pending(&self) -> usize {
         self.reply.len()
     }

@@ -220,7 +220,6 @@ impl Recording {
     }
 
     /// Whether elements are on their way.
-    #[must_use]
     pub fn is_fetching(&self) -> bool {
         self.chunk.is_some()
     }

@@ -26,7 +26,6 @@ impl GalilDevice {
     }
 
     /// How far the axis goes at most when palpate falls silent, in mm, as it was set up last.
-    #[must_use]
     pub const fn worst_case_mm(&self) -> f64 {
         self.worst_case_mm
     }

@@ -65,13 +65,11 @@ impl Sampler {
     }
 
     /// Whether the axis moved in the newest sample.
-    #[must_use]
     pub const fn is_moving(&self) -> bool {
         self.was_moving
     }
 
     /// Whether a clock that shows this has begun anew since the newest sample.
-    #[must_use]
     pub fn is_reset(&self, time: i64) -> bool {
         self.time.is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
     }

@@ -157,26 +157,22 @@ pub enum Sampling {
 
 impl GalilSettings {
     /// 1 where the controller counts as palpate does, towards the tissue, else -1.
-    #[must_use]
     pub const fn sign(&self) -> i64 {
         if self.is_reversed { -1 } else { 1 }
     }
 
     /// Volts of one count.
-    #[must_use]
     pub fn volts_per_count(&self) -> f64 {
         self.range.span().0 / f64::from(1_u32 << self.bits.min(24))
     }
 
     /// Counts per second of a speed.
-    #[must_use]
     pub fn counts(&self, speed: MmPerS) -> i64 {
         // Rounding forgives the decimals of millimetres; the controller rounds down to its quantum.
         (speed.0 / self.mm_per_pulse).round() as i64
     }
 
     /// Counts per second squared of an acceleration.
-    #[must_use]
     pub fn counts2(&self, acceleration: MmPerS2) -> i64 {
         (acceleration.0 / self.mm_per_pulse).round() as i64
     }

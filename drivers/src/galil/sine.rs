@@ -105,13 +105,11 @@ impl Feed {
     }
 
     /// Whether the controller has come to the end of what was sent before the end of the sine.
-    #[must_use]
     pub fn is_dry(&self, now: Nanos) -> bool {
         !self.is_over && self.lead(now) <= 0
     }
 
     /// When the next increments should be sent; never once all are.
-    #[must_use]
     pub fn due(&self) -> Option<Nanos> {
         let sent = Nanos(self.sent * self.tick.0);
         (!self.is_over).then(|| Nanos((self.begun_at + sent).0.saturating_sub(LEAD.0)))

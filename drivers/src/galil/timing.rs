@@ -50,7 +50,6 @@ impl Timing {
     }
 
     /// Time of a tick on the host's clock, for a tick of this length.
-    #[must_use]
     pub fn host_time(&self, tick: u64, length: Nanos) -> Option<Nanos> {
         let best = self.best?;
         let since = tick as f64 - best.tick as f64;
@@ -60,7 +59,6 @@ impl Timing {
 
     /// How far [`Timing::host_time`] may be wrong at a time: a question's half round trip, drift, and the sample itself,
     /// in which the controller answers.
-    #[must_use]
     pub fn uncertainty(&self, at: Nanos, length: Nanos) -> Option<Nanos> {
         let best = self.best?;
         Some(Nanos((best.uncertainty(at) + length.0 as f64).round() as u64))

@@ -77,26 +77,22 @@ impl Motion {
     }
 
     /// 1 or -1 in steps of the board.
-    #[must_use]
     pub fn side(&self) -> f64 {
         if self.to < self.from { -1.0 } else { 1.0 }
     }
 
     /// Whether nothing more is to be sent.
-    #[must_use]
     pub const fn is_all_sent(&self) -> bool {
         self.sent == self.to
     }
 
     /// The part of the profile for which jogs were sent: what becomes of it when no more come.
-    #[must_use]
     pub fn given(&self, mm_per_pulse: f64) -> Profile {
         let way = (self.sent - self.from).abs() as f64 * mm_per_pulse;
         Self::profile(way, &self.wanted)
     }
 
     /// How long before its time it is at these steps, where it goes at its full speed.
-    #[must_use]
     pub fn ahead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
         // A step is told of as soon as it is begun, and lasts until the next.
@@ -109,7 +105,6 @@ impl Motion {
     }
 
     /// From start to rest.
-    #[must_use]
     pub fn duration(&self) -> Nanos {
         Nanos((self.profile.duration().0 * 1e9) as u64)
     }

@@ -54,7 +54,6 @@ impl Pace {
     }
 
     /// What a feed is to be multiplied with.
-    #[must_use]
     pub fn feed(&self) -> f64 {
         1.0 - (self.drift + GAIN * self.ahead).clamp(-CHANGE_MAX, CHANGE_MAX)
     }

@@ -120,7 +120,6 @@ impl Status {
     }
 
     /// Whether a pin is closed.
-    #[must_use]
     pub fn has_pin(&self, pin: char) -> bool {
         self.pins.contains(pin)
     }

@@ -42,13 +42,11 @@ pub struct GrblSettings {
 
 impl GrblSettings {
     /// 1, or -1 where positive coordinates lead away from the tissue.
-    #[must_use]
     pub const fn sign(&self) -> i64 {
         if self.is_reversed { -1 } else { 1 }
     }
 
     /// 0 for `X`, 1 for `Y`, 2 for `Z`.
-    #[must_use]
     pub const fn index(&self) -> usize {
         match self.axis {
             'Y' => 1,

@@ -58,7 +58,6 @@ impl Default for Hx711Settings {
 
 impl Hx711Settings {
     /// Volts of one count at a gain of channel A.
-    #[must_use]
     pub fn volts_per_count(&self, gain: u8) -> f64 {
         self.full_scale.0 / f64::from(1_u32 << 23) * 128.0 / f64::from(gain)
     }

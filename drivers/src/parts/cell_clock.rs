@@ -40,7 +40,6 @@ impl CellClock {
     }
 
     /// How far arrivals of late are from the line, at the median: half of them are nearer.
-    #[must_use]
     pub fn spread(&self) -> Nanos {
         let mut late: Vec<f64> =
             self.prompt.iter().map(|(d, a)| a - (d * (1.0 + self.rate) + self.offset)).collect();

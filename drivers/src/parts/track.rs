@@ -143,7 +143,6 @@ impl Track {
     }
 
     /// At a time.
-    #[must_use]
     pub fn at(&self, time: Nanos) -> Placed {
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
         // Before all that is remembered: as it was first.

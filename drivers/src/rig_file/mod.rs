@@ -75,7 +75,6 @@ impl RigFile {
     }
 
     /// Where its devices are, that of the axis first.
-    #[must_use]
     pub fn places(&self) -> &[Place] {
         &self.places
     }

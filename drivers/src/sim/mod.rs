@@ -77,13 +77,11 @@ pub struct Truth {
 
 impl Truth {
     /// The probe's position on the scale of the pulse counter, as a host sees it.
-    #[must_use]
     pub fn position_counted(&self) -> Position {
         Position(self.position.distance_from(self.counter_zero))
     }
 
     /// The surface's position on the scale of the pulse counter, as a host sees it.
-    #[must_use]
     pub fn surface_counted(&self) -> Position {
         Position(self.surface.distance_from(self.counter_zero))
     }
@@ -157,19 +155,16 @@ impl SimRig {
     }
 
     /// The settings that rebuild this rig.
-    #[must_use]
     pub fn settings(&self) -> SimSettings {
         self.settings
     }
 
     /// What the laboratory's calibration of this rig's load cell says.
-    #[must_use]
     pub fn calibration(&self) -> Calibration {
         calibration(self.settings.profile)
     }
 
     /// What is really so at the tick of the newest event; see [`Truth`].
-    #[must_use]
     pub fn truth(&self) -> Truth {
         self.truth
     }

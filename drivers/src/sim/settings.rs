@@ -89,7 +89,6 @@ impl SimSettingError {
 
 impl SimSettings {
     /// True length of one tick in nanoseconds.
-    #[must_use]
     pub fn tick_nanos(&self) -> u64 {
         self.clock.tick_nanos() / self.rate.per_usual_tick()
     }
@@ -98,7 +97,6 @@ impl SimSettings {
     /// are not the usual ones, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
     /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C)
     /// and `input` (s).
-    #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
             ("profile".to_owned(), self.profile.to_string()),

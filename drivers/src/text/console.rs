@@ -40,7 +40,6 @@ impl<'a> TextConsole<'a> {
     }
 
     /// The host's clock.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         self.link.now()
     }

@@ -37,7 +37,6 @@ impl Lines {
     }
 
     /// Bytes of a line that has not ended.
-    #[must_use]
     pub fn pending(&self) -> usize {
         self.line.len()
     }

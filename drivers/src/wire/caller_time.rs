@@ -43,7 +43,6 @@ impl CallerTime {
     }
 
     /// The same without an order: of bytes that were exchanged.
-    #[must_use]
     pub fn of(&self, at: Nanos) -> Nanos {
         at.since(self.origin.unwrap_or(Nanos::ZERO))
     }

@@ -41,7 +41,6 @@ impl LinkStats {
 
     /// Half the difference of the longest and the shortest round trip: how far a sample's time at the host is
     /// uncertain against its controller's.
-    #[must_use]
     pub fn jitter(&self) -> Nanos {
         Nanos(self.round_trip_max.since(self.round_trip_min).0 / 2)
     }

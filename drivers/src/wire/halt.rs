@@ -39,7 +39,6 @@ impl HaltHandle {
     }
 
     /// How many stops are on the wire.
-    #[must_use]
     pub fn written(&self) -> u64 {
         self.standing.written.load(Ordering::Acquire)
     }
@@ -47,7 +46,6 @@ impl HaltHandle {
     /// Hands the immediate stop to the link's thread and waits about so long until it is written. Whether it is.
     ///
     /// On the link's own thread it does nothing: there the farewell stops the axis, see [`after_farewell`].
-    #[must_use]
     pub fn halt(&self, patience: Duration) -> bool {
         if self.is_own_thread() {
             return false;
@@ -57,13 +55,11 @@ impl HaltHandle {
     }
 
     /// Whether this is the link's own thread, which writes nothing while it waits.
-    #[must_use]
     pub fn is_own_thread(&self) -> bool {
         std::thread::current().id() == self.owner
     }
 
     /// Waits about so long until so many stops are written. Whether they are.
-    #[must_use]
     pub fn is_written(&self, number: u64, patience: Duration) -> bool {
         let looks = patience.as_micros() / LOOK_EVERY.as_micros();
         for _ in 0..=looks {

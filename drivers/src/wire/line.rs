@@ -134,7 +134,6 @@ impl Line {
     }
 
     /// What the device is called in the log of raw bytes.
-    #[must_use]
     pub fn device(&self) -> &str {
         &self.device
     }
@@ -154,14 +153,12 @@ impl Line {
     }
 
     /// What sends the immediate stop when the rig's owner cannot any more.
-    #[must_use]
     pub fn halt_handle(&self) -> Option<HaltHandle> {
         let thread = self.thread.as_ref()?.thread().id();
         Some(HaltHandle::new(self.stops.clone(), Arc::clone(&self.standing), thread))
     }
 
     /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
-    #[must_use]
     pub fn next_event(&self, until: Nanos, wait: Duration) -> Option<RigEvent> {
         let (reports, came) = &*self.reports;
         let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
@@ -178,7 +175,6 @@ impl Line {
     }
 
     /// The bytes exchanged since this was last asked.
-    #[must_use]
     pub fn take_raw(&self) -> Vec<RawBytes> {
         let (reports, _) = &*self.reports;
         let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
@@ -186,7 +182,6 @@ impl Line {
     }
 
     /// How the link behaves.
-    #[must_use]
     pub fn stats(&self) -> LinkStats {
         let (reports, _) = &*self.reports;
         let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);

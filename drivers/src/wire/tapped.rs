@@ -26,7 +26,6 @@ impl<'a> TappedLink<'a> {
     }
 
     /// The host's clock.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         (self.clock)()
     }

@@ -253,13 +253,11 @@ impl BiasCalibration {
     }
 
     /// By how much the way down is above the way up, in N: twice the friction.
-    #[must_use]
     pub fn hysteresis(&self) -> Option<Newtons> {
         self.falling.map(|one| Newtons(one.offset - self.rising.offset))
     }
 
     /// Bias voltage at which force begins on the way up: the end of the dead band.
-    #[must_use]
     pub fn begins(&self) -> Volts {
         let at = self.rising.dead.map_or(0.0, |dead| dead.0);
         Volts((at - self.rising.offset) / self.slope)

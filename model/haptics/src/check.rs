@@ -76,7 +76,6 @@ const LONGEST_S: f64 = 86_400.0;
 
 impl CheckSettings {
     /// The master's motor and what drives it.
-    #[must_use]
     pub fn torque(&self) -> TorqueSettings {
         TorqueSettings {
             drive: self.drive,
@@ -86,7 +85,6 @@ impl CheckSettings {
     }
 
     /// When the slider is at its end and begins to hold.
-    #[must_use]
     pub fn ramp(&self) -> Seconds {
         Seconds(self.depth.0 / self.speed.0)
     }

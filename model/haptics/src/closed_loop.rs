@@ -128,7 +128,6 @@ impl Plant {
     }
 
     /// What its encoder says.
-    #[must_use]
     pub fn sense(&self) -> Sensed {
         let step = self.settings.count_mm;
         if step > 0.0 {
@@ -143,37 +142,31 @@ impl Plant {
     }
 
     /// True place in mm and speed in mm/s.
-    #[must_use]
     pub fn motion(&self) -> [f64; 2] {
         [self.rack.x, self.rack.v]
     }
 
     /// Force of the hand, then of the motor into the tissue, at the end of the last part of a tick, in N.
-    #[must_use]
     pub fn forces(&self) -> [f64; 2] {
         [self.hand_force, self.motor_force]
     }
 
     /// Temperatures of the motor.
-    #[must_use]
     pub fn thermal(&self) -> ThermalState {
         self.thermal
     }
 
     /// Current of the motor in A.
-    #[must_use]
     pub fn amps(&self) -> f64 {
         self.motor.amps
     }
 
     /// Where the energies went, in N mm.
-    #[must_use]
     pub fn energies(&self) -> RackEnergies {
         self.rack.energies
     }
 
     /// Energy of its motion, in N mm.
-    #[must_use]
     pub fn kinetic(&self) -> f64 {
         self.rack.kinetic()
     }

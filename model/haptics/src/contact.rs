@@ -63,13 +63,11 @@ impl ContactDetector {
     }
 
     /// Whether it touches.
-    #[must_use]
     pub fn is_touching(&self) -> bool {
         self.is_touching
     }
 
     /// How often that has changed.
-    #[must_use]
     pub fn changes(&self) -> u64 {
         self.changes
     }

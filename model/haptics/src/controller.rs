@@ -91,19 +91,16 @@ impl PassivityController {
     }
 
     /// Energy that damping has taken, in N mm.
-    #[must_use]
     pub fn injected(&self) -> f64 {
         self.injected
     }
 
     /// Energy absorbed so far, in N mm.
-    #[must_use]
     pub fn energy(&self) -> f64 {
         self.observer.energy()
     }
 
     /// Whether a buzz was heard not long ago.
-    #[must_use]
     pub fn is_hushed(&self) -> bool {
         self.hush_left > 0
     }

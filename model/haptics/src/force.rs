@@ -193,19 +193,16 @@ impl ForceLaw {
     }
 
     /// How it was made.
-    #[must_use]
     pub fn settings(&self) -> &LawSettings {
         &self.settings
     }
 
     /// Ticks since the start.
-    #[must_use]
     pub fn ticks(&self) -> u64 {
         self.ticks
     }
 
     /// Time since the start.
-    #[must_use]
     pub fn time(&self) -> Nanos {
         self.settings.period.time_of(self.ticks)
     }

@@ -124,7 +124,6 @@ impl ForceGuard {
     }
 
     /// The force now at the device: what the next one is measured against.
-    #[must_use]
     pub fn force(&self) -> Newtons {
         Newtons(self.last)
     }

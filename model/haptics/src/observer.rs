@@ -39,7 +39,6 @@ impl PassivityObserver {
     }
 
     /// Energy absorbed so far in N mm; below zero the force has given more than it took.
-    #[must_use]
     pub fn energy(&self) -> f64 {
         self.energy
     }

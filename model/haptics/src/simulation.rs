@@ -147,7 +147,6 @@ impl Simulation {
     }
 
     /// The device.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
@@ -158,7 +157,6 @@ impl Simulation {
     }
 
     /// The system.
-    #[must_use]
     pub fn system(&self) -> &MasterSlave {
         &self.system
     }

@@ -107,7 +107,6 @@ impl TorqueSettings {
     }
 
     /// Bias voltage per force at the rack, at rest, in V/N.
-    #[must_use]
     pub fn volts_per_newton(&self) -> f64 {
         let amps = self.pinion.radius_mm() / self.motor.torque_constant;
         match self.drive {
@@ -117,7 +116,6 @@ impl TorqueSettings {
     }
 
     /// What the drive is told by a bias voltage.
-    #[must_use]
     pub fn drive(&self, bias: Volts) -> Drive {
         match self.drive {
             DriveKind::Voltage { gain } => Drive::Voltage(gain * bias.0),
@@ -126,7 +124,6 @@ impl TorqueSettings {
     }
 
     /// Current at a bias voltage with the motor at rest, in A.
-    #[must_use]
     pub fn amps_at_rest(&self, bias: Volts) -> f64 {
         let most = self.motor.volts_max / self.motor.resistance;
         let amps = match self.drive(bias) {
@@ -137,7 +134,6 @@ impl TorqueSettings {
     }
 
     /// Damping at the rack that the drive adds, in N s/mm.
-    #[must_use]
     pub fn damping(&self) -> f64 {
         match self.drive {
             DriveKind::Voltage { .. } => self.motor.voltage_damping(self.pinion.radius_mm()),
@@ -146,13 +142,11 @@ impl TorqueSettings {
     }
 
     /// Friction of the motor at the rack.
-    #[must_use]
     pub fn friction(&self) -> Newtons {
         Newtons(self.motor.friction / self.pinion.radius_mm())
     }
 
     /// The command for a force against motion into the tissue, with the device moving at `speed`.
-    #[must_use]
     pub fn tick(&self, force: Newtons, speed: MmPerS) -> TorqueTick {
         let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
         let help = if speed.0 > 0.0 {

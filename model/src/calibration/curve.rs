@@ -171,7 +171,6 @@ impl Curve {
     }
 
     /// The signal in V at a force in N.
-    #[must_use]
     pub fn volts_from_newtons(&self, force: Newtons) -> Volts {
         let first = &self.pieces[0];
         let newtons = force.0;
@@ -186,7 +185,6 @@ impl Curve {
     }
 
     /// The force in N at a signal in V: the exact inverse of [`Curve::volts_from_newtons`].
-    #[must_use]
     pub fn newtons_from_volts(&self, signal: Volts) -> Newtons {
         let first = &self.pieces[0];
         let volts = signal.0;
@@ -203,7 +201,6 @@ impl Curve {
 
     /// The force in N above the unloaded cell, whose signal the tare found: the curve is moved along the
     /// signal so that it passes through zero there. Without a tare, above the calibration's own zero.
-    #[must_use]
     pub fn newtons_above(&self, signal: Volts, tare: Option<Volts>) -> Newtons {
         let zero = self.volts_from_newtons(Newtons(0.0));
         let shift = tare.map_or(0.0, |tare| tare.0 - zero.0);
@@ -211,7 +208,6 @@ impl Curve {
     }
 
     /// The slope of the curve in V/N at a force; always positive.
-    #[must_use]
     pub fn sensitivity_at(&self, force: Newtons) -> f64 {
         if force.0 <= self.pieces[0].newtons {
             self.slope_first
@@ -224,20 +220,17 @@ impl Curve {
     }
 
     /// The forces in N of the first and the last weight step.
-    #[must_use]
     pub fn force_range(&self) -> (Newtons, Newtons) {
         (Newtons(self.pieces[0].newtons), Newtons(self.newtons_last))
     }
 
     /// Whether a force lies beyond the weight steps, where the curve is only a straight guess.
-    #[must_use]
     pub fn is_extrapolated(&self, force: Newtons) -> bool {
         !(self.pieces[0].newtons..=self.newtons_last).contains(&force.0)
     }
 
     /// The standard deviation in N of a force at `at` read from a signal with standard deviation
     /// `noise` in V: noise over sensitivity, to first order.
-    #[must_use]
     pub fn force_sigma(&self, at: Newtons, noise: Volts) -> Newtons {
         Newtons(noise.0 / self.sensitivity_at(at))
     }

@@ -159,7 +159,6 @@ pub struct Point {
 
 impl Point {
     /// Mean signal of one direction, if it was taken.
-    #[must_use]
     pub fn mean(&self, direction: Direction) -> Option<Volts> {
         let volts = |reading: &&Reading| reading.direction == direction;
         let own: Vec<f64> = self.readings.iter().filter(volts).map(|r| r.volts.0).collect();
@@ -167,7 +166,6 @@ impl Point {
     }
 
     /// Loading minus unloading.
-    #[must_use]
     pub fn hysteresis(&self) -> Option<Volts> {
         Some(self.mean(Direction::Loading)? - self.mean(Direction::Unloading)?)
     }
@@ -376,7 +374,6 @@ impl Calibration {
 
     /// The last digit of the readings, where it is known: stated, or for the thesis's table as recorded
     /// sessions carry it, read from its print.
-    #[must_use]
     pub fn reading_resolution(&self) -> Option<Volts> {
         let is_thesis = || self.steps == Self::thesis().steps;
         self.resolution.or_else(|| is_thesis().then_some(THESIS_RESOLUTION))
@@ -384,7 +381,6 @@ impl Calibration {
 
     /// How far the empty cell's signal moved from the beginning to the end: from the zeros taken for
     /// this, else from the empty steps of the first and the last series.
-    #[must_use]
     pub fn zero_shift(&self) -> Option<Volts> {
         if let (Some(before), Some(after)) = (self.zero_before, self.zero_after) {
             return Some(after - before);
@@ -395,7 +391,6 @@ impl Calibration {
     }
 
     /// Days for which it is valid.
-    #[must_use]
     pub fn valid_days(&self) -> u32 {
         self.valid_days.unwrap_or(VALID_DAYS)
     }

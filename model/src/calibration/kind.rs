@@ -44,7 +44,6 @@ impl CurveKind {
     }
 
     /// Whether the curve goes through every one of these points.
-    #[must_use]
     pub fn meets_all(&self, points: &[Point]) -> bool {
         match self {
             Self::Monotone => true,

@@ -215,7 +215,6 @@ impl Settling {
     }
 
     /// How far it has come.
-    #[must_use]
     pub fn now(&self) -> SettlingNow {
         SettlingNow {
             waited: self.waited(),

@@ -91,13 +91,11 @@ impl ForceUncertainty {
     }
 
     /// Standard uncertainty of a force; `None` where the calibration states nothing of its errors.
-    #[must_use]
     pub fn sigma(&self, force: Newtons) -> Option<Newtons> {
         self.is_stated().then(|| Newtons(self.between(&self.sigma, force.0)))
     }
 
     /// The part of one term.
-    #[must_use]
     pub fn term_sigma(&self, term: Term, force: Newtons) -> Option<Newtons> {
         if self.not_stated.contains(&term) {
             return None;
@@ -109,25 +107,21 @@ impl ForceUncertainty {
     }
 
     /// Whether anything is known of its errors.
-    #[must_use]
     pub fn is_stated(&self) -> bool {
         self.not_stated.len() < Term::ALL.len()
     }
 
     /// Terms of which the calibration says nothing.
-    #[must_use]
     pub fn not_stated(&self) -> &[Term] {
         &self.not_stated
     }
 
     /// Whether a force lies beyond the weights, where the true uncertainty is larger than what is told.
-    #[must_use]
     pub fn is_extrapolated(&self, force: Newtons) -> bool {
         !(self.range.0.0..=self.range.1.0).contains(&force.0)
     }
 
     /// The heaviest weight.
-    #[must_use]
     pub fn force_max(&self) -> Newtons {
         self.range.1
     }
@@ -139,7 +133,6 @@ impl ForceUncertainty {
 
     /// How far one standard uncertainty of the error with this index, of [`ForceUncertainty::errors`], moves
     /// a force.
-    #[must_use]
     pub fn shift(&self, error: usize, force: Newtons) -> Newtons {
         Newtons(self.between(&self.components[error].shifts, force.0))
     }

@@ -113,7 +113,6 @@ impl KnownWeight {
 impl Calibration {
     /// Why this calibration may not be right for that use, one sentence each; none if nothing speaks
     /// against it.
-    #[must_use]
     pub fn doubts(&self, bench: &Bench<'_>) -> Vec<String> {
         let mut doubts = Vec::new();
         let valid = i64::from(self.valid_days());

@@ -17,7 +17,6 @@ pub struct WeightStep {
 
 impl WeightStep {
     /// The weight of the mass in N under [`STANDARD_GRAVITY`].
-    #[must_use]
     pub fn newtons(&self) -> Newtons {
         newtons_of(self.mass_g)
     }

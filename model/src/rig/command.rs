@@ -52,14 +52,12 @@ pub enum RigCommand {
 
 impl RigCommand {
     /// Whether it moves the axis.
-    #[must_use]
     pub const fn is_motion(&self) -> bool {
         matches!(self, Self::MoveTo(_) | Self::Oscillate(_))
     }
 
     /// Whether a controller that acknowledges `set` does what this command asked. It counts speed and acceleration
     /// in quanta of its own, so 0.9 mm/s may come back as thirty times 0.03 mm/s, which is not the same float.
-    #[must_use]
     pub fn is_answered_by(&self, set: &Self) -> bool {
         // Far below any quantum of speed, far above the rounding of a product.
         let is_near = |asked: f64, set: f64| (asked - set).abs() <= 1e-9 * asked.abs();
@@ -79,7 +77,6 @@ impl RigCommand {
     }
 
     /// Whether this command takes speed out of the axis; such commands overtake all others.
-    #[must_use]
     pub fn is_stopping(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
     }

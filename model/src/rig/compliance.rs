@@ -215,7 +215,6 @@ impl Compliance {
     /// How deep the probe really is where the axis is at a raw depth under a force.
     ///
     /// Contact is found at forces far below those of a measurement, and the rig gives way by as little there.
-    #[must_use]
     pub fn correct(&self, raw: Depth, force: Newtons, force_sigma: Newtons) -> CorrectedDepth {
         let from_compliance = force.0 * self.std_error;
         let from_force = self.mm_per_newton * force_sigma.0;

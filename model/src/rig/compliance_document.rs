@@ -103,7 +103,6 @@ impl RigCompliance {
     }
 
     /// As depths are corrected with it.
-    #[must_use]
     pub fn compliance(&self) -> Compliance {
         Compliance {
             mm_per_newton: self.mm_per_n,

@@ -15,7 +15,6 @@ pub enum Course {
 
 impl Course {
     /// The deceleration to rest when it is stopped at `at`.
-    #[must_use]
     pub fn stopped_at(&self, at: Seconds) -> Self {
         Self::Move(match self {
             Self::Move(profile) => profile.stopped_at(at),
@@ -24,7 +23,6 @@ impl Course {
     }
 
     /// Time from start to rest.
-    #[must_use]
     pub fn duration(&self) -> Seconds {
         match self {
             Self::Move(profile) => profile.duration(),
@@ -33,13 +31,11 @@ impl Course {
     }
 
     /// Where it ends.
-    #[must_use]
     pub fn end(&self) -> Position {
         self.position(self.duration())
     }
 
     /// Commanded position at a time since the start; before and after, the ends.
-    #[must_use]
     pub fn position(&self, at: Seconds) -> Position {
         match self {
             Self::Move(profile) => profile.position(at),
@@ -48,7 +44,6 @@ impl Course {
     }
 
     /// Commanded velocity at a time since the start, signed.
-    #[must_use]
     pub fn velocity(&self, at: Seconds) -> MmPerS {
         match self {
             Self::Move(profile) => profile.velocity(at),

@@ -92,7 +92,6 @@ impl RigDescription {
     pub const UNSEEN_USUAL: Position = Position(0.1);
 
     /// Length of one controller clock count.
-    #[must_use]
     pub fn tick(&self) -> Seconds {
         Seconds(self.tick_nanos as f64 * 1e-9)
     }
@@ -100,7 +99,6 @@ impl RigDescription {
     /// Samples in a millisecond, or thereabouts: 1 on a rig that samples a thousand times a second, be its millisecond
     /// of 976 us, and 20 on one that does so twenty thousand times. What is meant to last as long as so many samples of
     /// the one takes as many times more of the other.
-    #[must_use]
     pub fn samples_per_ms(&self) -> u32 {
         // Saturates for a tick of zero, which no rig has.
         let nanos = self.tick_nanos.max(1) as f64 * self.ticks_per_sample.max(1.0);
@@ -109,7 +107,6 @@ impl RigDescription {
 
     /// What a filter of so many milliseconds holds: a mean of each millisecond, or as many samples as come in them where
     /// they come more seldom, one at least.
-    #[must_use]
     pub fn means_in(&self, ms: usize) -> usize {
         let apart_ms = self.tick_nanos as f64 * 1e-6 * self.ticks_per_sample;
         if self.ticks_per_sample <= 1.0 || apart_ms <= 1.0 {
@@ -120,7 +117,6 @@ impl RigDescription {
 
     /// Whether the signal's own noise changes its counts, so that many equal samples are a dead cell. Half a count of
     /// white noise leaves two samples equal two times in five; a hundred in a row never happen.
-    #[must_use]
     pub fn shows_noise(&self) -> bool {
         self.adc.is_none_or(|adc| self.noise_expected.0 >= 0.5 * adc.volts_per_count)
     }

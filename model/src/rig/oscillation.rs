@@ -35,13 +35,11 @@ impl Sine {
     }
 
     /// Highest speed on the way: `2 pi |a| / T`.
-    #[must_use]
     pub fn speed_max(&self) -> MmPerS {
         MmPerS(TAU * self.amplitude.abs() / self.period_secs)
     }
 
     /// Highest acceleration on the way, at the turning points: `4 pi^2 |a| / T^2`.
-    #[must_use]
     pub fn acceleration_max(&self) -> MmPerS2 {
         MmPerS2((TAU / self.period_secs).powi(2) * self.amplitude.abs())
     }
@@ -77,19 +75,16 @@ impl Sine {
     }
 
     /// The deceleration to rest when it is stopped at `at`.
-    #[must_use]
     pub fn stopped_at(&self, at: Seconds) -> Profile {
         Profile::braking(self.position(at), self.velocity(at), MmPerS2(self.accel))
     }
 
     /// Time from start to rest.
-    #[must_use]
     pub fn duration(&self) -> Seconds {
         Seconds(self.duration_secs)
     }
 
     /// Commanded position at a time since the start; before and after, where it starts and ends.
-    #[must_use]
     pub fn position(&self, at: Seconds) -> Position {
         if at.0 <= 0.0 || at.0 >= self.duration_secs {
             return Position(self.from);
@@ -100,7 +95,6 @@ impl Sine {
     }
 
     /// Commanded velocity at a time since the start, signed.
-    #[must_use]
     pub fn velocity(&self, at: Seconds) -> MmPerS {
         if at.0 <= 0.0 || at.0 >= self.duration_secs {
             return MmPerS(0.0);

@@ -104,13 +104,11 @@ impl PathTracker {
     }
 
     /// Commanded velocity at the newest sample.
-    #[must_use]
     pub fn velocity(&self) -> MmPerS {
         self.velocity
     }
 
     /// Whether the axis is at rest with no motion under way or awaited.
-    #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.pending.is_none() && matches!(self.motion, Motion::Rest)
     }

@@ -47,7 +47,6 @@ impl Profile {
     }
 
     /// The deceleration to rest of this move when it is stopped at `at`.
-    #[must_use]
     pub fn stopped_at(&self, at: Seconds) -> Self {
         Self::braking(self.position(at), self.velocity(at), MmPerS2(self.accel))
     }
@@ -69,19 +68,16 @@ impl Profile {
     }
 
     /// Time from start to rest.
-    #[must_use]
     pub fn duration(&self) -> Seconds {
         Seconds(self.accel_secs + self.cruise_secs + self.decel_secs)
     }
 
     /// Where the move ends.
-    #[must_use]
     pub fn end(&self) -> Position {
         self.position(self.duration())
     }
 
     /// Commanded position at a time since the start; before and after, the ends.
-    #[must_use]
     pub fn position(&self, at: Seconds) -> Position {
         let t = at.0.clamp(0.0, self.duration().0);
         let accel_distance = |s: f64| self.speed_start * s + 0.5 * self.accel * s * s;
@@ -99,7 +95,6 @@ impl Profile {
     }
 
     /// Commanded velocity at a time since the start, signed.
-    #[must_use]
     pub fn velocity(&self, at: Seconds) -> MmPerS {
         let t = at.0;
         let speed = if t < 0.0 || t >= self.duration().0 {

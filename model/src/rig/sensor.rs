@@ -25,7 +25,6 @@ pub enum SensorReading {
 
 impl SensorReading {
     /// Whether it is a value that can be: of an input that can be, and a number.
-    #[must_use]
     pub fn is_possible(&self) -> bool {
         match self {
             Self::DigitalInput { number, .. } => {
@@ -68,14 +67,12 @@ impl SensorValues {
     }
 
     /// Whether a digital input, numbered from 1, is high.
-    #[must_use]
     pub fn is_high(&self, number: u8) -> Option<bool> {
         let index = usize::from(number).checked_sub(1)?;
         *self.digital_inputs.get(index)?
     }
 
     /// Temperature of the bath in °C.
-    #[must_use]
     pub fn bath_celsius(&self) -> Option<f64> {
         self.bath_celsius
     }

@@ -29,7 +29,6 @@ pub struct SignalFacts {
 
 impl RigDescription {
     /// How this rig takes its signal: one sample a controller tick.
-    #[must_use]
     pub fn signal(&self) -> SignalFacts {
         let rate = 1.0 / self.tick().0;
         let filter = if self.settings.is_empty() {

@@ -18,7 +18,6 @@ impl MovingMean {
     }
 
     /// Whether the mean is over all the values it is meant for: before, it hides less noise.
-    #[must_use]
     pub fn is_full(&self) -> bool {
         self.ring.len() == self.length
     }

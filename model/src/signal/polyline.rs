@@ -72,7 +72,6 @@ impl Reducer {
     }
 
     /// The picture in the place of a line of too many points.
-    #[must_use]
     pub fn coverage(&self) -> Option<Coverage> {
         if !self.is_dense() {
             return None;

@@ -130,25 +130,21 @@ impl Pyramid {
     }
 
     /// How many samples there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
     /// The values, gaps as they came.
-    #[must_use]
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
     /// Bytes of values and levels.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         let levels = self.levels.iter().map(Vec::len).sum::<usize>();
         self.values.len() * size_of::<f32>() + levels * size_of::<Bucket>()
@@ -257,7 +253,6 @@ impl Pyramid {
     }
 
     /// Places and values of the lowest and the highest sample of a range; `None` without a number in it.
-    #[must_use]
     pub fn extremes(&self, from: usize, to: usize) -> Option<[(usize, f32); 2]> {
         let to = to.min(self.values.len());
         let mut fold = Fold::default();

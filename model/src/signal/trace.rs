@@ -82,13 +82,11 @@ impl LiveTrace {
     }
 
     /// Samples that share one drawn minimum and maximum; above 1 the plot is thinned.
-    #[must_use]
     pub fn samples_per_bucket(&self) -> u64 {
         self.per_bucket
     }
 
     /// The points to draw, in order of time; a NaN force breaks the line.
-    #[must_use]
     pub fn points(&self) -> Vec<TracePoint> {
         let mut points = Vec::with_capacity(2 * self.buckets.len() + 2);
         for bucket in self.buckets.iter().chain(self.open.iter().map(|(bucket, _)| bucket)) {

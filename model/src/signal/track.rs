@@ -36,13 +36,11 @@ impl Segment {
     }
 
     /// Times in s.
-    #[must_use]
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
     /// The values of a quantity; empty where there is no such one.
-    #[must_use]
     pub fn values(&self, quantity: usize) -> &[f32] {
         self.columns.get(quantity).map_or(&[], Pyramid::values)
     }
@@ -94,38 +92,32 @@ impl Track {
     }
 
     /// How many samples there are.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.samples
     }
 
     /// Whether there are none.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples == 0
     }
 
     /// Bytes of all samples and their pyramids.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         self.segments.iter().map(|one| one.bytes()).sum()
     }
 
     /// The segments in order of time.
-    #[must_use]
     pub fn segments(&self) -> &[Arc<Segment>] {
         &self.segments
     }
 
     /// Times of the first and the last sample.
-    #[must_use]
     pub fn span(&self) -> Option<[f64; 2]> {
         let first = self.segments.first()?.times.first()?;
         Some([*first, *self.segments.last()?.times.last()?])
     }
 
     /// Time of a sample; of the last one beyond the end.
-    #[must_use]
     pub fn time_of(&self, index: usize) -> Option<f64> {
         let index = index.min(self.samples.checked_sub(1)?);
         let segment = self.before.partition_point(|before| *before <= index) - 1;
@@ -133,7 +125,6 @@ impl Track {
     }
 
     /// The last sample not after a time; the first one before all.
-    #[must_use]
     pub fn place(&self, t: f64) -> Option<Place> {
         let after = self.segments.partition_point(|one| one.times[0] <= t);
         let segment = after.saturating_sub(1);
@@ -143,7 +134,6 @@ impl Track {
     }
 
     /// A quantity at a place; `None` in a gap.
-    #[must_use]
     pub fn value(&self, quantity: usize, place: Place) -> Option<f64> {
         let values = self.segments.get(place.segment)?.values(quantity);
         let value = f64::from(*values.get(place.within)?);
@@ -152,7 +142,6 @@ impl Track {
 
     /// The lowest and the highest value of a quantity between two samples, the second excluded, each with its
     /// time; `None` without a number there.
-    #[must_use]
     pub fn extremes(&self, quantity: usize, from: usize, to: usize) -> Option<[(f64, f64); 2]> {
         let mut found: Option<[(f64, f64); 2]> = None;
         for (segment, before) in self.segments.iter().zip(&self.before) {

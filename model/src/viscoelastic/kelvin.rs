@@ -52,7 +52,6 @@ impl ModifiedKelvin {
     }
 
     /// The force in N at which a depth held for ever settles; zero out of contact.
-    #[must_use]
     pub fn elastic(&self, depth: Depth) -> Newtons {
         let x = depth.0.max(0.0);
         let [mu1, mu2, mu3] = self.mu;
@@ -101,13 +100,11 @@ impl KelvinState {
     }
 
     /// The depth at the end of the last step.
-    #[must_use]
     pub fn depth(&self) -> Depth {
         Depth(self.depth)
     }
 
     /// The force in N that `body` exerts now.
-    #[must_use]
     pub fn force(&self, body: &ModifiedKelvin) -> Newtons {
         let [f1, f2, f3] = &self.powers;
         let [mu1, mu2, mu3] = body.mu;

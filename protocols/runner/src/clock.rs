@@ -199,7 +199,6 @@ impl Metronome {
     }
 
     /// Nanoseconds since it began.
-    #[must_use]
     pub fn now(&self) -> u64 {
         self.0.elapsed().as_nanos() as u64
     }
@@ -224,7 +223,6 @@ impl Stopwatch {
     }
 
     /// Seconds since the start.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
     }

@@ -106,13 +106,11 @@ impl Runner {
     }
 
     /// A sender of requests for another thread, such as a signal handler.
-    #[must_use]
     pub fn requests(&self) -> SyncSender<Request> {
         self.requests.clone()
     }
 
     /// Whether the thread still runs.
-    #[must_use]
     pub fn is_alive(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
@@ -123,7 +121,6 @@ impl Runner {
     }
 
     /// The newest snapshot.
-    #[must_use]
     pub fn snapshot(&self) -> Arc<Snapshot> {
         self.snapshot.load_full()
     }

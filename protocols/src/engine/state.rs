@@ -231,13 +231,11 @@ impl State {
     }
 
     /// What the run is doing now.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         self.phase
     }
 
     /// Repeat of the measurement, from 1; 0 where nothing is measured. A ramp and hold has one cycle.
-    #[must_use]
     pub fn cycle(&self) -> u32 {
         let planned = self.config.plan.steps.get(self.step_index);
         let cycle = planned.map_or(0, |planned| planned.cycle);
@@ -254,7 +252,6 @@ impl State {
     }
 
     /// Whether and how the run is paused or about to.
-    #[must_use]
     pub fn pause(&self) -> PauseView {
         match (&self.activity, self.pause) {
             (Activity::Paused { next }, _)
@@ -276,55 +273,46 @@ impl State {
     }
 
     /// Index of the step in progress, and since when.
-    #[must_use]
     pub fn step_progress(&self) -> (usize, Nanos) {
         (self.step_index, self.step_started)
     }
 
     /// Values derived from the newest sample.
-    #[must_use]
     pub fn derived(&self) -> &Derived {
         &self.derived
     }
 
     /// Whether motion is possible.
-    #[must_use]
     pub fn power(&self) -> Power {
         self.power
     }
 
     /// Whether position zero is known.
-    #[must_use]
     pub fn is_homed(&self) -> bool {
         self.is_homed
     }
 
     /// Whether the next run may trust position zero.
-    #[must_use]
     pub fn is_homed_for_next(&self) -> bool {
         self.is_homed && !self.is_path_lost
     }
 
     /// Where the tissue begins, once found.
-    #[must_use]
     pub fn contact(&self) -> Option<Contact> {
         self.contact
     }
 
     /// The unloaded signal, once measured.
-    #[must_use]
     pub fn tare(&self) -> Option<UnloadedSignal> {
         self.tare
     }
 
     /// Newest answer of the live fit, as it came in.
-    #[must_use]
     pub fn live(&self) -> Option<&LiveEstimate> {
         self.live.as_ref()
     }
 
     /// Whether a plan runs that never energised the motor, such as a calibration: no command can move the axis.
-    #[must_use]
     pub fn is_unpowered(&self) -> bool {
         self.power == Power::Stopped
             && matches!(
@@ -337,7 +325,6 @@ impl State {
     }
 
     /// Whether the axis may be moving or about to move.
-    #[must_use]
     pub fn is_motion_possible(&self) -> bool {
         matches!(
             self.activity,
@@ -351,7 +338,6 @@ impl State {
     }
 
     /// Set while the run has stopped and awaits the operator's choice to retract or close.
-    #[must_use]
     pub fn holding(&self) -> Option<&Outcome> {
         match &self.activity {
             // A monitor wanted the probe out: it leaves first.
@@ -372,7 +358,6 @@ impl State {
     }
 
     /// How the run ended, once it has.
-    #[must_use]
     pub fn outcome(&self) -> Option<&Outcome> {
         match &self.activity {
             Activity::Ended(outcome) => Some(outcome),
@@ -381,14 +366,12 @@ impl State {
     }
 
     /// The plan's step in progress, if any.
-    #[must_use]
     pub fn current_step(&self) -> Option<&Step> {
         let planned = self.config.plan.steps.get(self.step_index)?;
         Some(&planned.step)
     }
 
     /// What does not change during the run.
-    #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
     }

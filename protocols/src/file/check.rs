@@ -18,7 +18,6 @@ pub struct Checked {
 
 impl Checked {
     /// Whether nothing forbids a run.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         !self.problems.iter().any(Problem::is_error)
     }

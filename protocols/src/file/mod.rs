@@ -158,7 +158,6 @@ impl Protocol {
     }
 
     /// What it asks for and was not told, in the order of [`KEYS`].
-    #[must_use]
     pub fn open_questions(&self, labels: &Labels) -> Vec<&'static about::Key> {
         let is_open = |key: &&about::Key| {
             self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)

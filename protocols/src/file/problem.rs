@@ -41,7 +41,6 @@ impl Problem {
     }
 
     /// Whether it keeps the protocol from running.
-    #[must_use]
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
     }

@@ -167,7 +167,6 @@ impl Given {
     }
 
     /// Its kind; none for "none" and for a list of different kinds.
-    #[must_use]
     pub fn kind(&self) -> Option<Kind> {
         match &self.what {
             What::Number(kind, _) => Some(*kind),

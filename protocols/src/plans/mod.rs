@@ -92,13 +92,11 @@ pub struct PlanLimits {
 
 impl PlanLimits {
     /// Whether there is none.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// Which limits stand here for nothing, and why: they can only tighten what the rig allows.
-    #[must_use]
     pub fn unused(&self, rig: &Limits) -> Vec<String> {
         let told = |name, own: &dyn Display, rigs: &dyn Display| {
             format!(
@@ -113,7 +111,6 @@ impl PlanLimits {
     }
 
     /// The rig's limits, made tighter where this plan asks for it.
-    #[must_use]
     pub fn tighten(&self, mut limits: Limits) -> Limits {
         if let Some(force) = self.force_max {
             limits.force_max = Newtons(limits.force_max.0.min(force.0));

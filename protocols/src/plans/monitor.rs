@@ -77,7 +77,6 @@ impl Source {
 
 impl Monitor {
     /// Whether a value trips it.
-    #[must_use]
     pub fn is_tripped_by(&self, value: f64) -> bool {
         match self.side {
             Side::Above => value >= self.threshold,
@@ -86,7 +85,6 @@ impl Monitor {
     }
 
     /// Whether a value is past it again.
-    #[must_use]
     pub fn is_past_at(&self, value: f64) -> bool {
         match self.side {
             Side::Above => value <= self.resume,

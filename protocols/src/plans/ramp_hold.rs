@@ -60,7 +60,6 @@ impl Default for RampHold {
 
 impl RampHold {
     /// The plan, from self-test to retract.
-    #[must_use]
     pub fn plan(&self) -> Plan {
         let mut steps = approach(TARE, FindContact::default());
         steps.extend([

@@ -40,7 +40,6 @@ pub struct OutlinePoint {
 
 impl OutlinePoint {
     /// Force of the softest and the stiffest specimen expected.
-    #[must_use]
     pub fn force_band(&self) -> [Newtons; 2] {
         match self.is_force_set {
             true => [self.force; 2],

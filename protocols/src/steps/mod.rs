@@ -245,37 +245,31 @@ impl InProgress for Moving {
 
 impl Step {
     /// Its word in a protocol.
-    #[must_use]
     pub fn word(&self) -> &'static str {
         self.kind().facts().word
     }
 
     /// The phase it begins with.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         self.kind().facts().phase
     }
 
     /// Whether it is the measurement itself, which indents or leaves tissue while it is recorded.
-    #[must_use]
     pub fn is_measuring(&self) -> bool {
         self.kind().facts().is_measuring
     }
 
     /// Whether it may move the probe towards the tissue, where it can touch. Homing and leaving cannot.
-    #[must_use]
     pub fn may_touch(&self) -> bool {
         self.kind().may_touch()
     }
 
     /// Whether it moves the probe by a known position, which needs a homed axis.
-    #[must_use]
     pub fn needs_homed_axis(&self) -> bool {
         self.kind().needs().contains(&Need::Home)
     }
 
     /// The deepest place it is meant to reach in a measurement; none where that is not its purpose.
-    #[must_use]
     pub fn deepest(&self) -> Option<Depth> {
         self.kind().deepest()
     }

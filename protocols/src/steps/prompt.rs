@@ -178,7 +178,6 @@ impl InProgress for Asking {
 
 impl State {
     /// The prompt that waits for an answer, and until when.
-    #[must_use]
     pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
         match self.active() {
             Some(table::Active::Prompt(asking)) => Some((&asking.plan, asking.deadline)),

@@ -53,7 +53,6 @@ const MEAN_SAMPLES_MAX: f64 = 1000.0;
 
 impl Sine {
     /// What a rig is told: whole pulses and whole ticks.
-    #[must_use]
     pub fn command(&self, rig: &RigDescription) -> Oscillation {
         Oscillation {
             amplitude_pulses: (self.amplitude_mm / rig.mm_per_pulse).round() as i64,

@@ -131,7 +131,6 @@ impl InProgress for Weighing {
 
 impl State {
     /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
-    #[must_use]
     pub fn settling(&self) -> Option<SettlingNow> {
         match self.active() {
             Some(table::Active::Weigh(weighing)) => Some(weighing.settling.now()),

@@ -162,7 +162,6 @@ fn ways(text: &str, name: &str, value: &str) -> Result<Vec<Way>, ConditionError>
 
 impl Condition {
     /// Whether a session meets it. The catalog finds the same sessions with [`Condition::sql`].
-    #[must_use]
     pub fn is_met(&self, entry: &Entry) -> bool {
         let is_way = |one: &Named, way: &Way| {
             let is_unit = way.unit.is_none_or(|unit| one.unit.is_empty() || one.unit == unit);

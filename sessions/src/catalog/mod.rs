@@ -181,13 +181,11 @@ impl Catalog {
     }
 
     /// Whether it is in memory, for want of a library that may be written: then it starts empty whenever it is opened.
-    #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.db.path().is_none_or(str::is_empty)
     }
 
     /// The catalog's file.
-    #[must_use]
     pub fn path(&self) -> PathBuf {
         self.library.join(CATALOG_FILE)
     }

@@ -35,7 +35,6 @@ pub enum Notice {
 
 impl Notice {
     /// Whether a run should come to its end while all of it can still be saved.
-    #[must_use]
     pub fn ends_the_run(&self) -> bool {
         matches!(self, Self::Moved { is_last: true, .. } | Self::Altered(_) | Self::TooSlow)
     }
@@ -132,7 +131,6 @@ impl News {
     }
 
     /// What happened since this was last asked.
-    #[must_use]
     pub fn take(&self) -> Vec<Notice> {
         self.0.take_moves()
     }

@@ -90,7 +90,6 @@ impl Session {
 
     /// Whether it is as it was recorded, to the end: nothing was interrupted, lost, cut off or left out. Files that a
     /// failing disk made a recording go on in do not make it less.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         let recovered = self.manifest.recovered.as_ref();
         let is_cut = |note: &String| [NO_INDEX, LATER_PART].contains(&note.as_str());
@@ -101,7 +100,6 @@ impl Session {
 
     /// CRC-32 over the raw of every sample in order: tick, volts and pulses, eight bytes each, lowest first.
     /// How the log is cut into files is not in it.
-    #[must_use]
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         for row in &self.rows {
@@ -128,7 +126,6 @@ impl Session {
     }
 
     /// Session time of the newest sample or entry.
-    #[must_use]
     pub fn last_time(&self) -> Nanos {
         let row = self.rows.last().map(|row| row.host);
         let entry = self.entries.last().map(|entry| entry.now);

@@ -204,7 +204,6 @@ impl SessionWriter {
 
     /// How the disk keeps up: the log's part of a [`MachineState`], the longest synchronisation since this was
     /// last asked.
-    #[must_use]
     pub fn disk_state(&self) -> MachineState {
         let sync_ns = self.shared.sync_ns.swap(0, Ordering::AcqRel);
         let free = self.shared.free_bytes.load(Ordering::Acquire);
@@ -217,7 +216,6 @@ impl SessionWriter {
     }
 
     /// What becomes of the log after it was last asked, also once the writer is closed.
-    #[must_use]
     pub fn news(&self) -> News {
         News::of(&self.shared)
     }
@@ -248,14 +246,12 @@ impl SessionWriter {
     }
 
     /// Why nothing more is saved; `None` while all is well.
-    #[must_use]
     pub fn failure(&self) -> Option<String> {
         self.shared.check().err().map(|err| err.to_string())
     }
 
     /// Session time up to which everything is handed to the system, and so survives the death
     /// of this process.
-    #[must_use]
     pub fn saved_through(&self) -> Nanos {
         Nanos(self.shared.saved_through_ns.load(Ordering::Acquire))
     }

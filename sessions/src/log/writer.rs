@@ -51,7 +51,6 @@ pub struct Parts<'a> {
 
 impl Parts<'_> {
     /// Whether there is nothing.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         let has_more = !self.raw.is_empty() || !self.health.is_empty();
         self.rows.is_empty() && self.entries.is_empty() && !has_more
@@ -358,13 +357,11 @@ impl<S: Sink> LogWriter<S> {
     }
 
     /// Free room on the log's disk in bytes, if that is known.
-    #[must_use]
     pub fn free_bytes(&self) -> Option<u64> {
         self.segment.free_bytes()
     }
 
     /// Samples written so far.
-    #[must_use]
     pub fn samples(&self) -> u64 {
         self.at.samples
     }

@@ -64,14 +64,12 @@ pub struct Missing {
 
 impl Missing {
     /// Whether something is known to be missing, the end apart.
-    #[must_use]
     pub fn is_lossy(&self) -> bool {
         let has_gaps = !self.gaps.is_empty() || self.entries > 0 || self.raw_bytes > 0;
         has_gaps || !self.wounds.is_empty()
     }
 
     /// One sentence for every loss.
-    #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let mut told = Vec::new();
         for gap in &self.gaps {

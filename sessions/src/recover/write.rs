@@ -104,7 +104,6 @@ pub struct Recovery {
 
 impl Recovery {
     /// What was kept of the session at `from` and, after it, what is missing.
-    #[must_use]
     pub fn sentences(&self, from: &Path) -> Vec<String> {
         let raw = match self.salvage.raw_bytes {
             0 => String::new(),

@@ -396,13 +396,11 @@ pub struct Corrected {
 
 impl Corrected {
     /// By how much its depths are more, in mm.
-    #[must_use]
     pub fn deeper_mm(&self) -> f64 {
         self.was.depth_from(self.position).0
     }
 
     /// In words.
-    #[must_use]
     pub fn sentence(&self) -> String {
         format!(
             "contact {} at {:.3} mm instead of {:.3} mm; its depths change by {:+.3} mm",

@@ -71,7 +71,6 @@ impl Entry {
     }
 
     /// Whether it is in force, superseded, expired or only older, in words.
-    #[must_use]
     pub fn state(&self) -> String {
         let is_old = self.age_days.is_some_and(|age| age > i64::from(self.valid_days));
         match (&self.superseded_by, is_old, self.is_in_force) {

@@ -157,13 +157,11 @@ impl Traces {
     }
 
     /// Whether nothing is drawn.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples[1] == 0
     }
 
     /// What a reader must know of how points were left out.
-    #[must_use]
     pub fn thinning(&self) -> String {
         let [samples, known] = self.samples;
         let force = match known == samples {
@@ -176,7 +174,6 @@ impl Traces {
     }
 
     /// Where the interlock's limit is, if it is too far above the force to be drawn; else empty.
-    #[must_use]
     pub fn limit_above(&self) -> String {
         match (self.limit, limit_in_reach(self, &time_panel(self))) {
             (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),
@@ -185,7 +182,6 @@ impl Traces {
     }
 
     /// Time that counts as 0 in an overlay, if the session has it.
-    #[must_use]
     pub fn origin(&self, align: Align) -> Option<f64> {
         match align {
             Align::Ramp => self.ramp,

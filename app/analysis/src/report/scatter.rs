@@ -29,7 +29,6 @@ pub struct Scatter<'a> {
 
 impl Scatter<'_> {
     /// As a plot.
-    #[must_use]
     pub fn plot(&self) -> Plot {
         let best: Vec<usize> = match self.has_front {
             true => front(&self.marks.iter().map(|mark| mark.at).collect::<Vec<_>>()),

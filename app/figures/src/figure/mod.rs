@@ -272,7 +272,6 @@ impl Plot {
     }
 
     /// Names and inks of what has no name beside it: series, then stretches, each name once.
-    #[must_use]
     pub fn legend(&self) -> Vec<(&str, Ink)> {
         let series = self.series.iter();
         let series = series.filter(|one| one.labels == Labels::None);

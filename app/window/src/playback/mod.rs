@@ -76,7 +76,6 @@ impl PlaybackApp {
     }
 
     /// What is shown.
-    #[must_use]
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.snapshot
     }

@@ -34,13 +34,11 @@ impl Span {
     }
 
     /// What is shown.
-    #[must_use]
     pub fn shown(&self) -> [f64; 2] {
         self.part.unwrap_or(self.whole)
     }
 
     /// Whether all is shown.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.part.is_none()
     }
@@ -79,7 +77,6 @@ impl Span {
     }
 
     /// The place at a share of what is shown.
-    #[must_use]
     pub fn at(&self, share: f64) -> f64 {
         let [low, high] = self.shown();
         low + share * (high - low)

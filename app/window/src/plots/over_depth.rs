@@ -127,7 +127,6 @@ impl DepthLines {
     }
 
     /// What a reader must know of the lines: for how many samples how many points are drawn.
-    #[must_use]
     pub fn remark(&self) -> Option<String> {
         let made = self.made.as_ref()?;
         let samples: u64 = made.lines.iter().map(|line| line.samples).sum();
@@ -145,7 +144,6 @@ impl DepthLines {
     }
 
     /// Whether lines for another view or more samples are being found.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         self.job.is_busy()
     }

@@ -178,7 +178,6 @@ impl PlotCache {
     }
 
     /// The repeats so far, oldest first; empty where nothing is repeated.
-    #[must_use]
     pub fn loops(&self) -> &[CycleLoop] {
         &self.loops
     }
@@ -189,7 +188,6 @@ impl PlotCache {
     }
 
     /// What a reader of the plots must know: that they are thinned or cut. `None` if they are whole.
-    #[must_use]
     pub fn remark(&self) -> Option<String> {
         if self.force_time.is_cut || self.force_depth.is_cut {
             return Some("too many gaps to draw; the session holds everything".into());

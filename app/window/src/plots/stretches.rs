@@ -99,13 +99,11 @@ impl Stretches {
     }
 
     /// Lowest and highest of what is drawn.
-    #[must_use]
     pub fn y(&self) -> Option<[f64; 2]> {
         self.y
     }
 
     /// How much was drawn, and how far it is thinned.
-    #[must_use]
     pub fn drawn(&self) -> Drawn {
         self.drawn
     }

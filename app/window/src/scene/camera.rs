@@ -88,21 +88,18 @@ impl Camera {
     }
 
     /// Where the eye is.
-    #[must_use]
     pub fn eye(&self) -> Vec3 {
         let [_, _, away] = self.axes();
         along(self.target, away, -self.distance * self.size)
     }
 
     /// Unit vectors to the right and away from the eye as seen from above: what keys move along.
-    #[must_use]
     pub fn ground(&self) -> [[f64; 2]; 2] {
         let (sin, cos) = self.azimuth.sin_cos();
         [[cos, sin], [-sin, cos]]
     }
 
     /// This camera for a picture of a place and size, with what all its points share worked out.
-    #[must_use]
     pub fn lens(&self, picture: Rect) -> Lens {
         let half = f64::from(picture.height()) / 2.0;
         Lens {
@@ -127,7 +124,6 @@ pub struct Lens {
 
 impl Lens {
     /// Where a point is seen; `None` for one beside or behind the eye.
-    #[must_use]
     pub fn see(&self, point: Vec3) -> Option<Seen> {
         let from = along(point, self.eye, -1.0);
         let [right, up, distance] = self.axes.map(|axis| dot(from, axis));
@@ -142,13 +138,11 @@ impl Lens {
     }
 
     /// How many points of the picture a millimetre across the line of sight takes at a distance in mm.
-    #[must_use]
     pub fn points_per_mm(&self, distance: f64) -> f64 {
         self.scale / distance
     }
 
     /// The place at height `z` that is seen at a point of the picture; `None` above the horizon.
-    #[must_use]
     pub fn pick(&self, at: Pos2, z: f64) -> Option<[f64; 2]> {
         let right = f64::from(at.x - self.centre.x) / self.scale;
         let up = f64::from(self.centre.y - at.y) / self.scale;
@@ -160,7 +154,6 @@ impl Lens {
     }
 
     /// Where the eye is.
-    #[must_use]
     pub fn eye(&self) -> Vec3 {
         self.eye
     }

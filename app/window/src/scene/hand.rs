@@ -27,7 +27,6 @@ impl Hand {
     }
 
     /// Where, in mm.
-    #[must_use]
     pub fn at(&self) -> Vec3 {
         self.at
     }

@@ -75,7 +75,6 @@ impl SceneView {
     }
 
     /// Where the pointer and the keys want the tool.
-    #[must_use]
     pub fn hand(&self) -> &Hand {
         &self.hand
     }

@@ -59,7 +59,6 @@ pub struct ChecksScreen {
 
 impl ChecksScreen {
     /// The checks that were read last, oldest first.
-    #[must_use]
     pub fn checks(&self) -> Option<&Result<Vec<PastCheck>, String>> {
         self.task.answer()
     }

@@ -51,7 +51,6 @@ impl Default for ExtremesScreen {
 
 impl ExtremesScreen {
     /// Rows found by the last test.
-    #[must_use]
     pub fn rows(&self) -> Option<&[Row]> {
         let found = self.task.answer()?.as_ref().ok()?;
         Some(&found.rows)

@@ -74,7 +74,6 @@ impl RunScreen {
     }
 
     /// Where the exact fit of this run stands.
-    #[must_use]
     pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
         self.refitter.of(run)
     }

@@ -141,7 +141,6 @@ impl Screens {
     }
 
     /// Name of the one shown.
-    #[must_use]
     pub fn shown(&self) -> &'static str {
         self.all[self.shown].0
     }
@@ -152,7 +151,6 @@ impl Screens {
     }
 
     /// A screen by its type.
-    #[must_use]
     pub fn get<T: Screen>(&self) -> Option<&T> {
         let mut all = self.all.iter();
         all.find_map(|(_, one)| (one.as_ref() as &dyn Any).downcast_ref())
@@ -191,7 +189,6 @@ impl Screens {
     }
 
     /// What they are at.
-    #[must_use]
     pub fn occupation(&self) -> Occupation {
         let running = |(name, one): &(&'static str, Box<dyn Screen>)| Some((*name, one.running()?));
         Occupation {
@@ -201,7 +198,6 @@ impl Screens {
     }
 
     /// What can be asked of them by name.
-    #[must_use]
     pub fn actions(&self, workbench: &Workbench) -> Vec<Action> {
         let each = self.all.iter().map(|(_, one)| one.actions(workbench));
         each.flatten().collect()

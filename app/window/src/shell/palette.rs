@@ -56,7 +56,6 @@ impl Palette {
     }
 
     /// Whether it is open.
-    #[must_use]
     pub fn is_open(&self) -> bool {
         self.is_open
     }

@@ -56,7 +56,6 @@ impl Sizes {
     }
 
     /// Size of one in points.
-    #[must_use]
     pub fn get(&self, edge: Edge) -> f32 {
         self.0[edge as usize]
     }
@@ -73,7 +72,6 @@ impl Sizes {
     }
 
     /// What is to be remembered: none where a size is the usual one.
-    #[must_use]
     pub fn told(&self) -> [Option<f32>; 3] {
         Edge::ALL.map(|edge| Some(self.get(edge)).filter(|size| *size != edge.sizes()[1]))
     }

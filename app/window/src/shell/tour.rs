@@ -53,7 +53,6 @@ impl Tour {
     }
 
     /// Whether it is under way.
-    #[must_use]
     pub fn is_on(&self) -> bool {
         self.0.is_some()
     }

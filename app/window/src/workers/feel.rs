@@ -80,7 +80,6 @@ impl Feel {
     }
 
     /// Whether it ticks.
-    #[must_use]
     pub fn is_running(&self) -> bool {
         self.beat.is_some()
     }
@@ -98,7 +97,6 @@ impl Feel {
     }
 
     /// Where it is led, in mm.
-    #[must_use]
     pub fn place(&self) -> f64 {
         self.lead.place()
     }
@@ -109,37 +107,31 @@ impl Feel {
     }
 
     /// The newest tick.
-    #[must_use]
     pub fn last(&self) -> &SimulationTick {
         &self.last
     }
 
     /// How the loop kept its time.
-    #[must_use]
     pub fn kept(&self) -> &Kept {
         &self.kept
     }
 
     /// Ticks missed in the last half second or so.
-    #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed
     }
 
     /// Ticks a second that are wanted.
-    #[must_use]
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
     /// The priority that the system gave.
-    #[must_use]
     pub fn priority(&self) -> &str {
         &self.priority
     }
 
     /// What was special a moment ago and is still worth saying.
-    #[must_use]
     pub fn flags(&self) -> Flags {
         let late = self.trail.iter().rev();
         late.take_while(|point| point.t > self.last.t.0 - CAUSE_S)

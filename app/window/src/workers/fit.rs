@@ -78,13 +78,11 @@ impl Refitter {
     }
 
     /// Whether a fit is under way.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         self.job.is_busy()
     }
 
     /// Where the fit of this run stands.
-    #[must_use]
     pub fn of(&self, run: Option<&RunView>) -> Refit<'_> {
         let Some((folder, since)) = &self.asked else {
             return Refit::NotYet;

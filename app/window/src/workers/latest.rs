@@ -26,7 +26,6 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
     }
 
     /// Whether an answer is still to come.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         self.job.is_busy() || self.next.is_some()
     }

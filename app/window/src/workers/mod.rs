@@ -28,7 +28,6 @@ impl<T> Default for Job<T> {
 
 impl<T: Send + 'static> Job<T> {
     /// Whether an answer is still to come.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         self.answer.is_some()
     }

@@ -38,7 +38,6 @@ impl<T> Default for Dialog<T> {
 
 impl<T: Send + 'static> Dialog<T> {
     /// Whether the dialog is open.
-    #[must_use]
     pub fn is_open(&self) -> bool {
         self.job.is_busy()
     }

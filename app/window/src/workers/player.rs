@@ -50,7 +50,6 @@ impl PlayerThread {
     }
 
     /// The newest picture.
-    #[must_use]
     pub fn snapshot(&self) -> Arc<Snapshot> {
         Arc::clone(&locked(&self.desk.shown))
     }

@@ -39,13 +39,11 @@ impl Ports {
     }
 
     /// Whether a listing is under way.
-    #[must_use]
     pub fn is_busy(&self) -> bool {
         self.job.is_busy()
     }
 
     /// What the last listing found; `None` before the first.
-    #[must_use]
     pub fn found(&self) -> Option<Result<&[PortInfo], &str>> {
         self.found.as_ref().map(|found| match found {
             Ok(ports) => Ok(ports.as_slice()),

@@ -34,7 +34,6 @@ impl Recovery {
     }
 
     /// What was recovered and what is missing of it, a line each; empty if nothing was left unfinished.
-    #[must_use]
     pub fn told(&self) -> &[String] {
         &self.told
     }

@@ -85,19 +85,16 @@ impl<T: Send + 'static> Task<T> {
     }
 
     /// Whether it was asked to end and has not yet.
-    #[must_use]
     pub fn is_ending(&self) -> bool {
         self.job.is_busy() && self.progress.is_cancelled()
     }
 
     /// The last answer.
-    #[must_use]
     pub fn answer(&self) -> Option<&Result<T, String>> {
         self.answer.as_ref()
     }
 
     /// How far it is; none when nothing is under way.
-    #[must_use]
     pub fn standing(&self) -> Option<Standing> {
         let seconds = self.since.as_ref()?.seconds();
         let (done, of, what) = self.progress.read();

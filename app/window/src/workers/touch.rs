@@ -70,7 +70,6 @@ impl Moment {
     }
 
     /// Its heights at rest in mm.
-    #[must_use]
     pub fn rest(&self) -> &[f64] {
         &self.rest
     }
@@ -206,13 +205,11 @@ impl Touch {
     }
 
     /// Whether it ticks.
-    #[must_use]
     pub fn is_running(&self) -> bool {
         self.live.is_some()
     }
 
     /// Whether a path leads the hand, and not who sits here.
-    #[must_use]
     pub fn is_led(&self) -> bool {
         self.is_running() && self.is_led
     }
@@ -225,19 +222,16 @@ impl Touch {
     }
 
     /// What it is made of.
-    #[must_use]
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
     /// What was seen last.
-    #[must_use]
     pub fn moment(&self) -> &Moment {
         &self.moment
     }
 
     /// The time of it in s.
-    #[must_use]
     pub fn now(&self) -> f64 {
         let period = self.settings.period;
         period.time_of(self.moment.tick.tick).seconds().0
@@ -249,13 +243,11 @@ impl Touch {
     }
 
     /// How the loop kept its time.
-    #[must_use]
     pub fn kept(&self) -> &Kept {
         &self.kept
     }
 
     /// The priority that the system gave.
-    #[must_use]
     pub fn priority(&self) -> &str {
         &self.priority
     }

@@ -234,25 +234,21 @@ impl GalilEmulator {
     }
 
     /// True length of a sample.
-    #[must_use]
     pub fn period(&self) -> Seconds {
         self.clock.period()
     }
 
     /// The bench behind the controller, for tests and demonstrations.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
     /// Whether an axis, counted from 0, is moving, for tests and demonstrations.
-    #[must_use]
     pub fn is_running(&self, axis: usize) -> bool {
         self.axes.get(axis).is_some_and(Axis::is_running)
     }
 
     /// True position of the slide from home, whatever the counter says, for tests and demonstrations.
-    #[must_use]
     pub fn slide(&self) -> Position {
         self.plant.axis()
     }

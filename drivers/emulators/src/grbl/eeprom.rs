@@ -79,13 +79,11 @@ impl Eeprom {
     }
 
     /// A value; zero for a number that there is not.
-    #[must_use]
     pub fn get(&self, number: u16) -> f64 {
         self.values.get(&number).copied().unwrap_or(0.0)
     }
 
     /// Whether a flag is set.
-    #[must_use]
     pub fn flag(&self, number: u16) -> bool {
         self.get(number) != 0.0
     }
@@ -115,7 +113,6 @@ impl Eeprom {
     }
 
     /// The lines of `$$`.
-    #[must_use]
     pub fn listing(&self) -> String {
         let mut text = String::new();
         for (number, value) in &self.values {

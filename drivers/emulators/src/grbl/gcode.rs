@@ -76,7 +76,6 @@ pub struct Offsets {
 
 impl Offsets {
     /// Work coordinates are those of the machine less this.
-    #[must_use]
     pub fn of(&self, system: usize) -> Place {
         let mut all: Place =
             std::array::from_fn(|axis| self.systems[system][axis] + self.shift[axis]);

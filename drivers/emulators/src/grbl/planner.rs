@@ -71,25 +71,21 @@ impl Planner {
     }
 
     /// Where the newest block ends.
-    #[must_use]
     pub const fn end(&self) -> Place {
         self.end
     }
 
     /// Whether a block more finds no room.
-    #[must_use]
     pub fn is_full(&self) -> bool {
         self.blocks.len() >= BLOCKS_MAX
     }
 
     /// Free places for blocks.
-    #[must_use]
     pub fn free(&self) -> usize {
         BLOCKS_MAX - self.blocks.len()
     }
 
     /// Whether nothing is left to do.
-    #[must_use]
     pub fn is_idle(&self) -> bool {
         self.ahead.is_empty() && (self.blocks.is_empty() || (self.is_holding && self.speed == 0.0))
     }

@@ -127,7 +127,6 @@ impl EmulatedGauge {
     }
 
     /// Its reading of the moment as `?` gives it, for a stand that it sits on.
-    #[must_use]
     pub fn displayed(&self) -> String {
         let force = match self.set.mode {
             Mode::Current => self.filtered(self.set.filter_displayed),

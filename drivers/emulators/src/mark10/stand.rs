@@ -110,19 +110,16 @@ impl EmulatedStand {
     }
 
     /// What really is so, for tests: the plant behind it.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
     /// Its own travel in mm, for tests.
-    #[must_use]
     pub fn travel(&self) -> f64 {
         self.position - self.zero
     }
 
     /// Whether the crosshead moves, for tests.
-    #[must_use]
     pub fn is_moving(&self) -> bool {
         self.velocity != 0.0
     }

@@ -36,7 +36,6 @@ impl GaugeScale {
     }
 
     /// Volts of one count: one volt a newton.
-    #[must_use]
     pub fn volts_per_count(&self) -> f64 {
         self.unit.newtons() * 10_f64.powi(-i32::from(self.decimals))
     }

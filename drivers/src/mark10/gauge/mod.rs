@@ -57,7 +57,6 @@ pub struct GaugeSettings {
 impl GaugeSettings {
     /// Standard deviation of readings at rest: as it was given, or the rounding to steps of the last digit alone, for a
     /// gauge's filters are mostly stronger than its noise.
-    #[must_use]
     pub fn noise_expected(&self, step: Volts) -> Volts {
         self.noise.map_or(Volts(step.0 / 12.0_f64.sqrt()), |noise| Volts(noise.0))
     }

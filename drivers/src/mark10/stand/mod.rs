@@ -75,7 +75,6 @@ pub struct StandSettings {
 
 impl StandSettings {
     /// Pulses from home, into the tissue, of the stand's travel, which grows upwards.
-    #[must_use]
     pub fn pulses(&self, travel_hundredths: i64) -> i64 {
         if self.is_upwards { travel_hundredths } else { -travel_hundredths }
     }

@@ -32,7 +32,6 @@ impl Linear {
     }
 
     /// Damping in N s/mm that the lag alone takes, at any tick: `k0 tau - c0`.
-    #[must_use]
     pub fn lag(&self) -> f64 {
         self.stiffness * self.tau - self.damping
     }
@@ -81,7 +80,6 @@ impl Sampled {
     }
 
     /// Damping in N s/mm that slow motions need, by the criterion's limit at `theta = 0`.
-    #[must_use]
     pub fn slow(&self) -> f64 {
         // With q = e^{-j theta} = 1 - j theta + .. : H = H(1) + j theta h, and the limit is T/2 (H(1) - 2 h).
         let keep = 1.0 - self.share;
@@ -92,13 +90,11 @@ impl Sampled {
 
     /// Damping in N s/mm that the fastest motions need, which change at every tick: the criterion at
     /// `theta = pi`.
-    #[must_use]
     pub fn fast(&self) -> f64 {
         0.5 * self.tick * (self.now - self.before) / (2.0 - self.share)
     }
 
     /// Force in N/mm that one count more changes at once and in the end, the larger.
-    #[must_use]
     pub fn per_count(&self) -> f64 {
         self.now.abs().max((self.both / self.share).abs())
     }

@@ -82,19 +82,16 @@ pub struct Margin {
 
 impl Margin {
     /// Damping there is over damping needed; `None` where none is needed.
-    #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         (self.needed > 0.0).then(|| self.has / self.needed)
     }
 
     /// Whether the device has the damping needed.
-    #[must_use]
     pub fn is_enough(&self) -> bool {
         self.needed <= self.has
     }
 
     /// Whether friction is enough that single counts do not swing by themselves.
-    #[must_use]
     pub fn is_quiet(&self) -> bool {
         self.friction_needed <= self.friction
     }
@@ -102,7 +99,6 @@ impl Margin {
 
 impl Watch {
     /// The margin at a depth and speed; for every tick.
-    #[must_use]
     pub fn at(&self, depth: Depth, speed: MmPerS) -> Margin {
         let tick = self.period.seconds().0;
         let linear = Linear::of(&self.body, depth);
@@ -132,7 +128,6 @@ impl Watch {
 
     /// The same with the whole criterion instead of its two ends, which with a delay are up to a few times too
     /// careful. For before play: it looks at some hundreds of frequencies.
-    #[must_use]
     pub fn exactly_at(&self, depth: Depth, speed: MmPerS) -> Margin {
         if self.device.delay_ticks <= 0.0 {
             return self.at(depth, speed);
@@ -159,7 +154,6 @@ impl Watch {
     }
 
     /// What can be said before play of a stroke to `deepest`, entered at up to `speed`.
-    #[must_use]
     pub fn before_play(&self, deepest: Depth, speed: MmPerS) -> Verdict {
         let all = || self.over(deepest, speed).chain(self.over(deepest, MmPerS(0.0)));
         let worst = |more: fn(&Margin, &Margin) -> bool| {
@@ -199,19 +193,16 @@ pub struct Verdict {
 
 impl Verdict {
     /// Damping there is over damping needed, at the worst depth; `None` where none is needed.
-    #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         self.worst.ratio()
     }
 
     /// Whether nothing on the stroke can return energy that the device does not take.
-    #[must_use]
     pub fn is_calm(&self) -> bool {
         self.worst.is_enough() && self.loudest.is_quiet()
     }
 
     /// In words, the most important first.
-    #[must_use]
     pub fn sentences(&self) -> Vec<String> {
         let mut all = vec![self.damping_sentence()];
         if !self.bands.is_empty() {

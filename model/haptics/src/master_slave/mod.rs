@@ -127,7 +127,6 @@ impl MasterSlave {
     }
 
     /// Everything after the last tick.
-    #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { checksum: self.snapshot.sum(), ..self.snapshot }
     }

@@ -65,7 +65,6 @@ impl MasterSlaveSettings {
     }
 
     /// Way of the master per count, in mm.
-    #[must_use]
     pub fn count_mm(&self) -> f64 {
         self.encoder.count_mm(&self.torque.pinion)
     }
@@ -92,7 +91,6 @@ impl MasterSlaveSettings {
     }
 
     /// The margin of these settings, for before play and during it.
-    #[must_use]
     pub fn watch(&self) -> Watch {
         Watch {
             body: self.law.body,

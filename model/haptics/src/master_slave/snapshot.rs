@@ -89,7 +89,6 @@ impl Snapshot {
     }
 
     /// FNV-1a over the bits of every field but the checksum.
-    #[must_use]
     pub fn sum(&self) -> u64 {
         let floats = [
             self.master_mm,
@@ -130,7 +129,6 @@ impl Snapshot {
     }
 
     /// Whether every field is of the same tick.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.sum() == self.checksum
     }

@@ -68,19 +68,16 @@ impl Encoder {
     }
 
     /// Counts per revolution, the source's `N_R`.
-    #[must_use]
     pub fn counts_per_rev(&self) -> f64 {
         f64::from(self.lines) * f64::from(self.quadrature.edges())
     }
 
     /// Way of the rack per count, in mm.
-    #[must_use]
     pub fn count_mm(&self, pinion: &Pinion) -> f64 {
         pinion.mm_per_rev() / self.counts_per_rev()
     }
 
     /// Fastest counts per second.
-    #[must_use]
     pub fn counts_per_s_max(&self) -> f64 {
         self.lines_per_s_max * f64::from(self.quadrature.edges())
     }

@@ -48,7 +48,6 @@ pub enum HandPath {
 
 impl HandPath {
     /// Place in mm at `t` s.
-    #[must_use]
     pub fn at(&self, t: f64) -> f64 {
         match *self {
             Self::Still { at } => at,

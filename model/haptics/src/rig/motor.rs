@@ -92,25 +92,21 @@ impl Motor {
     }
 
     /// Voltage per speed in V s/rad.
-    #[must_use]
     pub fn back_emf(&self) -> f64 {
         self.torque_constant * 1e-3
     }
 
     /// Torque at a current, before friction.
-    #[must_use]
     pub fn torque(&self, amps: f64) -> f64 {
         self.torque_constant * amps
     }
 
     /// Damping at the rack that a voltage drive adds, in N s/mm: the motor as a brake, `kM kE / (R r^2)`.
-    #[must_use]
     pub fn voltage_damping(&self, radius_mm: f64) -> f64 {
         self.torque_constant * self.back_emf() / (self.resistance * radius_mm * radius_mm)
     }
 
     /// The current after `dt` s, the speed held over it: exact for the winding's own time constant.
-    #[must_use]
     pub fn after(&self, state: MotorState, drive: Drive, omega: f64, dt: f64) -> MotorState {
         let emf = self.back_emf() * omega;
         let limit = |volts: f64| volts.clamp(-self.volts_max, self.volts_max);

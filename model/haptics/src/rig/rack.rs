@@ -22,13 +22,11 @@ impl Default for Pinion {
 
 impl Pinion {
     /// Pitch radius in mm.
-    #[must_use]
     pub fn radius_mm(&self) -> f64 {
         0.5 * f64::from(self.teeth) * self.module_mm
     }
 
     /// Way of the rack per revolution, in mm.
-    #[must_use]
     pub fn mm_per_rev(&self) -> f64 {
         std::f64::consts::TAU * self.radius_mm()
     }
@@ -93,7 +91,6 @@ impl Rack {
     }
 
     /// Energy of its motion, in N mm.
-    #[must_use]
     pub fn kinetic(&self) -> f64 {
         0.5 * self.mass * self.v * self.v
     }
@@ -123,7 +120,6 @@ impl Rack {
     }
 
     /// What is missing in the balance of energies, in N mm, from a start at rest: rounding alone.
-    #[must_use]
     pub fn residual(&self) -> f64 {
         let RackEnergies { motor, hand, damping, friction } = self.energies;
         motor + hand - damping - friction - self.kinetic()

@@ -49,13 +49,11 @@ pub struct ThermalState {
 
 impl Thermal {
     /// Everything as warm as the air.
-    #[must_use]
     pub fn cold(&self) -> ThermalState {
         ThermalState { winding_c: self.air_c, case_c: self.air_c }
     }
 
     /// Where `watts` for ever would lead.
-    #[must_use]
     pub fn settled(&self, watts: f64) -> ThermalState {
         let case_c = self.air_c + watts * self.case_air;
         ThermalState { winding_c: case_c + watts * self.winding_case, case_c }
@@ -63,7 +61,6 @@ impl Thermal {
 
     /// After `dt` s of `watts`: each node by its exact exponential with the other held, which is stable at
     /// any step and right to `dt` over the shorter time constant.
-    #[must_use]
     pub fn after(&self, state: ThermalState, watts: f64, dt: f64) -> ThermalState {
         let towards = |from: f64, to: f64, tau: f64| from + (to - from) * -(-dt / tau).exp_m1();
         let winding = state.case_c + watts * self.winding_case;

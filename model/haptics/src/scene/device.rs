@@ -191,13 +191,11 @@ impl SimulatedDevice {
     }
 
     /// What it is.
-    #[must_use]
     pub fn settings(&self) -> &DeviceSettings {
         &self.settings
     }
 
     /// What it senses, in whole steps of its sensors.
-    #[must_use]
     pub fn pose(&self) -> Pose {
         let stepped = |value: f64, step: f64| (value / step).round() * step;
         Pose {
@@ -207,13 +205,11 @@ impl SimulatedDevice {
     }
 
     /// True places in mm and speeds in mm/s.
-    #[must_use]
     pub fn motion(&self) -> [[f64; 3]; 2] {
         [self.axes.map(|axis| axis.x), self.axes.map(|axis| axis.v)]
     }
 
     /// Where its energies went so far, in N mm, of all axes together.
-    #[must_use]
     pub fn energies(&self) -> RackEnergies {
         let mut sum = RackEnergies::default();
         for axis in &self.axes {
@@ -226,7 +222,6 @@ impl SimulatedDevice {
     }
 
     /// Energy of its motion in N mm.
-    #[must_use]
     pub fn kinetic(&self) -> f64 {
         self.axes.iter().map(Rack::kinetic).sum()
     }

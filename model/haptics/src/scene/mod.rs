@@ -70,7 +70,6 @@ pub struct SceneTick {
 
 impl SceneTick {
     /// Whether the stylus touches.
-    #[must_use]
     pub fn is_contact(&self) -> bool {
         self.depth > 0.0
     }
@@ -127,37 +126,31 @@ impl Scene {
     }
 
     /// What it is made of.
-    #[must_use]
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
     /// The surface.
-    #[must_use]
     pub fn field(&self) -> &HeightField {
         self.surface.field()
     }
 
     /// Every node that may be elsewhere than at rest, now or before the last tick.
-    #[must_use]
     pub fn dirty(&self) -> Rect {
         self.dirty
     }
 
     /// The last tick.
-    #[must_use]
     pub fn last(&self) -> SceneTick {
         self.last
     }
 
     /// Ticks since the start.
-    #[must_use]
     pub fn ticks(&self) -> u64 {
         self.last.tick
     }
 
     /// Hash of all heights' bits, in place of comparing them.
-    #[must_use]
     pub fn hash(&self) -> u64 {
         hash(self.field().heights())
     }

@@ -75,13 +75,11 @@ impl Default for SceneSettings {
 
 impl SceneSettings {
     /// The middle of the surface at rest in mm.
-    #[must_use]
     pub fn middle(&self) -> [f64; 3] {
         [0.5 * self.side_mm, 0.5 * self.side_mm, 0.0]
     }
 
     /// Where the stylus is at the start, in mm.
-    #[must_use]
     pub fn start(&self) -> [f64; 3] {
         let [x, y, _] = self.middle();
         [x, y, START_HEIGHT_MM]

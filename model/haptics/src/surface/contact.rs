@@ -53,13 +53,11 @@ impl Cut {
     }
 
     /// Most steps from a contact; `u32::MAX` where there is no end.
-    #[must_use]
     pub fn range(&self) -> u32 {
         self.range
     }
 
     /// Least movement in mm.
-    #[must_use]
     pub fn threshold(&self) -> f64 {
         self.threshold
     }

@@ -132,7 +132,6 @@ impl SceneCurves {
 
 impl CutPoint {
     /// Where it cuts, in words.
-    #[must_use]
     pub fn words(&self) -> String {
         match (self.range, self.threshold_mm > 0.0) {
             (Some(range), true) => {

@@ -42,50 +42,42 @@ impl Grid {
     }
 
     /// Nodes along x.
-    #[must_use]
     pub fn columns(&self) -> usize {
         usize::from(self.columns)
     }
 
     /// Nodes along y.
-    #[must_use]
     pub fn rows(&self) -> usize {
         usize::from(self.rows)
     }
 
     /// Distance between neighbours in mm.
-    #[must_use]
     pub fn spacing(&self) -> f64 {
         self.spacing
     }
 
     /// How many nodes.
-    #[must_use]
     pub fn nodes(&self) -> usize {
         self.columns() * self.rows()
     }
 
     /// Lengths along x and y in mm.
-    #[must_use]
     pub fn extent(&self) -> [f64; 2] {
         [self.columns - 1, self.rows - 1].map(|cells| f64::from(cells) * self.spacing)
     }
 
     /// Where a node's numbers are: row by row.
-    #[must_use]
     #[inline(always)]
     pub fn index(&self, node: Node) -> usize {
         usize::from(node.row) * usize::from(self.columns) + usize::from(node.column)
     }
 
     /// Where a node is, in mm.
-    #[must_use]
     pub fn place(&self, node: Node) -> [f64; 2] {
         [node.column, node.row].map(|step| f64::from(step) * self.spacing)
     }
 
     /// The node nearest to a place in mm; `None` more than half a spacing outside, or for no number.
-    #[must_use]
     pub fn nearest(&self, x: f64, y: f64) -> Option<Node> {
         let step = |place: f64, count: u16| {
             let step = (place / self.spacing).round();
@@ -96,7 +88,6 @@ impl Grid {
     }
 
     /// All nodes.
-    #[must_use]
     pub fn whole(&self) -> Rect {
         Rect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
     }
@@ -138,7 +129,6 @@ impl Rect {
     pub const EMPTY: Self = Self { columns: [0; 2], rows: [0; 2] };
 
     /// Whether there is no node in it.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.columns[0] >= self.columns[1] || self.rows[0] >= self.rows[1]
     }
@@ -160,7 +150,6 @@ impl Rect {
     }
 
     /// How many nodes.
-    #[must_use]
     pub fn nodes(&self) -> usize {
         let count = |[from, to]: [u32; 2]| to.saturating_sub(from) as usize;
         count(self.columns) * count(self.rows)

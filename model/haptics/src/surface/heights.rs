@@ -26,20 +26,17 @@ impl<'a> Heights<'a> {
     }
 
     /// The grid.
-    #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
     /// All of them.
-    #[must_use]
     pub fn all(&self) -> &'a [f64] {
         self.of
     }
 
     /// Height and unit normal of the bilinear surface at a place in mm; `None` outside the mesh or where
     /// a number is none.
-    #[must_use]
     pub fn at(&self, x: f64, y: f64) -> Option<(f64, [f64; 3])> {
         let (node, [u, v]) = self.cell(x, y)?;
         let [a, b, c, d] = self.corners(node);
@@ -52,7 +49,6 @@ impl<'a> Heights<'a> {
 
     /// Unit normal at a place in mm, interpolated between those of the nodes around it: no edge shows
     /// where cells meet. The true one is [`Heights::at`].
-    #[must_use]
     pub fn shaded(&self, x: f64, y: f64) -> Option<[f64; 3]> {
         let (Node { column, row }, [u, v]) = self.cell(x, y)?;
         let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
@@ -67,7 +63,6 @@ impl<'a> Heights<'a> {
 
     /// Unit normal of a node: the normalised sum of the unit normals of the faces around it, at the
     /// boundary of those that there are.
-    #[must_use]
     pub fn normal(&self, node: Node) -> [f64; 3] {
         let [column, row] = [node.column, node.row].map(usize::from);
         let mut sum = [0.0; 3];

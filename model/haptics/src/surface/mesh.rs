@@ -112,49 +112,41 @@ impl HeightField {
     }
 
     /// The grid.
-    #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
     /// Heights at rest in mm, row by row.
-    #[must_use]
     pub fn rest(&self) -> &[f64] {
         &self.rest
     }
 
     /// Heights now in mm, row by row.
-    #[must_use]
     pub fn heights(&self) -> &[f64] {
         &self.now
     }
 
     /// The surface at rest.
-    #[must_use]
     pub fn at_rest(&self) -> Heights<'_> {
         Heights::made_for(self.grid, &self.rest)
     }
 
     /// The surface now.
-    #[must_use]
     pub fn as_it_is(&self) -> Heights<'_> {
         Heights::made_for(self.grid, &self.now)
     }
 
     /// MaxShear.
-    #[must_use]
     pub fn shear(&self) -> &Shear {
         &self.shear
     }
 
     /// What is pinned.
-    #[must_use]
     pub fn pins(&self) -> &Pins {
         &self.pins
     }
 
     /// MaxShear between two nodes.
-    #[must_use]
     #[inline(always)]
     pub fn limit(&self, one: Node, other: Node) -> f64 {
         match &self.shear {
@@ -167,7 +159,6 @@ impl HeightField {
     }
 
     /// Whether a node is pinned.
-    #[must_use]
     #[inline(always)]
     pub fn is_pinned(&self, node: Node) -> bool {
         match &self.pins {
@@ -183,7 +174,6 @@ impl HeightField {
 
     /// Most that a link is stretched beyond its limit, in mm; links to pinned nodes are left out.
     /// Zero or less: the field is valid.
-    #[must_use]
     pub fn worst_excess(&self) -> f64 {
         let mut worst = f64::NEG_INFINITY;
         self.links(&self.now, |one, other, rise, limit| {

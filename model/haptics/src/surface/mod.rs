@@ -138,13 +138,11 @@ impl Surface {
     }
 
     /// The field.
-    #[must_use]
     pub fn field(&self) -> &HeightField {
         &self.field
     }
 
     /// Heights now in mm, row by row.
-    #[must_use]
     pub fn heights(&self) -> &[f64] {
         self.field.heights()
     }

@@ -80,14 +80,12 @@ pub struct Touch {
 
 impl Touch {
     /// Whether the device touches.
-    #[must_use]
     pub fn is_contact(&self) -> bool {
         matches!(self.state, TouchState::Sticks | TouchState::Slides)
     }
 
     /// Force on the device where the model gives `newtons` at this depth: along the normal, and across
     /// it what friction gives, which is in proportion to how far aside the contact point is held.
-    #[must_use]
     pub fn force(&self, newtons: f64) -> [f64; 3] {
         if self.depth <= 0.0 || !newtons.is_finite() {
             return [0.0; 3];

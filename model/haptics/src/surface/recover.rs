@@ -57,7 +57,6 @@ impl Recovery {
     }
 
     /// Share of the way to rest that a node goes in a tick.
-    #[must_use]
     pub fn share(&self) -> f64 {
         self.share
     }

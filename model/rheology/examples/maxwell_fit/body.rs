@@ -21,7 +21,6 @@ pub struct Maxwell {
 
 impl Maxwell {
     /// The relaxation time `eta / k`, in s.
-    #[must_use]
     pub fn tau(&self) -> Seconds {
         Seconds(self.eta / self.k)
     }

@@ -72,14 +72,12 @@ pub struct CycleAnalysis {
 
 impl CycleAnalysis {
     /// Energy kept over energy taken, 0 to 1 for tissue that makes none.
-    #[must_use]
     pub fn loss_share(&self) -> Option<f64> {
         let share = self.work_loop? / self.work_loading;
         share.is_finite().then_some(share)
     }
 
     /// Depth at half the first peak.
-    #[must_use]
     pub fn at_half(&self) -> Option<Depth> {
         self.levels[HALF].map(|level| level.depth.value)
     }

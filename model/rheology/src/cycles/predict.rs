@@ -49,7 +49,6 @@ pub enum PredictionError {
 
 impl Prediction {
     /// An error in percent of the measured peak.
-    #[must_use]
     pub fn percent(&self, error: Newtons) -> f64 {
         100.0 * error.0 / self.peak.0
     }

@@ -57,13 +57,11 @@ pub struct Sinusoid {
 
 impl Sinusoid {
     /// Whether the force comes back to zero, so that nothing was touched for a part of the swing.
-    #[must_use]
     pub fn is_contact_lost(&self) -> bool {
         self.zero_share > LOST_SHARE
     }
 
     /// What speaks against the numbers, in words; `None` if nothing does.
-    #[must_use]
     pub fn remark(&self) -> Option<String> {
         self.is_contact_lost().then(|| {
             format!(

@@ -46,7 +46,6 @@ pub struct Steadiness {
 
 impl SteadyRule {
     /// Judges cycles in their order.
-    #[must_use]
     pub fn judge(&self, cycles: &[CycleAnalysis]) -> Steadiness {
         let changes: Vec<Change> =
             cycles.windows(2).map(|pair| change(&pair[0], &pair[1])).collect();

@@ -72,7 +72,6 @@ impl Protocol {
 
     /// Time in tissue and rests between presses, in s; without what a rig does before (homing,
     /// finding contact) and after (leaving the tissue).
-    #[must_use]
     pub fn duration(&self) -> Seconds {
         let pieces: f64 = self.presses.iter().map(|press| duration_of(press)).sum();
         Seconds(pieces + self.rest.0 * self.presses.len().saturating_sub(1) as f64)

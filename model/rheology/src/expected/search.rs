@@ -76,7 +76,6 @@ pub enum Family {
 
 impl Family {
     /// The protocol on a rig.
-    #[must_use]
     pub fn protocol(&self, rig: &Rig) -> Protocol {
         let (depth, rate) = (rig.depth, rig.sample_rate_hz);
         match *self {

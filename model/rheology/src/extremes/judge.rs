@@ -205,7 +205,6 @@ pub struct PathCase {
 
 impl PathCase {
     /// Puts the path to a subject.
-    #[must_use]
     pub fn put_to(&self, subject: &dyn Subject) -> Row {
         let forces = subject.forces(self);
         let truth = self.truth(subject, forces.as_deref().unwrap_or_default());

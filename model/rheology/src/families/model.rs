@@ -198,13 +198,11 @@ impl Body {
     }
 
     /// The force now.
-    #[must_use]
     pub fn force(&self) -> Newtons {
         Newtons(self.response.sum())
     }
 
     /// The depth now.
-    #[must_use]
     pub fn depth(&self) -> Depth {
         self.response.depth()
     }

@@ -103,7 +103,6 @@ impl Drive {
     }
 
     /// Value at depth `x` after `x_max`.
-    #[must_use]
     pub fn at(&self, x: f64, x_max: f64) -> f64 {
         let polynomial = self.polynomial(Some(x_max));
         let sum = polynomial.iter().rev().fold(0.0, |sum, c| sum * x + c);
@@ -171,7 +170,6 @@ impl Drive {
     }
 
     /// Whether it depends on the greatest depth so far.
-    #[must_use]
     pub fn softens(&self) -> bool {
         self.softening.iter().any(|one| *one != 0.0)
     }
@@ -230,7 +228,6 @@ impl Relaxation {
     }
 
     /// The sum of two terms of one relaxation time, `None` if it is not one term.
-    #[must_use]
     pub fn plus(&self, other: &Self) -> Option<Self> {
         if self.tau != other.tau {
             return None;

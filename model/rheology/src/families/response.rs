@@ -104,19 +104,16 @@ impl Response {
     }
 
     /// Depth at the end of the last step.
-    #[must_use]
     pub fn depth(&self) -> Depth {
         Depth(self.depth)
     }
 
     /// Greatest depth so far.
-    #[must_use]
     pub fn depth_max(&self) -> Depth {
         Depth(self.depth_max)
     }
 
     /// Sum of all terms, in the unit of their drives.
-    #[must_use]
     pub fn sum(&self) -> f64 {
         self.terms.iter().map(Relaxing::value).sum()
     }

@@ -141,19 +141,16 @@ impl FitOptions {
     }
 
     /// The family.
-    #[must_use]
     pub fn family(&self) -> &dyn Family {
         &*self.family
     }
 
     /// Names of all parameters, in the order of every report.
-    #[must_use]
     pub fn names(&self) -> Vec<&str> {
         self.known.iter().map(|one| one.name.as_str()).collect()
     }
 
     /// Names of the parameters of the specimen: what records may share.
-    #[must_use]
     pub fn body_names(&self) -> Vec<&str> {
         let mut names = self.names();
         names.truncate(self.layout.outers + self.layout.coefficients);
@@ -200,7 +197,6 @@ impl FitOptions {
     }
 
     /// How many parameters the fit finds.
-    #[must_use]
     pub fn free_count(&self) -> usize {
         self.fixed.iter().filter(|value| value.is_none()).count()
     }

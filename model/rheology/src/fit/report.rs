@@ -89,7 +89,6 @@ pub struct NamedReport {
 
 impl JointReport {
     /// The warnings of all records, each once.
-    #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for warning in self.records.iter().flat_map(|one| &one.report.warnings) {
@@ -108,19 +107,16 @@ impl FitReport {
     }
 
     /// The value of a parameter, in its unit; `None` for a name that is not one.
-    #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameter(name).map(|parameter| parameter.value)
     }
 
     /// A parameter by name.
-    #[must_use]
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
     /// The body found, where it is a modified Kelvin body of third order or less.
-    #[must_use]
     pub fn kelvin(&self) -> Option<ModifiedKelvin> {
         let order: usize = self.body.family.strip_prefix("series-")?.parse().ok()?;
         let (mu, tau_sig) = self.body.linear.split_at(order.min(self.body.linear.len()));
@@ -133,7 +129,6 @@ impl FitReport {
 
     /// The modelled force in N at each sample, along the depth of the samples; their forces are
     /// not used. NaN from where depths or times are not finite or times do not increase.
-    #[must_use]
     pub fn predict(&self, samples: &[FitSample]) -> Vec<Newtons> {
         let mut before = f64::NEG_INFINITY;
         let is_valid = |sample: &&FitSample| {
@@ -148,7 +143,6 @@ impl FitReport {
     }
 
     /// The largest residual of the samples that were fitted, in size.
-    #[must_use]
     pub fn worst(&self, samples: &[FitSample]) -> Newtons {
         let pairs = samples.iter().zip(self.predict(samples));
         let known = pairs.filter(|(sample, _)| sample.is_measured());
@@ -174,13 +168,11 @@ impl FitReport {
 
 impl Fitted<'_> {
     /// The report of a fit of one record; of several, that of the first.
-    #[must_use]
     pub fn report(&self) -> FitReport {
         self.record_report(&Uncertainty::of(&self.system, &self.refined), 0)
     }
 
     /// The reports of all records.
-    #[must_use]
     pub fn joint_report(&self) -> JointReport {
         let uncertainty = Uncertainty::of(&self.system, &self.refined);
         let system = &self.system;

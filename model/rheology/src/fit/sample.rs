@@ -23,7 +23,6 @@ pub struct FitSample {
 
 impl FitSample {
     /// Whether its force counts.
-    #[must_use]
     pub fn is_measured(&self) -> bool {
         self.sigma.0 < f64::INFINITY
     }

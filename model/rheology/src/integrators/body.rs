@@ -39,7 +39,6 @@ impl<const N: usize> SeriesBody<N> {
 
     /// The same body with as many terms as there may be, those it has not as zeros: its steps give the
     /// same bits.
-    #[must_use]
     pub fn padded(&self) -> SeriesBody<POWER_MAX> {
         let mut mu = [0.0; POWER_MAX];
         mu[..N].copy_from_slice(&self.mu);
@@ -47,7 +46,6 @@ impl<const N: usize> SeriesBody<N> {
     }
 
     /// As the one relaxation term it is.
-    #[must_use]
     pub fn term(&self) -> Relaxation {
         let mut elastic = Drive::default();
         elastic.powers[..N].copy_from_slice(&self.mu);

@@ -160,13 +160,11 @@ impl Reference {
     }
 
     /// The double nearest the force.
-    #[must_use]
     pub fn force(&self) -> Newtons {
         Newtons(nearest(&self.sum()))
     }
 
     /// By how much a force in N is more than the exact one, in N, to the last digit of a double.
-    #[must_use]
     pub fn error_of(&self, force: Newtons) -> f64 {
         nearest(&(self.digits.exact(force.0) - self.sum()))
     }

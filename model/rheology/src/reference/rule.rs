@@ -93,13 +93,11 @@ impl RuleReference {
     }
 
     /// The double nearest the force.
-    #[must_use]
     pub fn force(&self) -> Newtons {
         Newtons(nearest(&self.force))
     }
 
     /// By how much a force in N is more than the rule's, in N, to the last digit of a double.
-    #[must_use]
     pub fn error_of(&self, force: Newtons) -> f64 {
         nearest(&(self.digits.exact(force.0) - &self.force))
     }

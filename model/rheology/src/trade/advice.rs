@@ -55,7 +55,6 @@ impl TradeCurves {
     /// The cheapest row of each table (of those within a tenth, the most exact) whose error is within the tolerance and which, `rate_hz` times a
     /// second, takes no more than `share` (0 to 1) of each period. An integrator may take several steps
     /// a period and never takes one longer than the period. The fit has no rate to keep up with.
-    #[must_use]
     pub fn recommend(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Recommendation {
         let targets = self.families.iter().map(|row| row.target.as_str());
         let mut names: Vec<&str> = Vec::new();

@@ -21,14 +21,12 @@ pub struct Machine {
 
 impl Machine {
     /// In words.
-    #[must_use]
     pub fn words(&self) -> String {
         let Self { cpu, os, cores, profile } = self;
         format!("{cpu}, {cores} logical cores, {os}, {profile} build")
     }
 
     /// A name for a file: letters, digits and dashes.
-    #[must_use]
     pub fn file_stem(&self) -> String {
         let words = self.words().to_lowercase();
         let parts = words.split(|c: char| !c.is_ascii_alphanumeric());
@@ -39,7 +37,6 @@ impl Machine {
 impl TradeCurves {
     /// What speaks against planning from these curves here and now, a sentence each: measured on
     /// another machine, by another build or version, too long ago (`age_days`), or in haste.
-    #[must_use]
     pub fn doubts(&self, here: &Machine, version: &str, age_days: f64) -> Vec<String> {
         let mut doubts = Vec::new();
         let there = &self.machine;

@@ -139,13 +139,11 @@ pub struct TradeCurves {
 
 impl ForceError {
     /// The larger of the two beside the peaks of their paths.
-    #[must_use]
     pub fn share_of(&self, peak: &Self) -> f64 {
         (self.ramp_hold_n / peak.ramp_hold_n).max(self.poke_n / peak.poke_n)
     }
 
     /// Whether both are within a tolerance.
-    #[must_use]
     pub fn is_within(&self, tolerance: crate::tolerance::Tolerance, peak: &Self) -> bool {
         let within = |error: f64, peak: f64| error <= tolerance.in_newtons(Newtons(peak)).0;
         within(self.ramp_hold_n, peak.ramp_hold_n) && within(self.poke_n, peak.poke_n)
@@ -187,7 +185,6 @@ impl TradeCurves {
 
     /// Largest difference between two halves of the measurement, as a share: how far the times would
     /// be reproduced.
-    #[must_use]
     pub fn worst_halves(&self) -> f64 {
         self.costs().map(|cost| cost.halves).fold(0.0, f64::max)
     }

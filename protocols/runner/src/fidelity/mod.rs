@@ -112,7 +112,6 @@ impl TimeUse {
     }
 
     /// All of it.
-    #[must_use]
     pub fn total_s(&self) -> f64 {
         self.set_up_s + self.motion_s + self.hold_s + self.waiting_s
     }
@@ -306,7 +305,6 @@ impl FidelityMeter {
     }
 
     /// What was found until now.
-    #[must_use]
     pub fn found(&self) -> &Fidelity {
         &self.found
     }

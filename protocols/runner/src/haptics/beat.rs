@@ -58,7 +58,6 @@ impl<T: Ticking> Beat<T> {
     }
 
     /// The priority that the system gave.
-    #[must_use]
     pub fn granted(&self) -> &Granted {
         &self.granted
     }
@@ -69,13 +68,11 @@ impl<T: Ticking> Beat<T> {
     }
 
     /// How the loop kept its time so far.
-    #[must_use]
     pub fn kept(&self) -> Kept {
         self.timing.kept()
     }
 
     /// Whether it still ticks; it does until it is ended, unless its work failed.
-    #[must_use]
     pub fn is_alive(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }

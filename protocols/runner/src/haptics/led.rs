@@ -30,7 +30,6 @@ impl Lead {
     }
 
     /// Where it was told to go last, in mm.
-    #[must_use]
     pub fn place(&self) -> f64 {
         f64::from_bits(self.0.load(Ordering::Relaxed))
     }
@@ -66,7 +65,6 @@ pub struct Live {
 
 impl Live {
     /// Points made so far.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -114,19 +112,16 @@ impl Led {
     }
 
     /// Where the hand was led in the last tick, in mm.
-    #[must_use]
     pub fn place(&self) -> f64 {
         self.place
     }
 
     /// What leads its hand.
-    #[must_use]
     pub fn lead(&self) -> Lead {
         self.lead.clone()
     }
 
     /// What is seen of it.
-    #[must_use]
     pub fn live(&self) -> &Live {
         &self.live
     }

@@ -155,13 +155,11 @@ impl SceneTask {
     }
 
     /// What is seen before the first tick.
-    #[must_use]
     pub fn first(&self) -> SceneFrame {
         SceneFrame::new(&self.scene)
     }
 
     /// The scene.
-    #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -268,26 +266,22 @@ impl SceneLoop {
     }
 
     /// How the loop keeps its time.
-    #[must_use]
     pub fn timing(&self) -> Kept {
         self.beat.kept()
     }
 
     /// The priority that the system gave.
-    #[must_use]
     pub fn granted(&self) -> &Granted {
         self.beat.granted()
     }
 
     /// Whether the path has come to its end; without one it is over from the start.
-    #[must_use]
     pub fn is_over(&self) -> bool {
         let path = self.hand.as_ref();
         path.is_none_or(|(_, is_over)| is_over.load(Ordering::Relaxed))
     }
 
     /// Whether it still ticks; it does until it is stopped, unless its work failed.
-    #[must_use]
     pub fn is_alive(&self) -> bool {
         self.beat.is_alive()
     }

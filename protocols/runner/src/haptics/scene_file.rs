@@ -109,7 +109,6 @@ impl SceneFile {
     }
 
     /// As a text that reads back to the same bits.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = String::new();
         let mut put = |line: String| {

@@ -29,7 +29,6 @@ impl Simulated {
     }
 
     /// The newest tick.
-    #[must_use]
     pub fn last(&self) -> &SimulationTick {
         &self.last
     }

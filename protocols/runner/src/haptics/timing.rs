@@ -52,7 +52,6 @@ impl Durations {
     }
 
     /// What was counted so far.
-    #[must_use]
     pub fn spread(&self) -> Spread {
         let counts: Vec<u64> = self.bins.iter().map(|one| one.load(Ordering::Relaxed)).collect();
         let count: u64 = counts.iter().sum();
@@ -128,7 +127,6 @@ pub struct Kept {
 
 impl Timing {
     /// What was measured so far.
-    #[must_use]
     pub fn kept(&self) -> Kept {
         Kept {
             period: self.period.spread(),

@@ -61,7 +61,6 @@ impl Conditions {
     }
 
     /// What is otherwise now, each with what it was.
-    #[must_use]
     pub fn changes(&self, now: &Self) -> Vec<String> {
         let mut changes = Vec::new();
         let mut compare = |was: &BTreeMap<String, String>,

@@ -79,14 +79,12 @@ impl Programme {
     }
 
     /// The specimen that is clipped in during a task.
-    #[must_use]
     pub fn specimen_at(&self, task: usize) -> Option<u64> {
         let so_far = self.tasks.iter().take(task + 1).rev();
         so_far.filter_map(|task| task.specimen).next()
     }
 
     /// Sessions in all.
-    #[must_use]
     pub fn session_count(&self) -> u32 {
         self.tasks.iter().map(|task| task.repeats).sum()
     }
@@ -95,7 +93,6 @@ impl Programme {
 impl Task {
     /// The plan of one repeat, counted from 1: the protocol's, behind the rest and the specimen it needs. `remount`
     /// is the specimen that somebody must look after before a programme goes on.
-    #[must_use]
     pub fn plan(&self, repeat: u32, remount: Option<u64>) -> Option<Plan> {
         let mut plan = self.protocol.plan(&self.values).ok()?;
         let mut before = Vec::new();

@@ -33,7 +33,6 @@ pub struct Foreseen {
 
 impl Foreseen {
     /// Expected duration of everything.
-    #[must_use]
     pub fn expected(&self) -> Seconds {
         Seconds(self.tasks.iter().map(|task| task.expected.0).sum())
     }

@@ -140,7 +140,6 @@ impl Progress {
     }
 
     /// The next run: the first repeat that has not finished. None once all have.
-    #[must_use]
     pub fn next(&self, programme: &Programme) -> Option<Place> {
         let places = programme
             .tasks
@@ -164,7 +163,6 @@ impl Progress {
     }
 
     /// Folders of the sessions of a task that finished, in order.
-    #[must_use]
     pub fn finished(&self, task: usize) -> Vec<&PathBuf> {
         let own = self
             .runs

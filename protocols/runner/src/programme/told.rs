@@ -156,7 +156,6 @@ impl Programme {
     }
 
     /// What protocols ask for and nobody tells: a sentence for each task, at its line. What a word means is said once.
-    #[must_use]
     pub fn questions(&self) -> Vec<Problem> {
         let mut explained: Vec<&str> = Vec::new();
         let mut questions = Vec::new();

@@ -96,13 +96,11 @@ pub struct Difference {
 
 impl Difference {
     /// What the session says, in words.
-    #[must_use]
     pub fn recorded_words(&self) -> String {
         words::of(&self.recorded)
     }
 
     /// What the engine says now, in words.
-    #[must_use]
     pub fn now_words(&self) -> String {
         words::of(&self.now)
     }

@@ -65,19 +65,16 @@ impl Player {
     }
 
     /// Session time of the last input.
-    #[must_use]
     pub fn end(&self) -> Nanos {
         self.end
     }
 
     /// Session time of the newest input taken.
-    #[must_use]
     pub fn now(&self) -> Nanos {
         self.here.board.now()
     }
 
     /// Whether the engine that recorded the session is this one; if not, what is shown may differ from what was.
-    #[must_use]
     pub fn is_same_engine(&self) -> bool {
         self.is_same_engine
     }
@@ -138,7 +135,6 @@ impl Player {
     }
 
     /// What a window shows of it.
-    #[must_use]
     pub fn snapshot(&self, sequence: u64) -> Option<Snapshot> {
         let Place { rows, board, .. } = &self.here;
         let state = self.here.state.as_ref()?;

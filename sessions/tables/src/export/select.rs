@@ -40,7 +40,6 @@ impl Selection {
     }
 
     /// Whether some samples are left out.
-    #[must_use]
     pub fn is_part(&self) -> bool {
         let all = Self { columns: self.columns.clone(), ..Self::default() };
         *self != all
@@ -51,7 +50,6 @@ impl Selection {
     }
 
     /// The name of a table: a thinned one says so.
-    #[must_use]
     pub fn file_name(&self, stem: &str, ending: &str) -> String {
         match self.step() {
             1 => format!("{stem}.{ending}"),

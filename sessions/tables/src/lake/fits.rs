@@ -33,7 +33,6 @@ pub enum FitState {
 
 impl FitFile<'_> {
     /// Where it is.
-    #[must_use]
     pub fn path(&self) -> PathBuf {
         let folder = root(self.lake).join("fits");
         let folder = folder.join(format!("model={}", value(self.model)));

@@ -173,7 +173,6 @@ impl Page {
     }
 
     /// The table of runs as text.
-    #[must_use]
     pub fn table(&self) -> String {
         let head = [
             "task", "repeat", "ended by", "s", "peak N", "session", "operator", "specimen",
@@ -201,7 +200,6 @@ impl Page {
     }
 
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
-    #[must_use]
     pub fn loss(&self) -> Option<String> {
         let finished = self.runs.iter();
         let finished = finished.filter(|run| run.ending.as_deref() == Some(FINISHED));
@@ -217,7 +215,6 @@ impl Page {
     }
 
     /// The page in HTML, whole in itself.
-    #[must_use]
     pub fn html(&self) -> String {
         let mut body = Body::default();
         body.heading(1, &self.title);

@@ -75,14 +75,12 @@ impl ParamField {
     }
 
     /// The unit to show beside the field: none where the text has one of its own.
-    #[must_use]
     pub fn unit_beside(&self) -> &'static str {
         let text = self.text.trim();
         if text.is_empty() || text.parse::<f64>().is_ok() { self.unit } else { "" }
     }
 
     /// What it is, its range and where the usual value comes from, a line each.
-    #[must_use]
     pub fn hint(&self) -> String {
         let one = &self.parameter;
         let mut lines = vec![one.about.clone()];

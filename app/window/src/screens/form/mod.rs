@@ -73,7 +73,6 @@ pub struct Checked {
 
 impl Checked {
     /// Greatest depth in mm.
-    #[must_use]
     pub fn deepest_mm(&self) -> f64 {
         let depths = self.outline.iter().map(|point| point.depth.0);
         depths.fold(0.0, f64::max)
@@ -197,7 +196,6 @@ impl ProtocolForm {
     }
 
     /// What stands in a field of what is told.
-    #[must_use]
     pub fn told_text(&self, name: &str) -> &str {
         let field = self.told.iter().find(|field| field.key.name == name);
         field.map_or("", |field| &field.text)
@@ -235,19 +233,16 @@ impl ProtocolForm {
     }
 
     /// What is indented, as far as it is told.
-    #[must_use]
     pub fn specimen(&self) -> &str {
         &self.labels.specimen
     }
 
     /// The plan and its preview; `None` while something is wrong.
-    #[must_use]
     pub fn checked(&self) -> Option<&Checked> {
         self.checked.as_ref()?.1.as_ref().ok()
     }
 
     /// What is wrong with the file, or with the values together.
-    #[must_use]
     pub fn problems(&self) -> &[Problem] {
         match (&self.protocol, &self.checked) {
             (Err(problems), _) | (Ok(_), Some((_, Err(problems)))) => problems,
@@ -256,7 +251,6 @@ impl ProtocolForm {
     }
 
     /// Whether everything the preview asks to acknowledge is acknowledged, in its present words.
-    #[must_use]
     pub fn is_acknowledged(&self) -> bool {
         self.checked().is_some_and(|checked| {
             !checked.preview.acknowledgements.is_empty()
@@ -306,7 +300,6 @@ impl ProtocolForm {
     }
 
     /// The request to run what stands in the form; `None` while it may not start.
-    #[must_use]
     pub fn request(&self, bench: &Bench) -> Option<RunRequest> {
         self.verdict().ok()?;
         let checked = self.checked()?;

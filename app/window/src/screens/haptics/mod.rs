@@ -71,25 +71,21 @@ pub struct HapticsScreen {
 
 impl HapticsScreen {
     /// Whether the loop runs.
-    #[must_use]
     pub fn is_running(&self) -> bool {
         self.feel.as_ref().is_some_and(Feel::is_running)
     }
 
     /// What was found of the body and device checked last.
-    #[must_use]
     pub fn looked(&self) -> Option<&Result<Looked, String>> {
         self.task.answer()
     }
 
     /// The loop that runs or ran last.
-    #[must_use]
     pub fn feel(&self) -> Option<&Feel> {
         self.feel.as_ref()
     }
 
     /// A recording that was computed again last.
-    #[must_use]
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }

@@ -34,7 +34,6 @@ pub struct ModelsScreen {
 
 impl ModelsScreen {
     /// The last comparison.
-    #[must_use]
     pub fn answer(&self) -> Option<&Result<Selected, String>> {
         self.task.answer()
     }

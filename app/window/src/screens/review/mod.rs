@@ -164,7 +164,6 @@ impl ReviewScreen {
     }
 
     /// Whether nothing is being read, fitted or looked for.
-    #[must_use]
     pub fn is_settled(&self) -> bool {
         let is_working = self.fits.standing().is_some() || self.prediction.standing().is_some();
         let is_read = self.subjects.iter().all(Subject::is_settled);

@@ -55,7 +55,6 @@ pub struct Shown {
 
 impl ReviewScreen {
     /// What is on the screen.
-    #[must_use]
     pub fn shown(&self) -> Shown {
         let colors = palpate_figures::tokens::LIGHT.sessions.len() as u64;
         let session = |subject: &super::Subject| ShownSession {
@@ -78,7 +77,6 @@ impl ReviewScreen {
     }
 
     /// The lines of the plots over time as they are shown, for a picture of so many columns.
-    #[must_use]
     pub fn series(&self, columns: usize) -> Vec<ShownSeries> {
         let mut series = Vec::new();
         for quantity in &self.quantities {

@@ -92,13 +92,11 @@ impl Subject {
     }
 
     /// Whether nothing more of it will come.
-    #[must_use]
     pub fn is_settled(&self) -> bool {
         !matches!(self.recording.stage, Stage::Waiting | Stage::Reading)
     }
 
     /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
-    #[must_use]
     pub fn fifths(&self) -> u64 {
         match self.is_settled() {
             true => u64::MAX,
@@ -113,19 +111,16 @@ impl Subject {
     }
 
     /// The fit, if there is one.
-    #[must_use]
     pub fn fitted(&self) -> Option<&SessionFit> {
         self.fit.as_ref()?.as_ref().ok().map(Arc::as_ref)
     }
 
     /// Lowest and highest value of a quantity.
-    #[must_use]
     pub fn extremes(&self, quantity: Quantity) -> Option<[f64; 2]> {
         self.ends.1[quantity as usize]
     }
 
     /// Time of the session that stands at zero; none where it has no such moment.
-    #[must_use]
     pub fn moment(&self, leader: Leader) -> Option<f64> {
         match leader {
             Leader::Start => Some(0.0),
@@ -138,13 +133,11 @@ impl Subject {
     }
 
     /// By how much it is laid earlier, in s.
-    #[must_use]
     pub fn shift(&self, leader: Leader) -> f64 {
         self.moment(leader).unwrap_or(0.0)
     }
 
     /// What a fit takes of it.
-    #[must_use]
     pub fn for_fit(&self, model: &ModelChoice) -> fit::Subject {
         let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
         let first = begins.into_iter().flatten().reduce(f64::min);

@@ -88,19 +88,16 @@ impl Default for SceneScreen {
 
 impl SceneScreen {
     /// Whether the scene runs.
-    #[must_use]
     pub fn is_running(&self) -> bool {
         self.touch.as_ref().is_some_and(Touch::is_running)
     }
 
     /// The scene that runs or ran last.
-    #[must_use]
     pub fn touch(&self) -> Option<&Touch> {
         self.touch.as_ref()
     }
 
     /// The path that was computed last.
-    #[must_use]
     pub fn ahead(&self) -> Option<&Result<Ahead, String>> {
         self.ahead.answer()
     }
@@ -115,7 +112,6 @@ impl SceneScreen {
     }
 
     /// A recording that was computed again last.
-    #[must_use]
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }

@@ -116,14 +116,12 @@ impl TradeScreen {
     }
 
     /// The curves on the screen.
-    #[must_use]
     pub fn curves(&self) -> Option<&TradeCurves> {
         let known = self.task.answer()?.as_ref().ok()?;
         Some(&known.curves)
     }
 
     /// The curves of a scene.
-    #[must_use]
     pub fn scene_curves(&self) -> Option<&SceneCurves> {
         self.scene_answer().map(Arc::as_ref)
     }

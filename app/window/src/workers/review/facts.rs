@@ -115,7 +115,6 @@ impl Facts {
     }
 
     /// How the computer kept up, in one sentence, and whether it did.
-    #[must_use]
     pub fn health_words(&self) -> (String, bool) {
         let Some(worst) = &self.health.worst else {
             return ("not measured".into(), true);
@@ -132,7 +131,6 @@ impl Facts {
     }
 
     /// Time of a sample that something came before, in s; none without samples.
-    #[must_use]
     pub fn contact_time(&self, track: &Track) -> Option<f64> {
         track.time_of(self.contact?)
     }

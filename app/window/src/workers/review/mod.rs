@@ -206,13 +206,11 @@ impl Recording {
     }
 
     /// Whether it is being read.
-    #[must_use]
     pub fn is_reading(&self) -> bool {
         self.stage == Stage::Reading
     }
 
     /// Share of the samples that is there, 0 to 1.
-    #[must_use]
     pub fn share(&self) -> f64 {
         let all = self.head.as_ref().map_or(0, |head| head.samples);
         match (&self.stage, all) {
@@ -223,7 +221,6 @@ impl Recording {
     }
 
     /// From the first sample to the last, though not all may be there yet, in s.
-    #[must_use]
     pub fn span(&self) -> [f64; 2] {
         let own = self.track.span().unwrap_or([0.0, 0.0]);
         let expected = match (&self.stage, &self.head) {
@@ -234,7 +231,6 @@ impl Recording {
     }
 
     /// What it is called: its session's name without what all names have.
-    #[must_use]
     pub fn name(&self) -> String {
         let own = self.head.as_ref().map(|head| head.manifest.session_id.clone());
         own.unwrap_or_else(|| {
@@ -244,7 +240,6 @@ impl Recording {
     }
 
     /// Time of the first sample of a phase; `None` without one.
-    #[must_use]
     pub fn phase_start(&self, phase: Phase) -> Option<f64> {
         let found = self.phases.iter().find(|one| one.what == phase);
         found.map(|one| one.t)

@@ -113,7 +113,6 @@ impl LiveFit {
     }
 
     /// The answer so far; `None` before there is any minimum to speak of.
-    #[must_use]
     pub fn estimate(&self) -> Option<LiveEstimate> {
         if self.samples <= 2 * COLUMNS as u64 {
             return None;

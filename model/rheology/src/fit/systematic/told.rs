@@ -26,7 +26,6 @@ fn words(terms: &[Term]) -> String {
 
 impl Systematic {
     /// One sentence on what was added and what could not be.
-    #[must_use]
     pub fn sentence(&self) -> String {
         let calibrations = self.calibrations.iter();
         let calibrations = calibrations.map(|one| format!("the calibration \"{}\"", one.name));

@@ -154,13 +154,11 @@ impl SlaveLeader {
     }
 
     /// Why there is no master, if it could not begin.
-    #[must_use]
     pub fn failure(&self) -> Option<&str> {
         self.failure.as_deref()
     }
 
     /// What came of it; none if nothing was led.
-    #[must_use]
     pub fn slaved(&self) -> Option<Slaved> {
         let mut slaved = self.meter.slaved()?;
         if let Some(Going::ByItself(beat)) = &self.going {
