@@ -124,10 +124,19 @@ impl Recovery {
 /// Where a session is recovered to: beside it, with its name and an ending.
 #[must_use]
 pub fn recovered_folder(path: &Path) -> PathBuf {
-    // A file stands for the folder it is in.
-    let folder = if path.is_file() { path.parent().unwrap_or(path) } else { path };
+    let folder = session_folder(path);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     folder.with_file_name(format!("{name}.recovered"))
+}
+
+/// A file stands for the folder it is in.
+fn session_folder(path: &Path) -> PathBuf {
+    // A file of the present folder, or that folder itself, has no name before it.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    match path.parent() {
+        Some(folder) if path.is_file() => folder.into(),
+        _ => path,
+    }
 }
 
 /// The name that what is recovered of a session gets.
@@ -136,10 +145,10 @@ pub fn recovered_id(session_id: &str) -> String {
     format!("{session_id}-recovered")
 }
 
-/// Whether a session's folder is locked by whoever records it. The lock is only looked at.
+/// Whether a session's folder, given it or a file in it, is locked by whoever records it. The lock is only looked at.
 #[must_use]
 pub fn is_in_use(path: &Path) -> bool {
-    let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
+    let lock = std::fs::File::open(session_folder(path).join(crate::folder::LOCK_FILE));
     lock.is_ok_and(|file| {
         let looked = file.try_lock_shared();
         // Not left to closing: a program started at this moment would hold it a little longer.
@@ -208,17 +217,18 @@ pub fn recover(
 }
 
 /// Makes sure that nobody else recovers the session, and waits a little for who does. The folder itself is locked, so nothing is
-/// written into it or left beside it; where a disk cannot do that, nothing is made sure of.
+/// written into it or left beside it, and whether it or a file in it was named makes no difference; where a disk cannot do
+/// that, nothing is made sure of.
 fn alone(path: &Path) -> Result<Option<File>, RecoverError> {
-    let Ok(session) = File::open(path) else {
+    let Ok(session) = File::open(session_folder(path)) else {
         // It is told why when it is read.
         return Ok(None);
     };
-    match lock::lock_soon(&session, path) {
+    match lock::lock_soon(&session, &session_folder(path)) {
         Ok(()) => Ok(Some(session)),
         Err(NotLocked::Io(_)) => Ok(None),
-        Err(NotLocked::Busy(Busy { path, holder })) => {
-            Err(RecoverError::InProgress { path, holder })
+        Err(NotLocked::Busy(Busy { holder, .. })) => {
+            Err(RecoverError::InProgress { path: path.into(), holder })
         }
     }
 }

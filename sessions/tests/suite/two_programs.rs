@@ -7,7 +7,9 @@ use palpate_sessions::atomic::{leftovers, sweep};
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError};
 use palpate_sessions::folder::Busy;
 use palpate_sessions::recover::{RecoverError, recover, recovered_folder};
-use palpate_sessions::{ChainError, EDITS_FILE, EditError, LOG_FILE, Session, add_edit};
+use palpate_sessions::{
+    ChainError, EDITS_FILE, EditError, LOG_FILE, Session, SessionFolder, add_edit,
+};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -121,4 +123,21 @@ fn of_many_recoveries_at_once_one_wins_and_nothing_is_left_over() {
         assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 2 * (round + 1));
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
     }
+}
+
+#[test]
+fn a_session_named_by_its_log_is_the_same_session() {
+    let parent = tempfile::tempdir().unwrap();
+    let folder = parent.path().join("cut");
+    let held = SessionFolder::create(&folder).unwrap();
+    let log = held.log_path();
+    fs::write(&log, log_bytes(&rows(100, 3), &[], None)).unwrap();
+    let refusal = || recover(&log, "1", chrono::DateTime::UNIX_EPOCH).unwrap_err();
+    assert!(matches!(refusal(), RecoverError::InUse { .. }));
+    drop(held);
+    let another = fs::File::open(&folder).unwrap();
+    another.lock().unwrap();
+    assert!(matches!(refusal(), RecoverError::InProgress { path, .. } if path == log));
+    drop(another);
+    recover(&log, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
 }
