@@ -53,7 +53,7 @@ pub trait Sink: Send {
         self.check()
     }
 
-    /// What checks the file as [`check`](Self::check) does once it is finished and closed.
+    /// What checks the file as [`read_back`](Self::read_back) does once it is finished and closed.
     fn closed_check(&self) -> ClosedCheck {
         Box::new(|| Ok(()))
     }
@@ -136,16 +136,10 @@ impl SegmentSource for FolderSegments {
 #[derive(Debug)]
 pub struct FileSink {
     file: File,
-    path: PathBuf,
     /// The file's folder, until its entry for the file is known to be on disk.
     folder: Option<File>,
-    /// Bytes written, and their CRC-32.
-    written: u64,
-    sum: crc32fast::Hasher,
+    written: Written,
 }
-
-/// Bytes that are read back at once.
-const WINDOW_BYTES: usize = 1 << 18;
 
 impl FileSink {
     /// Makes a file. An existing one is never touched.
@@ -155,22 +149,23 @@ impl FileSink {
             Some(parent) if !parent.as_os_str().is_empty() => File::open(parent)?,
             _ => File::open(".")?,
         };
-        Ok(Self {
-            file,
+        let own = file.metadata()?;
+        let written = Written {
             // The program may go to another folder before the file is looked for again.
             path: std::path::absolute(path)?,
-            folder: Some(folder),
-            written: 0,
+            id: (own.dev(), own.ino()),
+            bytes: 0,
             sum: crc32fast::Hasher::new(),
-        })
+        };
+        Ok(Self { file, folder: Some(folder), written })
     }
 }
 
 impl Sink for FileSink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.file.write_all(bytes)?;
-        self.written += bytes.len() as u64;
-        self.sum.update(bytes);
+        self.written.bytes += bytes.len() as u64;
+        self.written.sum.update(bytes);
         Ok(())
     }
 
@@ -185,8 +180,49 @@ impl Sink for FileSink {
     }
 
     fn check(&self) -> Result<(), Alteration> {
-        let own = self.file.metadata().map_err(unreadable)?;
-        check_file(&self.path, (own.dev(), own.ino()), self.written)
+        self.written.check()
+    }
+
+    fn read_back(&self) -> Result<(), Alteration> {
+        self.written.read_back()
+    }
+
+    fn closed_check(&self) -> ClosedCheck {
+        let written = self.written.clone();
+        Box::new(move || written.read_back())
+    }
+
+    fn free_bytes(&self) -> Option<u64> {
+        let disk = rustix::fs::fstatvfs(&self.file).ok()?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
+}
+
+/// What was written to a file, by which it is known again.
+#[derive(Clone, Debug)]
+struct Written {
+    path: PathBuf,
+    /// The device and the file's number on it.
+    id: (u64, u64),
+    bytes: u64,
+    /// CRC-32 of them.
+    sum: crc32fast::Hasher,
+}
+
+/// Bytes that are read back at once.
+const WINDOW_BYTES: usize = 1 << 18;
+
+impl Written {
+    /// Whether the file still has its name, and so many bytes.
+    fn check(&self) -> Result<(), Alteration> {
+        let there = std::fs::metadata(&self.path).map_err(unreadable)?;
+        if (there.dev(), there.ino()) != self.id {
+            return Err(Alteration::Replaced);
+        }
+        match there.len() {
+            found if found == self.bytes => Ok(()),
+            found => Err(Alteration::Length { found, written: self.bytes }),
+        }
     }
 
     fn read_back(&self) -> Result<(), Alteration> {
@@ -204,32 +240,6 @@ impl Sink for FileSink {
             true => Ok(()),
             false => Err(Alteration::Content),
         }
-    }
-
-    fn closed_check(&self) -> ClosedCheck {
-        let (path, written) = (self.path.clone(), self.written);
-        let own = self.file.metadata().map(|own| (own.dev(), own.ino()));
-        Box::new(move || match own {
-            Ok(id) => check_file(&path, id, written),
-            Err(_) => Ok(()),
-        })
-    }
-
-    fn free_bytes(&self) -> Option<u64> {
-        let disk = rustix::fs::fstatvfs(&self.file).ok()?;
-        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
-    }
-}
-
-/// Whether the file of this device and number has the name, and so many bytes.
-fn check_file(path: &Path, id: (u64, u64), written: u64) -> Result<(), Alteration> {
-    let there = std::fs::metadata(path).map_err(unreadable)?;
-    if (there.dev(), there.ino()) != id {
-        return Err(Alteration::Replaced);
-    }
-    match there.len() {
-        found if found == written => Ok(()),
-        found => Err(Alteration::Length { found, written }),
     }
 }
 

@@ -113,8 +113,7 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
 fn a_segment_that_was_finished_is_looked_at_too() {
     let rows = rows(4000, 7);
     let (first, rest) = rows.split_at(2000);
-    // While it is written, its content alone changes; later, its length does.
-    for (command, is_open) in [(CHANGE, true), (CUT, false)] {
+    for (command, is_open) in [(CHANGE, true), (CUT, false), (CHANGE, false), (REPLACE, false)] {
         let folder = tempfile::tempdir().unwrap();
         let source = FolderSegments::new(folder.path());
         let batches = if is_open { 1000 } else { 5 };
