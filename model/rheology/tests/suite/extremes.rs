@@ -4,7 +4,7 @@ use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::extremes::{
     Answer, Expected, Extent, FamilyBody, PathCase, Subject, Verdict, judge, member, parts,
 };
-use palpate_rheology::families::{self, Family, Live, Model, Outer, Relaxation};
+use palpate_rheology::families::{self, Family, Model, Outer, Relaxation};
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -181,9 +181,6 @@ impl Family for Counted {
     }
     fn cannot_represent(&self) -> &'static str {
         self.family.cannot_represent()
-    }
-    fn live(&self) -> Live {
-        self.family.live()
     }
     fn outer(&self) -> Vec<Outer> {
         self.family.outer()

@@ -3,7 +3,7 @@
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{self, Model, PowerSeries};
-use palpate_rheology::families::{Family, Live, Outer, Relaxation};
+use palpate_rheology::families::{Family, Outer, Relaxation};
 use palpate_rheology::fit::fit_joint;
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::sync::Arc;
@@ -174,9 +174,6 @@ impl Family for WithoutKernel {
     }
     fn cannot_represent(&self) -> &'static str {
         self.0.cannot_represent()
-    }
-    fn live(&self) -> Live {
-        self.0.live()
     }
     fn outer(&self) -> Vec<Outer> {
         self.0.outer()
