@@ -9,7 +9,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_analysis::fit::fit_source;
+use palpate_analysis::fit::Recipe;
 use palpate_analysis::report::text::{self, ParameterText};
 use palpate_analysis::source::Wanted;
 use palpate_drivers::sim::SimSettings;
@@ -170,9 +170,7 @@ impl Flow {
         });
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();
-        let options = FitOptions::default();
-        let fitted = fit_source(&session, None, Wanted::whatever_it_is_worth(), &options);
-        let result = match fitted.map(|fitted| fitted.with_systematic(&options)) {
+        let result = match Recipe::new(FitOptions::default(), Wanted::default()).fit(&session) {
             Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
             Err(err) => Err(err.to_string()),
         };

@@ -1,10 +1,10 @@
 //! What a device makes of a body: the margin before play, what the loop does without its guards and with them, and
 //! how the loop keeps its time on this computer.
 
-use super::fit::fit_source;
+use super::fit::Fitted;
 use super::margin::{MarginPoint, margin_curve};
 use super::recorded::RecordedTicks;
-use crate::source::Wanted;
+use crate::source::read;
 use palpate_figures::thin::thin;
 use palpate_haptics::check::{CheckSample, CheckSettings, calibration_points, check as run_check};
 use palpate_haptics::margin::Verdict;
@@ -50,8 +50,7 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
         });
     }
     let options = FitOptions::default();
-    let fitted =
-        fit_source(source, None, Wanted::default(), &options).map_err(|err| err.to_string())?;
+    let fitted = Fitted::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
     let value = |name: &str| {
         let parameter = report.parameter(name);

@@ -239,14 +239,20 @@ pub struct Recordings {
     pub notes: Vec<String>,
 }
 
+/// Refuses a recording that is named twice, however it is written.
+pub fn check_once<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), SourcesError> {
+    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    let mut reals: Vec<PathBuf> = paths.into_iter().map(real).collect();
+    reals.sort();
+    match reals.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(SourcesError::Twice(pair[0].clone())),
+        None => Ok(()),
+    }
+}
+
 /// Reads recordings that are looked at together, each once.
 pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesError> {
-    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
-    let mut reals: Vec<PathBuf> = paths.iter().map(real).collect();
-    reals.sort();
-    if let Some(pair) = reals.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(SourcesError::Twice(pair[0].clone()));
-    }
+    check_once(paths)?;
     let mut read = Recordings::default();
     for path in paths {
         let name = how.naming.name(path);

@@ -4,10 +4,10 @@ use crate::support::{
     assert_refused, command, json, palpate, short_run, split_words, stderr, stdout, succeeded,
     typed,
 };
-use palpate_analysis::fit::{Intervals, fit_source};
+use palpate_analysis::fit::{Fitted, Intervals};
 use palpate_analysis::report::fit_json::Overlay;
 use palpate_analysis::report::text;
-use palpate_analysis::source::Wanted;
+use palpate_analysis::source::read;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
 use palpate_rheology::fit::FitOptions;
@@ -97,8 +97,7 @@ fn one_source_prints_what_the_window_shows() {
     table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
     let output = palpate(at, &["fit", "t.csv"]);
     succeeded(&output);
-    let fitted =
-        fit_source(&at.join("t.csv"), None, Wanted::default(), &FitOptions::default()).unwrap();
+    let fitted = Fitted::of(read(&at.join("t.csv")).unwrap(), &FitOptions::default());
     let report = fitted.result.as_ref().unwrap();
     let (overlay, intervals) = (Overlay::of(report, &fitted.samples), Intervals::default());
     let page = text::whole(report, fitted.beside(&overlay, &intervals));

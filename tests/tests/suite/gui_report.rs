@@ -3,7 +3,7 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_analysis::fit::fit_source;
+use palpate_analysis::fit::Recipe;
 use palpate_analysis::report::text;
 use palpate_analysis::source::Wanted;
 use palpate_model::calibration::Calibration;
@@ -134,10 +134,8 @@ fn a_fit_is_made_compared_and_taken_back() {
     assert_eq!(panel.chosen().as_deref(), Some("all of it"));
     assert!(panel.says("95 % from the profile likelihood"));
     // The numbers of the command line, in its words.
-    let options = FitOptions::default();
-    let wanted = Wanted::whatever_it_is_worth();
-    let fitted = fit_source(&panel.session, None, wanted, &options).expect("a source");
-    let report = fitted.with_systematic(&options).result.expect("a fit");
+    let recipe = Recipe::new(FitOptions::default(), Wanted::default());
+    let report = recipe.fit(&panel.session).expect("a source").result.expect("a fit");
     panel.click("Compare with the session's own fit");
     panel.wait_for("session: ");
     for parameter in &report.parameters {

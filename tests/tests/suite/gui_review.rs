@@ -127,13 +127,9 @@ fn sessions_are_fitted_compared_and_foretold() {
     });
     flow.window.run_steps(2);
     // The same words as the command line has.
-    let fitted = palpate_analysis::fit::fit_source(
-        &path,
-        None,
-        palpate_analysis::source::Wanted::whatever_it_is_worth(),
-        &palpate_rheology::fit::FitOptions::default(),
-    );
-    let report = fitted.unwrap().result.unwrap();
+    let options = palpate_rheology::fit::FitOptions::default();
+    let recipe = palpate_analysis::fit::Recipe::new(options, Default::default());
+    let report = recipe.fit(&path).unwrap().result.unwrap();
     assert!(flow.says(&palpate_analysis::report::text::quality(&report)));
     for sentence in report.sentences() {
         assert!(flow.says(sentence), "{sentence}");

@@ -7,19 +7,21 @@ use crate::report::dossier::{Wanted, name_of};
 use crate::report::fit_json::{Beside, FitObject, Overlay};
 use crate::report::kept;
 use crate::source::{self, FitSource, Stretch};
-use crate::sources::{Recording, Recordings};
+use crate::sources::{Recording, Recordings, check_once};
 use palpate_rheology::fit::{FitOptions, Parameter};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// How a session is fitted.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FitWanted {
     /// Key of a family; none for the modified Kelvin body.
     pub family: Option<String>,
     /// The way back too, where the family knows it.
     pub with_unload: bool,
+    /// Take sessions though they were rejected.
+    pub is_rejected_included: bool,
     /// Intervals from the profile likelihood as well.
     pub with_profile: bool,
     /// The analysis that the session is read by.
@@ -69,7 +71,7 @@ impl FitWanted {
             unload: self.with_unload,
             systematic: true,
             profile: self.with_profile,
-            include_rejected: true,
+            include_rejected: self.is_rejected_included,
             ..FitSettings::default()
         };
         let mut settings = json!(settings);
@@ -87,8 +89,7 @@ impl FitWanted {
     fn read(&self, session: &Path, based_on: Option<&str>) -> Result<FitSource, String> {
         let wanted = source::Wanted {
             stretch: Stretch::with_unload(self.with_unload),
-            // Whoever works on a session knows what it is worth.
-            is_rejected_included: true,
+            is_rejected_included: self.is_rejected_included,
         };
         let source = source::read_analysed(session, None, wanted, based_on);
         source.map_err(|err| format!("{}: {err}", name_of(session)))
@@ -96,14 +97,17 @@ impl FitWanted {
 
     /// Fits a session; what `palpate fit --json` prints.
     pub(super) fn results(&self, session: &Path, progress: &dyn Progress) -> Result<Value, String> {
+        let session = session.to_path_buf();
+        let others = self.together_with.iter().map(|one| &one.session);
+        check_once(others.chain([&session])).map_err(|err| err.to_string())?;
         step(progress, 0, 4, "reading the session")?;
-        let source = self.read(session, self.based_on.as_deref())?;
+        let source = self.read(&session, self.based_on.as_deref())?;
         step(progress, 1, 4, "fitting")?;
         let options = self.options()?;
         if self.together_with.is_empty() {
             return self.exact(source, &options, progress);
         }
-        let mut all = vec![Recording::of(name_of(session), source, None)];
+        let mut all = vec![Recording::of(name_of(&session), source, None)];
         for one in &self.together_with {
             let name = name_of(&one.session);
             step(progress, 1, 4, &format!("reading {name}"))?;
@@ -175,15 +179,10 @@ impl FitWanted {
 /// The session's own fit, as its edits leave it, to be compared with: parameters and sentences.
 pub fn own(
     session: &Path,
+    is_rejected_included: bool,
     progress: &dyn Progress,
 ) -> Result<(Vec<Parameter>, Vec<String>), String> {
-    let wanted = FitWanted {
-        family: None,
-        with_unload: false,
-        with_profile: false,
-        based_on: None,
-        together_with: Vec::new(),
-    };
+    let wanted = FitWanted { is_rejected_included, ..FitWanted::default() };
     let results = wanted.results(session, progress)?;
     Ok((kept::parameters(&results), kept::sentences(&results)))
 }

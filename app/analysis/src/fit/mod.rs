@@ -212,14 +212,3 @@ pub struct Intervals {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bootstrap: Vec<BootstrapInterval>,
 }
-
-/// Reads what is wanted of a session or a table and fits it. `columns` names the columns of a table without header.
-pub fn fit_source(
-    path: &Path,
-    columns: Option<&ColumnNames>,
-    wanted: Wanted,
-    options: &FitOptions,
-) -> Result<Fitted, SourceError> {
-    let source = source::read_stretch(path, columns, wanted)?;
-    Ok(Fitted::of(source, options))
-}

@@ -53,14 +53,6 @@ pub struct Wanted {
     pub is_rejected_included: bool,
 }
 
-impl Wanted {
-    /// Ramp and hold of a session that may have been rejected.
-    #[must_use]
-    pub fn whatever_it_is_worth() -> Self {
-        Self { is_rejected_included: true, ..Self::default() }
-    }
-}
-
 impl Stretch {
     /// With the way back or without.
     #[must_use]

@@ -1,6 +1,7 @@
-//! The family to be fitted, chosen from a list.
+//! The family to be fitted, chosen from a list, and whether rejected sessions are.
 
 use super::choice::choice_ui;
+use super::tick_box::tick_box;
 use eframe::egui::Ui;
 use palpate_rheology::families;
 
@@ -12,11 +13,14 @@ pub struct ModelChoice {
     keys: Vec<String>,
     /// Key of the chosen one; none for the modified Kelvin body of third order.
     pub family: Option<String>,
+    /// Take sessions though they were rejected.
+    pub is_rejected_included: bool,
 }
 
 impl Default for ModelChoice {
     fn default() -> Self {
-        Self { keys: families::all().iter().map(|one| one.key()).collect(), family: None }
+        let keys = families::all().iter().map(|one| one.key()).collect();
+        Self { keys, family: None, is_rejected_included: false }
     }
 }
 
@@ -27,5 +31,7 @@ impl ModelChoice {
         let keys = keys.map(|key| (Some(key.clone()), key.as_str()));
         let all: Vec<_> = std::iter::once((None, OWN_MODEL)).chain(keys).collect();
         choice_ui(ui, name, &mut self.family, &all);
+        let words = format!("rejected sessions too ({name})");
+        tick_box(ui, &mut self.is_rejected_included, &words);
     }
 }

@@ -104,8 +104,7 @@ fn has_ramp(run: &RunView) -> bool {
 }
 
 fn exact(folder: &Path) -> Result<ExactFit, String> {
-    // Whoever looks at a run sees its fit, whatever the run is worth.
-    let recipe = Recipe::new(FitOptions::default(), Wanted::whatever_it_is_worth());
+    let recipe = Recipe::new(FitOptions::default(), Wanted::default());
     let fitted = recipe.fit(folder).map_err(|err| err.to_string())?;
     let report = fitted.result.map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);

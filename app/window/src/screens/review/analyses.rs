@@ -247,8 +247,9 @@ impl AnalysesPanel {
 
     fn fit_own(&mut self, ctx: &Context, session: &Path) {
         let session = session.to_path_buf();
+        let is_rejected_included = self.form.is_rejected_included();
         self.own.start("own-fit", ctx, move |progress| {
-            let (parameters, sentences) = own(&session, progress)?;
+            let (parameters, sentences) = own(&session, is_rejected_included, progress)?;
             Ok(Own { session, parameters, sentences })
         });
     }

@@ -145,6 +145,7 @@ impl Subject {
             path: self.looked.session.clone(),
             analysis: self.looked.analysis.clone(),
             family: model.family.clone(),
+            is_rejected_included: model.is_rejected_included,
             ramp_t: first.unwrap_or(0.0),
         }
     }

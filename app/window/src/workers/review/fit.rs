@@ -23,6 +23,8 @@ pub struct Subject {
     pub analysis: Option<String>,
     /// Key of the family to be fitted; none for the modified Kelvin body of third order.
     pub family: Option<String>,
+    /// Take it though it was rejected.
+    pub is_rejected_included: bool,
     /// Time of the first sample that a fit takes.
     pub ramp_t: f64,
 }
@@ -67,11 +69,10 @@ pub struct Prediction {
 }
 
 fn samples_of(subject: &Subject) -> Result<Fitted, String> {
-    // Whoever looks at a session sees its fit, whatever the session is worth.
-    let recipe = Recipe {
-        analysis: subject.analysis.clone(),
-        ..Recipe::new(subject.options()?, Wanted::whatever_it_is_worth())
-    };
+    let is_rejected_included = subject.is_rejected_included;
+    let wanted = Wanted { is_rejected_included, ..Wanted::default() };
+    let recipe =
+        Recipe { analysis: subject.analysis.clone(), ..Recipe::new(subject.options()?, wanted) };
     recipe.fit(&subject.path).map_err(|err| err.to_string())
 }
 
@@ -159,7 +160,9 @@ pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Predictio
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_analysis::analyses::{Who, judge};
     use palpate_analysis::progress::Unwatched;
+    use palpate_sessions::edits::Verdict;
     use std::path::Path;
 
     fn recorded() -> Subject {
@@ -167,6 +170,7 @@ mod tests {
             path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab"),
             analysis: None,
             family: None,
+            is_rejected_included: false,
             ramp_t: 3.0,
         }
     }
@@ -182,6 +186,25 @@ mod tests {
         assert!((rms_n / found.report.rmse_n - 1.0).abs() < 1e-3, "{rms_n}");
         assert!((found.track.span().unwrap()[0] - 3.0).abs() < 1e-9);
         assert!(found.profile.unwrap().len() >= 5);
+    }
+
+    #[test]
+    fn a_rejected_session_is_fitted_only_where_that_is_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hair");
+        std::fs::create_dir(&path).unwrap();
+        for file in std::fs::read_dir(recorded().path).unwrap() {
+            let file = file.unwrap().path();
+            std::fs::copy(&file, path.join(file.file_name().unwrap())).unwrap();
+        }
+        let who = Who { by: "Ada".into(), reason: "a hair".into() };
+        judge(&path, Verdict::Rejected, &who).unwrap();
+        let mut subject = Subject { path, ..recorded() };
+        assert!(fit_session(&subject).unwrap_err().contains("a hair"));
+        let pair = [recorded(), subject.clone()];
+        assert!(predict(&pair, &Unwatched).unwrap_err().contains("a hair"));
+        subject.is_rejected_included = true;
+        assert!(fit_session(&subject).is_ok());
     }
 
     #[test]

@@ -59,6 +59,11 @@ impl Default for Form {
 }
 
 impl Form {
+    /// Whether fits take a session though it was rejected.
+    pub fn is_rejected_included(&self) -> bool {
+        self.model.is_rejected_included
+    }
+
     /// What was made needs another name next time.
     pub fn forget(&mut self) {
         self.name.clear();
@@ -170,6 +175,7 @@ impl Form {
                 how: FitWanted {
                     family: self.model.family.clone(),
                     with_unload: self.with_unload && self.model.family.is_some(),
+                    is_rejected_included: self.model.is_rejected_included,
                     with_profile: self.with_profile,
                     based_on: read_by.map(str::to_owned),
                     together_with: match is_together {
