@@ -111,7 +111,7 @@ pub enum ReadError {
     },
     /// The session is not as it was written.
     #[error(
-        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or keep what is whole with palpate recover", path.display()
+        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or keep what is whole", path.display()
     )]
     Damaged {
         /// The log.

@@ -20,6 +20,9 @@ fn what_a_reader_refuses_is_worded() {
         ReadError::Damaged { path: path(), offset: 77, reason: "a wrong checksum".into() } => ["/data/one", "byte 77", "a wrong checksum"],
         ReadError::Io { path: path(), source: ErrorKind::PermissionDenied.into() } => ["/data/one", "permission denied"],
     }
+    // The way out is the front end's to tell.
+    let damaged = ReadError::Damaged { path: path(), offset: 77, reason: "torn".into() };
+    assert!(!damaged.to_string().contains("palpate"), "{damaged}");
 }
 
 #[test]
