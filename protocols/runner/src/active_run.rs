@@ -161,7 +161,7 @@ impl ActiveRun {
         }
         effects.iter().for_each(|effect| self.fidelity.effect(effect));
         if let Some(input) = &told {
-            self.run_log.input(input);
+            self.run_log.input(now, input);
         }
         if let Some((kind, body)) = logged {
             self.log(now, kind, body);

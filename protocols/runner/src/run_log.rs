@@ -1,21 +1,47 @@
-//! What the program's log says of a run, at transitions alone: never of a sample, a force or a note.
+//! What the program's log says of a run, at transitions alone: what kind of thing happened to which step, never a sample, a
+//! force or a note. Why stands in the session's own log, and reasons quote what was measured.
 
+use palpate_model::Nanos;
 use palpate_model::rig::Fault;
-use palpate_protocols::engine::{EndingKind, Input, Outcome, Record};
+use palpate_protocols::engine::{EndingKind, Input, Outcome, Record, Recovery};
 use palpate_protocols::plans::Plan;
 use std::mem::{Discriminant, discriminant};
 use std::path::Path;
 use tracing::{Span, error, info, info_span, warn};
 
-/// Faults, each kind said once until another one comes: a broken cell can report one with every sample.
+/// Between two lines of one kind of fault.
+const QUIET: Nanos = Nanos::from_millis(60_000);
+
+/// Faults, of each kind one line a minute: a broken cell can report one with every sample, and a bad link several kinds in
+/// turn.
 #[derive(Debug, Default)]
-pub(super) struct FaultLog(Option<Discriminant<Fault>>);
+pub(super) struct FaultLog(Vec<Repeated>);
+
+/// A kind of fault, when it was last told, and how often it came since.
+#[derive(Debug)]
+struct Repeated {
+    kind: Discriminant<Fault>,
+    told: Nanos,
+    since: u64,
+}
 
 impl FaultLog {
-    pub fn fault(&mut self, fault: &Fault) {
-        let kind = Some(discriminant(fault));
-        if std::mem::replace(&mut self.0, kind) != kind {
-            warn!("{fault}");
+    /// Takes a fault of this time.
+    pub fn fault(&mut self, now: Nanos, fault: &Fault) {
+        let kind = discriminant(fault);
+        match self.0.iter_mut().find(|one| one.kind == kind) {
+            None => {
+                warn!("{fault}");
+                self.0.push(Repeated { kind, told: now, since: 0 });
+            }
+            Some(one) if now.since(one.told) < QUIET => one.since += 1,
+            Some(one) => {
+                match std::mem::take(&mut one.since) {
+                    0 => warn!("{fault}"),
+                    more => warn!("{fault}; {more} more of its kind since the last line"),
+                }
+                one.told = now;
+            }
         }
     }
 }
@@ -44,9 +70,9 @@ impl RunLog {
         }
     }
 
-    pub fn input(&mut self, input: &Input) {
+    pub fn input(&mut self, now: Nanos, input: &Input) {
         match input {
-            Input::Fault(fault) => self.step.in_scope(|| self.faults.fault(fault)),
+            Input::Fault(fault) => self.step.in_scope(|| self.faults.fault(now, fault)),
             Input::Operator { choice } => info!(parent: &self.step, "operator: {choice}"),
             _ => {}
         }
@@ -58,17 +84,31 @@ impl RunLog {
                 self.begin_step(*step_index);
                 info!(parent: &self.step, "phase: {record}");
             }
-            Record::EndingStarted { ending: EndingKind::Finish | EndingKind::Stop, .. }
-            | Record::FinishedEarly
-            | Record::PausePending { .. }
-            | Record::Paused { .. }
-            | Record::Resumed => info!(parent: &self.step, "{record}"),
-            Record::EndingStarted { .. }
-            | Record::InterlockTripped { .. }
-            | Record::LeadLost { .. }
-            | Record::MonitorTripped { .. }
-            | Record::Refused { .. }
-            | Record::StepFailed { .. } => warn!(parent: &self.step, "{record}"),
+            Record::FinishedEarly | Record::PausePending { .. } | Record::Resumed => {
+                info!(parent: &self.step, "{record}");
+            }
+            Record::Paused { .. } => info!(parent: &self.step, "paused"),
+            Record::EndingStarted {
+                ending: ending @ (EndingKind::Finish | EndingKind::Stop),
+                ..
+            } => {
+                info!(parent: &self.step, "ending: {ending}");
+            }
+            Record::EndingStarted { ending, .. } => warn!(parent: &self.step, "ending: {ending}"),
+            Record::InterlockTripped { interlock, .. } => {
+                warn!(parent: &self.step, "interlock tripped: {interlock}");
+            }
+            Record::LeadLost { .. } => warn!(parent: &self.step, "lead lost"),
+            Record::MonitorTripped { index, .. } => {
+                warn!(parent: &self.step, "monitor {} tripped", index + 1);
+            }
+            Record::Refused { .. } => warn!(parent: &self.step, "request refused"),
+            Record::StepFailed { then: Recovery::Retry(count), .. } => {
+                warn!(parent: &self.step, "step failed, trying again ({count})");
+            }
+            Record::StepFailed { then: Recovery::Skip, .. } => {
+                warn!(parent: &self.step, "step failed, left out");
+            }
             _ => {}
         }
     }
@@ -87,7 +127,7 @@ impl RunLog {
     }
 
     pub fn closed(&self, outcome: &Outcome, log_error: Option<&str>) {
-        info!(parent: &self.run, "session closed, {}: {}", outcome.ending, outcome.reason);
+        info!(parent: &self.run, "session closed, {}", outcome.ending);
         if let Some(err) = log_error {
             error!(parent: &self.run, "{err}");
         }

@@ -4,6 +4,7 @@ use super::clock::{HostTimes, TimeScale, host_times};
 use super::live_feed::{Estimator, LiveFeed};
 use super::main_loop::{MainLoop, Runner};
 use super::panic_stop::is_registered;
+use super::run_log::FaultLog;
 use super::snapshot::Snapshot;
 use super::start::{AfterStop, Answers, RunRequest};
 use crate::replay::replay;
@@ -13,7 +14,7 @@ use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
 use palpate_model::about::Labels;
 use palpate_model::estimate::LiveEstimate;
-use palpate_model::rig::Limits;
+use palpate_model::rig::{Fault, Limits};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::plans::RampHold;
 use palpate_sessions::health::{Told, Why};
@@ -215,4 +216,73 @@ fn rig_is_stopped_by_a_panic_as_soon_as_its_runner_is_started() {
         let runner = Runner::start(rig, TimeScale::Max, None, || {}).unwrap();
         assert!(is_registered(runner.thread_id().unwrap()));
     }
+}
+
+/// Takes every line of the program's log.
+#[derive(Clone, Default)]
+struct Lines(Arc<std::sync::Mutex<Vec<String>>>);
+
+impl tracing::Subscriber for Lines {
+    fn enabled(&self, _: &tracing::Metadata<'_>) -> bool {
+        true
+    }
+
+    fn new_span(&self, _: &tracing::span::Attributes<'_>) -> tracing::span::Id {
+        tracing::span::Id::from_u64(1)
+    }
+
+    fn event(&self, event: &tracing::Event<'_>) {
+        let mut line = String::new();
+        event.record(&mut |field: &tracing::field::Field, value: &dyn std::fmt::Debug| {
+            line += &format!("{field}={value:?} ");
+        });
+        self.0.lock().unwrap().push(line);
+    }
+
+    fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
+    fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
+    fn enter(&self, _: &tracing::span::Id) {}
+    fn exit(&self, _: &tracing::span::Id) {}
+}
+
+#[test]
+fn program_log_of_a_tripped_interlock_holds_no_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("tripped");
+    let lines = Lines::default();
+    tracing::subscriber::with_default(lines.clone(), || {
+        let mut main_loop = MainLoop::new(Box::new(sim()), TimeScale::Max, Arc::new(host_times));
+        let mut request = request(&out);
+        request.limits.force_max = Newtons(0.5);
+        main_loop.start_run(&request).unwrap();
+        run(main_loop);
+    });
+    let is_force = |text: &str| {
+        text.as_bytes().windows(3).any(|it| it[0].is_ascii_digit() && it.ends_with(b" N"))
+    };
+    let end = Session::open(&out).unwrap().end.unwrap();
+    assert_eq!(end.outcome, "interlock");
+    assert!(is_force(&end.reason), "{}", end.reason);
+    let lines = lines.0.lock().unwrap();
+    assert!(lines.iter().any(|line| line.contains("interlock tripped: force")), "{lines:?}");
+    assert!(!lines.iter().any(|line| is_force(line)), "{lines:?}");
+}
+
+#[test]
+fn faults_in_turn_leave_a_line_a_minute_of_each_kind() {
+    let lines = Lines::default();
+    tracing::subscriber::with_default(lines.clone(), || {
+        let mut faults = FaultLog::default();
+        // Ten minutes of two faults in turn, a thousand times a second.
+        for ms in 0..600_000 {
+            let fault = match ms % 2 {
+                0 => Fault::SignalInvalid { tick: ms },
+                _ => Fault::CommandRefused { detail: "busy".into() },
+            };
+            faults.fault(Nanos::from_millis(ms), &fault);
+        }
+    });
+    let lines = lines.0.lock().unwrap();
+    assert_eq!(lines.len(), 2 * 10, "{lines:?}");
+    assert!(lines[2].contains("29999 more"), "{}", lines[2]);
 }
