@@ -1,6 +1,7 @@
 //! Files that only grow, one JSON object a line. Every line carries a checksum over itself and the line
 //! before, so that a line that was changed, moved or taken out of the middle is noticed. One taken off the end
-//! is noticed by the [`Head`], which stands in a file beside it, and in the catalog.
+//! is noticed by the [`Head`], which stands in a file beside it, and in the catalog, which tells there what it notices and what
+//! not.
 //!
 //! A line is `{"body": ..., "checksum": CRC-32}`. The checksum is over the checksum of the line before (of
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON
@@ -43,7 +44,7 @@ pub enum ChainError {
         line: usize,
     },
     /// Fewer lines than were written, or others.
-    #[error("{} is not all that was written: {}; restore the file from a backup, or move it and its head away and rebuild the catalog to go back to what was recorded", path.display(), missing(*found, *written))]
+    #[error("{} is not all that was written: {}; restore the file from a backup, or move it, its head and the catalog of the library away to go back to what was recorded", path.display(), missing(*found, *written))]
     Shortened {
         /// The file.
         path: PathBuf,

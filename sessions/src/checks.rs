@@ -1,9 +1,12 @@
 //! The daily checks of every rig: one line each in `checks/RIG.jsonl` of the library, never changed.
 
-use crate::chain::{self, ChainError};
+use crate::chain::{self, ChainError, Head};
 use chrono::{DateTime, Local, Utc};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+/// Folder of the checks in a library.
+pub(crate) const CHECKS_FOLDER: &str = "checks";
 
 /// One thing that was checked.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,25 +47,35 @@ impl DailyCheck {
     }
 }
 
-/// The file of a rig: its name, with what a file name cannot hold replaced and told apart by a checksum.
-fn file_of(library: &Path, rig: &str) -> PathBuf {
+/// The file of a rig below the library: its name, with what a file name cannot hold replaced and told apart by a checksum.
+fn file_of(rig: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let mut name: String = rig.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
     if name != rig {
         name += &format!("-{:08x}", crc32fast::hash(rig.as_bytes()));
     }
-    library.join("checks").join(format!("{name}.jsonl"))
+    format!("{CHECKS_FOLDER}/{name}.jsonl")
 }
 
 /// Every check of a rig, oldest first; a rig that was never checked has none.
 pub fn read_checks(library: &Path, rig: &str) -> Result<Vec<DailyCheck>, ChainError> {
-    let path = file_of(library, rig);
-    chain::read(&path, rig)?.records(&path, "a check")
+    read_checks_since(library, rig, |_| Head::default())
+}
+
+/// As [`read_checks`], and refuses a file that does not hold what it held once, by its path below the library.
+pub(crate) fn read_checks_since(
+    library: &Path,
+    rig: &str,
+    since: impl Fn(&str) -> Head,
+) -> Result<Vec<DailyCheck>, ChainError> {
+    let file = file_of(rig);
+    let path = library.join(&file);
+    chain::read_since(&path, rig, since(&file))?.records(&path, "a check")
 }
 
 /// Keeps a check.
 pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), ChainError> {
-    chain::append(&file_of(library, &check.rig), &check.rig, check)
+    chain::append(&library.join(file_of(&check.rig)), &check.rig, check)
 }
 
 /// The last check of the day of `now`, by this computer's calendar.
@@ -120,7 +133,7 @@ mod tests {
         // A name never leads out of the folder.
         // Each with its head.
         assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 6);
-        let file = file_of(at, "sim:bench 2");
+        let file = at.join(file_of("sim:bench 2"));
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(&file, text.replacen("\"is_passed\":false", "\"is_passed\":true", 1))
             .unwrap();

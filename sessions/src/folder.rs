@@ -11,6 +11,8 @@ use thiserror::Error;
 pub const LOG_FILE: &str = "000.mcap";
 /// Name of the file in a session folder that names the folder of segments its disk could not take.
 pub const SPARE_FILE: &str = "spare";
+/// Folder of the runs of programmes in a library.
+pub(crate) const PROGRAMMES_FOLDER: &str = "programmes";
 /// Name of the lock in a session folder.
 pub const LOCK_FILE: &str = "lock";
 
@@ -191,7 +193,7 @@ pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
 #[must_use]
 pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc>) -> PathBuf {
     let begun = crate::manifest::new_session_id(started_at);
-    library.join("programmes").join(format!("{name}-{begun}"))
+    library.join(PROGRAMMES_FOLDER).join(format!("{name}-{begun}"))
 }
 
 /// Refuses a disk with less than twice the room a session needs.

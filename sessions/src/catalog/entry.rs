@@ -1,5 +1,6 @@
 //! What the catalog knows of one session. All of it comes from the session's folder.
 
+use super::heads::KnownHeads;
 use super::walk::Place;
 use crate::analyses::{Analysed, Analyses};
 use crate::chain::Head;
@@ -143,14 +144,10 @@ pub struct Named {
 }
 
 impl Entry {
-    /// Reads a session. One that cannot be read has its reason in `trouble`, as has one that lacks what `former`, the
-    /// entry of the same folder, had seen of it.
-    pub(super) fn read(place: &Place, former: Option<&Self>) -> Self {
-        let mut entry = Self {
-            folder: place.name.clone(),
-            heads: former.map(|former| former.heads).unwrap_or_default(),
-            ..Self::default()
-        };
+    /// Reads a session. One that cannot be read has its reason in `trouble`, as has one that lacks lines that are known to
+    /// have been there.
+    pub(super) fn read(place: &Place, known: &KnownHeads) -> Self {
+        let mut entry = Self { folder: place.name.clone(), ..Self::default() };
         match Summary::read(&place.path) {
             Ok(summary) => {
                 entry.take_manifest(&summary.manifest);
@@ -162,10 +159,8 @@ impl Entry {
             }
         }
         let id = &entry.session_id;
-        if former.is_some_and(|former| former.session_id != *id) {
-            entry.heads = Heads::default();
-        }
-        let heads = entry.heads;
+        let heads = known.of_session(&place.name, id);
+        entry.heads = heads;
         let edits = Edits::read_since(&place.path, id, heads.edits);
         let analyses = Analyses::read_since(&place.path, id, heads.analyses);
         let mut trouble = Vec::new();

@@ -4,7 +4,7 @@
 use super::entry::Made;
 use super::search::{Order, Query};
 use super::{Catalog, CatalogError};
-use crate::checks::read_checks;
+use crate::checks::read_checks_since;
 use crate::edits::{Change, Edit, Edits};
 use crate::shelf::{Document, Shelf, taken_at};
 use chrono::{DateTime, SecondsFormat, Utc};
@@ -90,7 +90,8 @@ impl Catalog {
             (subject == Subject::Rig && one.rig == name).then(|| one.operator.clone())
         });
         if subject == Subject::Rig {
-            match read_checks(&self.library, name) {
+            let heads = self.heads()?;
+            match read_checks_since(&self.library, name, |file| heads.of(file, name)) {
                 Ok(checks) => events.extend(checks.iter().map(|one| Event {
                     at: stamp(one.at),
                     what: "check".into(),

@@ -1,14 +1,16 @@
 //! The catalog: what a library's sessions say of themselves, in one SQLite file that can be searched.
 //!
-//! The file holds nothing of its own. It is made from the sessions, brought up to date from those that
-//! changed, and may be deleted at any time. A file of another version is replaced; one that is damaged, or
-//! another program's, is set aside and made anew.
+//! The file is made from the sessions, brought up to date from those that changed, and may be deleted at any time; what is
+//! lost with it is only the memory of how far edits, analyses, checks and journals went, by which it notices that some were
+//! taken away (`heads.rs`). A file of another version is replaced; one that is damaged, or another program's, is set aside
+//! and made anew.
 //!
 //! Start reading at [`Entry`] for what is known of a session, then [`Catalog::update`] and
 //! [`Catalog::find`].
 
 mod condition;
 mod entry;
+mod heads;
 mod history;
 mod schema;
 mod search;
@@ -163,9 +165,12 @@ impl Catalog {
         let path = library.join(CATALOG_FILE);
         let db = match open_file(&path) {
             Ok(Opened::Ours(db)) => db,
-            Ok(Opened::OtherVersion) => {
+            Ok(Opened::OtherVersion(heads)) => {
                 remove(&path)?;
-                open_new(&path)?
+                let db = open_new(&path)?;
+                let kept = heads.iter().try_for_each(|one| heads::remember(&db, one));
+                kept.map_err(|err| CatalogError::of(&path, err))?;
+                db
             }
             Ok(Opened::Foreign) => {
                 remarks.push(set_aside(&path, "it is another program's")?);
@@ -198,7 +203,8 @@ impl Catalog {
 
 enum Opened {
     Ours(Connection),
-    OtherVersion,
+    /// What it remembers.
+    OtherVersion(Vec<heads::Remembered>),
     Foreign,
 }
 
@@ -213,7 +219,7 @@ fn open_file(path: &Path) -> Result<Opened, CatalogError> {
         db.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(failed)?;
     match (number("application_id")?, number("user_version")?) {
         (schema::APPLICATION, schema::VERSION) => {}
-        (schema::APPLICATION, _) => return Ok(Opened::OtherVersion),
+        (schema::APPLICATION, _) => return Ok(Opened::OtherVersion(heads::left_by(&db))),
         (0, 0) if tables == 0 => schema::create(&mut db).map_err(failed)?,
         _ => return Ok(Opened::Foreign),
     }
@@ -225,7 +231,7 @@ fn open_new(path: &Path) -> Result<Connection, CatalogError> {
     match open_file(path)? {
         Opened::Ours(db) => Ok(db),
         // Nobody else can have made one: the gate is ours.
-        Opened::OtherVersion | Opened::Foreign => Err(CatalogError::Busy(Busy::of(path))),
+        Opened::OtherVersion(_) | Opened::Foreign => Err(CatalogError::Busy(Busy::of(path))),
     }
 }
 

@@ -4,11 +4,11 @@ use rusqlite::{Connection, TransactionBehavior};
 
 /// Marks the file as ours: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
-/// Version of the tables and of what stands in them. Another one is replaced.
-pub(super) const VERSION: i64 = 7;
+/// Version of the tables and of what stands in them. Another one is replaced, but for what it remembers of files of lines.
+pub(super) const VERSION: i64 = 8;
 
 /// `entry` has all that is known of a session, as JSON, with its own checksum, for SQLite has none; the other
-/// columns are what is searched.
+/// columns are what is searched. `head` is how far files of lines went, each row with its own checksum.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -46,6 +46,15 @@ CREATE TABLE tag (
     PRIMARY KEY (session, tag)
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX tag_tag ON tag (tag);
+CREATE TABLE head (
+    file TEXT NOT NULL,
+    name TEXT NOT NULL,
+    lines INTEGER NOT NULL,
+    last INTEGER NOT NULL,
+    stamp TEXT NOT NULL,
+    checksum TEXT NOT NULL,
+    PRIMARY KEY (file, name)
+) STRICT, WITHOUT ROWID;
 CREATE VIRTUAL TABLE words USING fts5 (text, tokenize = 'unicode61', prefix = '2 3');
 ";
 

@@ -1,6 +1,7 @@
 //! The catalog follows the sessions: what changed is read again, what is gone goes.
 
 use super::entry::Entry;
+use super::heads::{remember, remember_session};
 use super::search::ReviewIs;
 use super::walk::{Place, walk};
 use super::{Catalog, CatalogError};
@@ -26,10 +27,10 @@ pub struct Changes {
     pub remarks: Vec<String>,
 }
 
-/// A session of which the catalog says something else than the session itself.
+/// A session, or a file of checks or a journal, of which the catalog says something else than there is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Doubt {
-    /// Its folder below the library.
+    /// Its folder, or the file, below the library.
     pub folder: String,
     /// What differs.
     pub sentence: String,
@@ -55,6 +56,7 @@ impl Catalog {
     ) -> Result<Changes, CatalogError> {
         let (places, remarks) = walk(&self.library);
         let mut known = self.fingerprints()?;
+        let heads = self.heads()?;
         let is_new = |place: &&Place| known.get(&place.name) != Some(&place.fingerprint);
         let new: Vec<&Place> = places.iter().filter(is_new).collect();
         for place in &places {
@@ -72,8 +74,7 @@ impl Catalog {
                 if flow.is_break() {
                     break;
                 }
-                let former = self.entry(&place.name)?;
-                entries.push((*place, Entry::read(place, former.as_ref())));
+                entries.push((*place, Entry::read(place, &heads)));
                 done += 1;
                 flow = progress(done, new.len());
             }
@@ -88,14 +89,20 @@ impl Catalog {
         if !gone.is_empty() {
             self.write(|db| gone.iter().try_for_each(|name| forget(db, name)))?;
         }
+        let (read, wrong) = self.confirm(&heads, true);
+        if !read.is_empty() {
+            self.write(|db| read.iter().try_for_each(|one| remember(db, one)))?;
+        }
+        changes.remarks.extend(wrong.into_iter().map(|(_, sentence)| sentence));
         Ok(changes)
     }
 
-    /// Reads every session again.
+    /// Reads everything again. What was known of edits, analyses, checks and journals is not forgotten.
     pub fn rebuild(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
         self.write(|db| {
             db.execute_batch(
-                "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;",
+                "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;
+                 UPDATE head SET stamp = '';",
             )
         })?;
         self.update(progress)
@@ -104,6 +111,7 @@ impl Catalog {
     /// Reads every session and tells where the catalog says something else; it is left as it is.
     pub fn check(&self, progress: Progress<'_>) -> Result<Vec<Doubt>, CatalogError> {
         let (places, _) = walk(&self.library);
+        let heads = self.heads()?;
         let mut known: BTreeMap<String, Entry> =
             self.all()?.into_iter().map(|entry| (entry.folder.clone(), entry)).collect();
         let mut doubts = Vec::new();
@@ -111,7 +119,7 @@ impl Catalog {
             progress(done, places.len());
             let sentence = match known.remove(&place.name) {
                 None => "the session is not in the catalog",
-                Some(entry) if entry != Entry::read(place, Some(&entry)) => {
+                Some(entry) if entry != Entry::read(place, &heads) => {
                     "the session has changed since the catalog read it"
                 }
                 Some(_) => continue,
@@ -122,6 +130,8 @@ impl Catalog {
             folder,
             sentence: "the catalog has a session that is gone".to_owned(),
         }));
+        let (_, wrong) = self.confirm(&heads, false);
+        doubts.extend(wrong.into_iter().map(|(folder, sentence)| Doubt { folder, sentence }));
         Ok(doubts)
     }
 
@@ -132,16 +142,6 @@ impl Catalog {
             let mut statement = self.db.prepare_cached(sql)?;
             let rows = statement.query_map([], entry_of)?;
             rows.collect()
-        };
-        read().map_err(self.failed())
-    }
-
-    /// The entry of a folder, if there is one.
-    fn entry(&self, folder: &str) -> Result<Option<Entry>, CatalogError> {
-        let read = || {
-            let sql = "SELECT entry, checksum FROM session WHERE folder = ?";
-            let mut statement = self.db.prepare_cached(sql)?;
-            statement.query_row([folder], entry_of).optional()
         };
         read().map_err(self.failed())
     }
@@ -230,6 +230,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     for tag in &entry.tags {
         tags.execute(params![id, tag])?;
     }
+    remember_session(db, entry)?;
     db.prepare_cached("INSERT INTO words (rowid, text) VALUES (?, ?)")?
         .execute(params![id, entry.text()])?;
     Ok(())

@@ -103,7 +103,7 @@ fn fingerprint(folder: &Path, files: &[OsString]) -> String {
 }
 
 /// One file: its name, bytes, and nanoseconds of its last change.
-fn stamp(path: &Path, name: &str) -> String {
+pub(super) fn stamp(path: &Path, name: &str) -> String {
     let Ok(facts) = fs::metadata(path) else {
         return format!("{name} gone;");
     };

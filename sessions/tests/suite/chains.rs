@@ -7,6 +7,7 @@ use palpate_sessions::analyses::{Analysed, Analysis, add_analysis};
 use palpate_sessions::catalog::{Catalog, Subject};
 use palpate_sessions::checks::{DailyCheck, add_check};
 use palpate_sessions::edits::{Change, Edit, EditError, Edits, Verdict, add_edit};
+use palpate_sessions::journal::Journal;
 use palpate_sessions::recover::examine;
 use palpate_sessions::{ANALYSES_FILE, ChainError, EDITS_FILE, LOG_FILE};
 use std::fs;
@@ -149,8 +150,74 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
     }
     fs::write(&edits, &whole).unwrap();
     assert_eq!(trouble(), None);
+    // Whether it is rebuilt or made anew by another version, it knows.
+    cut_last_line(&edits);
+    let catalog = at.join("catalog.sqlite");
+    Catalog::open(at).unwrap().rebuild(&mut |_, _| {}).unwrap();
+    assert!(trouble().is_some_and(|text| is_told(&text)));
+    let mut bytes = fs::read(&catalog).unwrap();
+    // The user version, four bytes at 60 (SQLite file format, 1.3).
+    bytes[60..64].copy_from_slice(&999u32.to_be_bytes());
+    fs::write(&catalog, bytes).unwrap();
+    assert!(trouble().is_some_and(|text| is_told(&text)));
+    fs::write(&edits, &whole).unwrap();
+    assert_eq!(trouble(), None);
     // A session from before there were heads.
     fs::remove_file(at.join("catalog.sqlite")).unwrap();
     cut_last_line(&edits);
     assert_eq!(trouble(), None);
+}
+
+#[test]
+fn a_check_or_a_journal_that_was_cut_off_with_its_head_is_missed_by_the_catalog() {
+    let (library, _) = library();
+    let at = library.path();
+    for number in 0..2 {
+        let check = DailyCheck {
+            at: chrono::DateTime::UNIX_EPOCH,
+            rig: "sim:bench 2".into(),
+            by: format!("Ada {number}"),
+            session_id: "id".into(),
+            calibration: "cell".into(),
+            is_passed: number == 0,
+            parts: Vec::new(),
+        };
+        add_check(at, &check).unwrap();
+    }
+    let programme = at.join("programmes/ten-a");
+    let (mut journal, _) = Journal::open::<u32>(&programme).unwrap();
+    [1, 22].iter().for_each(|entry| journal.push(entry).unwrap());
+    let mut files = fs::read_dir(at.join("checks")).unwrap().map(|item| item.unwrap().path());
+    let checks = files.find(|path| path.extension().unwrap() == "jsonl").unwrap();
+    let update = || {
+        let update = |catalog: &mut Catalog| {
+            let remarks = catalog.update(&mut |_, _| {})?.remarks;
+            let doubts = catalog.check(&mut |_, _| {})?.len();
+            assert_eq!(doubts, remarks.len(), "{remarks:?}");
+            Ok(remarks)
+        };
+        Catalog::with(at, update).unwrap()
+    };
+    assert_eq!(update(), Vec::<String>::new());
+    for file in [&checks, &programme.join("journal.jsonl")] {
+        let whole = fs::read(file).unwrap();
+        let head = file.with_extension("jsonl.head");
+        let known = fs::read(&head).unwrap();
+        for damage in [cut_last_line, |path: &Path| fs::remove_file(path).unwrap()] {
+            damage(file);
+            fs::remove_file(&head).unwrap();
+            for _ in 0..2 {
+                let told = update();
+                let name = file.file_name().unwrap().to_str().unwrap();
+                assert!(told.len() == 1 && told[0].contains(name), "{told:?}");
+                Catalog::open(at).unwrap().rebuild(&mut |_, _| {}).unwrap();
+            }
+            fs::write(file, &whole).unwrap();
+            fs::write(&head, &known).unwrap();
+            assert_eq!(update(), Vec::<String>::new());
+        }
+    }
+    // A programme that is gone as a whole was taken away by who needs it no more.
+    fs::remove_dir_all(&programme).unwrap();
+    assert_eq!(update(), Vec::<String>::new());
 }
