@@ -67,13 +67,15 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
     // The curve stands where the force stands: as late as the ramp, as high as the peak.
     let run = flow.run().unwrap();
     let ramp = run.phases.iter().find(|(_, phase)| *phase == Phase::Ramp);
-    let (first, peak) = (exact.curve[0], run.force_peak.unwrap().0);
+    let curve = &exact.fitted.plot.series[0].points;
+    let (first, peak) = (curve[0], run.force_peak.unwrap().0);
     // A sample and a tick of the runner lie between them.
-    assert!((first.x - ramp.unwrap().0).abs() < 0.05, "{first:?}");
-    let highest = exact.curve.iter().map(|point| point.y).fold(0.0, f64::max);
+    assert!((first[0] - ramp.unwrap().0).abs() < 0.05, "{first:?}");
+    let highest = curve.iter().map(|point| point[1]).fold(0.0, f64::max);
     // Noise makes the highest of ten thousand forces higher than the model: five times the rmse.
     assert!((highest - peak).abs() < 6.0 * report.rmse_n, "{highest} {peak}");
-    assert!(exact.residual.len() > 1000 && exact.residual.len() <= 4000);
+    let residual = &exact.residual.plot.series[0].points;
+    assert!(residual.len() > 1000 && residual.len() <= 4000);
     // A second run begins with live numbers again.
     flow.click("Start  F5");
     flow.wait("live numbers", |window| window.query_by_label("Live parameters").is_some());

@@ -59,7 +59,7 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
         // Beyond the heaviest weight nothing was measured.
         Series::dashed("", Ink::Quiet, 1.0, beyond),
     ];
-    let zero = Level { name: String::new(), at: 0.0, ink: Ink::Quiet, is_dashed: false };
+    let zero = Level::plain(0.0, Ink::Quiet);
     Ok([
         plot("signal (V)", upright("signal (V)")).with(lines.into_iter().chain(dots(readings))),
         Plot {
@@ -83,7 +83,7 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
 }
 
 fn flat(one: &FlatStretch) -> Stretch {
-    Stretch { name: "flat stretch".to_owned(), ends: [one.from_n, one.to_n] }
+    Stretch { name: "flat stretch".to_owned(), ends: [one.from_n, one.to_n], ink: Some(Ink::Line) }
 }
 
 fn dots([loading, unloading]: [Vec<[f64; 2]>; 2]) -> impl Iterator<Item = Series> {

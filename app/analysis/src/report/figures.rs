@@ -1,8 +1,8 @@
 //! The figures of a session: force over time and over depth, alone or several sessions over each other.
 
-use super::picture::{LEFT, RIGHT, WIDTH, look, title};
-use ecolor::Color32;
-use palpate_figures::drawing::{Anchor, Drawing, Ink, Panel, Svg};
+use super::picture::{LEFT, RIGHT, WIDTH, title};
+use palpate_figures::drawing::{Drawing, Ink as TextInk, Svg};
+use palpate_figures::figure::{Axis, AxisNames, Ink, Level, Plot, Series, Shape, Stretch};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::rig::Phase;
@@ -13,8 +13,6 @@ use palpate_sessions::log::Session;
 
 /// Time shown before the beginning at which several sessions are laid over each other, in s.
 const LEAD_S: f64 = 2.0;
-/// A name of a phase is written where it has so much room a letter, in px.
-const LETTER: f64 = 7.0;
 /// Dashes of a line: whole for the first round of inks, then in strokes.
 const DASHES: [f64; 3] = [0.0, 8.0, 3.0];
 /// Lines of the legend beneath a figure are so high, in px.
@@ -175,7 +173,7 @@ impl Traces {
 
     /// Where the interlock's limit is, if it is too far above the force to be drawn; else empty.
     pub fn limit_above(&self) -> String {
-        match (self.limit, limit_in_reach(self, &time_panel(self))) {
+        match (self.limit, limit_in_reach(self)) {
             (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),
             _ => String::new(),
         }
@@ -222,99 +220,72 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
 const TOP: f64 = 66.0;
 const BOTTOM: f64 = 380.0;
 
-fn time_panel(traces: &Traces) -> Panel {
-    let series: Vec<&[[f64; 2]]> = traces.force_time.iter().map(Vec::as_slice).collect();
-    Panel::around([LEFT, TOP, RIGHT, BOTTOM], traces.ends, &series)
-}
-
 /// The interlock's limit in N, unless it is so far above that the force would be flat beneath it.
-fn limit_in_reach(traces: &Traces, panel: &Panel) -> Option<f64> {
-    let limit = traces.limit?.0;
-    (limit <= panel.y[1] + 1.5 * (panel.y[1] - panel.y[0])).then_some(limit)
+fn limit_in_reach(traces: &Traces) -> Option<f64> {
+    let forces = || traces.force_time.iter().flatten().map(|point| point[1]);
+    let (low, high) = (forces().fold(f64::INFINITY, f64::min), forces().fold(0.0, f64::max));
+    traces.limit.map(|limit| limit.0).filter(|limit| *limit <= high + 1.5 * (high - low.min(high)))
 }
 
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
 #[must_use]
 pub fn force_time(traces: &Traces) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, &traces.name, "force over time");
-    let mut panel = time_panel(traces);
-    let limit = limit_in_reach(traces, &panel);
-    if let Some(limit) = limit {
-        panel.y[1] = panel.y[1].max(1.06 * limit);
-    }
-    for (index, span) in traces.phases.iter().enumerate() {
-        if index % 2 == 1 {
-            panel.shade(&mut svg, [span.from, span.until], LIGHT.control);
-        }
-        let [left, _] = panel.at([span.from, 0.0]);
-        let [right, _] = panel.at([span.until, 0.0]);
-        let name = span.phase.name();
-        if right - left > LETTER * name.chars().count() as f64 {
-            let ink = Ink::plain(LIGHT.text_quiet).anchored(Anchor::Middle);
-            svg.text([0.5 * (left + right), TOP + 14.0], ink, name);
-        }
-    }
-    for [from, until] in &traces.left_out_s {
-        let [first, last] = traces.ends;
-        let [from, until] = [from.max(first), until.min(last)];
-        if from < until {
-            panel.shade(&mut svg, [from, until], LIGHT.notice_fill);
-            let place = [panel.at([from, 0.0])[0] + 3.0, BOTTOM - 6.0];
-            svg.text(place, Ink::plain(LIGHT.text), "left out");
-        }
-    }
-    panel.axes(&mut svg, ["time since the first sample (s)", "force (N)"], look());
-    if let Some(limit) = limit {
-        let line = traces.ends.map(|x| panel.at([x, limit]));
-        svg.dashed_line(&line, LIGHT.limit, 1.2, 5.0);
-        // Beneath, for the names of the phases stand above.
-        let ink = Ink::plain(LIGHT.text).anchored(Anchor::End);
-        let place = [RIGHT - 6.0, line[0][1] + 16.0];
-        svg.text(place, ink, &format!("interlock at {limit:.1} N"));
-    }
-    for line in &traces.force_time {
-        panel.line(&mut svg, line, LIGHT.series, 1.4);
-    }
-    nothing(&mut svg, traces.is_empty());
-    svg.drawing(BOTTOM + 46.0, LIGHT.canvas, &format!("Force over time of {}", traces.name))
+    let phases = traces.phases.iter().enumerate().map(|(index, span)| Stretch {
+        name: span.phase.name().to_owned(),
+        ends: [span.from, span.until],
+        ink: (index % 2 == 1).then_some(Ink::Line),
+    });
+    let [first, last] = traces.ends;
+    let left_out = traces.left_out_s.iter().map(|[from, until]| Stretch {
+        name: "left out".to_owned(),
+        ends: [from.max(first), until.min(last)],
+        ink: Some(Ink::Notice),
+    });
+    let limit = limit_in_reach(traces).map(|at| Level {
+        name: format!("interlock at {at:.1} N"),
+        at,
+        ink: Ink::Limit,
+        is_dashed: true,
+    });
+    let time = Axis::linear("time since the first sample (s)").over(traces.ends);
+    let mut plot = Plot {
+        stretches: phases.chain(left_out.filter(|one| one.ends[0] < one.ends[1])).collect(),
+        levels: limit.into_iter().collect(),
+        ..force_plot(time, lines(&traces.force_time, Ink::Series, 0.0).collect())
+    };
+    // Room above the limit for the names of the phases.
+    plot.y.seen = plot.levels.iter().map(|level| 1.06 * level.at).collect();
+    drawing([&traces.name, "force over time"], &plot, &[])
 }
 
 /// Force over depth.
 #[must_use]
 pub fn force_depth(traces: &Traces) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, &traces.name, "force over depth");
-    let panel = depth_panel(&[traces]);
-    panel.axes(&mut svg, ["depth (mm)", "force (N)"], look());
-    for line in &traces.force_depth {
-        panel.line(&mut svg, line, LIGHT.series, 1.4);
-    }
-    nothing(&mut svg, traces.force_depth.is_empty());
-    svg.drawing(BOTTOM + 46.0, LIGHT.canvas, &format!("Force over depth of {}", traces.name))
+    let lines = lines(&traces.force_depth, Ink::Series, 0.0).collect();
+    drawing([&traces.name, "force over depth"], &force_plot(depth_axis(&[traces]), lines), &[])
 }
 
-fn nothing(svg: &mut Svg, is_empty: bool) {
-    if is_empty {
-        let ink = Ink::plain(LIGHT.text_quiet);
-        svg.text([LEFT + 12.0, BOTTOM - 12.0], ink, "nothing is known here");
-    }
+fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = Series> {
+    let shape = Shape::Line { width: 1.4, dash };
+    of.iter().map(move |line| Series { shape, ..Series::line("", ink, 1.4, line.clone()) })
 }
 
-fn depth_panel(all: &[&Traces]) -> Panel {
-    let lines = || all.iter().flat_map(|one| &one.force_depth);
-    let series: Vec<&[[f64; 2]]> = lines().map(Vec::as_slice).collect();
-    let depths = lines().flatten().map(|point| point[0]);
+fn force_plot(x: Axis, series: Vec<Series>) -> Plot {
+    let remark = series.is_empty().then(|| "nothing is known here".to_owned());
+    Plot { remark, ..Plot::new("", x, Axis::linear("force (N)")).with(series) }
+}
+
+fn depth_axis(all: &[&Traces]) -> Axis {
+    let points = all.iter().flat_map(|one| one.force_depth.iter().flatten());
+    let depths = points.map(|point| point[0]);
     let low = depths.clone().fold(0.0f64, f64::min);
     let high = depths.fold(low, f64::max);
-    let x = if high > low { [low, high] } else { [0.0, 1.0] };
-    Panel::around([LEFT, TOP, RIGHT, BOTTOM], x, &series)
+    Axis::linear("depth (mm)").over(if high > low { [low, high] } else { [0.0, 1.0] })
 }
 
 /// Ink and dashes of one of several.
-fn look_of(index: usize) -> (Color32, f64) {
-    let round = index / LIGHT.sessions.len();
-    (LIGHT.sessions[index % LIGHT.sessions.len()], DASHES[round % DASHES.len()])
+fn look_of(index: usize) -> (Ink, f64) {
+    (Ink::Session(index), DASHES[index / LIGHT.sessions.len() % DASHES.len()])
 }
 
 /// Several sessions over each other: force over time from where they are aligned, then force over depth. Those without
@@ -323,61 +294,44 @@ fn look_of(index: usize) -> (Color32, f64) {
 pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
     let lost: Vec<String> =
         all.iter().filter(|one| one.origin(align).is_none()).map(|one| one.name.clone()).collect();
-    let shifted: Vec<(usize, Vec<Vec<[f64; 2]>>)> = all
-        .iter()
-        .enumerate()
-        .filter_map(|(index, one)| {
-            let origin = one.origin(align)?;
-            let shift = |line: &Vec<[f64; 2]>| {
-                let moved = line.iter().map(|[t, force]| [t - origin, *force]);
-                moved.filter(|point| point[0] >= -LEAD_S).collect()
-            };
-            Some((index, one.force_time.iter().map(shift).collect()))
-        })
-        .collect();
-    let lines = || shifted.iter().flat_map(|(_, lines)| lines);
-    let last = lines().flatten().map(|point| point[0]).fold(1.0, f64::max);
-    let series: Vec<&[[f64; 2]]> = lines().map(Vec::as_slice).collect();
-    let over_time = Panel::around([LEFT, TOP, RIGHT, BOTTOM], [-LEAD_S, last], &series);
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, "Force over time", &format!("from when {}", align.word()));
-    let name = format!("time since {} (s)", align.word());
-    over_time.axes(&mut svg, [&name, "force (N)"], look());
-    for (index, lines) in &shifted {
-        let (ink, dash) = look_of(*index);
-        for line in lines {
-            let placed: Vec<[f64; 2]> = line.iter().map(|point| over_time.at(*point)).collect();
-            svg.dashed_line(&placed, ink, 1.4, dash);
-        }
-    }
-    nothing(&mut svg, shifted.is_empty());
-    let time = legend(svg, all, "Force over time of the sessions compared");
-
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, "Force over depth", "of the sessions compared");
-    let panel = depth_panel(all);
-    panel.axes(&mut svg, ["depth (mm)", "force (N)"], look());
+    let (mut over_time, mut over_depth) = (Vec::new(), Vec::new());
     for (index, one) in all.iter().enumerate() {
         let (ink, dash) = look_of(index);
-        for line in &one.force_depth {
-            let placed: Vec<[f64; 2]> = line.iter().map(|point| panel.at(*point)).collect();
-            svg.dashed_line(&placed, ink, 1.4, dash);
-        }
+        over_depth.extend(lines(&one.force_depth, ink, dash));
+        let Some(origin) = one.origin(align) else {
+            continue;
+        };
+        over_time.extend(lines(&one.force_time, ink, dash).map(|mut line| {
+            line.points.iter_mut().for_each(|point| point[0] -= origin);
+            line.points.retain(|point| point[0] >= -LEAD_S);
+            line
+        }));
     }
-    let depth = legend(svg, all, "Force over depth of the sessions compared");
-    ([time, depth], lost)
+    let times = over_time.iter().flat_map(|line| &line.points).map(|point| point[0]);
+    let last = times.fold(1.0, f64::max);
+    let time = Axis::linear(&format!("time since {} (s)", align.word())).over([-LEAD_S, last]);
+    let since = format!("from when {}", align.word());
+    let over_depth = force_plot(depth_axis(all), over_depth);
+    let drawings = [
+        drawing(["Force over time", &since], &force_plot(time, over_time), all),
+        drawing(["Force over depth", "of the sessions compared"], &over_depth, all),
+    ];
+    (drawings, lost)
 }
 
-/// Names and inks beneath a panel; finishes the figure.
-fn legend(mut svg: Svg, all: &[&Traces], name: &str) -> Drawing {
-    let mut y = BOTTOM + 60.0;
+/// A plot under its heads; beneath, names and inks of sessions compared.
+fn drawing([head, words]: [&str; 2], plot: &Plot, all: &[&Traces]) -> Drawing {
+    let mut svg = Svg::new(WIDTH);
+    title(&mut svg, head, words);
+    plot.draw(&mut svg, [LEFT, TOP, RIGHT, BOTTOM], AxisNames::Both);
+    let mut y = BOTTOM + 46.0;
     for (index, one) in all.iter().enumerate() {
-        let (ink, dash) = look_of(index);
-        svg.dashed_line(&[[LEFT, y - 4.0], [LEFT + 40.0, y - 4.0]], ink, 2.0, dash);
-        svg.text([LEFT + 50.0, y], Ink::plain(LIGHT.text), &one.name);
         y += LEGEND;
+        let (ink, dash) = look_of(index);
+        svg.dashed_line(&[[LEFT, y - 10.0], [LEFT + 40.0, y - 10.0]], ink.of(&LIGHT), 2.0, dash);
+        svg.text([LEFT + 50.0, y - 6.0], TextInk::plain(LIGHT.text), &one.name);
     }
-    svg.drawing(y, LIGHT.canvas, name)
+    svg.drawing(y, LIGHT.canvas, &format!("{head}, {words}"))
 }
 
 #[cfg(test)]

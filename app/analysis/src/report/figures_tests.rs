@@ -57,7 +57,7 @@ fn sessions_over_each_other_begin_together() {
     assert!(lost.is_empty());
     let svg = time.svg();
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
-    let points = |ink: Color32| {
+    let points = |ink| {
         let ink = palpate_figures::drawing::hex(ink);
         let own = lines.iter().filter(|line| line.contains(&ink) && line.len() > 200);
         own.map(|line| line.split('"').nth(1).unwrap().to_owned()).collect::<Vec<_>>()

@@ -1,9 +1,10 @@
 //! What is said of a body on a device, and of a loop's time.
 
-use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
+use super::picture::{COLUMNS, LEFT, RIGHT, WIDTH, title};
 use super::text::{ParameterText, in_columns};
 use crate::haptics::{Checked, Followed, Paced, Tried};
-use palpate_figures::drawing::{Anchor, Ink, Panel, Svg};
+use palpate_figures::drawing::Svg;
+use palpate_figures::figure::{self, Axis, AxisNames, Ink, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_figures::uncertain::plain;
@@ -255,8 +256,7 @@ fn fits_beside_the_body(followed: &Followed) -> String {
 /// A check of the feedback as a picture: forces over time, and one over the other.
 #[must_use]
 pub fn follow_plot(source: &str, followed: &Followed) -> String {
-    let columns = (RIGHT - LEFT) as usize;
-    let series = |of: fn(&CheckSample) -> [f64; 2]| thin(followed.samples.iter().map(of), columns);
+    let series = |of: fn(&CheckSample) -> [f64; 2]| thin(followed.samples.iter().map(of), COLUMNS);
     let commanded = series(|one| [one.t.0, one.commanded.0]);
     let measured = series(|one| [one.t.0, one.measured.0]);
     let torque = series(|one| [one.t.0, one.torque]);
@@ -267,19 +267,17 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
         followed.peak_commanded_n, followed.peak_measured_n
     );
     title(&mut svg, source, &line);
-    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], [0.0, last], &[&commanded, &measured]);
-    upper.axes(&mut svg, ["", "force (N)"], look());
-    // Wide under narrow, so that both are seen where they agree.
-    upper.line(&mut svg, &measured, LIGHT.series, 2.6);
-    upper.line(&mut svg, &commanded, LIGHT.limit, 1.4);
-    let words = [("measured", LIGHT.series), ("commanded", LIGHT.limit)];
-    for (place, (word, color)) in words.into_iter().enumerate() {
-        let at = [RIGHT - 8.0, 90.0 + LINE * place as f64];
-        svg.text(at, Ink::plain(color).anchored(Anchor::End), word);
-    }
-    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], [0.0, last], &[&torque]);
-    lower.axes(&mut svg, ["time (s)", "torque (N mm)"], look());
-    lower.line(&mut svg, &torque, LIGHT.limit, 1.4);
+    let time = || Axis::linear("time (s)").over([0.0, last]);
+    let force = Plot::new("", time(), Axis::linear("force (N)")).with([
+        // Wide under narrow, so that both are seen where they agree.
+        Series::line("measured", Ink::Series, 2.6, measured),
+        Series::line("commanded", Ink::Limit, 1.4, commanded),
+    ]);
+    figure::legend(&mut svg, [RIGHT, 46.0], &force);
+    force.draw(&mut svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
+    let torque = Series::line("torque", Ink::Limit, 1.4, torque);
+    let torque = Plot::new("", time(), Axis::linear("torque (N mm)")).with([torque]);
+    torque.draw(&mut svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
     svg.finish(556.0, LIGHT.canvas, &format!("Feedback of {source}"))
 }
 

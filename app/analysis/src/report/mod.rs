@@ -15,6 +15,7 @@ pub mod fit_json;
 pub mod haptics;
 pub(super) mod imported;
 pub mod kept;
+pub mod live;
 pub mod picture;
 pub mod plan_picture;
 pub mod plan_plot;

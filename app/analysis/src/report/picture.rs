@@ -1,10 +1,11 @@
 //! A fit as one picture: measured and fitted force over time, what is left over beneath, the
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
-use super::band::{self, Band};
+use super::band;
 use super::fit_json::Overlay;
 use super::text::{ParameterText, energy, equation, limit, quality};
-use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink, Look, Panel, Svg};
+use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink as TextInk, Look, Svg};
+use palpate_figures::figure::{self, Axis, AxisNames, Ink, Level, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
@@ -16,6 +17,8 @@ pub(super) const WIDTH: f64 = 960.0;
 /// Left and right edge of what is drawn.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 936.0;
+/// Pixels between both: each has two points of a line at most.
+pub(super) const COLUMNS: usize = (RIGHT - LEFT) as usize;
 /// Height of a line of text.
 pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
@@ -32,27 +35,24 @@ pub fn of_report(
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
     let mut svg = Svg::new(WIDTH);
-    let columns = (RIGHT - LEFT) as usize;
     curves(&mut svg, source, (samples, &overlay.forces), report, uncertainty);
     // Where the force is not known the fit is not drawn over depth: the probe may have left the tissue.
     let pairs = samples.iter().zip(&overlay.forces);
     let known = || pairs.clone().filter(|(one, _)| one.is_measured());
-    let measured = thin(known().map(|(one, _)| [one.depth.0, one.force.0]), columns);
-    let fitted = thin(known().map(|(one, fit)| [one.depth.0, fit.0]), columns);
+    let measured = thin(known().map(|(one, _)| [one.depth.0, one.force.0]), COLUMNS);
+    let fitted = thin(known().map(|(one, fit)| [one.depth.0, fit.0]), COLUMNS);
     let deepest = known().fold(0.0f64, |deepest, (one, _)| deepest.max(one.depth.0));
-    let inside = [LEFT, 576.0, RIGHT, 790.0];
-    let panel = Panel::around(inside, [0.0, deepest], &[&measured, &fitted]);
-    panel.axes(&mut svg, ["depth (mm)", "force (N)"], look());
-    panel.line(&mut svg, &measured, LIGHT.series, 2.6);
-    panel.line(&mut svg, &fitted, LIGHT.limit, 1.4);
+    let depth = Axis::linear("depth (mm)").over([0.0, deepest]);
+    let over_depth = force_plot(depth, [measured, fitted], uncertainty);
+    over_depth.draw(&mut svg, [LEFT, 576.0, RIGHT, 790.0], AxisNames::Both);
     let mut y = 860.0;
     for text in equation(report).map(str::to_owned).into_iter().chain([energy(overlay)]) {
-        svg.text([LEFT, y], Ink::plain(LIGHT.text), &text);
+        svg.text([LEFT, y], TextInk::plain(LIGHT.text), &text);
         y += LINE;
     }
     y = table(&mut svg, report, y + LINE);
     for sentence in report.sentences().map(str::to_owned).chain(limit(report)) {
-        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), &sentence);
+        y = sentence_lines(&mut svg, y, TextInk::plain(LIGHT.text), &sentence);
     }
     svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
 }
@@ -78,45 +78,84 @@ fn curves(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) {
-    let span = span(samples);
+    title(svg, source, &format!("{}; {}", report.model, quality(report)));
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
-    let columns = (RIGHT - LEFT) as usize;
+    let [mut force, mut residual] =
+        plots_over_time((samples, modelled), uncertainty, -start, COLUMNS);
+    force.x.range = Some(span(samples));
+    residual.x.range = Some(span(samples));
+    figure::legend(svg, [RIGHT, 46.0], &force);
+    force.draw(svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
+    residual.draw(svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
+}
+
+/// Force over time, measured and fitted, and what is left over, thinned to so many columns. A shift in s is added to
+/// all times.
+#[must_use]
+pub fn fit_plots(
+    samples: &[FitSample],
+    report: &FitReport,
+    uncertainty: Option<&ForceUncertainty>,
+    shift: f64,
+    columns: usize,
+) -> [Plot; 2] {
+    plots_over_time((samples, &report.predict(samples)), uncertainty, shift, columns)
+}
+
+fn plots_over_time(
+    (samples, modelled): (&[FitSample], &[Newtons]),
+    uncertainty: Option<&ForceUncertainty>,
+    shift: f64,
+    columns: usize,
+) -> [Plot; 2] {
     let pairs = || samples.iter().zip(modelled);
     // A force that is not known leaves nothing over.
     let known = || pairs().filter(|(one, _)| one.is_measured());
-    let measured = thin(known().map(|(one, _)| [one.t.0 - start, one.force.0]), columns);
-    let fitted = thin(pairs().map(|(one, fit)| [one.t.0 - start, fit.0]), columns);
-    let residual =
-        thin(known().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]), columns);
-    title(svg, source, &format!("{}; {}", report.model, quality(report)));
-    let band = Band::around(&fitted, uncertainty);
-    let [above, below] = band.edges();
-    let inside = [&measured, &fitted, above, below];
-    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &inside);
-    upper.axes(svg, ["", "force (N)"], look());
-    band.draw(svg, &upper, LIGHT.series);
-    // Wide under narrow, so that both are seen where they agree.
-    upper.line(svg, &measured, LIGHT.series, 2.6);
-    upper.line(svg, &fitted, LIGHT.limit, 1.4);
-    legend(svg);
-    band::legend(svg, uncertainty);
-    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], span, &[&residual]);
-    lower.axes(svg, ["time (s)", "residual (mN)"], look());
-    lower.line(svg, &residual, LIGHT.series, 1.0);
+    let measured = thin(known().map(|(one, _)| [one.t.0 + shift, one.force.0]), columns);
+    let fitted = thin(pairs().map(|(one, fit)| [one.t.0 + shift, fit.0]), columns);
+    let left = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
+    let residual = Series::line("residual", Ink::Series, 1.0, thin(left, columns));
+    let time = || Axis::linear("time (s)");
+    [
+        force_plot(time(), [measured, fitted], uncertainty),
+        Plot {
+            levels: vec![Level::plain(0.0, Ink::Quiet)],
+            ..Plot::new("", time(), Axis::linear("residual (mN)")).with([residual])
+        },
+    ]
+}
+
+/// Measured and fitted force over something, the band of the force's calibration around the fitted.
+pub(super) fn force_plot(
+    x: Axis,
+    [measured, fitted]: [Vec<[f64; 2]>; 2],
+    uncertainty: Option<&ForceUncertainty>,
+) -> Plot {
+    Plot {
+        bands: band::around(&fitted, uncertainty).into_iter().collect(),
+        ..Plot::new("", x, Axis::linear("force (N)")).with([
+            // Wide under narrow, so that both are seen where they agree.
+            Series::line("measured", Ink::Series, 2.6, measured),
+            Series::line("fitted", Ink::Limit, 1.4, fitted),
+        ])
+    }
 }
 
 /// The picture of a fit that was refused, with the sentence that says why.
 #[must_use]
 pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
-    let depth =
-        thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), (RIGHT - LEFT) as usize);
+    let depth = thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), COLUMNS);
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, source, "not fitted");
-    let panel = Panel::around([LEFT, 66.0, RIGHT, 360.0], span(samples), &[&depth]);
-    panel.axes(&mut svg, ["time (s)", "depth (mm)"], look());
-    panel.line(&mut svg, &depth, LIGHT.series, 1.6);
-    let y = sentence_lines(&mut svg, 434.0, Ink::plain(LIGHT.alarm_text), sentence);
+    let plot =
+        Plot::new("", Axis::linear("time (s)").over(span(samples)), Axis::linear("depth (mm)"));
+    plot.with([Series::line("", Ink::Series, 1.6, depth)]).draw(
+        &mut svg,
+        [LEFT, 66.0, RIGHT, 360.0],
+        AxisNames::Both,
+    );
+    let y = sentence_lines(&mut svg, 434.0, TextInk::plain(LIGHT.alarm_text), sentence);
     svg.finish(y, LIGHT.canvas, &format!("Refused fit of {source}"))
 }
 
@@ -133,25 +172,15 @@ pub(super) fn look() -> Look {
 }
 
 pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
-    let ink = Ink { size: 18.0, ..Ink::plain(LIGHT.text) };
+    let ink = TextInk { size: 18.0, ..TextInk::plain(LIGHT.text) };
     svg.text([LEFT, 28.0], ink, source);
-    svg.text([LEFT, 50.0], Ink::plain(LIGHT.text_quiet), line);
-}
-
-fn legend(svg: &mut Svg) {
-    for (i, (name, color)) in
-        [("measured", LIGHT.series), ("fitted", LIGHT.limit)].into_iter().enumerate()
-    {
-        let x = RIGHT - 190.0 + 100.0 * i as f64;
-        svg.line(&[[x, 46.0], [x + 24.0, 46.0]], color, 2.5);
-        svg.text([x + 30.0, 50.0], Ink::plain(LIGHT.text), name);
-    }
+    svg.text([LEFT, 50.0], TextInk::plain(LIGHT.text_quiet), line);
 }
 
 /// The parameters from `y` on; returns where what follows may begin.
 fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
     let places = [LEFT, 180.0, 420.0, 540.0];
-    let quiet = Ink::plain(LIGHT.text_quiet);
+    let quiet = TextInk::plain(LIGHT.text_quiet);
     let heads = ["parameter", "value ± standard error", "unit", "95 % interval"];
     for (x, head) in places.into_iter().zip(heads) {
         svg.text([x, y], quiet, head);
@@ -162,14 +191,14 @@ fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
         let text = ParameterText::of(parameter);
         let cells = [text.name, text.value, text.unit, text.interval];
         for (x, cell) in places.into_iter().zip(&cells) {
-            svg.text([x, y + 4.0], Ink::plain(LIGHT.text), cell);
+            svg.text([x, y + 4.0], TextInk::plain(LIGHT.text), cell);
         }
     }
     y + 2.0 * LINE
 }
 
 /// A sentence from `y` on, wrapped; returns where the next one may begin.
-pub(super) fn sentence_lines(svg: &mut Svg, mut y: f64, ink: Ink, sentence: &str) -> f64 {
+pub(super) fn sentence_lines(svg: &mut Svg, mut y: f64, ink: TextInk, sentence: &str) -> f64 {
     for line in wrap(sentence, LETTERS) {
         svg.text([LEFT, y], ink.anchored(Anchor::Start), &line);
         y += FONT + 5.0;
@@ -238,7 +267,7 @@ mod tests {
         assert!(!picture.contains("<polygon"));
         let thesis = ForceUncertainty::of(&palpate_model::calibration::Calibration::thesis());
         let banded = of_report("S", (&samples, &overlay), &report, thesis.as_ref().ok());
-        // Around the force, and in the legend.
+        // Around the force over time and over depth.
         assert_eq!(banded.matches("<polygon").count(), 2);
         // Five curves of at most two points a pixel, and nothing that is not a number.
         assert!(!picture.contains("NaN") && !picture.contains("inf"));

@@ -28,6 +28,10 @@ pub enum Ink {
     Alarm,
     /// Strong but grey.
     Active,
+    /// One of several that belong beside each other, by its place among them.
+    Session(usize),
+    /// From what was measured to what was fitted, in 255 parts.
+    Between(u8),
 }
 
 impl Ink {
@@ -43,6 +47,10 @@ impl Ink {
             Self::Notice => tokens.notice_fill,
             Self::Alarm => tokens.alarm_text,
             Self::Active => tokens.active_fill,
+            Self::Between(part) => {
+                tokens.series.lerp_to_gamma(tokens.limit, f32::from(part) / 255.0)
+            }
+            Self::Session(index) => tokens.sessions[index % tokens.sessions.len()],
         }
     }
 }
@@ -110,15 +118,18 @@ impl Axis {
     }
 }
 
+/// Length of dashes in px where nothing else is said.
+const DASH: f64 = 5.0;
+
 /// How points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// A line of this width in px, whole or dashed.
+    /// A line of this width in px.
     Line {
         /// Width in px.
         width: f64,
-        /// Whether it is dashed.
-        is_dashed: bool,
+        /// Length of its dashes in px, 0 for a whole line.
+        dash: f64,
     },
     /// A dot at each point, filled or hollow.
     Dots {
@@ -162,14 +173,14 @@ impl Series {
     /// A whole line.
     #[must_use]
     pub fn line(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line { width, is_dashed: false };
+        let shape = Shape::Line { width, dash: 0.0 };
         Self::new(name, ink, shape, points)
     }
 
     /// A dashed line.
     #[must_use]
     pub fn dashed(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line { width, is_dashed: true };
+        let shape = Shape::Line { width, dash: DASH };
         Self::new(name, ink, shape, points)
     }
 
@@ -216,9 +227,11 @@ pub struct Stretch {
     pub name: String,
     /// From and to.
     pub ends: [f64; 2],
+    /// Its ink, drawn thinly; none for a stretch that only has a name.
+    pub ink: Option<Ink>,
 }
 
-/// A value that is marked across the whole plot.
+/// A value that is marked across the whole plot, along either axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     /// What it is; empty for a zero.
@@ -246,10 +259,20 @@ pub struct Plot {
     pub bands: Vec<Band>,
     /// Marked values.
     pub levels: Vec<Level>,
+    /// Marked places of the abscissa.
+    pub moments: Vec<Level>,
     /// Lines and dots, those in front last.
     pub series: Vec<Series>,
     /// A sentence in the plot, such as why there is nothing to see.
     pub remark: Option<String>,
+}
+
+impl Level {
+    /// A whole line of an ink, without a name.
+    #[must_use]
+    pub fn plain(at: f64, ink: Ink) -> Self {
+        Self { name: String::new(), at, ink, is_dashed: false }
+    }
 }
 
 impl Plot {
@@ -278,7 +301,7 @@ impl Plot {
         let series = series.map(|one| (one.name.as_str(), one.ink));
         let bands = self.bands.iter().map(|one| (one.name.as_str(), one.ink));
         let shaded = self.stretches.iter();
-        let shaded = shaded.map(|one| (one.name.as_str(), Ink::Line));
+        let shaded = shaded.filter_map(|one| Some((one.name.as_str(), one.ink?)));
         let mut names: Vec<(&str, Ink)> = Vec::new();
         for (name, ink) in series.chain(bands).chain(shaded) {
             if !name.is_empty() && names.iter().all(|(known, _)| *known != name) {
@@ -297,7 +320,11 @@ mod tests {
     fn a_legend_names_each_thing_once_and_nothing_that_has_its_name_beside_it() {
         let line = |name: &str| Series::line(name, Ink::Series, 1.0, Vec::new());
         let plot = Plot {
-            stretches: vec![Stretch { name: "flat".into(), ends: [0.0, 1.0] }],
+            stretches: vec![Stretch {
+                name: "flat".into(),
+                ends: [0.0, 1.0],
+                ink: Some(Ink::Line),
+            }],
             ..Plot::default().with([
                 line("one"),
                 line(""),

@@ -1,12 +1,10 @@
 //! A plot drawn into a rectangle of a picture for a file.
 
 use super::labels::{beside, pushed_apart};
-use super::{Labels, Plot, Scale, Series, Shape};
+use super::{DASH, Ink, Labels, Plot, Scale, Series, Shape, Stretch};
 use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
 use crate::tokens::LIGHT;
 
-/// Length of dashes in px.
-const DASH: f64 = 5.0;
 /// Letters are about so wide, in px.
 const LETTER: f64 = 7.0;
 
@@ -24,7 +22,7 @@ impl Plot {
     pub fn draw(&self, svg: &mut Svg, place: [f64; 4], names: AxisNames) {
         let panel = self.panel(place);
         for stretch in &self.stretches {
-            panel.shade(svg, stretch.ends.map(|x| self.x.scale.place(x)), LIGHT.line);
+            self.draw_stretch(svg, &panel, stretch);
         }
         let x_name = match names {
             AxisNames::Both => self.x.name.as_str(),
@@ -85,8 +83,29 @@ impl Plot {
         places.collect()
     }
 
+    fn draw_stretch(&self, svg: &mut Svg, panel: &Panel, stretch: &Stretch) {
+        let [_, top, _, bottom] = panel.place;
+        let ends = stretch.ends.map(|x| self.x.scale.place(x));
+        if let Some(ink) = stretch.ink {
+            panel.shade(svg, ends, ink.of(&LIGHT));
+        }
+        let [left, right] = ends.map(|x| panel.at([x, 0.0])[0]);
+        let room = LETTER * stretch.name.chars().count() as f64;
+        match stretch.ink {
+            None | Some(Ink::Line) if right - left > room => {
+                let ink = TextInk::plain(LIGHT.text_quiet).anchored(Anchor::Middle);
+                svg.text([0.5 * (left + right), top + 14.0], ink, &stretch.name);
+            }
+            None | Some(Ink::Line) => {}
+            // What stands out is named in any case.
+            Some(_) => {
+                svg.text([left + 3.0, bottom - 6.0], TextInk::plain(LIGHT.text), &stretch.name);
+            }
+        }
+    }
+
     fn draw_levels(&self, svg: &mut Svg, panel: &Panel) {
-        let [left, _, right, _] = panel.place;
+        let [left, top, right, bottom] = panel.place;
         for level in &self.levels {
             let [_, y] = panel.at([panel.x[0], self.y.scale.place(level.at)]);
             let ink = level.ink.of(&LIGHT);
@@ -96,7 +115,17 @@ impl Plot {
                 (false, false) => (1.6, 0.0),
             };
             svg.dashed_line(&[[left, y], [right, y]], ink, width, dash);
-            svg.text([left + 6.0, y - 5.0], TextInk::plain(ink), &level.name);
+            // Beneath where names of stretches stand above.
+            let (at, anchor) = match self.stretches.is_empty() {
+                true => ([left + 6.0, y - 5.0], Anchor::Start),
+                false => ([right - 6.0, y + 16.0], Anchor::End),
+            };
+            svg.text(at, TextInk::plain(ink).anchored(anchor), &level.name);
+        }
+        for moment in &self.moments {
+            let [x, _] = panel.at([self.x.scale.place(moment.at), 0.0]);
+            let dash = if moment.is_dashed { DASH } else { 0.0 };
+            svg.dashed_line(&[[x, top], [x, bottom]], moment.ink.of(&LIGHT), 1.2, dash);
         }
     }
 
@@ -107,8 +136,7 @@ impl Plot {
         };
         let places = self.placed(panel, &one.points);
         match one.shape {
-            Shape::Line { width, is_dashed } => {
-                let dash = if is_dashed { DASH } else { 0.0 };
+            Shape::Line { width, dash } => {
                 svg.dashed_line(&places, ink, width, dash);
             }
             Shape::Dots { radius, is_filled } => {
@@ -167,7 +195,7 @@ pub fn legend(svg: &mut Svg, [right, y]: [f64; 2], plot: &Plot) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Axis, Ink, Level};
+    use super::super::{Axis, Level};
     use super::*;
 
     fn drawn(plot: &Plot) -> String {

@@ -5,8 +5,6 @@ mod transport;
 
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
-use crate::plots::force_depth::force_depth_ui;
-use crate::plots::force_time::{TimeView, force_time_ui, head_ui};
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
 use crate::shell::event_log::EventLog;
@@ -50,7 +48,6 @@ pub struct PlaybackApp {
     is_same_engine: bool,
     plots: PlotCache,
     events: EventLog,
-    time_view: TimeView,
 }
 
 impl PlaybackApp {
@@ -71,7 +68,6 @@ impl PlaybackApp {
             is_same_engine,
             plots: PlotCache::for_calibration(&options.calibration),
             events: EventLog::default(),
-            time_view: TimeView::default(),
         })
     }
 
@@ -105,17 +101,6 @@ impl PlaybackApp {
             });
         });
     }
-
-    fn plots_ui(&mut self, ui: &mut Ui) {
-        head_ui(ui, &mut self.time_view, &self.plots);
-        let run = self.snapshot.run.as_ref();
-        let height = (ui.available_height() - 30.0) * 0.56;
-        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-            force_time_ui(ui, run, &self.plots, None, self.time_view, self.force_max);
-        });
-        ui.label(RichText::new("Force over depth").heading().strong());
-        force_depth_ui(ui, &self.plots, 0.0);
-    }
 }
 
 impl eframe::App for PlaybackApp {
@@ -125,7 +110,7 @@ impl eframe::App for PlaybackApp {
 
     fn logic(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {
         self.snapshot = self.thread.snapshot();
-        self.plots.update(self.snapshot.run.as_ref());
+        self.plots.update(self.snapshot.run.as_ref(), self.force_max, 0.0);
         let shown = self.snapshot.run.as_ref();
         let shown = shown.map_or(0.0, |run| run.now.seconds().0);
         self.transport.read_keys(ctx, shown);
@@ -167,10 +152,10 @@ impl eframe::App for PlaybackApp {
             .show(ui, |ui| {
                 let area = ScrollArea::vertical().id_salt("results");
                 area.auto_shrink(false).show(ui, |ui| {
-                    findings_ui(ui, &self.snapshot, Refit::NotYet, self.plots.loops());
+                    findings_ui(ui, &self.snapshot, Refit::NotYet, self.plots.cycles());
                 });
             });
-        CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots_ui(ui));
+        CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));
         // The only thing that the events ask for here.
         if commands.take().contains(&Command::SwitchTheme) {
             theme::switch(ui.ctx());

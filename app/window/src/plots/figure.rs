@@ -1,45 +1,97 @@
 //! A figure as data, painted on the screen: the same that pages and pictures show.
 
-use super::strip;
 use super::style::{quiet, round_marks};
 use crate::theme::Tokens;
-use eframe::egui::{Id, Ui, vec2};
+use eframe::egui::{Align2, Color32, Id, RichText, Sense, Ui, vec2};
 use egui_plot::{
     FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, PlotPoint, PlotPoints,
-    PlotUi, Points, Span, Text,
+    PlotUi, Points, Span, Text, VLine,
 };
 use palpate_figures::drawing::BAND_OPACITY;
-use palpate_figures::figure::{Labels, Plot, Scale, Series, Shape};
+use palpate_figures::figure::{Axis, Ink, Labels, Plot, Scale, Series, Shape};
+
+/// Opacity of a shaded stretch that has an ink of its own.
+const SHADE: f32 = 0.16;
 
 /// How a plot stands among others.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct PlotLook {
-    /// Labelled steps across it, at most, where it is narrower than others.
-    pub steps_across: Option<f64>,
+pub struct PlotLook<'a> {
+    /// Labelled steps across it and up it, at most, where it is smaller than others.
+    pub steps: [Option<f64>; 2],
     /// Plots of one name share what they show along x.
     pub link: Option<&'static str>,
+    /// What is always shown along x; its axis is not drawn if it has no name.
+    pub shown: Option<[f64; 2]>,
+    /// How places along x are written, where not as numbers.
+    pub x_text: Option<fn(f64) -> String>,
+    /// What is drawn over it on the same axes.
+    pub over: Option<&'a Painted>,
+}
+
+/// A plot whose points are placed on their axes once and not in every frame. Of the plot, everything but its series may
+/// change from frame to frame.
+#[derive(Clone, Debug, Default)]
+pub struct Painted {
+    /// What it shows.
+    pub plot: Plot,
+    points: Vec<Vec<PlotPoint>>,
+}
+
+impl From<Plot> for Painted {
+    fn from(plot: Plot) -> Self {
+        Self { points: placed(&plot), plot }
+    }
+}
+
+impl Painted {
+    /// Draws it in the space there is; returns what is shown along x.
+    pub fn ui(&self, ui: &mut Ui, id: &str, look: PlotLook<'_>) -> [f64; 2] {
+        show(ui, id, &self.plot, &self.points, look)
+    }
 }
 
 /// Draws a plot in the space there is.
-pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook) {
+pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook<'_>) {
+    show(ui, id, plot, &placed(plot), look);
+}
+
+/// The points of each series on the plot's axes.
+fn placed(plot: &Plot) -> Vec<Vec<PlotPoint>> {
+    let place = |one: &Series| one.points.iter().map(|at| plot.place(*at).into()).collect();
+    plot.series.iter().map(place).collect()
+}
+
+fn show(
+    ui: &mut Ui,
+    id: &str,
+    plot: &Plot,
+    points: &[Vec<PlotPoint>],
+    look: PlotLook<'_>,
+) -> [f64; 2] {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let told = readouts(plot);
+    let (x_text, y_unit) = (look.x_text, unit(&plot.y));
     let mut drawn = quiet(ui, egui_plot::Plot::new(id.to_owned()), tokens)
         .x_axis_label(plot.x.name.as_str())
         .y_axis_label(plot.y.name.as_str())
+        .show_axes([look.shown.is_none() || !plot.x.name.is_empty(), true])
+        .auto_bounds([look.shown.is_none(), true])
+        .allow_drag([look.shown.is_none(), true])
         .label_formatter(move |hover| match hover {
             HoverPosition::NearDataPoint { position, .. } => {
-                let is_it =
-                    |(at, _): &&(PlotPoint, String)| at.x == position.x && at.y == position.y;
-                let own = told.iter().find(is_it).map(|(_, words)| words.clone());
-                Some(own.unwrap_or_else(|| format!("{:.3}\n{:.4}", position.x, position.y)))
+                let own = told(plot, points, position).map(str::to_owned);
+                let x =
+                    x_text.map_or_else(|| format!("{:.3}", position.x), |text| text(position.x));
+                Some(own.unwrap_or_else(|| format!("{x}\n{:.4}{y_unit}", position.y)))
             }
             HoverPosition::Elsewhere { .. } => None,
         });
     if plot.x.scale == Scale::Logarithmic {
         drawn = drawn.x_grid_spacer(decades).x_axis_formatter(|mark, _| decade_text(mark));
-    } else if let Some(steps) = look.steps_across {
+    } else if let Some(steps) = look.steps[0] {
         drawn = drawn.x_grid_spacer(move |input| round_marks(input, steps));
+    }
+    if let Some(text) = look.x_text {
+        drawn = drawn.x_axis_formatter(move |mark, _| text(mark.value));
     }
     if plot.y.scale == Scale::Logarithmic {
         drawn = drawn
@@ -47,6 +99,11 @@ pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook) {
             .y_axis_formatter(|mark, _| decade_text(mark))
             // The ring around a recommended point needs room at every edge.
             .set_margin_fraction(vec2(0.04, 0.08));
+    } else if let Some(steps) = look.steps[1] {
+        drawn = drawn.y_grid_spacer(move |input| round_marks(input, steps));
+    }
+    for &x in &plot.x.seen {
+        drawn = drawn.include_x(plot.x.scale.place(x));
     }
     for &y in &plot.y.seen {
         drawn = drawn.include_y(plot.y.scale.place(y));
@@ -54,40 +111,88 @@ pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook) {
     if let Some(link) = look.link {
         drawn = drawn.link_axis(Id::unique(link), [true, false]);
     }
-    drawn.show(ui, |plot_ui| paint(plot_ui, plot, tokens));
+    let response = drawn.show(ui, |plot_ui| {
+        if let Some([from, to]) = look.shown {
+            plot_ui.set_plot_bounds_x(from..=to);
+        }
+        paint(plot_ui, plot, points, tokens);
+        if let Some(over) = look.over {
+            paint(plot_ui, &over.plot, &over.points, tokens);
+        }
+    });
+    let bounds = response.transform.bounds();
+    [bounds.min()[0], bounds.max()[0]]
 }
 
-/// Draws names and inks of plots in one line.
+/// The unit of an even axis, as it stands behind a number.
+fn unit(axis: &Axis) -> String {
+    let unit = axis.name.rsplit_once(" (").and_then(|(_, rest)| rest.strip_suffix(')'));
+    match (unit, axis.scale) {
+        (Some(unit), Scale::Linear) => format!(" {unit}"),
+        _ => String::new(),
+    }
+}
+
+/// Draws names and inks of plots in one line, each name once.
 pub fn legend_ui(ui: &mut Ui, plots: &[&Plot]) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let mut known: Vec<&str> = Vec::new();
     ui.horizontal_wrapped(|ui| {
         for (name, ink) in plots.iter().flat_map(|plot| plot.legend()) {
             if !known.contains(&name) {
                 known.push(name);
-                strip::legend_ui(ui, ink.of(tokens), name);
+                patch_ui(ui, ink, name);
             }
         }
     });
 }
 
-/// What is told under the pointer of points that have something to tell.
-fn readouts(plot: &Plot) -> Vec<(PlotPoint, String)> {
-    let each = plot.series.iter().filter_map(|one| match &one.labels {
-        Labels::Each(labels) => Some(one.points.iter().zip(labels)),
-        _ => None,
-    });
-    let points = each.flatten();
-    points.map(|(at, [_, words])| (plot.place(*at).into(), words.clone())).collect()
+/// Draws a patch of an ink and the words that it stands for.
+pub fn patch_ui(ui: &mut Ui, ink: Ink, words: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::empty());
+    ui.painter().rect_filled(rect, 2.0, ink.of(tokens));
+    ui.label(RichText::new(words).small());
 }
 
-fn paint(plot_ui: &mut PlotUi<'_>, plot: &Plot, tokens: &Tokens) {
+/// Draws what a loop did over time so high in points, live or computed, its names above: nothing along x has a name
+/// where another strip stands below.
+pub fn strip_ui(ui: &mut Ui, [x, y]: [&str; 2], curves: Vec<Series>, shown: [f64; 2], height: f32) {
+    // What is at rest is a line at zero and no noise.
+    let plot = Plot::new("", Axis::linear(x), Axis::linear(y).seeing(&[0.0, 0.5])).with(curves);
+    legend_ui(ui, &[&plot]);
+    ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+        plot_ui(ui, y, &plot, PlotLook { shown: Some(shown), ..PlotLook::default() });
+    });
+}
+
+/// What is told under the pointer of a point that has something to tell.
+fn told<'a>(plot: &'a Plot, points: &[Vec<PlotPoint>], at: &PlotPoint) -> Option<&'a str> {
+    plot.series.iter().zip(points).find_map(|(one, points)| {
+        let Labels::Each(labels) = &one.labels else {
+            return None;
+        };
+        let is_it = |point: &PlotPoint| point.x == at.x && point.y == at.y;
+        points.iter().position(is_it).map(|index| labels[index][1].as_str())
+    })
+}
+
+fn paint<'a>(
+    plot_ui: &mut PlotUi<'a>,
+    plot: &'a Plot,
+    points: &'a [Vec<PlotPoint>],
+    tokens: &Tokens,
+) {
     for stretch in &plot.stretches {
         let [from, to] = stretch.ends.map(|x| plot.x.scale.place(x));
         let span = Span::new(stretch.name.as_str(), from..=to);
-        plot_ui.span(span.fill(tokens.phase_band).border_color(tokens.line));
+        let (fill, border) = match stretch.ink {
+            None => (Color32::TRANSPARENT, tokens.line),
+            Some(Ink::Line) => (tokens.phase_band, tokens.line),
+            Some(ink) => (ink.of(tokens).gamma_multiply(SHADE), ink.of(tokens)),
+        };
+        plot_ui.span(span.fill(fill).border_color(border));
     }
-    for band in &plot.bands {
+    for (number, band) in plot.bands.iter().enumerate() {
         let edge = |edge: &Vec<[f64; 2]>| -> (Vec<f64>, Vec<f64>) {
             let placed = edge.iter().map(|point| plot.place(*point));
             placed.map(|[x, y]| (x, y)).unzip()
@@ -95,19 +200,32 @@ fn paint(plot_ui: &mut PlotUi<'_>, plot: &Plot, tokens: &Tokens) {
         let [low, high] = band.edges.each_ref().map(edge);
         let area = FilledArea::new(band.name.as_str(), &low.0, &low.1, &high.1);
         let ink = band.ink.of(tokens).gamma_multiply(BAND_OPACITY as f32);
-        plot_ui.add(area.fill_color(ink));
+        plot_ui.add(area.id((band.name.as_str(), number)).fill_color(ink).allow_hover(false));
     }
     for level in &plot.levels {
         let at = plot.y.scale.place(level.at);
-        let style = match level.is_dashed {
-            true => LineStyle::dashed_dense(),
-            false => LineStyle::Solid,
-        };
         let line = HLine::new(level.name.as_str(), at).color(level.ink.of(tokens));
-        plot_ui.hline(line.style(style).width(1.0).allow_hover(false));
+        let width = if level.name.is_empty() { 1.0 } else { 1.5 };
+        plot_ui.hline(line.style(style_of(level.is_dashed)).width(width).allow_hover(false));
+        // At the left edge as it will be: the text's own place counts in the automatic bounds.
+        let left = plot.x.range.map(|[from, _]| from).or(plot.x.seen.first().copied());
+        if let Some(left) = left.filter(|_| !level.name.is_empty()) {
+            let text = Text::new(
+                "level",
+                PlotPoint::new(plot.x.scale.place(left), at),
+                format!(" {}", level.name),
+            );
+            let text = text.anchor(Align2::LEFT_TOP).color(tokens.text_quiet);
+            plot_ui.text(text.allow_hover(false));
+        }
     }
-    for (number, one) in plot.series.iter().enumerate() {
-        paint_series(plot_ui, plot, one, number, tokens);
+    for moment in &plot.moments {
+        let at = plot.x.scale.place(moment.at);
+        let line = VLine::new(moment.name.as_str(), at).color(moment.ink.of(tokens));
+        plot_ui.vline(line.style(style_of(moment.is_dashed)).width(1.5).allow_hover(false));
+    }
+    for (number, (one, points)) in plot.series.iter().zip(points).enumerate() {
+        paint_series(plot_ui, one, points, number, tokens);
     }
     if let Some(remark) = &plot.remark {
         let bounds = plot_ui.plot_bounds();
@@ -116,25 +234,25 @@ fn paint(plot_ui: &mut PlotUi<'_>, plot: &Plot, tokens: &Tokens) {
     }
 }
 
-fn paint_series(
-    plot_ui: &mut PlotUi<'_>,
-    plot: &Plot,
-    one: &Series,
+fn style_of(is_dashed: bool) -> LineStyle {
+    if is_dashed { LineStyle::dashed_dense() } else { LineStyle::Solid }
+}
+
+fn paint_series<'a>(
+    plot_ui: &mut PlotUi<'a>,
+    one: &'a Series,
+    points: &'a [PlotPoint],
     number: usize,
     tokens: &Tokens,
 ) {
     let ink = one.ink.of(tokens).gamma_multiply(one.opacity as f32);
     let id = (one.name.as_str(), number);
-    let points: PlotPoints<'_> = one.points.iter().map(|point| plot.place(*point)).collect();
+    let points = PlotPoints::Borrowed(points);
     match one.shape {
-        Shape::Line { width, is_dashed } => {
-            let style = match is_dashed {
-                true => LineStyle::dashed_dense(),
-                false => LineStyle::Solid,
-            };
+        Shape::Line { width, dash } => {
             // Bands of points that share a column would be drawn as wedges where there are few.
             let line = Line::new(one.name.as_str(), points).id(id).allow_band(false);
-            plot_ui.line(line.color(ink).width(width as f32).style(style));
+            plot_ui.line(line.color(ink).width(width as f32).style(style_of(dash > 0.0)));
         }
         Shape::Dots { radius, is_filled } => {
             let dots = Points::new(one.name.as_str(), points).id(id);

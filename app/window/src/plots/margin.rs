@@ -1,16 +1,10 @@
 //! Damping that a body needs over depth, what asks for it, and what the device has.
 
-use super::strip::legend_ui;
-use super::style::quiet;
-use crate::theme::Tokens;
-use eframe::egui::{Color32, Ui, vec2};
-use egui_plot::{FilledArea, HLine, HoverPosition, Line, Plot, PlotPoints, Span, VLine};
+use super::figure::{PlotLook, legend_ui, patch_ui, plot_ui};
+use eframe::egui::{Ui, vec2};
 use palpate_analysis::margin::MarginPoint;
+use palpate_figures::figure::{Axis, Band, Ink, Level, Plot, Series, Stretch};
 use palpate_haptics::margin::DepthBand;
-use std::ops::RangeInclusive;
-
-/// Opacity of a part: the grid shows through, and its edge is drawn in full.
-const PART: f32 = 0.35;
 
 /// The device's damping is in the picture up to so many times the most that is needed; more would flatten the parts.
 const IN_SIGHT: f64 = 3.0;
@@ -44,81 +38,65 @@ fn cut_at(cycles: &[DepthBand], deepest: f64) -> Option<f64> {
 
 /// Draws it in the space there is: the shallow depths on the left where they are another matter than the rest.
 pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.horizontal_wrapped(|ui| {
-        let names = ["the body's lag", "the tick", "the delay"];
-        for (ink, name) in inks(tokens).into_iter().zip(names) {
-            legend_ui(ui, ink, name);
-        }
-        legend_ui(ui, tokens.text, &format!("the device has {:.2} N s/m", picture.has));
-        if !picture.cycles.is_empty() {
-            legend_ui(ui, tokens.line, "the model itself returns energy");
-        }
-    });
     let deepest = picture.curve.last().map_or(0.0, |one| one.depth);
-    match cut_at(picture.cycles, deepest) {
-        None => part_ui(ui, "margin", picture, 0.0..=deepest),
+    let cut = cut_at(picture.cycles, deepest);
+    let deep = part(picture, [cut.unwrap_or(0.0), deepest]);
+    legend_ui(ui, &[&deep]);
+    patch_ui(ui, Ink::Text, &format!("the device has {:.2} N s/m", picture.has));
+    let look = |shown| PlotLook { shown: Some(shown), ..PlotLook::default() };
+    match cut {
+        None => plot_ui(ui, "margin", &deep, look([0.0, deepest])),
         Some(at) => {
             let size = vec2(0.4 * ui.available_width(), ui.available_height());
             ui.horizontal_top(|ui| {
-                ui.allocate_ui(size, |ui| part_ui(ui, "margin_shallow", picture, 0.0..=at));
-                part_ui(ui, "margin_deep", picture, at..=deepest);
+                let shallow = part(picture, [0.0, at]);
+                ui.allocate_ui(size, |ui| {
+                    plot_ui(ui, "margin_shallow", &shallow, look([0.0, at]));
+                });
+                plot_ui(ui, "margin_deep", &deep, look([at, deepest]));
             });
         }
     }
 }
 
-/// Colours of the parts: lag, tick, delay.
-fn inks(tokens: &Tokens) -> [Color32; 3] {
-    [tokens.sessions[3], tokens.sessions[1], tokens.sessions[0]]
-}
+/// Names and inks of what asks for damping, each with its edge above the one before.
+type Part = (&'static str, Ink, fn(&MarginPoint) -> f64);
+const PARTS: [Part; 3] = [
+    ("the body's lag", Ink::Session(3), |one| one.lag),
+    ("the tick", Ink::Session(1), |one| one.tick),
+    ("the delay", Ink::Session(0), |one| one.delay),
+];
 
-fn part_ui(ui: &mut Ui, id: &str, picture: &MarginPicture<'_>, shown: RangeInclusive<f64>) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let points: Vec<&MarginPoint> =
-        picture.curve.iter().filter(|one| shown.contains(&one.depth)).collect();
-    let most = points.iter().map(|one| one.delay).fold(0.0, f64::max);
-    let plot = quiet(ui, Plot::new(id.to_owned()), tokens)
-        .x_axis_label("depth (mm)")
-        .y_axis_label("damping needed (N s/m)")
-        .include_y(0.0)
-        // A body that needs none has a picture all the same.
-        .include_y(if most > 0.0 { most } else { 1.0 })
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .label_formatter(|hover| match hover {
-            HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("{:.3} mm\n{:.3} N s/m", position.x, position.y))
-            }
-            HoverPosition::Elsewhere { .. } => None,
-        });
-    let parts: [fn(&MarginPoint) -> f64; 4] =
-        [|_| 0.0, |one| one.lag, |one| one.tick, |one| one.delay];
-    let depths: Vec<f64> = points.iter().map(|one| one.depth).collect();
-    let edges = parts.map(|part| points.iter().map(|one| part(one)).collect::<Vec<f64>>());
-    plot.show(ui, |plot_ui| {
-        plot_ui.set_plot_bounds_x(shown.clone());
-        for band in picture.cycles {
-            let shade = Span::new("", band.from.0..=band.to.0).fill(tokens.phase_band);
-            plot_ui.span(shade.border_color(tokens.line));
-        }
-        for (edge, ink) in edges.windows(2).zip(inks(tokens)) {
-            let area = FilledArea::new("needed", &depths, &edge[0], &edge[1]);
-            plot_ui.add(area.fill_color(ink.gamma_multiply(PART)));
-            let points = depths.iter().zip(&edge[1]).map(|(x, y)| [*x, *y]);
-            let points: PlotPoints<'_> = points.collect();
-            plot_ui.line(Line::new("needed", points).allow_band(false).color(ink));
-        }
-        if is_in_sight(picture.has, most) {
-            let line = HLine::new("the device has", picture.has);
-            plot_ui.hline(line.color(tokens.text).width(1.6));
-        }
-        if let Some(depth) = picture.now.filter(|depth| shown.contains(depth)) {
-            let line = VLine::new("now", depth).color(tokens.text_quiet);
-            plot_ui.vline(line.allow_hover(false));
-        }
-    });
+/// What is needed between two depths in mm.
+fn part(picture: &MarginPicture<'_>, [from, to]: [f64; 2]) -> Plot {
+    let points = || picture.curve.iter().filter(|one| (from..=to).contains(&one.depth));
+    let most = points().map(|one| one.delay).fold(0.0, f64::max);
+    let mut beneath: Vec<[f64; 2]> = points().map(|one| [one.depth, 0.0]).collect();
+    // A body that needs none has a picture all the same.
+    let seen = [0.0, if most > 0.0 { most } else { 1.0 }];
+    let damping = Axis::linear("damping needed (N s/m)").seeing(&seen);
+    let mut plot = Plot::new("", Axis::linear("depth (mm)"), damping);
+    for (name, ink, of) in PARTS {
+        let edge: Vec<[f64; 2]> = points().map(|one| [one.depth, of(one)]).collect();
+        plot.series.push(Series::line(name, ink, 1.0, edge.clone()));
+        let edges = [std::mem::replace(&mut beneath, edge.clone()), edge];
+        plot.bands.push(Band { name: name.to_owned(), ink, edges });
+    }
+    plot.stretches = picture
+        .cycles
+        .iter()
+        .map(|band| Stretch {
+            name: "the model itself returns energy".to_owned(),
+            ends: [band.from.0, band.to.0],
+            ink: Some(Ink::Line),
+        })
+        .collect();
+    if is_in_sight(picture.has, most) {
+        plot.levels.push(Level::plain(picture.has, Ink::Text));
+    }
+    let now = picture.now.filter(|depth| (from..=to).contains(depth));
+    plot.moments.extend(now.map(|depth| Level::plain(depth, Ink::Quiet)));
+    plot
 }
 
 #[cfg(test)]

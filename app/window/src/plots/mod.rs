@@ -3,16 +3,12 @@
 
 pub mod course;
 pub mod figure;
-pub mod force_depth;
-pub mod force_time;
 pub mod margin;
 pub mod navigate;
 pub mod over_depth;
 pub mod over_time;
-mod points;
-pub mod residual;
+mod run;
 pub mod stretches;
-pub mod strip;
-pub(crate) mod style;
+mod style;
 
-pub use points::{CycleLoop, PlotCache};
+pub use run::PlotCache;

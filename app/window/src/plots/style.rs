@@ -1,8 +1,8 @@
 //! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
 
 use crate::theme::Tokens;
-use eframe::egui::{Color32, Rangef, Ui, Vec2, vec2};
-use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
+use eframe::egui::{Rangef, Ui, Vec2, vec2};
+use egui_plot::{GridInput, GridMark, Plot};
 use palpate_figures::drawing::round_up;
 
 /// Labelled steps across the width and up the height of a plot, at most.
@@ -15,13 +15,8 @@ const POINTS_PER_STEP: [f32; 2] = [75.0, 34.0];
 /// Unlabelled lines between two labelled ones.
 const MINOR_PER_MAJOR: f64 = 5.0;
 
-/// The band of a force's calibration: the ink of the force, thin enough for the grid to show through.
-pub(super) fn band_of(tokens: &Tokens) -> Color32 {
-    tokens.series.gamma_multiply(0.18)
-}
-
 /// Gives a plot that fills the space there is the common look.
-pub(crate) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+pub(super) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
     let [across, up] = steps(ui.available_size());
     // It would be filled a second time; see `shell::panels::frame`.
     plot.show_background(false)
@@ -36,12 +31,6 @@ pub(crate) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         .y_axis_formatter(|mark, _| mark_text(mark))
         // One width for all, so that plots above each other share their time axis.
         .y_axis_min_width(46.0)
-        .label_formatter(|hover| match hover {
-            HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("{:.3}\n{:.4} N", position.x, position.y))
-            }
-            HoverPosition::Elsewhere { .. } => None,
-        })
 }
 
 /// The same for a plot whose bounds are ours: [`super::navigate`] moves and zooms it, and its readouts are drawn by us.
@@ -54,6 +43,7 @@ pub(super) fn still<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         .allow_double_click_reset(false)
         .show_x(false)
         .show_y(false)
+        .label_formatter(|_| None)
 }
 
 /// Labelled steps that a plot of a size in points has room for, across and up.
@@ -66,7 +56,7 @@ fn steps(size: Vec2) -> [f64; 2] {
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
-pub(crate) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
+pub(super) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {

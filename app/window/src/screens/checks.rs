@@ -2,8 +2,7 @@
 
 use super::screen::{Screen, ScreenEntry};
 use crate::command::Commands;
-use crate::plots::style::quiet;
-use crate::theme::Tokens;
+use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
@@ -12,8 +11,8 @@ use crate::workbench::Workbench;
 use crate::workers::task::Task;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, RichText, Ui, vec2};
-use egui_plot::{HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
+use palpate_analysis::report::live::deviations;
 use std::path::PathBuf;
 
 /// The screen's line in the table.
@@ -181,46 +180,11 @@ fn day_text(days: f64) -> String {
 }
 
 /// Draws how far one reading of each check was off, between what was allowed.
-fn deviations_ui(ui: &mut Ui, head: &'static str, checks: &[PastCheck], measured: Measured) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn deviations_ui(ui: &mut Ui, head: &str, checks: &[PastCheck], measured: Measured) {
     let known: Vec<(f64, Deviation)> =
         checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
-    let line = |of: fn(&Deviation) -> f64| -> PlotPoints<'_> {
-        known.iter().map(|(at, one)| [*at, of(one)]).collect()
-    };
-    let plot = quiet(ui, Plot::new(head), tokens)
-        .include_y(0.0)
-        .x_axis_formatter(|mark, _| day_text(mark.value))
-        .label_formatter(|hover| match hover {
-            HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("{}\n{:+.4} N", day_text(position.x), position.y))
-            }
-            HoverPosition::Elsewhere { .. } => None,
-        });
-    // One check alone has no span of time; a day on either side gives it one.
-    let plot = match known.as_slice() {
-        [(at, _)] => plot.include_x(at - 1.0).include_x(at + 1.0),
-        _ => plot,
-    };
-    plot.show(ui, |plot_ui| {
-        for (name, points) in
-            [("allowed", line(|one| one.limit)), ("allowed below", line(|one| -one.limit))]
-        {
-            let limit = Line::new(name, points).color(tokens.limit);
-            plot_ui.line(limit.style(LineStyle::dashed_dense()).width(1.5));
-        }
-        plot_ui.line(Line::new("between", line(|one| one.newtons)).color(tokens.line));
-        for (name, is_within, shape, ink) in [
-            ("within", true, MarkerShape::Circle, tokens.series),
-            ("beyond", false, MarkerShape::Cross, tokens.alarm_text),
-        ] {
-            let points =
-                known.iter().filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
-            let points: PlotPoints<'_> = points.map(|(at, one)| [*at, one.newtons]).collect();
-            let points = Points::new(name, points).shape(shape);
-            plot_ui.points(points.radius(4.0).color(ink));
-        }
-    });
+    let look = PlotLook { x_text: Some(day_text), ..PlotLook::default() };
+    plot_ui(ui, head, &deviations(head, &known), look);
 }
 
 fn row(past: &PastCheck) -> Row {

@@ -4,13 +4,13 @@ use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
 use crate::command::Commands;
-use crate::plots::CycleLoop;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::alarm_ui;
 use crate::widgets::step_mark::{StepState, step_ui};
 use crate::workers::fit::Refit;
 use eframe::egui::{RichText, Ui};
+use palpate_analysis::report::live::Cycle;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, Snapshot};
 
@@ -22,18 +22,18 @@ pub fn results_ui(
     ui: &mut Ui,
     snapshot: &Snapshot,
     refit: Refit<'_>,
-    loops: &[CycleLoop],
+    cycles: &[Cycle],
     commands: &mut Commands,
 ) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {
         after_stop_ui(ui, run, commands);
     }
-    findings_ui(ui, snapshot, refit, loops);
+    findings_ui(ui, snapshot, refit, cycles);
 }
 
 /// Draws what was found, without what can be done.
-pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, loops: &[CycleLoop]) {
+pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, cycles: &[Cycle]) {
     let run = snapshot.run.as_ref();
     match refit {
         Refit::Done(exact) => exact_ui(ui, &exact.report),
@@ -51,7 +51,7 @@ pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, loops: &[
             ui.label(RichText::new("no run yet").color(tokens.text_quiet));
         }
     }
-    cycles_ui(ui, loops);
+    cycles_ui(ui, cycles);
     if let Some(run) = run {
         section_ui(ui, "Steps");
         steps_ui(ui, run);
@@ -98,18 +98,18 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 }
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
-fn cycles_ui(ui: &mut Ui, loops: &[CycleLoop]) {
-    let Some(first) = loops.first().and_then(|one| one.peak) else {
+fn cycles_ui(ui: &mut Ui, cycles: &[Cycle]) {
+    let Some(first) = cycles.first().and_then(|one| one.peak) else {
         return;
     };
     section_ui(ui, "Peak of each cycle, change from the first");
-    let left_out = loops.len().saturating_sub(CYCLES_SHOWN);
+    let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);
     if left_out > 0 {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let words = format!("the first {left_out} are in the session");
         ui.label(RichText::new(words).color(tokens.text_quiet).small());
     }
-    for one in loops.iter().skip(left_out) {
+    for one in cycles.iter().skip(left_out) {
         if let Some(peak) = one.peak {
             let change = match one.cycle {
                 1 => String::new(),

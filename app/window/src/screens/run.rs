@@ -11,9 +11,6 @@ use super::weighing::weighing_ui;
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
-use crate::plots::force_depth::force_depth_ui;
-use crate::plots::force_time::{TimeView, force_time_ui, head_ui};
-use crate::plots::residual::residual_ui;
 use crate::shell::palette::Action;
 use crate::shell::panels::{frame, side_ui};
 use crate::shell::sizes::{Edge, Sizes};
@@ -21,9 +18,7 @@ use crate::workbench::Workbench;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::Ask;
 use crate::workers::recovery::Recovery;
-use eframe::egui::{
-    CentralPanel, Context, Frame, Key, Margin, Panel, RichText, ScrollArea, Ui, vec2,
-};
+use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
 use palpate_runner::{RunRequest, RunView};
 use std::path::Path;
@@ -36,14 +31,10 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |workbench| Box::new(RunScreen::new(workbench)),
 };
 
-/// Height of the residuals under the force in points.
-const RESIDUAL_HEIGHT: f32 = 96.0;
-
 /// The screen's state. What runs belongs to the runner.
 pub struct RunScreen {
     chooser: Chooser,
     middle: Middle,
-    time_view: TimeView,
     approach: Approach,
     plots: PlotCache,
     /// The start that the plots are of.
@@ -60,7 +51,6 @@ impl RunScreen {
         Self {
             chooser: Chooser::default(),
             middle: Middle::default(),
-            time_view: TimeView::default(),
             approach: Approach::default(),
             plots: PlotCache::for_calibration(&workbench.bench.calibration),
             plotted: 0,
@@ -110,31 +100,6 @@ impl RunScreen {
             recovered: self.recovery.told(),
             is_dialog_open: workbench.dialog.is_open(),
         }
-    }
-
-    fn plots_ui(&mut self, ui: &mut Ui, workbench: &Workbench) {
-        head_ui(ui, &mut self.time_view, &self.plots);
-        let run = workbench.run();
-        let limit = workbench.bench.limits.force_max;
-        let exact = match self.refit(run) {
-            Refit::Done(exact) => Some(exact),
-            _ => None,
-        };
-        // The chart over time carries the limits and phases, so it gets the larger half.
-        let height = (ui.available_height() - 30.0) * 0.56;
-        let below = if exact.is_some() { RESIDUAL_HEIGHT } else { 0.0 };
-        let mut shown = 0.0..=1.0;
-        ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
-            shown = force_time_ui(ui, run, &self.plots, exact, self.time_view, limit);
-        });
-        if let Some(exact) = exact {
-            ui.allocate_ui(vec2(ui.available_width(), below), |ui| {
-                residual_ui(ui, exact, shown);
-            });
-        }
-        ui.label(RichText::new("Force over depth").heading().strong());
-        let depth = workbench.form.checked().map_or(0.0, Checked::deepest_mm);
-        force_depth_ui(ui, &self.plots, depth);
     }
 }
 
@@ -211,13 +176,19 @@ impl Screen for RunScreen {
                 };
                 expected_ui(ui, checked, limits);
             }
-            (Middle::Measured, _) => self.plots_ui(ui, workbench),
+            (Middle::Measured, _) => {
+                let exact = match self.refitter.of(run) {
+                    Refit::Done(exact) => Some(exact),
+                    _ => None,
+                };
+                self.plots.ui(ui, exact);
+            }
         }
     }
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let refit = self.refit(workbench.run());
-        results_ui(ui, &workbench.snapshot, refit, self.plots.loops(), commands);
+        results_ui(ui, &workbench.snapshot, refit, self.plots.cycles(), commands);
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -241,7 +212,8 @@ impl Screen for RunScreen {
             self.plotted = workbench.starts();
             self.plots = PlotCache::for_calibration(&workbench.bench.calibration);
         }
-        self.plots.update(workbench.run());
+        let depth = workbench.form.checked().map_or(0.0, Checked::deepest_mm);
+        self.plots.update(workbench.run(), workbench.bench.limits.force_max, depth);
         self.refitter.update(ctx, workbench.run());
     }
 

@@ -3,14 +3,14 @@
 
 use super::form::Bench;
 use crate::command::{Command, Commands};
-use crate::plots::style::quiet;
+use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::shell::run_strip::{Wish, is_controllable};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
 use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
-use egui_plot::{HLine, MarkerShape, Plot, PlotPoints, Points};
-use palpate_model::calibration::{Curve, Direction, SettlingNow, newtons_of};
+use palpate_analysis::report::live::weighing;
+use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
 use palpate_model::units::Volts;
 use palpate_protocols::weighed::Weighed;
 use palpate_runner::{RunView, ToWeigh};
@@ -180,36 +180,12 @@ impl Apart {
 }
 
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let words =
         format!("Force by the calibration in use ({}) less the weight's", bench.calibration.name);
     ui.label(RichText::new(words).strong());
-    let heaviest = run.to_weigh.iter().map(|one| one.mass_g).fold(0.0, f64::max);
-    quiet(ui, Plot::new("weighing residuals"), tokens)
-        .x_axis_label("weight (N)")
-        .y_axis_label("apart (N)")
-        .include_x(0.0)
-        .include_x(newtons_of(heaviest).0)
-        .show(ui, |plot_ui| {
-            plot_ui.hline(HLine::new("none", 0.0).color(tokens.line).allow_hover(false));
-            for (name, direction, shape) in [
-                ("masses go up", Direction::Loading, MarkerShape::Up),
-                ("masses go down", Direction::Unloading, MarkerShape::Down),
-            ] {
-                let points: Vec<[f64; 2]> = run
-                    .weighed
-                    .iter()
-                    .filter(|one| one.direction == direction)
-                    .map(|one| [newtons_of(one.mass_g()).0, Apart::of(one, &bench.curve).newtons])
-                    .collect();
-                plot_ui.points(
-                    Points::new(name, PlotPoints::from(points))
-                        .shape(shape)
-                        .radius(4.0)
-                        .color(tokens.series),
-                );
-            }
-        });
+    let plot = weighing(run, &bench.curve);
+    legend_ui(ui, &[&plot]);
+    plot_ui(ui, "weighing residuals", &plot, PlotLook::default());
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! The refit of a run that has ended, on a thread of its own.
 
 use super::Job;
+use crate::plots::figure::Painted;
 use eframe::egui::Context;
-use egui_plot::PlotPoint;
 use palpate_analysis::fit::Recipe;
+use palpate_analysis::report::picture::fit_plots;
 use palpate_analysis::source::Wanted;
-use palpate_figures::thin::thin;
+use palpate_figures::figure::{Ink, Shape};
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::{RunView, Stopwatch};
@@ -19,10 +20,10 @@ const COLUMNS: usize = 2000;
 pub struct ExactFit {
     /// What the fit found.
     pub report: FitReport,
-    /// Modelled force in N over session time in s, thinned.
-    pub curve: Vec<PlotPoint>,
-    /// Measured minus modelled force in mN over session time in s, thinned.
-    pub residual: Vec<PlotPoint>,
+    /// Modelled force in N over session time in s, to be drawn over the measured.
+    pub fitted: Painted,
+    /// Measured minus modelled force in mN over session time in s.
+    pub residual: Painted,
 }
 
 /// Where the exact fit of the run on the screen stands.
@@ -107,19 +108,14 @@ fn exact(folder: &Path) -> Result<ExactFit, String> {
     let recipe = Recipe::new(FitOptions::default(), Wanted::default());
     let fitted = recipe.fit(folder).map_err(|err| err.to_string())?;
     let report = fitted.result.map_err(|err| err.to_string())?;
-    let modelled = report.predict(&fitted.samples);
-    let start = fitted.start.0;
-    let pairs = || fitted.samples.iter().zip(&modelled);
-    let curve = pairs().map(|(sample, fit)| [start + sample.t.0, fit.0]);
-    let known = pairs().filter(|(sample, _)| sample.is_measured());
-    let residual = known.map(|(sample, fit)| [start + sample.t.0, (sample.force.0 - fit.0) * 1e3]);
-    Ok(ExactFit {
-        curve: points(&thin(curve, COLUMNS)),
-        residual: points(&thin(residual, COLUMNS)),
-        report,
-    })
-}
-
-fn points(thinned: &[[f64; 2]]) -> Vec<PlotPoint> {
-    thinned.iter().map(|&point| point.into()).collect()
+    let [mut force, mut residual] =
+        fit_plots(&fitted.samples, &report, None, fitted.start.0, COLUMNS);
+    force.series.retain(|one| one.ink == Ink::Limit);
+    for one in &mut force.series {
+        // Dashed, so that the measured force shows through where both agree.
+        one.shape = Shape::Line { width: 2.0, dash: 8.0 };
+    }
+    // It stands under the force, over the same time.
+    residual.x.name.clear();
+    Ok(ExactFit { fitted: force.into(), residual: residual.into(), report })
 }

@@ -1,15 +1,15 @@
 //! The picture of an analysis of cycles: loops, how peak and place change, and how the force relaxes.
 
 use super::CycleReport;
-use crate::report::band::{self, Band};
-use crate::report::picture::{LEFT, RIGHT, WIDTH, look, title};
-use ecolor::Color32;
-use palpate_figures::drawing::{Anchor, Ink, Panel, Svg};
+use crate::report::band;
+use crate::report::picture::{LEFT, RIGHT, WIDTH, title};
+use palpate_figures::drawing::Svg;
+use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::rig::Phase;
-use palpate_rheology::cycles::CycleSample;
+use palpate_rheology::cycles::{CycleAnalysis, CycleSample};
 
 /// Top and bottom of the loops and of the row of panels below, in px.
 const LOOPS: [f64; 2] = [66.0, 400.0];
@@ -36,90 +36,78 @@ pub fn picture(report: &CycleReport) -> String {
     title(&mut svg, &report.name, &words);
     let calibration = report.source.calibration.as_ref();
     let uncertainty = calibration.and_then(|one| ForceUncertainty::of(one).ok());
-    let uncertainty = uncertainty.as_ref();
-    band::legend(&mut svg, uncertainty);
-    loops(&mut svg, report, uncertainty);
-    let relaxations = relaxations(report);
-    let panels = if relaxations.is_empty() { 2 } else { 3 };
-    let width = (RIGHT - LEFT - GAP * f64::from(panels - 1)) / f64::from(panels);
-    let place = |index: i32| {
-        let left = LEFT + f64::from(index) * (width + GAP);
-        [left, ROW[0], left + width, ROW[1]]
-    };
-    let first = report.cycles.first().and_then(|one| one.at_half());
-    let peaks = report.cycles.iter().enumerate();
-    let peaks = peaks.map(|(i, one)| Some([i as f64 + 1.0, one.force_peak.value.0]));
-    by_cycle(&mut svg, report, place(0), "peak (N)", &peaks.collect::<Vec<_>>(), uncertainty);
-    let shifts = report.cycles.iter().enumerate().map(|(i, one)| {
-        let shift = one.at_half()?.0 - first?.0;
-        Some([i as f64 + 1.0, shift])
-    });
-    by_cycle(
-        &mut svg,
-        report,
-        place(1),
-        "shift from cycle 1 (mm)",
-        &shifts.collect::<Vec<_>>(),
-        None,
-    );
-    if panels == 3 {
-        let curves: Vec<&[[f64; 2]]> = relaxations.iter().map(|(_, curve)| &curve[..]).collect();
-        let ends = first_and_last(relaxations.len()).map(|i| &relaxations[i]);
-        let bands: Vec<(usize, Band)> =
-            ends.map(|(index, curve)| (*index, Band::around(curve, uncertainty))).collect();
-        let mut inside = curves.clone();
-        inside.extend(bands.iter().flat_map(|(_, band)| band.edges()));
-        let panel = Panel::around(place(2), [0.0, longest(&curves)], &inside);
-        panel.axes(&mut svg, ["time of hold (s)", "force (N)"], look());
-        for (index, band) in &bands {
-            band.draw(&mut svg, &panel, color(*index, count));
-        }
-        for (index, curve) in &relaxations {
-            panel.line(&mut svg, curve, color(*index, count), 1.2);
-        }
+    let loops = loops(report, uncertainty.as_ref());
+    figure::legend(&mut svg, [RIGHT, 46.0], &loops);
+    loops.draw(&mut svg, [LEFT, LOOPS[0], RIGHT, LOOPS[1]], AxisNames::Both);
+    let panels = panels(report, uncertainty.as_ref());
+    let width = (RIGHT - LEFT - GAP * (panels.len() - 1) as f64) / panels.len() as f64;
+    for (index, panel) in panels.iter().enumerate() {
+        let left = LEFT + index as f64 * (width + GAP);
+        panel.draw(&mut svg, [left, ROW[0], left + width, ROW[1]], AxisNames::Both);
     }
     svg.finish(HEIGHT, LIGHT.canvas, &format!("Cycles of {}", report.name))
 }
 
-fn color(index: usize, count: usize) -> Color32 {
-    let share = index as f32 / (count.max(2) - 1) as f32;
-    LIGHT.series.lerp_to_gamma(LIGHT.limit, share)
+/// Peak and place of every cycle and, where a force was held, how it relaxed.
+fn panels(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Vec<Plot> {
+    let numbered = || (1..).map(f64::from).zip(&report.cycles);
+    let peaks = numbered().map(|(number, one)| [number, one.force_peak.value.0]).collect();
+    let first = report.cycles.first().and_then(|one| one.at_half());
+    let shift = |(number, one): (f64, &CycleAnalysis)| Some([number, one.at_half()?.0 - first?.0]);
+    let mut panels = vec![
+        by_cycle(report, "peak (N)", peaks, uncertainty),
+        by_cycle(report, "shift from cycle 1 (mm)", numbered().filter_map(shift).collect(), None),
+    ];
+    let relaxations = relaxations(report);
+    if !relaxations.is_empty() {
+        let ends = relaxations.iter().filter_map(|(_, curve)| curve[0].last());
+        let longest = ends.map(|point| point[0]).fold(0.0, f64::max).max(1e-3);
+        let time = Axis::linear("time of hold (s)").over([0.0, longest]);
+        panels.push(faded(report, time, &relaxations, uncertainty));
+    }
+    panels
 }
 
-/// Indices of the first and the last of so many, each once.
-fn first_and_last(count: usize) -> impl Iterator<Item = usize> {
-    let last = count.checked_sub(1);
-    let first = last.filter(|last| *last > 0).map(|_| 0);
-    first.into_iter().chain(last)
+fn ink(index: usize, count: usize) -> Ink {
+    Ink::Between((255 * index / (count.max(2) - 1)) as u8)
 }
 
-fn loops(svg: &mut Svg, report: &CycleReport, uncertainty: Option<&ForceUncertainty>) {
+/// A curve of forces in the parts in which it was thinned, with the index of its cycle.
+type Curve = (usize, Vec<Vec<[f64; 2]>>);
+
+/// Curves of cycles, with bands around those of the first and the last.
+fn faded(
+    report: &CycleReport,
+    x: Axis,
+    curves: &[Curve],
+    uncertainty: Option<&ForceUncertainty>,
+) -> Plot {
     let count = report.cycles.len();
-    let curves: Vec<Vec<[f64; 2]>> =
-        (0..count).map(|index| one_loop(report, index).concat()).collect();
-    let bands: Vec<(usize, Band)> = first_and_last(count)
-        .flat_map(|index| one_loop(report, index).map(|part| (index, part)))
-        .map(|(index, part)| (index, Band::around(&part, uncertainty)))
-        .collect();
-    let mut borrowed: Vec<&[[f64; 2]]> = curves.iter().map(Vec::as_slice).collect();
-    borrowed.extend(bands.iter().flat_map(|(_, band)| band.edges()));
-    let depths = || borrowed.iter().flat_map(|curve| curve.iter().map(|point| point[0]));
+    let ends = [curves.first(), curves.last()].map(|end| end.map(|(index, _)| *index));
+    let banded = curves.iter().filter(|(index, _)| ends.contains(&Some(*index)));
+    let parts = banded.flat_map(|(index, parts)| parts.iter().map(move |part| (index, part)));
+    let bands = parts.filter_map(|(index, part)| {
+        Some(Band { ink: ink(*index, count), ..band::around(part, uncertainty)? })
+    });
+    let bands = bands.collect();
+    let lines = curves.iter().map(|(index, parts)| {
+        let name = match ends.contains(&Some(*index)) {
+            true => format!("cycle {}", report.cycles[*index].cycle),
+            false => String::new(),
+        };
+        Series::line(&name, ink(*index, count), 1.2, parts.concat())
+    });
+    Plot { bands, ..Plot::new("", x, Axis::linear("force (N)")).with(lines) }
+}
+
+fn loops(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Plot {
+    let curve = |index: usize| (index, Vec::from(one_loop(report, index)));
+    let curves: Vec<Curve> = (0..report.cycles.len()).map(curve).collect();
+    let points = || curves.iter().flat_map(|(_, parts)| parts.iter().flatten());
+    let depths = || points().map(|point| point[0]);
     let (low, high) = (depths().fold(0.0, f64::min), depths().fold(0.0, f64::max));
     let range = [low, if high > low { high } else { low + 1.0 }];
-    let panel = Panel::around([LEFT, LOOPS[0], RIGHT, LOOPS[1]], range, &borrowed);
-    panel.axes(svg, ["depth (mm)", "force (N)"], look());
-    for (index, band) in &bands {
-        band.draw(svg, &panel, color(*index, count));
-    }
-    for (index, curve) in curves.iter().enumerate() {
-        panel.line(svg, curve, color(index, count), 1.2);
-    }
-    for (i, index) in [0, count.saturating_sub(1)].into_iter().enumerate().take(count.min(2)) {
-        let (x, y) = (LEFT + 20.0, LOOPS[0] + 20.0 + 20.0 * i as f64);
-        svg.line(&[[x, y], [x + 24.0, y]], color(index, count), 2.5);
-        let text = format!("cycle {}", report.cycles[index].cycle);
-        svg.text([x + 30.0, y + 4.0], Ink::plain(LIGHT.text).anchored(Anchor::Start), &text);
-    }
+    faded(report, Axis::linear("depth (mm)").over(range), &curves, uncertainty)
 }
 
 /// Force over depth, thinned one phase after the other, as thinning wants depths in order.
@@ -133,41 +121,34 @@ fn one_loop(report: &CycleReport, index: usize) -> [Vec<[f64; 2]>; 4] {
 }
 
 /// Force over time of every hold, with the index of its cycle.
-fn relaxations(report: &CycleReport) -> Vec<(usize, Vec<[f64; 2]>)> {
+fn relaxations(report: &CycleReport) -> Vec<Curve> {
     let indices = (0..report.cycles.len()).filter(|i| report.cycles[*i].relaxation.is_some());
     let curve = |index: usize| {
         let held = report.samples(index).filter(|one| one.phase == Phase::Hold);
         let start = held.clone().next().map_or(0.0, |one| one.t.0);
         thin(held.map(move |one| [one.t.0 - start, one.force.0]), COLUMNS / 3)
     };
-    indices.map(|index| (index, curve(index))).collect()
-}
-
-fn longest(curves: &[&[[f64; 2]]]) -> f64 {
-    let ends = curves.iter().filter_map(|curve| curve.last());
-    ends.map(|point| point[0]).fold(0.0, f64::max).max(1e-3)
+    indices.map(|index| (index, vec![curve(index)])).collect()
 }
 
 /// Dots over the number of the cycle, joined by a line; with a band where they are forces whose uncertainty is stated.
 fn by_cycle(
-    svg: &mut Svg,
     report: &CycleReport,
-    place: [f64; 4],
     name: &str,
-    points: &[Option<[f64; 2]>],
+    points: Vec<[f64; 2]>,
     uncertainty: Option<&ForceUncertainty>,
-) {
+) -> Plot {
     let count = report.cycles.len();
-    let known: Vec<[f64; 2]> = points.iter().flatten().copied().collect();
-    let band = Band::around(&known, uncertainty);
-    let [above, below] = band.edges();
     let range = [0.5, count.max(SLOTS_MIN) as f64 + 0.5];
-    let panel = Panel::around(place, range, &[&known, above, below]);
-    panel.axes(svg, ["cycle", name], look());
-    band.draw(svg, &panel, LIGHT.series);
-    panel.line(svg, &known, LIGHT.line, 1.0);
-    for [x, y] in &known {
-        svg.dot(panel.at([*x, *y]), color(*x as usize - 1, count), 3.5);
+    let dots = points.iter().map(|at| {
+        let ink = ink(at[0] as usize - 1, count);
+        Series::dots("", ink, 3.5, vec![*at])
+    });
+    let dots: Vec<Series> = dots.collect();
+    Plot {
+        bands: band::around(&points, uncertainty).into_iter().collect(),
+        ..Plot::new("", Axis::linear("cycle").over(range), Axis::linear(name))
+            .with(std::iter::once(Series::line("", Ink::Line, 1.0, points)).chain(dots))
     }
 }
 
@@ -227,12 +208,12 @@ mod tests {
             picture(&report)
         };
         let banded = drawn(Some(Calibration::thesis()));
-        // The legend; the four phases of the first loop and of the last, of which one was not run; the peaks; two holds.
+        // The four phases of the first loop and of the last, of which one was not run; the peaks; two holds.
         let bands = bands(&banded);
-        assert_eq!(bands.len(), 1 + 2 * 3 + 1 + 2, "{banded}");
+        assert_eq!(bands.len(), 2 * 3 + 1 + 2, "{banded}");
         assert!(banded.contains("calibration, \u{b1} 2u") && !banded.contains("NaN"));
         // 3 N is in the flat stretch: at their left end peaks and holds are unsure by 0.1 N and more of some 3.
-        for [above, below] in &bands[7..] {
+        for [above, below] in &bands[6..] {
             assert!(below - above > 5.0, "{bands:?}");
         }
         let straight = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0));

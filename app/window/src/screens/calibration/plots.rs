@@ -5,7 +5,13 @@ use eframe::egui::{RichText, Ui, vec2};
 use palpate_figures::figure::Plot;
 
 /// How each looks: it is half as wide as the plots of a run.
-const LOOK: PlotLook = PlotLook { steps_across: Some(4.0), link: Some("calibration_force") };
+const LOOK: PlotLook<'_> = PlotLook {
+    steps: [Some(4.0), None],
+    link: Some("calibration_force"),
+    shown: None,
+    x_text: None,
+    over: None,
+};
 
 /// Draws all four in the space there is, two beside each other.
 pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {

@@ -1,15 +1,16 @@
 //! The margin and the buzz, or the loop as it runs.
 
 use super::{HapticsScreen, Looked};
+use crate::plots::figure::{PlotLook, legend_ui, plot_ui, strip_ui};
 use crate::plots::margin::{MarginPicture, margin_ui};
-use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
 use crate::widgets::remark::alarm_ui;
 use crate::workers::feel::Feel;
 use crate::workers::trail::PAST_S;
-use eframe::egui::{Color32, RichText, Ui, vec2};
+use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::haptics::Tried;
+use palpate_figures::figure::{Axis, Ink, Plot, Series};
 use palpate_runner::haptics::TrailPoint;
 
 /// What the middle shows.
@@ -78,61 +79,44 @@ fn before_ui(ui: &mut Ui, looked: &Looked, running: Option<&Feel>) {
     });
 }
 
-fn tried_ui(ui: &mut Ui, tried: &Tried, [low, high]: [f64; 2]) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
     let (id, words, ink) = match tried.is_guarded {
-        false => ("unguarded", "without guards", tokens.limit),
-        true => ("guarded", "with guards", tokens.series),
+        false => ("unguarded", "without guards", Ink::Limit),
+        true => ("guarded", "with guards", Ink::Series),
     };
     let buzz = match tried.buzz_until_s {
         Some(until) => format!("{words}: buzzes, last at {until:.2} s"),
         None => format!("{words}: no buzz"),
     };
-    ui.horizontal(|ui| legend_ui(ui, ink, &buzz));
     let from = tried.trace.first().map_or(0.0, |point| point[0]);
     let to = tried.trace.last().map_or(1.0, |point| point[0]);
-    let strip = Strip {
-        id,
-        axes: ["time from when the hand arrives (s)", "place (mm)"],
-        shown: from..=to,
-        least: low..=high,
-        curves: vec![Curve { name: words, ink, points: tried.trace.clone() }],
-    };
-    strip_ui(ui, strip);
+    let time = Axis::linear("time from when the hand arrives (s)");
+    let plot = Plot::new("", time, Axis::linear("place (mm)").seeing(&ends)).with([Series::line(
+        &buzz,
+        ink,
+        1.4,
+        tried.trace.clone(),
+    )]);
+    legend_ui(ui, &[&plot]);
+    plot_ui(ui, id, &plot, PlotLook { shown: Some([from, to]), ..PlotLook::default() });
 }
 
 fn live_ui(ui: &mut Ui, feel: &Feel) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let end = feel.last().t.0.max(PAST_S);
-    let curve = |name, ink: Color32, of: fn(&TrailPoint) -> f64| Curve {
-        name,
-        ink,
-        points: feel.trail().map(|point| [point.t, of(point)]).collect(),
+    let curve = |name, ink: Ink, of: fn(&TrailPoint) -> f64| {
+        Series::line(name, ink, 1.4, feel.trail().map(|point| [point.t, of(point)]).collect())
     };
-    let model = curve("force of the model", tokens.text_quiet, |point| point.model);
-    let force = curve("force commanded", tokens.series, |point| point.force);
-    let torque = curve("torque commanded", tokens.limit, |point| point.torque);
-    let depth = curve("depth of the slave", tokens.series, |point| point.depth);
+    let model = curve("force of the model", Ink::Quiet, |point| point.model);
+    let force = curve("force commanded", Ink::Series, |point| point.force);
+    let torque = curve("torque commanded", Ink::Limit, |point| point.torque);
+    let depth = curve("depth of the slave", Ink::Series, |point| point.depth);
     let height = (ui.available_height() - 3.0 * 0.7 * HEAD) / 3.0;
     let strips = [
-        ("live_force", ["", "force (N)"], vec![model, force]),
-        ("live_torque", ["", "torque (N mm)"], vec![torque]),
-        ("live_depth", ["time (s)", "depth (mm)"], vec![depth]),
+        ("", "force (N)", vec![model, force]),
+        ("", "torque (N mm)", vec![torque]),
+        ("time (s)", "depth (mm)", vec![depth]),
     ];
-    for (id, axes, curves) in strips {
-        ui.horizontal(|ui| {
-            for curve in curves.iter().rev() {
-                legend_ui(ui, curve.ink, curve.name);
-            }
-        });
-        let strip = Strip {
-            id,
-            axes,
-            shown: end - PAST_S..=end,
-            // A loop at rest is a line at zero and no noise.
-            least: 0.0..=0.5,
-            curves,
-        };
-        ui.allocate_ui(vec2(ui.available_width(), height), |ui| strip_ui(ui, strip));
+    for (x, y, curves) in strips {
+        strip_ui(ui, [x, y], curves, [end - PAST_S, end], height);
     }
 }

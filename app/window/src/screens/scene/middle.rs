@@ -1,7 +1,7 @@
 //! The picture of the scene, and force and depth over time below it.
 
 use super::SceneScreen;
-use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
+use crate::plots::figure::strip_ui;
 use crate::scene::view::Shown;
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
@@ -10,7 +10,7 @@ use crate::widgets::tick_box::tick_box;
 use crate::workers::touch::{Ahead, Moment, Touch, TouchPoint};
 use crate::workers::trail::PAST_S;
 use eframe::egui::{RichText, Ui, vec2};
-use std::ops::RangeInclusive;
+use palpate_figures::figure::{Ink, Series};
 
 /// What the middle shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ struct Played<'a> {
     moment: &'a Moment,
     trail: Vec<TouchPoint>,
     /// Seconds along the plots.
-    shown: RangeInclusive<f64>,
+    shown: [f64; 2],
     title: String,
 }
 
@@ -52,7 +52,7 @@ fn played<'a>(
             Ok(Played {
                 moment: touch.moment(),
                 trail: touch.trail().copied().collect(),
-                shown: end - PAST_S..=end,
+                shown: [end - PAST_S, end],
                 title: title.to_owned(),
             })
         }
@@ -61,7 +61,7 @@ fn played<'a>(
             Ok(Played {
                 moment: &ahead.deepest,
                 trail: ahead.trail.clone(),
-                shown: 0.0..=ahead.path.seconds(),
+                shown: [0.0, ahead.path.seconds()],
                 title: format!(
                     "{}, computed: where it is deepest, after {:.2} s",
                     ahead.path.name(),
@@ -118,28 +118,13 @@ impl SceneScreen {
         let height = PICTURE_SHARE * ui.available_height();
         let size = vec2(ui.available_width(), height);
         ui.allocate_ui(size, |ui| self.view.ui(ui, &picture));
-        let curve = |name, ink, of: fn(&TouchPoint) -> f64| Curve {
-            name,
-            ink,
-            points: trail.iter().map(|point| [point.t, of(point)]).collect(),
+        let curve = |name, ink, of: fn(&TouchPoint) -> f64| {
+            Series::line(name, ink, 1.4, trail.iter().map(|point| [point.t, of(point)]).collect())
         };
-        let force = curve("force on the hand", tokens.limit, |point| point.force);
-        let depth = curve("depth of the stylus", tokens.series, |point| point.depth);
+        let force = curve("force on the hand", Ink::Limit, |point| point.force);
+        let depth = curve("depth of the stylus", Ink::Series, |point| point.depth);
         let height = (ui.available_height() - 2.0 * HEAD) / 2.0;
-        for (id, axes, curve) in [
-            ("scene_force", ["", "force (N)"], force),
-            ("scene_depth", ["time (s)", "depth (mm)"], depth),
-        ] {
-            ui.horizontal(|ui| legend_ui(ui, curve.ink, curve.name));
-            let strip = Strip {
-                id,
-                axes,
-                shown: shown.clone(),
-                // A scene at rest is a line at zero and no noise.
-                least: 0.0..=0.5,
-                curves: vec![curve],
-            };
-            ui.allocate_ui(vec2(ui.available_width(), height), |ui| strip_ui(ui, strip));
-        }
+        strip_ui(ui, ["", "force (N)"], vec![force], shown, height);
+        strip_ui(ui, ["time (s)", "depth (mm)"], vec![depth], shown, height);
     }
 }

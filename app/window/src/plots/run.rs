@@ -1,0 +1,102 @@
+//! Force over time and over depth of the run that is shown, with what its exact fit found and left over.
+
+use super::figure::{Painted, PlotLook};
+use crate::theme::Tokens;
+use crate::widgets::places::Place;
+use crate::workers::fit::ExactFit;
+use eframe::egui::{RichText, Ui, vec2};
+use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
+use palpate_model::calibration::{Calibration, ForceUncertainty};
+use palpate_model::signal::LiveTrace;
+use palpate_model::units::Newtons;
+use palpate_runner::RunView;
+use std::sync::Arc;
+
+/// Height of what the exact fit leaves over, in points.
+const RESIDUAL_HEIGHT: f32 = 96.0;
+
+/// The plots of a run, converted when its trace changed, never per frame.
+#[derive(Debug, Default)]
+pub struct PlotCache {
+    trace: Option<Arc<LiveTrace>>,
+    force_time: Painted,
+    force_depth: Painted,
+    /// One for each repeat; empty where nothing is repeated.
+    cycles: Vec<Cycle>,
+    remark: Option<String>,
+    /// Of the forces drawn; `None` where their calibration cannot tell.
+    uncertainty: Option<ForceUncertainty>,
+    /// Whether the run is shown from just before its ramp.
+    is_from_ramp: bool,
+}
+
+impl PlotCache {
+    /// A cache for forces read with this calibration.
+    #[must_use]
+    pub fn for_calibration(calibration: &Calibration) -> Self {
+        let uncertainty = ForceUncertainty::of(calibration).ok();
+        let mut cache = Self { uncertainty, ..Self::default() };
+        cache.convert(&LiveTrace::new(1), &[]);
+        cache
+    }
+
+    /// Takes over a run's history, if it changed. `depth_mm` is the depth the form or the run asks for, so the axis does
+    /// not creep while the probe goes in.
+    pub fn update(&mut self, run: Option<&RunView>, force_max: Newtons, depth_mm: f64) {
+        let is_same = |run: &&RunView| {
+            self.trace.as_ref().is_some_and(|trace| Arc::ptr_eq(trace, &run.trace))
+        };
+        if let Some(run) = run.filter(|run| !is_same(run)) {
+            self.convert(&run.trace, if run.cycles > 1 { &run.cycle_starts } else { &[] });
+            self.trace = Some(Arc::clone(&run.trace));
+        }
+        set_course(&mut self.force_time.plot, run, force_max, self.is_from_ramp);
+        self.force_depth.plot.x.seen = vec![0.0, depth_mm];
+        self.force_depth.plot.y.seen = vec![0.0, 0.5];
+    }
+
+    fn convert(&mut self, trace: &LiveTrace, starts: &[(f64, u32)]) {
+        let plots = RunPlots::of(trace, starts, self.uncertainty.as_ref());
+        (self.force_time, self.force_depth) = (plots.force_time.into(), plots.force_depth.into());
+        (self.cycles, self.remark) = (plots.cycles, plots.remark);
+    }
+
+    /// The repeats so far, oldest first; empty where nothing is repeated.
+    #[must_use]
+    pub fn cycles(&self) -> &[Cycle] {
+        &self.cycles
+    }
+
+    /// Draws both in the space there is, the exact fit over the measured force once there is one.
+    pub fn ui(&mut self, ui: &mut Ui, exact: Option<&ExactFit>) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(&self.force_time.plot.title).heading().strong());
+            for (view, name) in [(false, "Whole run"), (true, "From ramp")] {
+                ui.selectable_value(&mut self.is_from_ramp, view, name).place(name);
+            }
+            if let Some(remark) = &self.remark {
+                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+            }
+        });
+        // The chart over time carries the limits and phases, so it gets the larger half.
+        let height = (ui.available_height() - 30.0) * 0.56;
+        let below = if exact.is_some() { RESIDUAL_HEIGHT } else { 0.0 };
+        let shown = ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
+            let (shown, over) = (self.force_time.plot.x.range, exact.map(|exact| &exact.fitted));
+            let look = PlotLook { shown, over, ..PlotLook::default() };
+            self.force_time.ui(ui, "force_time", look)
+        });
+        if let Some(exact) = exact {
+            ui.allocate_ui(vec2(ui.available_width(), below), |ui| {
+                // Low as it is, it has room for three numbers.
+                let steps = [None, Some(4.0)];
+                let shown = Some(shown.inner);
+                let look = PlotLook { steps, shown, ..PlotLook::default() };
+                exact.residual.ui(ui, "residual", look);
+            });
+        }
+        ui.label(RichText::new(&self.force_depth.plot.title).heading().strong());
+        self.force_depth.ui(ui, "force_depth", PlotLook::default());
+    }
+}
