@@ -42,7 +42,9 @@ pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
     let cut = cut_at(picture.cycles, deepest);
     let deep = part(picture, [cut.unwrap_or(0.0), deepest]);
     legend_ui(ui, &[&deep]);
-    patch_ui(ui, Ink::Text, &format!("the device has {:.2} N s/m", picture.has));
+    ui.horizontal(|ui| {
+        patch_ui(ui, Ink::Text, &format!("the device has {:.2} N s/m", picture.has));
+    });
     let look = |shown| PlotLook { shown: Some(shown), ..PlotLook::default() };
     match cut {
         None => plot_ui(ui, "margin", &deep, look([0.0, deepest])),

@@ -25,13 +25,12 @@ impl Default for ModelChoice {
 }
 
 impl ModelChoice {
-    /// Draws the choice under a name that no other on the screen has.
-    pub fn ui(&mut self, ui: &mut Ui, name: &'static str) {
+    /// Draws the choice and the box for rejected sessions, under names that nothing else on the screen has.
+    pub fn ui(&mut self, ui: &mut Ui, name: &'static str, include_rejected: &str) {
         let keys = self.keys.iter();
         let keys = keys.map(|key| (Some(key.clone()), key.as_str()));
         let all: Vec<_> = std::iter::once((None, OWN_MODEL)).chain(keys).collect();
         choice_ui(ui, name, &mut self.family, &all);
-        let words = format!("rejected sessions too ({name})");
-        tick_box(ui, &mut self.is_rejected_included, &words);
+        tick_box(ui, &mut self.is_rejected_included, include_rejected);
     }
 }

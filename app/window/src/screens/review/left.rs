@@ -95,7 +95,7 @@ impl ReviewScreen {
             quiet_ui(ui, "no session shown has been fitted here yet");
         }
         section_ui(ui, "Fit");
-        self.model.ui(ui, "fit with");
+        self.model.ui(ui, "fit with", "include rejected sessions");
         let verdict = self.fit_verdict();
         if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
             self.start_fits(ui.ctx());

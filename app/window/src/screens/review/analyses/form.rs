@@ -114,7 +114,7 @@ impl Form {
     }
 
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
-        self.model.ui(ui, "model");
+        self.model.ui(ui, "model", "even if the session is rejected");
         if self.model.family.is_some() {
             tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
         }
