@@ -19,10 +19,10 @@ use palpate_model::units::Seconds;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::cycles::predict;
 use palpate_rheology::fit::{FitOptions, FitReport, Systematic};
-use palpate_runner::programme::{FINISHED, Programme, Progress, Task, calibration_of};
+use palpate_runner::programme::{FINISHED, Place, Programme, Progress, Task, calibration_of};
 use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What one task told.
 #[derive(Clone, Debug, Serialize)]
@@ -111,65 +111,75 @@ impl Page {
                 fits: Vec::new(),
                 predictions: Vec::new(),
             };
-            for (place, session, ending) in progress.runs.iter().filter(|run| run.0.task == index) {
-                let name = session.display().to_string();
-                let path = folder.join(session);
-                let opened = edited::open(&path);
-                let lost = Lost::of(&opened, &path, ending.as_deref());
-                // What was said of a session holds for it as it was.
-                let whole = opened.as_ref().ok().filter(|_| lost.is_none());
-                let verdict = whole.and_then(|one| one.edits.verdict());
-                let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
-                let is_rejected = rejection.is_some();
-                let verdict = verdict.map(|(verdict, edit)| match verdict {
-                    Verdict::Valid => verdict.to_string(),
-                    _ => format!("{verdict}: {}", edit.reason),
-                });
-                let opened = opened.map(|one| one.session);
-                let forces = opened.iter().flat_map(|session| &session.rows);
-                let peak = forces.filter_map(|row| row.force).reduce(f64::max);
-                let end = opened.as_ref().ok().and_then(|session| session.rows.last());
-                let manifest = opened.as_ref().ok().map(|session| &session.manifest);
-                let told = manifest.map(SpecimenPart::of);
-                let told = told.filter(|one| !one.specimen.is_empty());
-                page.specimens.extend(told.filter(|one| !page.specimens.contains(one)));
-                let word = |of: fn(&Manifest) -> &String| {
-                    manifest.map_or(String::new(), |one| of(one).clone())
-                };
-                page.runs.push(RunLine {
-                    task: task.name.clone(),
-                    repeat: place.repeat,
-                    attempt: place.attempt,
-                    session: name.clone(),
-                    ending: ending.clone(),
-                    lost: lost.as_ref().map(|(lost, _)| *lost),
-                    operator: word(|manifest| &manifest.operator),
-                    specimen: word(|manifest| &manifest.specimen),
-                    verdict,
-                    duration_s: end.map(|row| row.host.seconds().0),
-                    force_peak_n: peak,
-                });
-                let mut leave_out = |reason: &str| {
-                    let line = format!("{name}: {reason}, left out");
-                    bodies.left_out.push((task.name.clone(), line.clone()));
-                    part.line(&line);
-                };
-                match opened {
-                    _ if let Some((lost, reason)) = &lost => {
-                        leave_out(&format!("{} ({reason})", lost.word()));
-                    }
-                    // It stays in the count and tells nothing.
-                    Ok(_) if is_rejected => leave_out("rejected"),
-                    Ok(session) if ending.as_deref() == Some(FINISHED) => {
-                        part.read(task, &name, &session, &mut bodies);
-                    }
-                    Ok(_) => {}
-                    Err(err) => part.line(&format!("{name}: {err}")),
-                }
+            for run in progress.runs.iter().filter(|run| run.0.task == index) {
+                page.add_run(&mut part, &mut bodies, task, run, folder);
             }
             page.tasks.push(part);
         }
         page
+    }
+
+    fn add_run(
+        &mut self,
+        part: &mut TaskPart,
+        bodies: &mut Bodies,
+        task: &Task,
+        (place, session, ending): &(Place, PathBuf, Option<String>),
+        folder: &Path,
+    ) {
+        let name = session.display().to_string();
+        let path = folder.join(session);
+        let opened = edited::open(&path);
+        let lost = Lost::of(&opened, &path, ending.as_deref());
+        // What was said of a session holds for it as it was.
+        let whole = opened.as_ref().ok().filter(|_| lost.is_none());
+        let verdict = whole.and_then(|one| one.edits.verdict());
+        let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
+        let is_rejected = rejection.is_some();
+        let verdict = verdict.map(|(verdict, edit)| match verdict {
+            Verdict::Valid => verdict.to_string(),
+            _ => format!("{verdict}: {}", edit.reason),
+        });
+        let opened = opened.map(|one| one.session);
+        let forces = opened.iter().flat_map(|session| &session.rows);
+        let peak = forces.filter_map(|row| row.force).reduce(f64::max);
+        let end = opened.as_ref().ok().and_then(|session| session.rows.last());
+        let manifest = opened.as_ref().ok().map(|session| &session.manifest);
+        let told = manifest.map(SpecimenPart::of);
+        let told = told.filter(|one| !one.specimen.is_empty());
+        self.specimens.extend(told.filter(|one| !self.specimens.contains(one)));
+        let word =
+            |of: fn(&Manifest) -> &String| manifest.map_or(String::new(), |one| of(one).clone());
+        self.runs.push(RunLine {
+            task: task.name.clone(),
+            repeat: place.repeat,
+            attempt: place.attempt,
+            session: name.clone(),
+            ending: ending.clone(),
+            lost: lost.as_ref().map(|(lost, _)| *lost),
+            operator: word(|manifest| &manifest.operator),
+            specimen: word(|manifest| &manifest.specimen),
+            verdict,
+            duration_s: end.map(|row| row.host.seconds().0),
+            force_peak_n: peak,
+        });
+        let mut leave_out = |reason: &str| {
+            let line = format!("{name}: {reason}, left out");
+            bodies.left_out.push((task.name.clone(), line.clone()));
+            part.line(&line);
+        };
+        match opened {
+            _ if let Some((lost, reason)) = &lost => {
+                leave_out(&format!("{} ({reason})", lost.word()));
+            }
+            // It stays in the count and tells nothing.
+            Ok(_) if is_rejected => leave_out("rejected"),
+            Ok(session) if ending.as_deref() == Some(FINISHED) => {
+                part.read(task, &name, &session, bodies);
+            }
+            Ok(_) => {}
+            Err(err) => part.line(&format!("{name}: {err}")),
+        }
     }
 
     /// The table of runs as text.
