@@ -184,9 +184,7 @@ fn paint<'a>(
 ) {
     for stretch in &plot.stretches {
         let [from, to] = stretch.ends.map(|x| plot.x.scale.place(x));
-        // One that has an ink has its name in the legend.
-        let name = if stretch.ink.is_some() { "" } else { stretch.name.as_str() };
-        let span = Span::new(name, from..=to);
+        let span = Span::new(stretch.name.as_str(), from..=to);
         let (fill, border) = match stretch.ink {
             None => (Color32::TRANSPARENT, tokens.line),
             Some(Ink::Line) => (tokens.phase_band, tokens.line),

@@ -40,8 +40,10 @@ fn cut_at(cycles: &[DepthBand], deepest: f64) -> Option<f64> {
 pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
     let deepest = picture.curve.last().map_or(0.0, |one| one.depth);
     let cut = cut_at(picture.cycles, deepest);
-    let deep = part(picture, [cut.unwrap_or(0.0), deepest]);
+    let mut deep = part(picture, [cut.unwrap_or(0.0), deepest]);
     legend_ui(ui, &[&deep]);
+    // The legend names them; the plots are too narrow for it.
+    deep.stretches.iter_mut().for_each(|one| one.name.clear());
     ui.horizontal(|ui| {
         patch_ui(ui, Ink::Text, &format!("the device has {:.2} N s/m", picture.has));
     });
@@ -51,7 +53,8 @@ pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
         Some(at) => {
             let size = vec2(0.4 * ui.available_width(), ui.available_height());
             ui.horizontal_top(|ui| {
-                let shallow = part(picture, [0.0, at]);
+                let shallow =
+                    Plot { stretches: deep.stretches.clone(), ..part(picture, [0.0, at]) };
                 ui.allocate_ui(size, |ui| {
                     plot_ui(ui, "margin_shallow", &shallow, look([0.0, at]));
                 });
