@@ -1,7 +1,7 @@
 //! Files that only grow, one JSON object a line. Every line carries a checksum over itself and the line
 //! before, so that a line that was changed, moved or taken out of the middle is noticed. One taken off the end
-//! is noticed by the [`Head`], which stands in a file beside it, and in the catalog, which tells there what it notices and what
-//! not.
+//! is noticed by the [`Head`], which stands in a file beside it, and by the catalog (`catalog/heads.rs` says what is noticed
+//! and what is not).
 //!
 //! A line is `{"body": ..., "checksum": CRC-32}`. The checksum is over the checksum of the line before (of
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON

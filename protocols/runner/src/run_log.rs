@@ -15,13 +15,13 @@ const QUIET: Nanos = Nanos::from_millis(60_000);
 /// Faults, of each kind one line a minute: a broken cell can report one with every sample, and a bad link several kinds in
 /// turn.
 #[derive(Debug, Default)]
-pub(super) struct FaultLog(Vec<Repeated>);
+pub(super) struct FaultLog(Vec<FaultCount>);
 
-/// A kind of fault, when it was last told, and how often it came since.
+/// A kind of fault, session time of its last line, and how often it came since.
 #[derive(Debug)]
-struct Repeated {
+struct FaultCount {
     kind: Discriminant<Fault>,
-    told: Nanos,
+    logged: Nanos,
     since: u64,
 }
 
@@ -32,15 +32,15 @@ impl FaultLog {
         match self.0.iter_mut().find(|one| one.kind == kind) {
             None => {
                 warn!("{fault}");
-                self.0.push(Repeated { kind, told: now, since: 0 });
+                self.0.push(FaultCount { kind, logged: now, since: 0 });
             }
-            Some(one) if now.since(one.told) < QUIET => one.since += 1,
+            Some(one) if now.since(one.logged) < QUIET => one.since += 1,
             Some(one) => {
                 match std::mem::take(&mut one.since) {
                     0 => warn!("{fault}"),
                     more => warn!("{fault}; {more} more of its kind since the last line"),
                 }
-                one.told = now;
+                one.logged = now;
             }
         }
     }

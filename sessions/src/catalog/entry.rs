@@ -121,7 +121,7 @@ palpate_model::named! {
     pub enum Source {
         /// In the protocol.
         Plan = "plan",
-        /// Among what was told of specimen, probe and series.
+        /// Among the facts about specimen, probe and series.
         About = "about",
         /// A fitted parameter.
         Fit = "fit",

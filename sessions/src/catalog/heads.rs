@@ -1,14 +1,14 @@
 //! How far files of lines went when the catalog last read them: what notices that lines were taken off the end together
 //! with the [`Head`] beside them.
 //!
-//! Remembered are the edits and the analyses of every session, the daily checks of every rig and the journals of programmes
+//! Recorded are the edits and the analyses of every session, the daily checks of every rig and the journals of programmes
 //! in the library. It is the one thing that the catalog does not only repeat, so it stays when the catalog is rebuilt and
-//! when another version of palpate makes the tables anew.
+//! when another version of palpate replaces the tables.
 //!
-//! Noticed is a file that is shorter or other than at the last update, whatever became of the head beside it. Not noticed
+//! It notices a file that is shorter or other than at the last update, whatever became of the head beside it. Not noticed
 //! is what was added and cut again between two updates, what was cut in a folder that was moved or renamed since, a programme
-//! whose whole folder is gone, and anything by somebody who also deletes or rewrites the catalog: it then knows what it
-//! finds. A library that may not be written is never remembered.
+//! whose whole folder is gone, and anything by somebody who also deletes or rewrites the catalog: it then knows only
+//! what it finds. A library that may not be written is never remembered.
 
 use super::entry::{Entry, Heads};
 use super::update::entry_of;
@@ -34,7 +34,7 @@ const LINE_BYTES_MAX: u64 = 1 << 20;
 
 /// A file of lines that the catalog has read.
 #[derive(Clone, Debug)]
-pub(super) struct Remembered {
+pub(super) struct RecordedHead {
     /// Its path below the library, with `/` between.
     file: String,
     /// What it belongs to: a session's id, a rig, or the journal's own name.
@@ -46,7 +46,7 @@ pub(super) struct Remembered {
 
 /// All of them, by path.
 #[derive(Debug, Default)]
-pub(super) struct KnownHeads(BTreeMap<String, Vec<Remembered>>);
+pub(super) struct KnownHeads(BTreeMap<String, Vec<RecordedHead>>);
 
 impl KnownHeads {
     /// How far a file went that belongs to `name`.
@@ -68,12 +68,12 @@ fn beside(folder: &str) -> [String; 2] {
 }
 
 /// The file of lines of a rig's checks or a programme, which is in no session's folder.
-struct Lines<'a> {
+struct LineFile<'a> {
     library: &'a Path,
     file: &'a str,
 }
 
-impl Lines<'_> {
+impl LineFile<'_> {
     fn stamp(&self) -> String {
         let path = self.library.join(self.file);
         stamp(&path, "lines") + &stamp(&Head::file_of(&path), "head")
@@ -94,7 +94,7 @@ impl Lines<'_> {
 }
 
 impl Catalog {
-    /// What is remembered of every file.
+    /// The recorded head of every file.
     pub(super) fn heads(&self) -> Result<KnownHeads, CatalogError> {
         let mut known = KnownHeads::default();
         for one in read(&self.db).map_err(self.failed())? {
@@ -103,18 +103,17 @@ impl Catalog {
         Ok(known)
     }
 
-    /// Reads the files of lines that are of no session, unless they are as they were, and tells how far they go and, by file,
-    /// what is wrong.
+    /// Reads the changed files of lines outside sessions. Returns how far each goes and, by file, what is wrong.
     pub(super) fn confirm(
         &self,
         known: &KnownHeads,
         is_stamp_enough: bool,
-    ) -> (Vec<Remembered>, Vec<(String, String)>) {
+    ) -> (Vec<RecordedHead>, Vec<(String, String)>) {
         let (mut read, mut wrong) = (Vec::new(), Vec::new());
         let mut files = self.files_of_lines();
         files.extend(known.0.keys().filter(|file| self.is_expected(file)).cloned());
         for file in files {
-            let lines = Lines { library: &self.library, file: &file };
+            let lines = LineFile { library: &self.library, file: &file };
             let stamp = lines.stamp();
             let former = known.0.get(&file).and_then(|all| all.first());
             if is_stamp_enough && former.is_some_and(|former| former.stamp == stamp) {
@@ -124,7 +123,7 @@ impl Catalog {
             let Some(name) = name else { continue };
             let since = known.of(&file, &name);
             match chain::read_since(&self.library.join(&file), &name, since) {
-                Ok(chain) => read.push(Remembered { file, name, head: chain.head(), stamp }),
+                Ok(chain) => read.push(RecordedHead { file, name, head: chain.head(), stamp }),
                 Err(err) => wrong.push((file, err.to_string())),
             }
         }
@@ -153,8 +152,8 @@ impl Catalog {
 }
 
 /// Remembers how far a file goes. What is remembered of more lines stays.
-pub(super) fn remember(db: &Connection, one: &Remembered) -> rusqlite::Result<()> {
-    let Remembered { file, name, head, stamp } = one;
+pub(super) fn remember(db: &Connection, one: &RecordedHead) -> rusqlite::Result<()> {
+    let RecordedHead { file, name, head, stamp } = one;
     db.prepare_cached(
         "INSERT INTO head (file, name, lines, last, stamp, checksum) VALUES (?, ?, ?, ?, ?, ?)
          ON CONFLICT DO UPDATE SET lines = excluded.lines, last = excluded.last,
@@ -170,20 +169,20 @@ pub(super) fn remember_session(db: &Connection, entry: &Entry) -> rusqlite::Resu
     of_entry(entry).iter().try_for_each(|one| remember(db, one))
 }
 
-fn of_entry(entry: &Entry) -> Vec<Remembered> {
+fn of_entry(entry: &Entry) -> Vec<RecordedHead> {
     let Heads { edits, analyses } = entry.heads;
     let heads = beside(&entry.folder).into_iter().zip([edits, analyses]);
     let has_lines = |(_, head): &(String, Head)| head.lines > 0;
     let name = &entry.session_id;
     heads
         .filter(has_lines)
-        .map(|(file, head)| Remembered { file, name: name.clone(), head, stamp: String::new() })
+        .map(|(file, head)| RecordedHead { file, name: name.clone(), head, stamp: String::new() })
         .collect()
 }
 
 /// What a catalog of another version remembers, as far as that can be understood.
-pub(super) fn left_by(db: &Connection) -> Vec<Remembered> {
-    let entries = || -> rusqlite::Result<Vec<Remembered>> {
+pub(super) fn heads_of_other_version(db: &Connection) -> Vec<RecordedHead> {
+    let entries = || -> rusqlite::Result<Vec<RecordedHead>> {
         let mut statement = db.prepare("SELECT entry, checksum FROM session")?;
         let entries = statement.query_map([], entry_of)?;
         Ok(entries.flatten().flat_map(|entry| of_entry(&entry)).collect())
@@ -191,15 +190,15 @@ pub(super) fn left_by(db: &Connection) -> Vec<Remembered> {
     read(db).or_else(|_| entries()).unwrap_or_default()
 }
 
-fn read(db: &Connection) -> rusqlite::Result<Vec<Remembered>> {
+fn read(db: &Connection) -> rusqlite::Result<Vec<RecordedHead>> {
     let mut statement =
         db.prepare_cached("SELECT file, name, lines, last, stamp, checksum FROM head")?;
     statement.query_map([], remembered)?.collect()
 }
 
-fn remembered(row: &Row<'_>) -> rusqlite::Result<Remembered> {
+fn remembered(row: &Row<'_>) -> rusqlite::Result<RecordedHead> {
     let head = Head { lines: row.get::<_, i64>(2)?.unsigned_abs(), checksum: row.get(3)? };
-    let one = Remembered { file: row.get(0)?, name: row.get(1)?, head, stamp: row.get(4)? };
+    let one = RecordedHead { file: row.get(0)?, name: row.get(1)?, head, stamp: row.get(4)? };
     match sum(&one.file, &one.name, head) == row.get::<_, String>(5)? {
         true => Ok(one),
         false => Err(rusqlite::Error::FromSqlConversionFailure(

@@ -3,7 +3,7 @@
 //! The file is made from the sessions, brought up to date from those that changed, and may be deleted at any time; what is
 //! lost with it is only the memory of how far edits, analyses, checks and journals went, by which it notices that some were
 //! taken away (`heads.rs`). A file of another version is replaced; one that is damaged, or another program's, is set aside
-//! and made anew.
+//! and replaced.
 //!
 //! Start reading at [`Entry`] for what is known of a session, then [`Catalog::update`] and
 //! [`Catalog::find`].
@@ -204,7 +204,7 @@ impl Catalog {
 enum Opened {
     Ours(Connection),
     /// What it remembers.
-    OtherVersion(Vec<heads::Remembered>),
+    OtherVersion(Vec<heads::RecordedHead>),
     Foreign,
 }
 
@@ -219,7 +219,9 @@ fn open_file(path: &Path) -> Result<Opened, CatalogError> {
         db.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(failed)?;
     match (number("application_id")?, number("user_version")?) {
         (schema::APPLICATION, schema::VERSION) => {}
-        (schema::APPLICATION, _) => return Ok(Opened::OtherVersion(heads::left_by(&db))),
+        (schema::APPLICATION, _) => {
+            return Ok(Opened::OtherVersion(heads::heads_of_other_version(&db)));
+        }
         (0, 0) if tables == 0 => schema::create(&mut db).map_err(failed)?,
         _ => return Ok(Opened::Foreign),
     }

@@ -138,7 +138,7 @@ pub struct FileSink {
     file: File,
     /// The file's folder, until its entry for the file is known to be on disk.
     folder: Option<File>,
-    written: Written,
+    written: WrittenFile,
 }
 
 impl FileSink {
@@ -150,7 +150,7 @@ impl FileSink {
             _ => File::open(".")?,
         };
         let own = file.metadata()?;
-        let written = Written {
+        let written = WrittenFile {
             // The program may go to another folder before the file is looked for again.
             path: std::path::absolute(path)?,
             id: (own.dev(), own.ino()),
@@ -200,7 +200,7 @@ impl Sink for FileSink {
 
 /// What was written to a file, by which it is known again.
 #[derive(Clone, Debug)]
-struct Written {
+struct WrittenFile {
     path: PathBuf,
     /// The device and the file's number on it.
     id: (u64, u64),
@@ -212,7 +212,7 @@ struct Written {
 /// Bytes that are read back at once.
 const WINDOW_BYTES: usize = 1 << 18;
 
-impl Written {
+impl WrittenFile {
     /// Whether the file still has its name, and so many bytes.
     fn check(&self) -> Result<(), Alteration> {
         let there = std::fs::metadata(&self.path).map_err(unreadable)?;

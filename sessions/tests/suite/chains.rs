@@ -150,7 +150,7 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
     }
     fs::write(&edits, &whole).unwrap();
     assert_eq!(trouble(), None);
-    // Whether it is rebuilt or made anew by another version, it knows.
+    // It knows after a rebuild and after a replacement by another version.
     cut_last_line(&edits);
     let catalog = at.join("catalog.sqlite");
     Catalog::open(at).unwrap().rebuild(&mut |_, _| {}).unwrap();
@@ -207,9 +207,9 @@ fn a_check_or_a_journal_that_was_cut_off_with_its_head_is_missed_by_the_catalog(
             damage(file);
             fs::remove_file(&head).unwrap();
             for _ in 0..2 {
-                let told = update();
+                let remarks = update();
                 let name = file.file_name().unwrap().to_str().unwrap();
-                assert!(told.len() == 1 && told[0].contains(name), "{told:?}");
+                assert!(remarks.len() == 1 && remarks[0].contains(name), "{remarks:?}");
                 Catalog::open(at).unwrap().rebuild(&mut |_, _| {}).unwrap();
             }
             fs::write(file, &whole).unwrap();
