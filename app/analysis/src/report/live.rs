@@ -1,5 +1,5 @@
-//! The plots of a run in progress: force over time and over depth, the search for the surface, weights that were read;
-//! and those of daily checks. Whoever draws them finds their points again only where the trace is another.
+//! The plots of a run in progress (force over time and over depth, contact search, weight readings) and of daily checks.
+//! A painter converts a plot's points once and again only when the trace has changed.
 
 use super::band;
 use crate::daily::Deviation;
@@ -171,32 +171,32 @@ pub fn approach(trace: &LiveTrace) -> Plot {
     .with([Series::line("force", Ink::Series, WIDTH, points)])
 }
 
-/// What passes felt and where the surface was found, to be drawn over the search; its x axis says what is shown.
+/// Positions and forces of the contact passes and the contact point, drawn over the search; its x axis has the range to show.
 #[must_use]
 pub fn touches(run: &RunView, search: &Plot) -> Plot {
-    let felt: Vec<[f64; 2]> =
+    let passes: Vec<[f64; 2]> =
         run.touches.iter().map(|touch| [touch.position.0, touch.force.0]).collect();
     let contact = run.contact.map(|contact| Level::plain(contact.position.0, Ink::Limit));
-    let from = felt.iter().map(|touch| touch[0]).reduce(f64::min);
+    let from = passes.iter().map(|touch| touch[0]).reduce(f64::min);
     let points = search.series.iter().flat_map(|one| &one.points);
     let end = points.map(|point| point[0]).fold(f64::NEG_INFINITY, f64::max);
     let range = from.map(|from| [from - LEAD_MM, end.max(from) + 0.5]);
     Plot {
         moments: contact.into_iter().collect(),
         ..Plot::new("", Axis { range, ..Axis::default() }, Axis::default()).with([Series::dots(
-            "felt",
+            "contact pass",
             Ink::Limit,
             5.0,
-            felt,
+            passes,
         )])
     }
 }
 
-/// How far the force of each weight read is from the weight's, by the calibration in use.
+/// Force by the calibration in use minus the weight, in N, over each weight that was read.
 #[must_use]
 pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
     let heaviest = run.to_weigh.iter().map(|one| one.mass_g).fold(0.0, f64::max);
-    let apart = |wanted: Direction| -> Vec<[f64; 2]> {
+    let deviations = |wanted: Direction| -> Vec<[f64; 2]> {
         let own = run.weighed.iter().filter(|one| one.direction == wanted);
         own.map(|one| {
             let weight = newtons_of(one.mass_g()).0;
@@ -209,16 +209,17 @@ pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
         ..Plot::new(
             "",
             Axis::linear("weight (N)").seeing(&[0.0, newtons_of(heaviest).0]),
-            Axis::linear("apart (N)"),
+            Axis::linear("deviation (N)"),
         )
         .with([
-            Series::dots("masses go up", Ink::Series, 3.6, apart(Direction::Loading)),
-            Series::dots("masses go down", Ink::Limit, 2.6, apart(Direction::Unloading)),
+            Series::dots("loading", Ink::Series, 3.6, deviations(Direction::Loading)),
+            // Hollow, so that the two are told apart without colours.
+            Series::rings("unloading", Ink::Limit, 4.6, deviations(Direction::Unloading)),
         ])
     }
 }
 
-/// How far one reading of each daily check was off, over days, between what was allowed.
+/// Deviation of one reading of each daily check in N over days, between its limits.
 #[must_use]
 pub fn deviations(title: &str, known: &[(f64, Deviation)]) -> Plot {
     let line = |of: fn(&Deviation) -> f64| known.iter().map(|(at, one)| [*at, of(one)]).collect();
@@ -231,15 +232,14 @@ pub fn deviations(title: &str, known: &[(f64, Deviation)]) -> Plot {
         [(at, _)] => vec![at - 1.0, at + 1.0],
         _ => Vec::new(),
     };
-    Plot::new(title, Axis::default().seeing(&seen), Axis::linear("apart (N)").seeing(&[0.0])).with(
-        [
-            Series::dashed("allowed", Ink::Limit, 1.5, line(|one| one.limit)),
-            Series::dashed("allowed", Ink::Limit, 1.5, line(|one| -one.limit)),
-            Series::line("between", Ink::Line, 1.0, line(|one| one.newtons)),
-            Series::dots("within", Ink::Series, 4.0, dots(true)),
-            Series::rings("beyond", Ink::Alarm, 4.0, dots(false)),
-        ],
-    )
+    Plot::new(title, Axis::default().seeing(&seen), Axis::linear("deviation (N)").seeing(&[0.0]))
+        .with([
+            Series::dashed("limit", Ink::Limit, 1.5, line(|one| one.limit)),
+            Series::dashed("limit", Ink::Limit, 1.5, line(|one| -one.limit)),
+            Series::line("deviation", Ink::Line, 1.0, line(|one| one.newtons)),
+            Series::dots("within the limit", Ink::Series, 4.0, dots(true)),
+            Series::rings("beyond the limit", Ink::Alarm, 4.0, dots(false)),
+        ])
 }
 
 #[cfg(test)]

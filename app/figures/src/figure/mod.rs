@@ -268,6 +268,11 @@ pub struct Plot {
 }
 
 impl Level {
+    /// Length of its dashes in px, 0 for a whole line.
+    pub fn dash(&self) -> f64 {
+        if self.is_dashed { DASH } else { 0.0 }
+    }
+
     /// A whole line of an ink, without a name.
     #[must_use]
     pub fn plain(at: f64, ink: Ink) -> Self {

@@ -1,7 +1,7 @@
 //! A plot drawn into a rectangle of a picture for a file.
 
 use super::labels::{beside, pushed_apart};
-use super::{DASH, Ink, Labels, Plot, Scale, Series, Shape, Stretch};
+use super::{Ink, Labels, Plot, Scale, Series, Shape, Stretch};
 use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
 use crate::tokens::LIGHT;
 
@@ -109,12 +109,8 @@ impl Plot {
         for level in &self.levels {
             let [_, y] = panel.at([panel.x[0], self.y.scale.place(level.at)]);
             let ink = level.ink.of(&LIGHT);
-            let (width, dash) = match (level.is_dashed, level.name.is_empty()) {
-                (true, _) => (1.6, DASH),
-                (false, true) => (0.8, 0.0),
-                (false, false) => (1.6, 0.0),
-            };
-            svg.dashed_line(&[[left, y], [right, y]], ink, width, dash);
+            let width = if !level.is_dashed && level.name.is_empty() { 0.8 } else { 1.6 };
+            svg.dashed_line(&[[left, y], [right, y]], ink, width, level.dash());
             // Beneath where names of stretches stand above.
             let (at, anchor) = match self.stretches.is_empty() {
                 true => ([left + 6.0, y - 5.0], Anchor::Start),
@@ -124,8 +120,8 @@ impl Plot {
         }
         for moment in &self.moments {
             let [x, _] = panel.at([self.x.scale.place(moment.at), 0.0]);
-            let dash = if moment.is_dashed { DASH } else { 0.0 };
-            svg.dashed_line(&[[x, top], [x, bottom]], moment.ink.of(&LIGHT), 1.2, dash);
+            let ink = moment.ink.of(&LIGHT);
+            svg.dashed_line(&[[x, top], [x, bottom]], ink, 1.2, moment.dash());
         }
     }
 

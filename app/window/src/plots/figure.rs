@@ -25,25 +25,25 @@ pub struct PlotLook<'a> {
     /// How places along x are written, where not as numbers.
     pub x_text: Option<fn(f64) -> String>,
     /// What is drawn over it on the same axes.
-    pub over: Option<&'a Painted>,
+    pub over: Option<&'a PlacedPlot>,
 }
 
 /// A plot whose points are placed on their axes once and not in every frame. Of the plot, everything but its series may
 /// change from frame to frame.
 #[derive(Clone, Debug, Default)]
-pub struct Painted {
+pub struct PlacedPlot {
     /// What it shows.
     pub plot: Plot,
     points: Vec<Vec<PlotPoint>>,
 }
 
-impl From<Plot> for Painted {
+impl From<Plot> for PlacedPlot {
     fn from(plot: Plot) -> Self {
         Self { points: placed(&plot), plot }
     }
 }
 
-impl Painted {
+impl PlacedPlot {
     /// Draws it in the space there is; returns what is shown along x.
     pub fn ui(&self, ui: &mut Ui, id: &str, look: PlotLook<'_>) -> [f64; 2] {
         show(ui, id, &self.plot, &self.points, look)
@@ -78,7 +78,7 @@ fn show(
         .allow_drag([look.shown.is_none(), true])
         .label_formatter(move |hover| match hover {
             HoverPosition::NearDataPoint { position, .. } => {
-                let own = told(plot, points, position).map(str::to_owned);
+                let own = label_at(plot, points, position).map(str::to_owned);
                 let x =
                     x_text.map_or_else(|| format!("{:.3}", position.x), |text| text(position.x));
                 Some(own.unwrap_or_else(|| format!("{x}\n{:.4}{y_unit}", position.y)))
@@ -165,8 +165,8 @@ pub fn strip_ui(ui: &mut Ui, [x, y]: [&str; 2], curves: Vec<Series>, shown: [f64
     });
 }
 
-/// What is told under the pointer of a point that has something to tell.
-fn told<'a>(plot: &'a Plot, points: &[Vec<PlotPoint>], at: &PlotPoint) -> Option<&'a str> {
+/// The label of a point, shown under the pointer.
+fn label_at<'a>(plot: &'a Plot, points: &[Vec<PlotPoint>], at: &PlotPoint) -> Option<&'a str> {
     plot.series.iter().zip(points).find_map(|(one, points)| {
         let Labels::Each(labels) = &one.labels else {
             return None;
@@ -206,7 +206,7 @@ fn paint<'a>(
         let at = plot.y.scale.place(level.at);
         let line = HLine::new(level.name.as_str(), at).color(level.ink.of(tokens));
         let width = if level.name.is_empty() { 1.0 } else { 1.5 };
-        plot_ui.hline(line.style(style_of(level.is_dashed)).width(width).allow_hover(false));
+        plot_ui.hline(line.style(style_of(level.dash())).width(width).allow_hover(false));
         // At the left edge as it will be: the text's own place counts in the automatic bounds.
         let left = plot.x.range.map(|[from, _]| from).or(plot.x.seen.first().copied());
         if let Some(left) = left.filter(|_| !level.name.is_empty()) {
@@ -222,7 +222,7 @@ fn paint<'a>(
     for moment in &plot.moments {
         let at = plot.x.scale.place(moment.at);
         let line = VLine::new(moment.name.as_str(), at).color(moment.ink.of(tokens));
-        plot_ui.vline(line.style(style_of(moment.is_dashed)).width(1.5).allow_hover(false));
+        plot_ui.vline(line.style(style_of(moment.dash())).width(1.5).allow_hover(false));
     }
     for (number, (one, points)) in plot.series.iter().zip(points).enumerate() {
         paint_series(plot_ui, one, points, number, tokens);
@@ -234,8 +234,9 @@ fn paint<'a>(
     }
 }
 
-fn style_of(is_dashed: bool) -> LineStyle {
-    if is_dashed { LineStyle::dashed_dense() } else { LineStyle::Solid }
+/// Dashes of this length in px, 0 for a whole line.
+fn style_of(dash: f64) -> LineStyle {
+    if dash > 0.0 { LineStyle::Dashed { length: dash as f32 } } else { LineStyle::Solid }
 }
 
 fn paint_series<'a>(
@@ -252,13 +253,13 @@ fn paint_series<'a>(
         Shape::Line { width, dash } => {
             // Bands of points that share a column would be drawn as wedges where there are few.
             let line = Line::new(one.name.as_str(), points).id(id).allow_band(false);
-            plot_ui.line(line.color(ink).width(width as f32).style(style_of(dash > 0.0)));
+            plot_ui.line(line.color(ink).width(width as f32).style(style_of(dash)));
         }
         Shape::Dots { radius, is_filled } => {
             let dots = Points::new(one.name.as_str(), points).id(id);
-            let is_told = one.labels != Labels::None || !one.name.is_empty();
+            let is_hovered = one.labels != Labels::None || !one.name.is_empty();
             plot_ui.points(
-                dots.radius(radius as f32).filled(is_filled).color(ink).allow_hover(is_told),
+                dots.radius(radius as f32).filled(is_filled).color(ink).allow_hover(is_hovered),
             );
         }
     }

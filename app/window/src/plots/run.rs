@@ -1,6 +1,6 @@
 //! Force over time and over depth of the run that is shown, with what its exact fit found and left over.
 
-use super::figure::{Painted, PlotLook};
+use super::figure::{PlacedPlot, PlotLook};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
 use crate::workers::fit::ExactFit;
@@ -19,8 +19,8 @@ const RESIDUAL_HEIGHT: f32 = 96.0;
 #[derive(Debug, Default)]
 pub struct PlotCache {
     trace: Option<Arc<LiveTrace>>,
-    force_time: Painted,
-    force_depth: Painted,
+    force_time: PlacedPlot,
+    force_depth: PlacedPlot,
     /// One for each repeat; empty where nothing is repeated.
     cycles: Vec<Cycle>,
     remark: Option<String>,
@@ -43,16 +43,19 @@ impl PlotCache {
     /// Takes over a run's history, if it changed. `depth_mm` is the depth the form or the run asks for, so the axis does
     /// not creep while the probe goes in.
     pub fn update(&mut self, run: Option<&RunView>, force_max: Newtons, depth_mm: f64) {
-        let is_same = |run: &&RunView| {
-            self.trace.as_ref().is_some_and(|trace| Arc::ptr_eq(trace, &run.trace))
-        };
-        if let Some(run) = run.filter(|run| !is_same(run)) {
-            self.convert(&run.trace, if run.cycles > 1 { &run.cycle_starts } else { &[] });
-            self.trace = Some(Arc::clone(&run.trace));
+        if let Some(run) = run {
+            self.follow(&run.trace, if run.cycles > 1 { &run.cycle_starts } else { &[] });
         }
         set_course(&mut self.force_time.plot, run, force_max, self.is_from_ramp);
         self.force_depth.plot.x.seen = vec![0.0, depth_mm];
         self.force_depth.plot.y.seen = vec![0.0, 0.5];
+    }
+
+    fn follow(&mut self, trace: &Arc<LiveTrace>, starts: &[(f64, u32)]) {
+        if !self.trace.as_ref().is_some_and(|old| Arc::ptr_eq(old, trace)) {
+            self.convert(trace, starts);
+            self.trace = Some(Arc::clone(trace));
+        }
     }
 
     fn convert(&mut self, trace: &LiveTrace, starts: &[(f64, u32)]) {
@@ -98,5 +101,33 @@ impl PlotCache {
         }
         ui.label(RichText::new(&self.force_depth.plot.title).heading().strong());
         self.force_depth.ui(ui, "force_depth", PlotLook::default());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::units::{Depth, Seconds};
+
+    fn trace(count: u32) -> Arc<LiveTrace> {
+        let mut trace = LiveTrace::new(100);
+        for i in 0..count {
+            let value = f64::from(i);
+            trace.push(Seconds(value), Depth(value), Newtons(value));
+        }
+        Arc::new(trace)
+    }
+
+    #[test]
+    fn trace_is_converted_once_and_again_when_another_one_comes() {
+        let mut cache = PlotCache::default();
+        let first = trace(10);
+        cache.follow(&first, &[]);
+        // The conversion of a trace that is seen again would bring its points back.
+        cache.force_time = PlacedPlot::default();
+        cache.follow(&first, &[]);
+        assert!(cache.force_time.plot.series.is_empty());
+        cache.follow(&trace(20), &[]);
+        assert_eq!(cache.force_time.plot.series[0].points.len(), 20);
     }
 }

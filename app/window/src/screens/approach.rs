@@ -1,6 +1,6 @@
 //! The search for the surface as the probe feels it: force over position, and what each pass found.
 
-use crate::plots::figure::{Painted, PlotLook};
+use crate::plots::figure::{PlacedPlot, PlotLook};
 use eframe::egui::{RichText, Ui};
 use palpate_analysis::report::live::{approach, touches};
 use palpate_model::signal::LiveTrace;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 #[derive(Debug, Default)]
 pub struct Approach {
     trace: Option<Arc<LiveTrace>>,
-    plot: Painted,
+    plot: PlacedPlot,
 }
 
 impl Approach {
@@ -25,7 +25,7 @@ impl Approach {
         for line in words(run) {
             ui.label(line);
         }
-        let touches = Painted::from(touches(run, &self.plot.plot));
+        let touches = PlacedPlot::from(touches(run, &self.plot.plot));
         let shown = touches.plot.x.range;
         let look = PlotLook { shown, over: Some(&touches), ..PlotLook::default() };
         self.plot.ui(ui, "approach", look);

@@ -46,8 +46,8 @@ pub fn weighing_ui(
         Column::numbers("mass (g)", 60.0),
         Column::numbers("expected (V)", 82.0),
         Column::numbers("measured (V)", 82.0),
-        Column::numbers("apart (mV)", 70.0),
-        Column::numbers("apart (N)", 66.0),
+        Column::numbers("deviation (mV)", 92.0),
+        Column::numbers("deviation (N)", 84.0),
         Column::words("", 44.0),
     ];
     ui.allocate_ui(vec2(ui.available_width(), TABLE_HEIGHT), |ui| {

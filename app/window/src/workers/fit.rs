@@ -1,7 +1,7 @@
 //! The refit of a run that has ended, on a thread of its own.
 
 use super::Job;
-use crate::plots::figure::Painted;
+use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
 use palpate_analysis::fit::Recipe;
 use palpate_analysis::report::picture::fit_plots;
@@ -21,9 +21,9 @@ pub struct ExactFit {
     /// What the fit found.
     pub report: FitReport,
     /// Modelled force in N over session time in s, to be drawn over the measured.
-    pub fitted: Painted,
+    pub fitted: PlacedPlot,
     /// Measured minus modelled force in mN over session time in s.
-    pub residual: Painted,
+    pub residual: PlacedPlot,
 }
 
 /// Where the exact fit of the run on the screen stands.

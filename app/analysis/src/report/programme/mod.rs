@@ -145,9 +145,9 @@ impl Page {
         let peak = forces.filter_map(|row| row.force).reduce(f64::max);
         let end = opened.as_ref().ok().and_then(|session| session.rows.last());
         let manifest = opened.as_ref().ok().map(|session| &session.manifest);
-        let told = manifest.map(SpecimenPart::of);
-        let told = told.filter(|one| !one.specimen.is_empty());
-        self.specimens.extend(told.filter(|one| !self.specimens.contains(one)));
+        let specimen = manifest.map(SpecimenPart::of);
+        let specimen = specimen.filter(|one| !one.specimen.is_empty());
+        self.specimens.extend(specimen.filter(|one| !self.specimens.contains(one)));
         let word =
             |of: fn(&Manifest) -> &String| manifest.map_or(String::new(), |one| of(one).clone());
         self.runs.push(RunLine {
@@ -172,7 +172,7 @@ impl Page {
             _ if let Some((lost, reason)) = &lost => {
                 leave_out(&format!("{} ({reason})", lost.word()));
             }
-            // It stays in the count and tells nothing.
+            // It is counted, and not fitted.
             Ok(_) if is_rejected => leave_out("rejected"),
             Ok(session) if ending.as_deref() == Some(FINISHED) => {
                 part.read(task, &name, &session, bodies);
