@@ -234,7 +234,7 @@ fn set_text_size(ctx: &Context, size: TextSize) {
 
 impl eframe::App for WorkbenchApp {
     fn clear_color(&self, visuals: &Visuals) -> [f32; 4] {
-        visuals.extreme_bg_color.to_normalized_gamma_f32()
+        theme::clear_color(visuals)
     }
 
     fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut RawInput) {
@@ -268,8 +268,7 @@ impl eframe::App for WorkbenchApp {
         self.remember(ctx);
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
-        let frame_s = frame.info().cpu_usage;
-        self.pace.next(ctx, frame_s, !self.workbench.is_quiet(), is_watched);
+        self.pace.next(ctx, !self.workbench.is_quiet(), is_watched);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {

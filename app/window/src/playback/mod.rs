@@ -105,7 +105,7 @@ impl PlaybackApp {
 
 impl eframe::App for PlaybackApp {
     fn clear_color(&self, visuals: &Visuals) -> [f32; 4] {
-        visuals.extreme_bg_color.to_normalized_gamma_f32()
+        theme::clear_color(visuals)
     }
 
     fn logic(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {

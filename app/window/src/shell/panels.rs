@@ -8,8 +8,8 @@ use eframe::egui::{Color32, Frame, Margin, Panel, ScrollArea, Stroke, Ui};
 pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     Frame::new()
-        // The window is cleared in the colour of a canvas; filling it again would take a software renderer ten
-        // milliseconds, in which it reads no key.
+        // The window is cleared in this colour already. Filling canvases and plots again delays a stop key on a software
+        // renderer: median 27 ms with, 14 ms without (`scripts/key-to-wire`).
         .fill(if is_canvas { Color32::TRANSPARENT } else { tokens.panel })
         .inner_margin(Margin::symmetric(8, 6))
         .stroke(Stroke::NONE)

@@ -22,6 +22,11 @@ pub fn apply(ctx: &Context) {
     ctx.set_theme(ThemePreference::Light);
 }
 
+/// The colour in which the window is cleared: that of a canvas, on which plots and tables stand.
+pub fn clear_color(visuals: &Visuals) -> [f32; 4] {
+    visuals.extreme_bg_color.to_normalized_gamma_f32()
+}
+
 /// The other theme.
 pub fn switch(ctx: &Context) {
     ctx.set_theme(match ctx.theme() {
