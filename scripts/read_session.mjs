@@ -1,4 +1,4 @@
-// Reads a session without palpate: the JavaScript example of docs/guide/format.md, and a reader of scripts/other-readers.
+// Reads a session without palpate: the JavaScript example of docs/format.md, and a reader of scripts/other-readers.
 //
 // Usage: node read_session.mjs SESSION      (needs `npm install @mcap/core fzstd` in the same folder)
 import { existsSync, readFileSync, readdirSync, statSync } from "node:fs";

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads a session without palpate: the example of docs/guide/format.md, and the reader of scripts/other-readers.
+"""Reads a session without palpate: the example of docs/format.md, and the reader of scripts/other-readers.
 
 Usage: python3 read_session.py SESSION      (needs `pip install mcap`; tells what is in a session, a folder or one file)
 """

@@ -18,7 +18,7 @@ fn the_extremes_agree_with_the_page_of_the_guide() {
     for verdict in ["right", "refused", "flagged"] {
         assert_eq!(run[verdict].as_u64(), Some(count(verdict) as u64));
     }
-    let committed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/guide/extremes.md");
+    let committed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/explanation/extremes.md");
     let pages = [
         std::fs::read_to_string(at.join("page.md")).unwrap(),
         std::fs::read_to_string(committed).unwrap(),

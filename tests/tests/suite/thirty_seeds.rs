@@ -4,7 +4,7 @@
 //! contact given, thirty fits must scatter as their standard errors say, and those must be the
 //! ones that follow from the protocol. The lab rig adds a nonlinear cell, a converter and drift;
 //! its bias and spread are printed (`cargo test -p palpate-tests thirty_seeds --
-//! --nocapture`) and stand in `docs/guide/accuracy.md`.
+//! --nocapture`) and stand in `docs/explanation/accuracy.md`.
 use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::RampHold;

@@ -97,7 +97,7 @@ pub fn page(rows: &[Row]) -> String {
 pub const PAGE_HEAD: &str = "\
 # Extremes
 
-Written by `palpate extremes --page docs/guide/extremes.md`; do not edit.
+Written by `palpate extremes --page docs/explanation/extremes.md`; do not edit.
 ";
 
 const INTRODUCTION: &str = "
