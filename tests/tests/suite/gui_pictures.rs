@@ -195,7 +195,7 @@ fn every_screen_looks_as_it_did() {
     let mut results = SnapshotResults::new();
     // Other versions of the renderer place some pixels otherwise: fewer than a letter has.
     let options = SnapshotOptions::new()
-        .output_path(workspace().join("tests/pictures"))
+        .output_path(workspace().join("docs/pictures/screens"))
         .max_failed_pixels(40);
     settle(&mut window);
     for theme in ["light", "dark"] {
