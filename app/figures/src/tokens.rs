@@ -39,7 +39,7 @@ pub struct Tokens {
     pub alarm_text: Color32,
     /// Measured force: Okabe-Ito blue or sky blue.
     pub series: Color32,
-    /// Interlock limits in plots: Okabe-Ito vermillion.
+    /// Interlock limits in plots: Okabe-Ito vermilion.
     pub limit: Color32,
     /// Sessions laid over each other, in turn: Okabe-Ito, darkened where a lit ground needs it, and the ink.
     pub sessions: [Color32; 6],

@@ -22,7 +22,7 @@ const COLUMNS: usize = 860;
 /// Room for so many cycles at least: with fewer, marks would stand between whole numbers.
 const SLOTS_MIN: usize = 8;
 
-/// The picture of one record. The first cycle is blue, the last vermillion, those between in between. Around forces lies
+/// The picture of one record. The first cycle is blue, the last vermilion, those between in between. Around forces lies
 /// the band of twice their calibration's standard uncertainty, where that is stated: of loops and holds around the
 /// first and the last, as more would hide each other.
 #[must_use]
