@@ -37,7 +37,7 @@
 // More than this is not caught up: a board stood still, as the computer did. What it has to do with did not.
 #define CATCH_UP_NS 50000000ULL
 // OCR1A of an ATmega328P. simavr takes a timer that counts to zero for one that is off; the chip takes it for the fastest,
-// and so begins the first motion of Grbl. Grbl sets it anew before the first step.
+// and so begins the first motion of Grbl. Grbl sets it again before the first step.
 #define OCR1AL 0x88
 
 // Pins of Grbl on an ATmega328P (gnea/grbl, cpu_map.h): step and direction of X on D, its limit switch on B, the probe on C.
@@ -139,7 +139,7 @@ static void on_sck(avr_irq_t *irq, uint32_t value, void *param) {
 static void on_output(avr_irq_t *irq, uint32_t value, void *param) {
   (void)irq;
   const uint8_t byte = (uint8_t)value;
-  // A full pseudo-terminal loses bytes, as a wire does at which nobody listens.
+  // A full pseudo-terminal loses bytes, as a wire does without a listener.
   if (write(((struct board *)param)->port, &byte, 1) != 1) {
     note("lost", now_ns(), byte);
   }
@@ -221,15 +221,15 @@ static double normal(void) {
 
 // A millisecond of slide and tissue.
 static void axis_tick(void) {
-  static int told = -1;
+  static int reported = -1;
   static int64_t told_steps;
   if (!axis.avr->data[OCR1AL] && !axis.avr->data[OCR1AL + 1]) {
     const int number = AVR_DATA_TO_IO(OCR1AL);
     axis.avr->io[number].w.c(axis.avr, OCR1AL, 100, axis.avr->io[number].w.param);
   }
   const int is_home = place() <= 0, is_end = place() <= -2 || place() >= travel_mm + 2;
-  if (told != (is_home | is_end << 1)) {
-    told = is_home | is_end << 1;
+  if (reported != (is_home | is_end << 1)) {
+    reported = is_home | is_end << 1;
     drive(&axis, 'C', PROBE_PIN, !is_home);
     drive(&axis, 'B', LIMIT_PIN, !is_end);
   }
@@ -259,7 +259,7 @@ static void cell_tick(void) {
   for (int i = 0; i < SETTLING_MS; i++) {
     mean += felt[i] / SETTLING_MS;
   }
-  // Nobody reads so slowly that a conversion would come into it.
+  // No host reads so slowly that a conversion would come into it.
   const double count = (VOLTS_AT_REST + VOLTS_PER_N * mean + NOISE_V * normal()) * COUNTS_PER_V;
   chip.shifting = (uint32_t)lround(fmin(count, (1 << 23) - 1)) & 0xFFFFFF;
   chip.clocks = 0;

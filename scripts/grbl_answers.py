@@ -169,11 +169,11 @@ $I=01234567890123456789012345678901234567890123456789012345678901234567890123456
 $I=""".split("\n")
 BYTES = [b"?", b"!", b"?", b"~", b"?", b"\x85", b"?", b"\x91?", b"\x90?", b"\x9a?", b"\x99?", b"\x9e?", b"\xa0?", b"\xa0?", b"\xa1?", b"\x84", b"?", b"~", b"?", b"\x18", b"\x80", b"\xb0", b"\x00G0\x00X0\n", b"G0X0\r\n", b"\r\n", b"\n\n\n", b"$G\r", b"G0X0\t\n", b"\x18", b"?"]
 # Answers that differ: arcs, which the emulator leaves out; `$I` behind `$I=HELLO`, which the emulated chip does not keep (why is
-# not known); a startup line beyond the two there are, which Grbl takes; and the free bytes told while a line end waits.
+# not known); a startup line beyond the two there are, which Grbl takes; and the free bytes reported while a line end waits.
 LEFT_OUT = {b"G2X1Y1I1\n", b"$I\n", b"$N2=G20\n", b"?\n"}
 # An alarm lasts so long before anything else is said (protocol.c).
 ALARM_S = 0.8
-# Told every so many reports, which are counted.
+# Sent once in so many reports, which are counted.
 NOW_AND_THEN = re.compile(rb"\|(WCO|Ov):[^|>]*")
 
 
@@ -197,10 +197,10 @@ def compare(firmware, emulator):
 
     def answers(data):
         found = both(data)
-        if any(b"ALARM" in told for told in found):
+        if any(b"ALARM" in answer for answer in found):
             time.sleep(ALARM_S)
-            found = [told + more for told, more in zip(found, both(b""))]
-        return [NOW_AND_THEN.sub(b"", told) for told in found] if data == b"?" else found
+            found = [answer + more for answer, more in zip(found, both(b""))]
+        return [NOW_AND_THEN.sub(b"", answer) for answer in found] if data == b"?" else found
 
     both(b"\x18")
     for key, value in SETTINGS.items():
@@ -212,7 +212,7 @@ def compare(firmware, emulator):
         if data not in BYTES:
             # The two move at paces of their own: each goes on when both rest.
             for _ in range(60):
-                if not any(b"<Jog" in told or b"<Run" in told for told in both(b"?")):
+                if not any(b"<Jog" in answer or b"<Run" in answer for answer in both(b"?")):
                     break
                 time.sleep(0.3)
         if one != other:
