@@ -101,14 +101,14 @@ pub enum AboutError {
         text: String,
     },
     /// The value cannot be.
-    #[error("{key} cannot be '{value}'; give {wanted}")]
+    #[error("{key} cannot be '{value}'; give {expected}")]
     Value {
         /// The key.
         key: &'static str,
         /// What was given.
         value: String,
         /// What is possible.
-        wanted: String,
+        expected: String,
     },
     /// A repeat beyond the last.
     #[error("repeat {repeat} of {repeats} cannot be; correct series.repeat or series.repeats")]
@@ -142,7 +142,7 @@ impl Key {
     pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
         let value = value.trim();
         let refused =
-            |wanted: String| AboutError::Value { key: self.name, value: value.to_owned(), wanted };
+            |expected: String| AboutError::Value { key: self.name, value: value.to_owned(), expected };
         match self.kind {
             Kind::Text if value.is_empty() => Err(refused("some words".into())),
             Kind::Text => Ok(value.into()),
@@ -170,25 +170,25 @@ impl Key {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct About {
-    told: BTreeMap<String, Value>,
+    values: BTreeMap<String, Value>,
 }
 
 impl About {
     /// Whether nothing was told.
     pub fn is_empty(&self) -> bool {
-        self.told.is_empty()
+        self.values.is_empty()
     }
 
     /// The value of a key, if it was told.
     pub fn get(&self, key: &str) -> Option<&Value> {
-        self.told.get(key)
+        self.values.get(key)
     }
 
     /// What was told, in the order of [`KEYS`], then what this version does not know. Text without quotes.
     pub fn lines(&self) -> Vec<(&str, String)> {
         let place = |name: &str| KEYS.iter().position(|key| key.name == name);
         let mut told: Vec<(&str, &Value)> =
-            self.told.iter().map(|(k, v)| (k.as_str(), v)).collect();
+            self.values.iter().map(|(k, v)| (k.as_str(), v)).collect();
         told.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
         let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         told.into_iter().map(|(name, value)| (name, plain(value))).collect()
@@ -220,7 +220,7 @@ impl Labels {
             "specimen" => self.specimen = words(),
             "indenter" => self.indenter = words(),
             name => {
-                self.about.told.insert(name.to_owned(), value);
+                self.about.values.insert(name.to_owned(), value);
             }
         }
         Ok(())

@@ -5,7 +5,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example speaks to its user")]
 
 use palpate_haptics::{
-    Flags, Input, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, Snapshot,
+    Flags, MasterSlaveInput, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, MasterSlaveSnapshot,
 };
 use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -20,10 +20,10 @@ fn counts(phase: u64) -> i64 {
     (phase.min(MOVING.saturating_sub(phase)) / 4) as i64
 }
 
-fn tick(system: &mut MasterSlave, phase: u64) -> Snapshot {
+fn tick(system: &mut MasterSlave, phase: u64) -> MasterSlaveSnapshot {
     let counts = counts(phase);
     let cell = if counts > 20 { 1.0 } else { 0.0 };
-    let _ = system.tick(&Input {
+    let _ = system.tick(&MasterSlaveInput {
         counts,
         elapsed: 1,
         cell: Newtons(cell),
@@ -34,7 +34,7 @@ fn tick(system: &mut MasterSlave, phase: u64) -> Snapshot {
 }
 
 /// Force and place at the deepest point of the second round from a fresh start.
-fn fresh(settings: &MasterSlaveSettings) -> Result<Snapshot, MasterSlaveError> {
+fn fresh(settings: &MasterSlaveSettings) -> Result<MasterSlaveSnapshot, MasterSlaveError> {
     let mut system = MasterSlave::new(settings)?;
     let mut deepest = system.snapshot();
     for i in 0..2 * ROUND {

@@ -53,7 +53,7 @@ impl CheckSettings {
 
 /// No check.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum CheckError {
+pub enum FeedbackCheckError {
     /// The system it would be of.
     #[error(transparent)]
     System(#[from] MasterSlaveError),
@@ -90,13 +90,13 @@ impl CheckSettings {
     }
 
     /// How long it takes, if it can be made.
-    fn seconds(&self) -> Result<f64, CheckError> {
+    fn seconds(&self) -> Result<f64, FeedbackCheckError> {
         let above = [
             ("speed", self.speed.0, "mm/s"),
             ("depth", self.depth.0, "mm"),
             ("samples", self.samples_hz, "Hz"),
         ];
-        let refusal = |name, value, unit, should| CheckError::Setting { name, value, unit, should };
+        let refusal = |name, value, unit, should| FeedbackCheckError::Setting { name, value, unit, should };
         for (name, value, unit) in above {
             if !(value > 0.0 && value.is_finite()) {
                 let should = "it is a finite number above zero";
@@ -141,7 +141,7 @@ pub fn check(
     settings: &CheckSettings,
     mut seen: impl FnMut(&CheckSample),
     mut progress: impl FnMut(f64),
-) -> Result<(), CheckError> {
+) -> Result<(), FeedbackCheckError> {
     let seconds = settings.seconds()?;
     let path = HandPath::RampHold { from: 0.0, to: settings.depth.0, speed: settings.speed.0 };
     let mut all = SimulationSettings::of(settings.body, settings.period, slider(path));

@@ -2,10 +2,10 @@
 //!
 //! Deterministic: the same settings give the same run, bit by bit. Between ticks the device moves in equal parts of a
 //! tick, its force held; commands reach it whole ticks late where a delay is set. The loop itself is whoever calls
-//! [`Plant::sense`] and [`Plant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
+//! [`HapticPlant::sense`] and [`HapticPlant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
 
 use super::rig::{
-    Drive, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
+    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
 };
 use super::{DELAY_MAX, Period};
 use palpate_model::units::{MmPerS, Newtons};
@@ -63,16 +63,16 @@ impl PlantSettings {
 
 /// What a loop tells the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub enum PlantCommand {
     /// So many N against motion into the tissue; a motor takes it as no command.
     Force(Newtons),
     /// The motor's drive, positive against motion into the tissue.
-    Drive(Drive),
+    Drive(DriveInput),
 }
 
 /// What a loop is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensed {
+pub struct SensedPosition {
     /// Counts of the encoder; zero for one without steps.
     pub counts: i64,
     /// The place they stand for, in mm.
@@ -81,12 +81,12 @@ pub struct Sensed {
 
 /// The device with its state.
 #[derive(Clone, Copy, Debug)]
-pub struct Plant {
+pub struct HapticPlant {
     settings: PlantSettings,
     rack: Rack,
     motor: MotorState,
     thermal: ThermalState,
-    queue: [Command; DELAY_MAX + 1],
+    queue: [PlantCommand; DELAY_MAX + 1],
     tick: u64,
     /// The tick at which the hand's path began.
     begun: u64,
@@ -94,7 +94,7 @@ pub struct Plant {
     motor_force: f64,
 }
 
-impl Plant {
+impl HapticPlant {
     /// At its start.
     #[must_use]
     pub fn new(settings: &PlantSettings) -> Self {
@@ -107,7 +107,7 @@ impl Plant {
             rack,
             motor: MotorState::default(),
             thermal: thermal.thermal.cold(),
-            queue: [Command::Force(settings.held); DELAY_MAX + 1],
+            queue: [PlantCommand::Force(settings.held); DELAY_MAX + 1],
             tick: 0,
             begun: 0,
             hand_force: 0.0,
@@ -128,16 +128,16 @@ impl Plant {
     }
 
     /// What its encoder says.
-    pub fn sense(&self) -> Sensed {
+    pub fn sense(&self) -> SensedPosition {
         let step = self.settings.count_mm;
         if step > 0.0 {
             // A cast beyond the numbers is their end.
             let counts = (self.rack.x / step).floor() as i64;
             let place = counts as f64 * step;
-            Sensed { counts, place }
+            SensedPosition { counts, place }
         } else {
             let place = self.rack.x;
-            Sensed { counts: 0, place }
+            SensedPosition { counts: 0, place }
         }
     }
 
@@ -172,7 +172,7 @@ impl Plant {
     }
 
     /// Moves through one tick. The hand's path begins with the first.
-    pub fn tick(&mut self, command: Command) {
+    pub fn tick(&mut self, command: PlantCommand) {
         let Self { settings, .. } = *self;
         const RING: u64 = DELAY_MAX as u64 + 1;
         let delay = settings.delay.min(DELAY_MAX) as u64;
@@ -180,7 +180,7 @@ impl Plant {
         let due = if self.tick >= delay {
             self.queue[((self.tick - delay) % RING) as usize]
         } else {
-            Command::Force(settings.held)
+            PlantCommand::Force(settings.held)
         };
         let parts = settings.parts.max(1);
         let dt = settings.period.seconds().0 / f64::from(parts);
@@ -190,13 +190,13 @@ impl Plant {
             let path = &settings.hand.path;
             let [early, late] = [path.at(t - 0.5 * dt), path.at(t + 0.5 * dt)];
             let motor = match (settings.motor, due) {
-                (None, Command::Force(force)) => -force.0,
-                (None, Command::Drive(_)) => 0.0,
+                (None, PlantCommand::Force(force)) => -force.0,
+                (None, PlantCommand::Drive(_)) => 0.0,
                 (Some((motor, pinion)), due) => {
                     // Outwards is positive for the drive, inwards for the rack.
                     let drive = match due {
-                        Command::Drive(drive) => drive,
-                        Command::Force(_) => Drive::Current(0.0),
+                        PlantCommand::Drive(drive) => drive,
+                        PlantCommand::Force(_) => DriveInput::Current(0.0),
                     };
                     let omega = -self.rack.v / pinion.radius_mm();
                     self.motor = motor.after(self.motor, drive, omega, dt);

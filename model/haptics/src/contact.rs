@@ -20,7 +20,7 @@ pub struct ContactSettings {
 #[error(
     "contact from {on} on and until below {off} has no hysteresis; let it end at a smaller force than it begins"
 )]
-pub struct ContactError {
+pub struct ContactThresholdError {
     /// Where it would begin.
     pub on: Newtons,
     /// Where it would end.
@@ -37,12 +37,12 @@ impl ContactSettings {
     }
 
     /// Itself if contact can end.
-    pub fn checked(self) -> Result<Self, ContactError> {
+    pub fn checked(self) -> Result<Self, ContactThresholdError> {
         let Self { on, off } = self;
         if on.is_finite() && off.is_finite() && off <= on {
             Ok(self)
         } else {
-            Err(ContactError { on, off })
+            Err(ContactThresholdError { on, off })
         }
     }
 }

@@ -18,7 +18,7 @@ const N: usize = POWER_MAX;
 /// tissue follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Pull {
+pub enum PullPolicy {
     /// Zero: tissue does not stick to the probe.
     Never,
     /// As the model has it, for comparisons.
@@ -43,7 +43,7 @@ pub struct LawSettings {
     /// Largest force.
     pub force_max: Newtons,
     /// What becomes of a force below zero.
-    pub pull: Pull,
+    pub pull: PullPolicy,
 }
 
 impl LawSettings {
@@ -59,7 +59,7 @@ impl LawSettings {
             depth_max: Depth(30.0),
             speed_max: MmPerS(1000.0),
             force_max: Newtons(10.0),
-            pull: Pull::Never,
+            pull: PullPolicy::Never,
         }
     }
 }
@@ -103,7 +103,7 @@ pub struct LawTick {
 /// A body at a constant tick, with its state; nothing in a tick allocates, and any input gives a finite
 /// force.
 ///
-/// The force is never below zero unless [`Pull::AsModel`], and zero with the probe above the surface,
+/// The force is never below zero unless [`PullPolicy::AsModel`], and zero with the probe above the surface,
 /// where the model's memory goes on fading.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
@@ -233,7 +233,7 @@ impl ForceLaw {
         if to <= 0.0 {
             flags |= Flags::ABOVE_SURFACE;
             force = 0.0;
-        } else if force < 0.0 && self.settings.pull == Pull::Never {
+        } else if force < 0.0 && self.settings.pull == PullPolicy::Never {
             flags |= Flags::PULL;
             force = 0.0;
         }

@@ -1,9 +1,9 @@
 //! The whole system on a simulated device: master, hand, slave and the specimen under it.
 
-use super::closed_loop::{Command, Plant, PlantSettings, Sensed};
-use super::force::{ForceLaw, LawSettings, Pull};
+use super::closed_loop::{PlantCommand, HapticPlant, PlantSettings, SensedPosition};
+use super::force::{ForceLaw, LawSettings, PullPolicy};
 use super::master_slave::{
-    Input, MasterSlave, MasterSlaveError, MasterSlaveSettings, Output, Snapshot,
+    MasterSlaveInput, MasterSlave, MasterSlaveError, MasterSlaveSettings, MasterSlaveOutput, MasterSlaveSnapshot,
 };
 use super::rig::{Hand, HandPath};
 use super::torque::{DriveKind, TorqueSettings};
@@ -92,11 +92,11 @@ pub struct SimulationTick {
     /// Temperature of the winding in degrees Celsius.
     pub winding_c: f64,
     /// What the system was told.
-    pub input: Input,
+    pub input: MasterSlaveInput,
     /// What it answered.
-    pub output: Output,
+    pub output: MasterSlaveOutput,
     /// Its state.
-    pub snapshot: Snapshot,
+    pub snapshot: MasterSlaveSnapshot,
 }
 
 /// A simulation with its state; the same settings give the same ticks, bit by bit.
@@ -104,14 +104,14 @@ pub struct SimulationTick {
 pub struct Simulation {
     torque: TorqueSettings,
     period: Period,
-    plant: Plant,
+    plant: HapticPlant,
     system: MasterSlave,
     specimen: ForceLaw,
     cell: Newtons,
-    command: Command,
+    command: PlantCommand,
     away: u64,
     tick: u64,
-    last: Output,
+    last: MasterSlaveOutput,
 }
 
 impl Simulation {
@@ -120,7 +120,7 @@ impl Simulation {
         let period = settings.system.law.period;
         let surface = Depth(-settings.system.surface_mm);
         let specimen = LawSettings {
-            pull: Pull::Never,
+            pull: PullPolicy::Never,
             force_max: Newtons(1e3),
             speed_max: MmPerS(1e6),
             ..LawSettings::of::<3>(settings.specimen, period)
@@ -130,14 +130,14 @@ impl Simulation {
         Ok(Self {
             torque: settings.system.torque,
             period,
-            plant: Plant::new(&settings.plant),
+            plant: HapticPlant::new(&settings.plant),
             system,
             specimen: ForceLaw::new(specimen, surface)?,
             cell: Newtons(0.0),
-            command: Command::Drive(settings.system.torque.drive(snapshot.bias)),
+            command: PlantCommand::Drive(settings.system.torque.drive(snapshot.bias)),
             away: 0,
             tick: 0,
-            last: Output {
+            last: MasterSlaveOutput {
                 pulses: 0,
                 bias: snapshot.bias,
                 force: Newtons(0.0),
@@ -147,11 +147,11 @@ impl Simulation {
     }
 
     /// The device.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &HapticPlant {
         &self.plant
     }
 
-    /// The hand goes to another place: see [`Plant::lead`].
+    /// The hand goes to another place: see [`HapticPlant::lead`].
     pub fn lead(&mut self, to: f64, speed: MmPerS) {
         self.plant.lead(to, speed);
     }
@@ -171,11 +171,11 @@ impl Simulation {
 
     /// One tick with a slave elsewhere, whose cell felt this last, and with force only if it is wanted.
     pub fn tick_with(&mut self, cell: Newtons, is_on: bool) -> SimulationTick {
-        let Sensed { counts, .. } = self.plant.sense();
-        let input = Input { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
+        let SensedPosition { counts, .. } = self.plant.sense();
+        let input = MasterSlaveInput { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
         self.away = 0;
         self.last = self.system.tick(&input);
-        self.command = Command::Drive(self.torque.drive(self.last.bias));
+        self.command = PlantCommand::Drive(self.torque.drive(self.last.bias));
         self.moved(input)
     }
 
@@ -184,7 +184,7 @@ impl Simulation {
         self.away += 1;
         let depth = self.system.snapshot().depth;
         self.cell = self.specimen.tick(depth).force;
-        let input = Input {
+        let input = MasterSlaveInput {
             counts: self.plant.sense().counts,
             elapsed: 0,
             cell: self.cell,
@@ -194,7 +194,7 @@ impl Simulation {
         self.moved(input)
     }
 
-    fn moved(&mut self, input: Input) -> SimulationTick {
+    fn moved(&mut self, input: MasterSlaveInput) -> SimulationTick {
         self.plant.tick(self.command);
         self.tick += 1;
         let [x, v] = self.plant.motion();

@@ -1,7 +1,7 @@
 //! From the force to be felt to the bias voltage of the master's motor.
 
 use super::Flags;
-use super::rig::{Drive, Motor, Pinion};
+use super::rig::{DriveInput, Motor, Pinion};
 use palpate_model::units::{MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -116,10 +116,10 @@ impl TorqueSettings {
     }
 
     /// What the drive is told by a bias voltage.
-    pub fn drive(&self, bias: Volts) -> Drive {
+    pub fn drive(&self, bias: Volts) -> DriveInput {
         match self.drive {
-            DriveKind::Voltage { gain } => Drive::Voltage(gain * bias.0),
-            DriveKind::Current { amps_per_volt } => Drive::Current(amps_per_volt * bias.0),
+            DriveKind::Voltage { gain } => DriveInput::Voltage(gain * bias.0),
+            DriveKind::Current { amps_per_volt } => DriveInput::Current(amps_per_volt * bias.0),
         }
     }
 
@@ -127,8 +127,8 @@ impl TorqueSettings {
     pub fn amps_at_rest(&self, bias: Volts) -> f64 {
         let most = self.motor.volts_max / self.motor.resistance;
         let amps = match self.drive(bias) {
-            Drive::Voltage(volts) => volts / self.motor.resistance,
-            Drive::Current(amps) => amps,
+            DriveInput::Voltage(volts) => volts / self.motor.resistance,
+            DriveInput::Current(amps) => amps,
         };
         amps.clamp(-most, most)
     }
@@ -206,7 +206,7 @@ mod tests {
         let current =
             TorqueSettings { drive: DriveKind::Current { amps_per_volt: 1.0 }, ..voltage };
         assert_eq!(current.damping(), 0.0);
-        assert_eq!(current.drive(Volts(2.0)), Drive::Current(2.0));
+        assert_eq!(current.drive(Volts(2.0)), DriveInput::Current(2.0));
     }
 
     #[test]

@@ -6,9 +6,9 @@
 //! error is told apart and does not count.
 
 use super::curve::Curve;
-use super::document::Point;
+use super::document::CalibrationPoint;
 use super::kind::CurveKind;
-use super::quality::{Zeroed, rms};
+use super::quality::{TaredCurve, rms};
 use crate::units::Newtons;
 use serde::Serialize;
 
@@ -46,7 +46,7 @@ enum Recipe {
 
 impl Recipe {
     /// The kind as this recipe makes it of these points.
-    fn kind(&self, points: &[Point]) -> Option<CurveKind> {
+    fn kind(&self, points: &[CalibrationPoint]) -> Option<CurveKind> {
         match self {
             Self::Fixed(kind) => Some(kind.clone()),
             // With a weight less there may be a segment less.
@@ -61,7 +61,7 @@ impl Recipe {
 ///
 /// With fewer than four weights nothing can be compared, and the monotone curve stands alone.
 #[must_use]
-pub fn candidates(points: &[Point]) -> Vec<Candidate> {
+pub fn candidates(points: &[CalibrationPoint]) -> Vec<Candidate> {
     let mut recipes = vec![Recipe::Fixed(CurveKind::Monotone)];
     if points.len() >= 4 {
         let all = points.len() - 1;
@@ -84,7 +84,7 @@ pub fn candidates(points: &[Point]) -> Vec<Candidate> {
 
 /// What a given kind misses at these points.
 #[must_use]
-pub fn judge_kind(kind: &CurveKind, points: &[Point]) -> Option<Candidate> {
+pub fn judge_kind(kind: &CurveKind, points: &[CalibrationPoint]) -> Option<Candidate> {
     let recipe = match kind {
         CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
         _ => Recipe::Fixed(kind.clone()),
@@ -92,11 +92,11 @@ pub fn judge_kind(kind: &CurveKind, points: &[Point]) -> Option<Candidate> {
     judge_as(kind.clone(), &recipe, points)
 }
 
-fn judge(recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+fn judge(recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
     judge_as(recipe.kind(points)?, recipe, points)
 }
 
-fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
     let mut candidate = Candidate {
         name: kind.to_string(),
         curve: kind,
@@ -114,7 +114,7 @@ fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candid
             return Some(candidate);
         }
     };
-    let zeroed = Zeroed::of(&curve, points);
+    let zeroed = TaredCurve::of(&curve, points);
     for point in points {
         candidate.residuals_n.push(zeroed.force(point.volts).0 - point.newtons.0);
         candidate.residuals_v.push(zeroed.signal(point.newtons).0 - point.volts.0);
@@ -138,7 +138,7 @@ fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candid
 
 /// Errors in N of every reading with its weight left out, with the index of the weight. The zero of the
 /// empty cell is known in any case, as it is from the tare.
-fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, String> {
+fn left_out(recipe: &Recipe, points: &[CalibrationPoint]) -> Result<Vec<(usize, f64)>, String> {
     let mut errors = Vec::new();
     if points.len() < 3 {
         return Ok(errors);
@@ -158,7 +158,7 @@ fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, Stri
                 ));
             }
         };
-        let zeroed = Zeroed::of(&curve, &others);
+        let zeroed = TaredCurve::of(&curve, &others);
         let error = |volts| zeroed.force(volts).0 - out.newtons.0;
         errors.extend(out.readings.iter().map(|reading| (i, error(reading.volts))));
     }
@@ -167,7 +167,7 @@ fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, Stri
 
 /// Errors in V at each weight with it left out, the mean of its readings; `None` at the ends and where the
 /// others make no curve.
-pub(super) fn left_out_volts(kind: &CurveKind, points: &[Point]) -> Vec<Option<f64>> {
+pub(super) fn left_out_volts(kind: &CurveKind, points: &[CalibrationPoint]) -> Vec<Option<f64>> {
     let recipe = match kind {
         CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
         _ => Recipe::Fixed(kind.clone()),
@@ -179,7 +179,7 @@ pub(super) fn left_out_volts(kind: &CurveKind, points: &[Point]) -> Vec<Option<f
         let mut others = points.to_vec();
         let out = others.remove(i);
         let curve = recipe.kind(&others)?.through(&others).ok()?;
-        let signal = Zeroed::of(&curve, &others).signal(Newtons(out.newtons.0));
+        let signal = TaredCurve::of(&curve, &others).signal(Newtons(out.newtons.0));
         Some(signal.0 - out.volts.0)
     };
     (0..points.len()).map(error).collect()

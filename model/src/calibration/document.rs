@@ -135,7 +135,7 @@ fn is_zero(format: &u32) -> bool {
 
 /// One reading with the series it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub struct CalibrationReading {
     /// Which way the load went.
     pub direction: Direction,
     /// Mean signal.
@@ -146,7 +146,7 @@ pub struct Reading {
 
 /// All readings under one mass.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct CalibrationPoint {
     /// The mass in g.
     pub mass_g: f64,
     /// Its weight.
@@ -154,13 +154,13 @@ pub struct Point {
     /// Mean of the means of both directions: a direction read more often counts no more.
     pub volts: Volts,
     /// Every reading.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<CalibrationReading>,
 }
 
-impl Point {
+impl CalibrationPoint {
     /// Mean signal of one direction, if it was taken.
     pub fn mean(&self, direction: Direction) -> Option<Volts> {
-        let volts = |reading: &&Reading| reading.direction == direction;
+        let volts = |reading: &&CalibrationReading| reading.direction == direction;
         let own: Vec<f64> = self.readings.iter().filter(volts).map(|r| r.volts.0).collect();
         (!own.is_empty()).then(|| Volts(own.iter().sum::<f64>() / own.len() as f64))
     }
@@ -170,7 +170,7 @@ impl Point {
         Some(self.mean(Direction::Loading)? - self.mean(Direction::Unloading)?)
     }
 
-    fn averaged(mass_g: f64, readings: Vec<Reading>) -> Self {
+    fn averaged(mass_g: f64, readings: Vec<CalibrationReading>) -> Self {
         let mut point =
             Self { mass_g, newtons: newtons_of(mass_g), volts: Volts(f64::NAN), readings };
         let means = [Direction::Loading, Direction::Unloading].map(|way| point.mean(way));
@@ -241,7 +241,7 @@ impl Calibration {
     }
 
     /// All readings by mass, in order of increasing mass; at least two masses, all numbers finite.
-    pub fn points(&self) -> Result<Vec<Point>, CalibrationError> {
+    pub fn points(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
         if self.format > CALIBRATION_FORMAT {
             return Err(CalibrationError::NewerFormat { format: self.format });
         }
@@ -280,8 +280,8 @@ impl Calibration {
         wrong.map_or(Ok(()), Err)
     }
 
-    fn points_of_steps(&self) -> Result<Vec<Point>, CalibrationError> {
-        let mut points: Vec<Point> = Vec::with_capacity(self.steps.len());
+    fn points_of_steps(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
+        let mut points: Vec<CalibrationPoint> = Vec::with_capacity(self.steps.len());
         for (index, here) in self.steps.iter().enumerate() {
             check_numbers(index + 1, here.mass_g, here.volts)?;
             if let Some(before) = points.last().filter(|last| here.mass_g <= last.mass_g) {
@@ -292,20 +292,20 @@ impl Calibration {
                 });
             }
             let reading =
-                Reading { direction: Direction::Loading, volts: here.volts, noise_of_mean: None };
-            points.push(Point::averaged(here.mass_g, vec![reading]));
+                CalibrationReading { direction: Direction::Loading, volts: here.volts, noise_of_mean: None };
+            points.push(CalibrationPoint::averaged(here.mass_g, vec![reading]));
         }
         Ok(points)
     }
 
-    fn points_of_series(&self) -> Result<Vec<Point>, CalibrationError> {
-        let mut readings: Vec<(f64, Reading)> = Vec::new();
+    fn points_of_series(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
+        let mut readings: Vec<(f64, CalibrationReading)> = Vec::new();
         for (series, step) in self.series_steps() {
             let number = readings.len() + 1;
             check_numbers(number, step.mass_g, step.volts)?;
             self.check_weights(number, step)?;
             let noise = step.noise.zip(step.samples.filter(|samples| *samples > 0));
-            let reading = Reading {
+            let reading = CalibrationReading {
                 direction: series.direction,
                 volts: step.volts,
                 noise_of_mean: noise.map(|(noise, n)| Volts(noise.0 / (n as f64).sqrt())),
@@ -314,8 +314,8 @@ impl Calibration {
         }
         readings.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let groups = readings.chunk_by(|(a, _), (b, _)| b - a <= SAME_MASS);
-        let point = |group: &[(f64, Reading)]| {
-            Point::averaged(group[0].0, group.iter().map(|(_, reading)| *reading).collect())
+        let point = |group: &[(f64, CalibrationReading)]| {
+            CalibrationPoint::averaged(group[0].0, group.iter().map(|(_, reading)| *reading).collect())
         };
         Ok(groups.map(point).collect())
     }

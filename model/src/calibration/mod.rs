@@ -20,7 +20,7 @@ mod weight_steps;
 pub use choice::{Candidate, candidates, judge_kind};
 pub use curve::{Curve, DEGREE_MAX};
 pub use document::{
-    CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, Point, Reading, Series, SeriesStep,
+    CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, CalibrationPoint, CalibrationReading, Series, SeriesStep,
     VALID_DAYS,
 };
 pub use error::CalibrationError;
@@ -28,5 +28,5 @@ pub use kind::CurveKind;
 pub use quality::{FlatStretch, Hysteresis, PointQuality, Quality};
 pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady, Unsettled};
 pub use uncertainty::{ForceUncertainty, Term};
-pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckError, CheckResult, KnownWeight};
+pub use validity::{Bench, CHECK_LIMIT_PERCENT, WeightCheckError, CheckResult, KnownWeight};
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -2,7 +2,7 @@
 
 use super::CalibrationError;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, Point};
+use super::document::{Calibration, Direction, CalibrationPoint};
 use super::uncertainty::ForceUncertainty;
 use crate::units::{Newtons, Volts};
 use serde::Serialize;
@@ -12,14 +12,14 @@ const FLAT_SHARE: f64 = 0.25;
 
 /// A curve read after taring, as every force of a run is: the signal is shifted so that the empty cell
 /// reads 0 N. A curve by least squares misses the empty cell's signal; taring takes that out.
-pub(super) struct Zeroed<'a> {
+pub(super) struct TaredCurve<'a> {
     curve: &'a Curve,
     shift: f64,
 }
 
-impl<'a> Zeroed<'a> {
+impl<'a> TaredCurve<'a> {
     /// Tared on the empty cell if it is among the points, else not at all.
-    pub fn of(curve: &'a Curve, points: &[Point]) -> Self {
+    pub fn of(curve: &'a Curve, points: &[CalibrationPoint]) -> Self {
         let empty = points.first().filter(|point| point.newtons.0 == 0.0);
         let shift =
             empty.map_or(0.0, |point| point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0);
@@ -121,7 +121,7 @@ impl Calibration {
         let points = self.points()?;
         let curve = self.curve.through(&points)?;
         let uncertainty = ForceUncertainty::of(self)?;
-        let zeroed = Zeroed::of(&curve, &points);
+        let zeroed = TaredCurve::of(&curve, &points);
         let sigma = |newtons: f64| uncertainty.sigma(Newtons(newtons)).map(|sigma| sigma.0);
         let qualities: Vec<PointQuality> = points
             .iter()
@@ -174,7 +174,7 @@ fn hysteresis(points: &[PointQuality]) -> Option<Hysteresis> {
 }
 
 /// Standard deviation of one reading from repeats under the same weight in the same direction, pooled.
-pub(super) fn repeatability(points: &[Point]) -> Option<Volts> {
+pub(super) fn repeatability(points: &[CalibrationPoint]) -> Option<Volts> {
     let (mut square, mut freedom) = (0.0, 0);
     for point in points {
         for direction in [Direction::Loading, Direction::Unloading] {
@@ -198,7 +198,7 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The flat stretch, as it shows to somebody who lays weight after weight: it begins where the next weight
 /// hardly moves the signal and goes on as long as the signal, seen from there, lags behind.
-fn flat(points: &[Point], curve: &Curve, uncertainty: &ForceUncertainty) -> Option<FlatStretch> {
+fn flat(points: &[CalibrationPoint], curve: &Curve, uncertainty: &ForceUncertainty) -> Option<FlatStretch> {
     let chord = |i: usize, j: usize| {
         (points[j].volts.0 - points[i].volts.0) / (points[j].newtons.0 - points[i].newtons.0)
     };

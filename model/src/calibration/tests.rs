@@ -222,7 +222,7 @@ fn segments_go_where_they_are_told_or_nearest() {
     // Against every choice of three breaks between the ends.
     let sum = |kind: &CurveKind| -> f64 {
         let curve = kind.through(&points).unwrap();
-        let miss = |point: &Point| curve.volts_from_newtons(point.newtons).0 - point.volts.0;
+        let miss = |point: &CalibrationPoint| curve.volts_from_newtons(point.newtons).0 - point.volts.0;
         points.iter().map(|point| miss(point).powi(2)).sum()
     };
     let mut least = f64::INFINITY;

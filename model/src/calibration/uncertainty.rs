@@ -8,7 +8,7 @@
 use super::CalibrationError;
 use super::choice::left_out_volts;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, Point};
+use super::document::{Calibration, Direction, CalibrationPoint};
 use super::quality::{repeatability, rms};
 use crate::units::{Newtons, Volts};
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ pub struct ForceUncertainty {
 impl ForceUncertainty {
     /// That of a calibration's forces.
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
-        let maker = Maker::of(calibration)?;
+        let maker = ComponentBuilder::of(calibration)?;
         let mut not_stated = Vec::new();
         let mut components = Vec::new();
         for term in Term::ALL {
@@ -147,14 +147,14 @@ impl ForceUncertainty {
 }
 
 /// What is needed to make the components.
-struct Maker<'a> {
+struct ComponentBuilder<'a> {
     calibration: &'a Calibration,
-    points: Vec<Point>,
+    points: Vec<CalibrationPoint>,
     curve: Curve,
     nodes: Vec<f64>,
 }
 
-impl<'a> Maker<'a> {
+impl<'a> ComponentBuilder<'a> {
     fn of(calibration: &'a Calibration) -> Result<Self, CalibrationError> {
         let points = calibration.points()?;
         let curve = calibration.curve.through(&points)?;
@@ -240,7 +240,7 @@ impl<'a> Maker<'a> {
         (!components.is_empty()).then_some(components)
     }
 
-    fn share(&self, name: &str, point: &Point) -> f64 {
+    fn share(&self, name: &str, point: &CalibrationPoint) -> f64 {
         let steps = self.calibration.series_steps().map(|(_, step)| step);
         let own: Vec<_> = steps.filter(|step| (step.mass_g - point.mass_g).abs() <= 1e-6).collect();
         let with = own.iter().filter(|step| step.weights.iter().any(|one| one == name));
@@ -251,7 +251,7 @@ impl<'a> Maker<'a> {
     /// from the noise of the samples.
     fn reading_sigmas(&self) -> Option<Vec<f64>> {
         if let Some(one) = repeatability(&self.points) {
-            let sigma = |point: &Point| mean_sigma(point, |_| Some(one));
+            let sigma = |point: &CalibrationPoint| mean_sigma(point, |_| Some(one));
             return self.points.iter().map(sigma).collect();
         }
         self.sampled()
@@ -259,7 +259,7 @@ impl<'a> Maker<'a> {
 
     /// The same from the noise of the samples alone.
     fn sampled(&self) -> Option<Vec<f64>> {
-        let sigma = |point: &Point| mean_sigma(point, |reading| reading.noise_of_mean);
+        let sigma = |point: &CalibrationPoint| mean_sigma(point, |reading| reading.noise_of_mean);
         self.points.iter().map(sigma).collect()
     }
 
@@ -279,7 +279,7 @@ impl<'a> Maker<'a> {
     }
 
     /// The curve through points that were moved.
-    fn moved(&self, change: impl Fn(usize, &mut Point)) -> Option<Curve> {
+    fn moved(&self, change: impl Fn(usize, &mut CalibrationPoint)) -> Option<Curve> {
         let mut points = self.points.clone();
         points.iter_mut().enumerate().for_each(|(i, point)| change(i, point));
         let is_ordered = points.windows(2).all(|pair| pair[0].newtons.0 < pair[1].newtons.0);
@@ -369,7 +369,7 @@ impl<'a> Maker<'a> {
 }
 
 /// Standard deviation in V of the mean of directions' means; `None` if a reading's own is not known.
-fn mean_sigma(point: &Point, sigma: impl Fn(&super::Reading) -> Option<Volts>) -> Option<f64> {
+fn mean_sigma(point: &CalibrationPoint, sigma: impl Fn(&super::CalibrationReading) -> Option<Volts>) -> Option<f64> {
     let mut square = 0.0;
     let mut ways = 0;
     for direction in [Direction::Loading, Direction::Unloading] {

@@ -69,7 +69,7 @@ pub struct CheckResult {
 
 /// A check could not be judged.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum CheckError {
+pub enum WeightCheckError {
     /// The calibration is none.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
@@ -87,7 +87,7 @@ pub enum CheckError {
 
 impl KnownWeight {
     /// Its limit in percent, if its numbers can be.
-    fn checked_limit(&self) -> Result<f64, CheckError> {
+    fn checked_limit(&self) -> Result<f64, WeightCheckError> {
         let limit_percent = self.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         for (what, value, is_right, advice) in [
@@ -103,7 +103,7 @@ impl KnownWeight {
             ("tare", self.tare.0, self.tare.is_finite(), "read the empty cell again"),
         ] {
             if !is_right {
-                return Err(CheckError::Number { what, value, advice });
+                return Err(WeightCheckError::Number { what, value, advice });
             }
         }
         Ok(limit_percent)
@@ -168,7 +168,7 @@ impl Calibration {
         let digit = self.reading_resolution().unwrap_or(Volts(0.0)).0;
         let allowed = spread.max(digit);
         for direction in [Direction::Loading, Direction::Unloading] {
-            let mean = |point: &super::Point| Some((point.mass_g, point.mean(direction)?.0));
+            let mean = |point: &super::CalibrationPoint| Some((point.mass_g, point.mean(direction)?.0));
             let taken: Vec<(f64, f64)> = points.iter().filter_map(mean).collect();
             let fall = taken.windows(2).find(|pair| pair[0].1 - pair[1].1 > allowed);
             if let Some(&[(before_g, before_volts), (mass_g, volts)]) = fall {
@@ -217,7 +217,7 @@ impl Calibration {
     }
 
     /// Whether a known weight reads what it weighs.
-    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, CheckError> {
+    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, WeightCheckError> {
         let limit_percent = weight.checked_limit()?;
         let curve = self.curve()?;
         let uncertainty = ForceUncertainty::of(self)?;

@@ -86,7 +86,7 @@ pub fn fit_compliance(
     samples: &[StiffSample],
     seating: Newtons,
 ) -> Result<Compliance, ComplianceError> {
-    let known: Vec<Weighed> = samples.iter().filter_map(Weighed::of).collect();
+    let known: Vec<WeightedSample> = samples.iter().filter_map(WeightedSample::of).collect();
     let by_force = known.iter().filter(|one| one.force >= seating.0);
     let mut line = Line::through(by_force.copied().collect(), seating)?;
     for _ in 0..ROUNDS_MAX {
@@ -105,13 +105,13 @@ pub fn fit_compliance(
 
 /// A sample as the line takes it, in mm and N.
 #[derive(Clone, Copy)]
-struct Weighed {
+struct WeightedSample {
     position: f64,
     force: f64,
     weight: f64,
 }
 
-impl Weighed {
+impl WeightedSample {
     fn of(sample: &StiffSample) -> Option<Self> {
         let weight = sample.sigma.0.powi(-2);
         let is_known = sample.position.is_finite() && sample.force.is_finite();
@@ -137,25 +137,25 @@ struct Line {
 }
 
 impl Line {
-    fn through(used: Vec<Weighed>, seating: Newtons) -> Result<Self, ComplianceError> {
+    fn through(used: Vec<WeightedSample>, seating: Newtons) -> Result<Self, ComplianceError> {
         let (samples, count) = (used.len(), used.len() as f64);
         if samples < SAMPLES_MIN {
             return Err(ComplianceError::TooShort { samples, seating });
         }
         let weights: f64 = used.iter().map(|one| one.weight).sum();
-        let mean = |of: &dyn Fn(&Weighed) -> f64| {
+        let mean = |of: &dyn Fn(&WeightedSample) -> f64| {
             used.iter().map(|one| one.weight * of(one)).sum::<f64>() / weights
         };
         let (middle, force_mean) = (mean(&|s| s.position), mean(&|s| s.force));
         let half = used.iter().fold(0.0f64, |max, s| max.max((s.position - middle).abs()));
         // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
-        let u = |s: &Weighed| (s.position - middle) / half;
+        let u = |s: &WeightedSample| (s.position - middle) / half;
         let (square, cube) = (mean(&|s| u(s).powi(2)), mean(&|s| u(s).powi(3)));
-        let parabola = |s: &Weighed| u(s).powi(2) - cube / square * u(s) - square;
+        let parabola = |s: &WeightedSample| u(s).powi(2) - cube / square * u(s) - square;
         let slope = mean(&|s| u(s) * s.force) / square;
         let parabola_square = mean(&|s| parabola(s).powi(2));
         let bend = mean(&|s| parabola(s) * s.force) / parabola_square;
-        let residual = |s: &Weighed| s.force - force_mean - slope * u(s);
+        let residual = |s: &WeightedSample| s.force - force_mean - slope * u(s);
         let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
         let slope_error = (variance / count / square).sqrt();
         // Three standard errors: a slope that could be noise is none.

@@ -35,7 +35,7 @@ pub struct ContactEstimate {
 
 /// No contact position follows from the pass.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum ContactError {
+pub enum ContactFitError {
     /// Too little data.
     #[error(
         "the slow pass has only {points} points; at least {POINTS_MIN} are needed, so approach more slowly"
@@ -64,12 +64,12 @@ const CONTACT_COUNT: usize = 60;
 type Rows = Triangle<6>;
 
 /// Estimates the contact position from a slow pass at constant speed.
-pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactError> {
+pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactFitError> {
     if points.len() < POINTS_MIN {
-        return Err(ContactError::TooShort { points: points.len() });
+        return Err(ContactFitError::TooShort { points: points.len() });
     }
     let pass = Pass::new(points)?;
-    let (mut at, mut cost) = pass.scan().ok_or(ContactError::NoOnset)?;
+    let (mut at, mut cost) = pass.scan().ok_or(ContactFitError::NoOnset)?;
     // Gauss-Newton with step halving; it settles in a few steps from a scanned start.
     for _ in 0..30 {
         let Some(step) = pass.step(at) else { break };
@@ -87,7 +87,7 @@ pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactEr
             break;
         }
     }
-    pass.estimate(at).ok_or(ContactError::NoOnset)
+    pass.estimate(at).ok_or(ContactFitError::NoOnset)
 }
 
 /// A trial contact position and relaxation time.
@@ -115,7 +115,7 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(points: &'a [ContactPoint]) -> Result<Self, ContactError> {
+    fn new(points: &'a [ContactPoint]) -> Result<Self, ContactFitError> {
         let (begin, end) = (points[0], points[points.len() - 1]);
         let speed = (end.position.0 - begin.position.0) / (end.t.0 - begin.t.0);
         let is_straight = points.iter().all(|point| {
@@ -124,7 +124,7 @@ impl<'a> Pass<'a> {
             (point.position.0 - expected).abs() < 1e-3 && point.force.is_finite()
         });
         if !(is_straight && speed > 0.0) {
-            return Err(ContactError::NotOneSpeed);
+            return Err(ContactFitError::NotOneSpeed);
         }
         Ok(Self { points, speed, first: begin.position.0, last: end.position.0 })
     }
@@ -321,7 +321,7 @@ mod tests {
                 force: Newtons(0.006 * noise.normal()),
             })
             .collect();
-        assert_eq!(fit_contact(&flat), Err(ContactError::NoOnset));
-        assert!(matches!(fit_contact(&flat[..10]), Err(ContactError::TooShort { points: 10 })));
+        assert_eq!(fit_contact(&flat), Err(ContactFitError::NoOnset));
+        assert!(matches!(fit_contact(&flat[..10]), Err(ContactFitError::TooShort { points: 10 })));
     }
 }

@@ -13,7 +13,7 @@
 //! a millimetre earlier. So where the residuals remember, a body with both viscous forces is tried as well, and
 //! preferred if it leaves less than chance would explain.
 
-use super::contact::{ContactError, ContactEstimate};
+use super::contact::{ContactFitError, ContactEstimate};
 use crate::linalg::Triangle;
 use crate::units::{Depth, Newtons, Position, Seconds};
 use crate::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -73,10 +73,10 @@ pub struct TouchEstimate {
 
 /// Estimates the contact position from a whole search. The path must begin out of contact and go on without
 /// gaps; times rise. What follows the last point without force is the second touch.
-pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
+pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactFitError> {
     let mut search = Search::new(points.to_vec())?;
     let mut starts = search.coarse().scan();
-    let mut found = search.best(&starts).ok_or(ContactError::NoOnset)?;
+    let mut found = search.best(&starts).ok_or(ContactFitError::NoOnset)?;
     if found.memory > 1.0 {
         search.has_speed_term = true;
         let others = search.coarse().scan();
@@ -93,7 +93,7 @@ pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
             _ => search.has_speed_term = false,
         }
     }
-    search.estimate(&found, &starts).ok_or(ContactError::NoOnset)
+    search.estimate(&found, &starts).ok_or(ContactFitError::NoOnset)
 }
 
 /// A trial contact position in mm, the logarithm of a relaxation time in s, and how much deeper in mm the second
@@ -106,7 +106,7 @@ struct Trial {
 }
 
 /// The bottom of the deepest valley.
-struct Bottom {
+struct ValleyBottom {
     trial: Trial,
     /// Sum of squares of the residuals, its share of one force, and what [`Search::memory`] says.
     cost: f64,
@@ -130,10 +130,10 @@ struct Search {
 }
 
 impl Search {
-    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactError> {
+    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactFitError> {
         let forces = points.iter().filter(|point| point.force.is_some()).count();
         if forces < FORCES_MIN {
-            return Err(ContactError::TooShort { points: forces });
+            return Err(ContactFitError::TooShort { points: forces });
         }
         let is_forward = points.windows(2).all(|pair| pair[1].t.0 > pair[0].t.0);
         let is_finite = points.iter().all(|point| {
@@ -144,7 +144,7 @@ impl Search {
         points.iter().for_each(|point| deep = deep.max(point.position.0));
         let (begin, end) = (points[0], points[points.len() - 1]);
         if !(is_forward && is_finite && deep > begin.position.0) {
-            return Err(ContactError::NotOneSpeed);
+            return Err(ContactFitError::NotOneSpeed);
         }
         Ok(Self {
             has_speed_term: false,
@@ -167,7 +167,7 @@ impl Search {
         if self.may_be_apart { 3 } else { 2 }
     }
 
-    fn best(&self, starts: &[Trial]) -> Option<Bottom> {
+    fn best(&self, starts: &[Trial]) -> Option<ValleyBottom> {
         let coarse = self.coarse();
         // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
         // relaxation time has its own valley, and the deepest shows only at its bottom.
@@ -180,7 +180,7 @@ impl Search {
         let (linear, cost) = self.solve(trial)?;
         let forces = self.points.iter().filter(|point| point.force.is_some());
         let variance = cost / (forces.count() - self.linear() - self.outer()) as f64;
-        Some(Bottom {
+        Some(ValleyBottom {
             trial,
             cost,
             variance,
@@ -368,7 +368,7 @@ impl Search {
         Some(rows)
     }
 
-    fn estimate(&self, bottom: &Bottom, starts: &[Trial]) -> Option<TouchEstimate> {
+    fn estimate(&self, bottom: &ValleyBottom, starts: &[Trial]) -> Option<TouchEstimate> {
         let by_noise = self.std_error(bottom, 0)?;
         let apart_mm = self.apart(starts);
         let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0).hypot(bottom.by_choice_mm);
@@ -394,7 +394,7 @@ impl Search {
     }
 
     /// Of the contact (0), ln tau (1) or the distance (2).
-    fn std_error(&self, bottom: &Bottom, which: usize) -> Option<f64> {
+    fn std_error(&self, bottom: &ValleyBottom, which: usize) -> Option<f64> {
         let mut triangle = Triangle::default();
         let rows = self.linearised(bottom.trial)?;
         rows.iter().for_each(|(_, row)| triangle.push(*row));

@@ -39,7 +39,7 @@ impl Linear {
 
 /// `F(+) = keep F + now x(+) + before x`: a step of length `tick` as a transfer function.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampled {
+pub struct SampledStep {
     /// Tick in s.
     pub tick: f64,
     /// Share of the force that goes: `1 - keep`.
@@ -52,7 +52,7 @@ pub struct Sampled {
     pub both: f64,
 }
 
-impl Sampled {
+impl SampledStep {
     /// Of a body by a scheme, its speed the difference of two depths, as the integrators take it.
     #[must_use]
     pub fn of(linear: &Linear, scheme: Scheme, tick: f64) -> Self {

@@ -14,7 +14,7 @@ pub mod criterion;
 mod linear;
 
 pub use bands::{DepthBand, active_cycles, active_pokes};
-pub use linear::{Linear, Sampled};
+pub use linear::{Linear, SampledStep};
 
 use super::Period;
 use palpate_model::units::{Depth, MmPerS, Newtons};
@@ -102,7 +102,7 @@ impl Watch {
     pub fn at(&self, depth: Depth, speed: MmPerS) -> Margin {
         let tick = self.period.seconds().0;
         let linear = Linear::of(&self.body, depth);
-        let sampled = Sampled::of(&linear, self.scheme, tick);
+        let sampled = SampledStep::of(&linear, self.scheme, tick);
         let delay = self.device.delay_ticks.max(0.0);
         let moving = self.moving(speed);
         let slow = sampled.slow() + linear.stiffness * delay * tick + moving;
@@ -133,7 +133,7 @@ impl Watch {
             return self.at(depth, speed);
         }
         let linear = Linear::of(&self.body, depth);
-        let sampled = Sampled::of(&linear, self.scheme, self.period.seconds().0);
+        let sampled = SampledStep::of(&linear, self.scheme, self.period.seconds().0);
         let (needed, _) = criterion::needed(&sampled, self.device.delay_ticks.max(0.0));
         Margin { needed: needed + self.moving(speed), ..self.at(depth, speed) }
     }

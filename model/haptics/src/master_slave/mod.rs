@@ -16,11 +16,11 @@ use crate::torque::TorqueSettings;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 pub use settings::{MasterSlaveError, MasterSlaveSettings};
-pub use snapshot::Snapshot;
+pub use snapshot::MasterSlaveSnapshot;
 
 /// What comes in with a tick; the same inputs give the same outputs, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Input {
+pub struct MasterSlaveInput {
     /// Counts of the master's encoder.
     pub counts: i64,
     /// Ticks since the last input: one, unless the loop was away.
@@ -35,7 +35,7 @@ pub struct Input {
 
 /// What goes out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Output {
+pub struct MasterSlaveOutput {
     /// Pulses for the slave in this tick.
     pub pulses: i64,
     /// Bias voltage of the master's motor, positive against motion into the tissue.
@@ -67,7 +67,7 @@ pub struct MasterSlave {
     direction: i64,
     still: u64,
     thermal: ThermalState,
-    snapshot: Snapshot,
+    snapshot: MasterSlaveSnapshot,
 }
 
 /// Ticks of a stall that the model is led through one by one; after longer ones its memory is as old as it was.
@@ -77,7 +77,7 @@ const CAUGHT_UP: u64 = 64;
 const HEADING_S: f64 = 0.1;
 
 /// What the controller sees of a tick.
-struct Touch {
+struct ControllerInput {
     is_touching: bool,
     is_on: bool,
     has_buzz: bool,
@@ -122,13 +122,13 @@ impl MasterSlave {
             direction: 0,
             still: 0,
             thermal,
-            snapshot: Snapshot::at_start(&watch, depth, thermal.winding_c),
+            snapshot: MasterSlaveSnapshot::at_start(&watch, depth, thermal.winding_c),
         })
     }
 
     /// Everything after the last tick.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot { checksum: self.snapshot.sum(), ..self.snapshot }
+    pub fn snapshot(&self) -> MasterSlaveSnapshot {
+        MasterSlaveSnapshot { checksum: self.snapshot.sum(), ..self.snapshot }
     }
 
     /// Which way the master goes, for what helps against friction: slow motion has many ticks without a count, so that a
@@ -171,7 +171,7 @@ impl MasterSlave {
     }
 
     /// What the passivity controller makes of the guarded force.
-    fn damp(&mut self, guarded: Newtons, touch: &Touch) -> ControllerTick {
+    fn damp(&mut self, guarded: Newtons, touch: &ControllerInput) -> ControllerTick {
         let mut damped =
             ControllerTick { force: guarded, damping: 0.0, energy: 0.0, flags: Flags::NONE };
         let Some(controller) = &mut self.controller else {
@@ -196,7 +196,7 @@ impl MasterSlave {
 
     /// Takes one input and gives one output.
     #[must_use]
-    pub fn tick(&mut self, input: &Input) -> Output {
+    pub fn tick(&mut self, input: &MasterSlaveInput) -> MasterSlaveOutput {
         let elapsed = input.elapsed.max(1);
         let before = self.snapshot;
         let span = self.watch.period.seconds().0 * elapsed as f64;
@@ -225,7 +225,7 @@ impl MasterSlave {
         let buzz = self.buzz.tick(master_mm, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
         let touch =
-            Touch { is_touching, is_on: input.is_on, has_buzz: buzz.is_some(), moved, elapsed };
+            ControllerInput { is_touching, is_on: input.is_on, has_buzz: buzz.is_some(), moved, elapsed };
         let damped = self.damp(guarded.force, &touch);
         let force = damped.force.0;
         flags |= damped.flags;
@@ -239,7 +239,7 @@ impl MasterSlave {
         let margin = self.watch.at(law.depth, MmPerS(0.0));
         flags |= torque.flags | Flags::MARGIN.when(is_touching && !margin.is_enough());
         let tick = before.tick.saturating_add(elapsed);
-        self.snapshot = Snapshot {
+        self.snapshot = MasterSlaveSnapshot {
             tick,
             time: self.watch.period.time_of(tick),
             counts: input.counts,
@@ -264,6 +264,6 @@ impl MasterSlave {
             flags,
             checksum: 0,
         };
-        Output { pulses: gear.pulses, bias: torque.bias, force: Newtons(force), flags }
+        MasterSlaveOutput { pulses: gear.pulses, bias: torque.bias, force: Newtons(force), flags }
     }
 }

@@ -1,7 +1,7 @@
 //! What a master-slave system is made of, and what makes none.
 
 use crate::buzz::BuzzSettings;
-use crate::contact::{ContactError, ContactSettings};
+use crate::contact::{ContactThresholdError, ContactSettings};
 use crate::controller::ControllerSettings;
 use crate::force::{LawError, LawSettings};
 use crate::guard::GuardSettings;
@@ -114,7 +114,7 @@ pub enum MasterSlaveError {
     Law(#[from] LawError),
     /// The thresholds.
     #[error(transparent)]
-    Contact(#[from] ContactError),
+    Contact(#[from] ContactThresholdError),
     /// The encoder.
     #[error(transparent)]
     Encoder(#[from] EncoderError),

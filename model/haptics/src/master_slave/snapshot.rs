@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// The state of everything after a tick, as screens and records take it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Snapshot {
+pub struct MasterSlaveSnapshot {
     /// Ticks since the start, those away included.
     pub tick: u64,
     /// The time of that.
@@ -58,7 +58,7 @@ pub struct Snapshot {
     pub checksum: u64,
 }
 
-impl Snapshot {
+impl MasterSlaveSnapshot {
     /// Before the first tick.
     pub(super) fn at_start(watch: &Watch, depth: Depth, winding_c: f64) -> Self {
         Self {

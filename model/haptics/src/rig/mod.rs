@@ -11,6 +11,6 @@ mod thermal;
 pub use encoder::{Encoder, EncoderCounter, EncoderError, Quadrature};
 pub use gear::{Gear, GearError, GearRatio, GearTick, SlaveDrive};
 pub use hand::{Hand, HandPath};
-pub use motor::{Drive, Motor, MotorError, MotorOrigin, MotorState};
+pub use motor::{DriveInput, Motor, MotorError, MotorOrigin, MotorState};
 pub use rack::{Pinion, Rack, RackEnergies, RackForces};
 pub use thermal::{Thermal, ThermalState};

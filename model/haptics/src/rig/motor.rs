@@ -107,12 +107,12 @@ impl Motor {
     }
 
     /// The current after `dt` s, the speed held over it: exact for the winding's own time constant.
-    pub fn after(&self, state: MotorState, drive: Drive, omega: f64, dt: f64) -> MotorState {
+    pub fn after(&self, state: MotorState, drive: DriveInput, omega: f64, dt: f64) -> MotorState {
         let emf = self.back_emf() * omega;
         let limit = |volts: f64| volts.clamp(-self.volts_max, self.volts_max);
         let settled = |volts: f64| (volts - emf) / self.resistance;
         let (amps, is_saturated) = match drive {
-            Drive::Voltage(volts) => {
+            DriveInput::Voltage(volts) => {
                 let within = limit(volts);
                 let to = settled(within);
                 let share = if self.inductance > 0.0 {
@@ -123,7 +123,7 @@ impl Motor {
                 (state.amps + (to - state.amps) * share, within != volts)
             }
             // The inner loop of a current drive is fast beside a tick; what it cannot do is go beyond its voltage.
-            Drive::Current(amps) => {
+            DriveInput::Current(amps) => {
                 let within = amps.clamp(settled(-self.volts_max), settled(self.volts_max));
                 (within, within != amps)
             }
@@ -134,7 +134,7 @@ impl Motor {
 
 /// What a drive is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
+pub enum DriveInput {
     /// Volts on the winding.
     Voltage(f64),
     /// Amperes through it.
@@ -173,14 +173,14 @@ mod tests {
     fn voltage_lags_by_the_winding_and_current_does_not() {
         let motor = Motor::SOURCE;
         let dt = motor.inductance / motor.resistance;
-        let one = motor.after(MotorState::default(), Drive::Voltage(2.0), 0.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Voltage(2.0), 0.0, dt);
         assert!((one.amps - 2.0 / 0.64 * (1.0 - (-1f64).exp())).abs() < 1e-12);
-        let one = motor.after(MotorState::default(), Drive::Current(3.0), 10.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Current(3.0), 10.0, dt);
         assert_eq!((one.amps, one.is_saturated), (3.0, false));
         // 24 V less the speed's own voltage is all there is.
-        let one = motor.after(MotorState::default(), Drive::Current(100.0), 100.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Current(100.0), 100.0, dt);
         assert!(one.is_saturated && (one.amps - (24.0 - 3.36) / 0.64).abs() < 1e-12);
-        let one = motor.after(MotorState::default(), Drive::Voltage(-30.0), 0.0, 1.0);
+        let one = motor.after(MotorState::default(), DriveInput::Voltage(-30.0), 0.0, 1.0);
         assert!(one.is_saturated && (one.amps + 37.5).abs() < 1e-12);
     }
 }

@@ -129,7 +129,7 @@ impl DeviceSettings {
 
     /// `force` as far as the device can give it, the same way, and whether it is less than asked for.
     #[must_use]
-    pub fn given(&self, force: [f64; 3]) -> ([f64; 3], bool) {
+    pub fn limit_force(&self, force: [f64; 3]) -> ([f64; 3], bool) {
         let asked = length(force);
         if asked <= self.force_max_n {
             return (force, false);
@@ -229,7 +229,7 @@ impl SimulatedDevice {
     /// Moves through `ticks` ticks, a thousand at most, with `force` (N) held on the stylus, led by a hand. A hand at no number
     /// stays where it was.
     pub fn follow(&mut self, hand: Hand6, force: [f64; 3], ticks: u64) {
-        let (force, _) = self.settings.given(force);
+        let (force, _) = self.settings.limit_force(force);
         let wanted = if hand.is_finite() {
             self.turn = hand.turn;
             [0, 1, 2].map(|axis| {

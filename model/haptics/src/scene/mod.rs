@@ -19,7 +19,7 @@ pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
 pub use why::WhyNoForce;
 
 use crate::surface::{
-    Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, Touch, TouchState,
+    Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, ProxyTouch, TouchState,
 };
 use crate::{
     BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
@@ -36,7 +36,7 @@ const LED_MAX: u64 = 1000;
 pub struct SceneTick {
     /// Ticks since the start.
     pub tick: u64,
-    /// Sensed place of the stylus in mm.
+    /// SensedPosition place of the stylus in mm.
     pub device: [f64; 3],
     /// Its sensed yaw, pitch and roll in rad.
     pub turn: [f64; 3],
@@ -196,7 +196,7 @@ impl Scene {
             flags |= one.flags;
         }
         let asked = self.felt(&touch, along);
-        let (force, is_saturated) = self.settings.device.given(asked);
+        let (force, is_saturated) = self.settings.device.limit_force(asked);
         let given = Newtons(dot(force, touch.normal));
         if let Some(controller) = &mut self.controller {
             controller.rendered(given);
@@ -245,7 +245,7 @@ impl Scene {
 
     /// The force on the hand where `along` is what there is along the normal: friction goes with what the model gives, and damping
     /// has none.
-    fn felt(&self, touch: &Touch, along: Newtons) -> [f64; 3] {
+    fn felt(&self, touch: &ProxyTouch, along: Newtons) -> [f64; 3] {
         let push = along.0.max(0.0);
         let with_friction = touch.force(push);
         let pull = along.0 - if touch.is_contact() { push } else { 0.0 };
@@ -253,7 +253,7 @@ impl Scene {
     }
 
     /// The surface follows the stylus from the contact point down.
-    fn press(&mut self, touch: &Touch) {
+    fn press(&mut self, touch: &ProxyTouch) {
         let [x, y, z] = touch.point;
         let contact = Contact { x, y, z: z - touch.depth, side: Side::Push };
         let contacts = [contact];

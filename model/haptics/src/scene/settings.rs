@@ -1,7 +1,7 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, RecoveryError};
+use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, SurfaceRecoveryError};
 use crate::surface::{ProxyError, Shear};
 use crate::{ControllerSettings, GuardSettings, LawError, Period};
 use palpate_model::units::Newtons;
@@ -128,7 +128,7 @@ pub enum SceneError {
     Proxy(#[from] ProxyError),
     /// Its way back to rest.
     #[error(transparent)]
-    Recovery(#[from] RecoveryError),
+    Recovery(#[from] SurfaceRecoveryError),
     /// How its surface is found.
     #[error(transparent)]
     Method(#[from] MethodError),

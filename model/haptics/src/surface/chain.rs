@@ -8,7 +8,7 @@
 //! be the largest, and with one limit for all that is the one over the fewest links. Where limits
 //! differ it is not, and [`sorted`](super::sorted) is needed.
 
-use super::contact::{Cut, Moved, Poke, Side};
+use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node, Rect};
 use super::mesh::HeightField;
 
@@ -76,12 +76,12 @@ pub(super) fn allowed<const PULL: bool>(z: f64, limit: f64) -> f64 {
 
 /// What a pass tells where nothing is to move: the contact does not reach its node, or the node is pinned.
 #[inline(always)]
-pub(super) fn unmoved<const PULL: bool>(field: &HeightField, poke: Poke) -> Option<Moved> {
+pub(super) fn unmoved<const PULL: bool>(field: &HeightField, poke: Poke) -> Option<MoveCounts> {
     let node = field.grid.index(poke.node);
     if beyond::<PULL>(field.now[node], poke.z) <= 0.0 {
-        return Some(Moved::default());
+        return Some(MoveCounts::default());
     }
-    field.is_pinned(poke.node).then(|| Moved { held: 1, ..Moved::default() })
+    field.is_pinned(poke.node).then(|| MoveCounts { held: 1, ..MoveCounts::default() })
 }
 
 impl Chain {
@@ -102,7 +102,7 @@ impl Chain {
         shear: f64,
         cut: Cut,
         poke: Poke,
-    ) -> Moved {
+    ) -> MoveCounts {
         self.stamps.begin();
         self.moved = 0;
         match poke.side {
@@ -117,11 +117,11 @@ impl Chain {
         shear: f64,
         cut: Cut,
         poke: Poke,
-    ) -> Moved {
+    ) -> MoveCounts {
         if let Some(told) = unmoved::<PULL>(field, poke) {
             return told;
         }
-        let mut told = Moved::default();
+        let mut told = MoveCounts::default();
         let seed = field.grid.index(poke.node);
         self.rows = [poke.node.row, poke.node.row + 1];
         self.put(field, poke.node, seed, poke.z);

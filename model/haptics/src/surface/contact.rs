@@ -99,7 +99,7 @@ impl Contact {
 
 /// What a pass did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Moved {
+pub struct MoveCounts {
     /// Nodes moved by contacts, counted once for each contact.
     pub moved: usize,
     /// Nodes or links looked at for it.
@@ -108,7 +108,7 @@ pub struct Moved {
     pub held: usize,
 }
 
-impl Moved {
+impl MoveCounts {
     pub(super) fn add(&mut self, other: Self) {
         self.moved += other.moved;
         self.visited += other.visited;

@@ -11,7 +11,7 @@
 //! recovery and all contacts in one go over memory, no further than a contact can reach.
 
 use super::chain::{beyond, reaches};
-use super::contact::{Cut, Moved, Poke, Side};
+use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node, Rect};
 use super::mesh::{HeightField, Pins};
 use super::recover::{Recovery, trimmed};
@@ -58,8 +58,8 @@ pub(super) fn tick(
     recovery: Recovery,
     cut: Cut,
     pokes: &[Poke],
-) -> Moved {
-    let mut told = Moved::default();
+) -> MoveCounts {
+    let mut told = MoveCounts::default();
     let mut cones = [NO_CONE; TOGETHER];
     let mut count = 0;
     let mut touched = Rect::EMPTY;
@@ -116,7 +116,7 @@ fn cone(
     cut: Cut,
     poke: Poke,
     before: &[Cone],
-    told: &mut Moved,
+    told: &mut MoveCounts,
 ) -> Option<Cone> {
     let index = field.grid.index(poke.node);
     // The touched node as it will be when this contact's turn comes.
@@ -198,7 +198,7 @@ impl Row<'_> {
         shape: &Envelope,
         recovery: Recovery,
         cut: Cut,
-        told: &mut Moved,
+        told: &mut MoveCounts,
     ) {
         let mut recovery = Some(recovery);
         for cone in cones {

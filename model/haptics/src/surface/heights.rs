@@ -49,7 +49,7 @@ impl<'a> Heights<'a> {
 
     /// Unit normal at a place in mm, interpolated between those of the nodes around it: no edge shows
     /// where cells meet. The true one is [`Heights::at`].
-    pub fn shaded(&self, x: f64, y: f64) -> Option<[f64; 3]> {
+    pub fn shading_normal(&self, x: f64, y: f64) -> Option<[f64; 3]> {
         let (Node { column, row }, [u, v]) = self.cell(x, y)?;
         let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
             .map(|(right, down)| self.normal(Node { column: column + right, row: row + down }));

@@ -23,15 +23,15 @@ mod recover;
 mod sorted;
 mod trade;
 
-pub use contact::{Contact, Cut, CutError, Moved, Side};
+pub use contact::{Contact, Cut, CutError, MoveCounts, Side};
 pub use curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
 pub use grid::{Grid, MOST_NODES, Node, Rect};
 pub use heights::Heights;
 pub use mesh::{HIGHEST_MM, HeightField, INERT, Pins, Shear};
 pub use mesh_error::MeshError;
-pub use plan::{Dropped, Needs, NoPlan, ScenePlan, plan, slower};
-pub use proxy::{Proxy, ProxyError, Touch, TouchState};
-pub use recover::{Recovery, RecoveryError, SETTLED_MM};
+pub use plan::{OmittedPart, Needs, NoPlan, ScenePlan, plan, slower};
+pub use proxy::{Proxy, ProxyError, ProxyTouch, TouchState};
+pub use recover::{Recovery, SurfaceRecoveryError, SETTLED_MM};
 pub use trade::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 
 use chain::Chain;
@@ -103,9 +103,9 @@ pub struct Surface {
 
 /// What a tick did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tick {
+pub struct SurfaceTick {
     /// Work and effect of the contacts.
-    pub moved: Moved,
+    pub moved: MoveCounts,
     /// Every node that may be at another height than before.
     pub dirty: Rect,
     /// Contacts outside the mesh or with a number that is none: they had no effect.
@@ -153,8 +153,8 @@ impl Surface {
     }
 
     /// One tick of recovery, then the contacts one after the other.
-    pub fn tick(&mut self, contacts: &[Contact]) -> Tick {
-        let mut told = Tick { dirty: self.field.displaced.bounds(), ..Tick::default() };
+    pub fn tick(&mut self, contacts: &[Contact]) -> SurfaceTick {
+        let mut told = SurfaceTick { dirty: self.field.displaced.bounds(), ..SurfaceTick::default() };
         let mut recovery = self.recovery;
         let mut rest = contacts;
         loop {
@@ -181,18 +181,18 @@ impl Surface {
         }
     }
 
-    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> Moved {
+    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> MoveCounts {
         let Self { field, solver, cut, .. } = self;
         if let Solver::Envelope(shape) = solver {
             return envelope::tick(field, shape, recovery, *cut, pokes);
         }
         recovery.step_field(field);
-        let mut moved = Moved::default();
+        let mut moved = MoveCounts::default();
         for &poke in pokes {
             moved.add(match solver {
                 Solver::Chain { shear, chain } => chain.poke(field, *shear, *cut, poke),
                 Solver::Sorted(sorted) => sorted.poke(field, *cut, poke),
-                Solver::Envelope(_) => Moved::default(),
+                Solver::Envelope(_) => MoveCounts::default(),
             });
         }
         moved

@@ -27,7 +27,7 @@ pub struct Needs {
 
 /// What a plan leaves out, beside the most exact that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Dropped {
+pub struct OmittedPart {
     /// What, in words.
     pub what: String,
     /// The error of that part with it left out.
@@ -56,7 +56,7 @@ pub struct ScenePlan {
     /// Expected time of a tick in microseconds.
     pub cost_us: f64,
     /// What was left out.
-    pub dropped: Vec<Dropped>,
+    pub dropped: Vec<OmittedPart>,
     /// Parts without effect, and why.
     pub inert: [(&'static str, &'static str); 2],
 }
@@ -201,7 +201,7 @@ impl SceneCurves {
     }
 
     /// Part by part, what the most exact measured would be instead.
-    fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<Dropped> {
+    fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<OmittedPart> {
         let ScenePlan { mesh, cut, step, family, .. } = plan;
         let finest = most_exact(&self.meshes, |point| (point.error_mm, point.cost_us));
         let widest = most_exact(&self.cuts, |point| (point.error_mm, point.cost_share));
@@ -211,7 +211,7 @@ impl SceneCurves {
         let mut drop = |what: String, error: [f64; 2], unit, saved_us: f64| {
             // What is as exact as the most exact leaves nothing out.
             if error[0] > error[1] {
-                dropped.push(Dropped { what, error: error[0], unit, saved_us: slower * saved_us });
+                dropped.push(OmittedPart { what, error: error[0], unit, saved_us: slower * saved_us });
             }
         };
         if let Some(finest) = finest {

@@ -63,7 +63,7 @@ pub enum TouchState {
 
 /// What a device at a place touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct ProxyTouch {
     /// Whether, and why not.
     pub state: TouchState,
     /// The contact point in mm; without contact where the device is.
@@ -73,12 +73,12 @@ pub struct Touch {
     /// True unit normal of the surface at the contact point.
     pub normal: [f64; 3],
     /// Smooth unit normal there, for a force without edges; signs and depths take the true one.
-    pub shaded: [f64; 3],
+    pub shading_normal: [f64; 3],
     /// The way from the device to the contact point without its part along the normal, in mm.
     pub aside: [f64; 3],
 }
 
-impl Touch {
+impl ProxyTouch {
     /// Whether the device touches.
     pub fn is_contact(&self) -> bool {
         matches!(self.state, TouchState::Sticks | TouchState::Slides)
@@ -99,7 +99,7 @@ impl Touch {
             point,
             depth: 0.0,
             normal: [0.0, 0.0, 1.0],
-            shaded: [0.0, 0.0, 1.0],
+            shading_normal: [0.0, 0.0, 1.0],
             aside: [0.0; 3],
         }
     }
@@ -120,10 +120,10 @@ impl Proxy {
     }
 
     /// One tick: the device is at `device` (mm).
-    pub fn follow(&mut self, surface: Heights, device: [f64; 3]) -> Touch {
+    pub fn follow(&mut self, surface: Heights, device: [f64; 3]) -> ProxyTouch {
         if !device.iter().all(|part| part.is_finite()) {
             let at = self.last.unwrap_or_default();
-            return Touch::without(TouchState::NotANumber, at);
+            return ProxyTouch::without(TouchState::NotANumber, at);
         }
         let [x, y, z] = device;
         let below = surface.at(x, y).map(|(height, _)| z < height);
@@ -135,7 +135,7 @@ impl Proxy {
         };
         if let Some(state) = state {
             self.at = None;
-            return Touch::without(state, device);
+            return ProxyTouch::without(state, device);
         }
         let (from, entered) = match self.at {
             Some(at) => (at, false),
@@ -147,7 +147,7 @@ impl Proxy {
             // Below the surface and yet not under the plane of the contact point, as behind a ridge:
             // the contact begins anew above the device.
             self.at = Some([x, y]);
-            touch(surface, [x, y], device, true).unwrap_or(Touch::without(TouchState::Free, device))
+            touch(surface, [x, y], device, true).unwrap_or(ProxyTouch::without(TouchState::Free, device))
         })
     }
 
@@ -232,16 +232,16 @@ fn goal(surface: Heights, from: [f64; 2], device: [f64; 3]) -> [f64; 2] {
 }
 
 /// The contact at a place, if the device is under its plane.
-fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Option<Touch> {
+fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Option<ProxyTouch> {
     let (point, normal) = on(surface, at)?;
     let way = minus(point, device);
     let depth = dot(way, normal);
-    (depth > 0.0).then(|| Touch {
+    (depth > 0.0).then(|| ProxyTouch {
         state: if slides { TouchState::Slides } else { TouchState::Sticks },
         point,
         depth,
         normal,
-        shaded: surface.shaded(at[0], at[1]).unwrap_or(normal),
+        shading_normal: surface.shading_normal(at[0], at[1]).unwrap_or(normal),
         aside: [0, 1, 2].map(|axis| way[axis] - depth * normal[axis]),
     })
 }

@@ -31,10 +31,10 @@ pub struct Recovery {
 #[error(
     "a recovery with a time constant of {tau} s at ticks of {tick} s is not possible; the tick is a finite time above zero, the time constant zero or more (infinite: never)"
 )]
-pub struct RecoveryError {
+pub struct SurfaceRecoveryError {
     /// Time constant in s.
     pub tau: f64,
-    /// Tick in s.
+    /// SurfaceTick in s.
     pub tick: f64,
 }
 
@@ -46,10 +46,10 @@ impl Recovery {
     pub const NONE: Self = Self { share: 0.0, creep: 0.0 };
 
     /// With a time constant, such as the `tau_eps` of the force model, at a constant tick.
-    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, RecoveryError> {
+    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, SurfaceRecoveryError> {
         let (tau, tick) = (tau.0, tick.0);
         if !(tick > 0.0 && tick.is_finite() && tau >= 0.0) {
-            return Err(RecoveryError { tau, tick });
+            return Err(SurfaceRecoveryError { tau, tick });
         }
         // tau = 0 gives exp(-inf) = 0: elastic.
         let share = -(-tick / tau).exp_m1();

@@ -8,7 +8,7 @@
 //! `z` itself keeps to the limits; so the largest first settles every node at `min(z, D)`.
 
 use super::chain::{Stamps, allowed, beyond, finish, unmoved};
-use super::contact::{Cut, Moved, Poke, Side};
+use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node};
 use super::mesh::HeightField;
 use std::collections::BinaryHeap;
@@ -54,7 +54,7 @@ impl Sorted {
     }
 
     /// One pass for one contact.
-    pub(super) fn poke(&mut self, field: &mut HeightField, cut: Cut, poke: Poke) -> Moved {
+    pub(super) fn poke(&mut self, field: &mut HeightField, cut: Cut, poke: Poke) -> MoveCounts {
         self.stamps.begin();
         self.heap.clear();
         match poke.side {
@@ -63,11 +63,11 @@ impl Sorted {
         }
     }
 
-    fn spread<const PULL: bool>(&mut self, field: &mut HeightField, cut: Cut, poke: Poke) -> Moved {
+    fn spread<const PULL: bool>(&mut self, field: &mut HeightField, cut: Cut, poke: Poke) -> MoveCounts {
         if let Some(told) = unmoved::<PULL>(field, poke) {
             return told;
         }
-        let mut told = Moved::default();
+        let mut told = MoveCounts::default();
         self.rows = [poke.node.row, poke.node.row + 1];
         self.put::<PULL>(field, cut, poke, [poke.node, poke.node], poke.z, &mut told);
         while let Some(next) = self.heap.pop() {
@@ -92,7 +92,7 @@ impl Sorted {
         poke: Poke,
         [node, sponsor]: [Node; 2],
         z: f64,
-        told: &mut Moved,
+        told: &mut MoveCounts,
     ) {
         let index = field.grid.index(node);
         field.now[index] = z;

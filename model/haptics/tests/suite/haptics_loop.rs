@@ -1,7 +1,7 @@
 //! Device, hand and loop together: rows L1 to L7, L10 and L11. Figures are printed; run with `--nocapture` to read them.
 
 use crate::renderer::{Rendered, Renderer, RunTick, run};
-use palpate_haptics::closed_loop::{Command, Plant, PlantSettings};
+use palpate_haptics::closed_loop::{PlantCommand, HapticPlant, PlantSettings};
 use palpate_haptics::margin::{Device, Watch};
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::{
@@ -21,7 +21,7 @@ fn period(us: u64) -> Period {
 }
 
 /// L7 in every run: the energies of all ports and losses add up, and no loss is a gain.
-fn balanced(plant: &Plant, started_with: f64) {
+fn balanced(plant: &HapticPlant, started_with: f64) {
     let all = plant.energies();
     let put_in = all.motor + all.hand + started_with;
     let gone = all.damping + all.friction + plant.kinetic();
@@ -36,8 +36,8 @@ fn play(
     mut renderer: Renderer,
     seconds: f64,
     seen: impl FnMut(&RunTick) -> bool,
-) -> Plant {
-    let mut plant = Plant::new(settings);
+) -> HapticPlant {
+    let mut plant = HapticPlant::new(settings);
     let ticks = (seconds / settings.period.seconds().0).round() as u64;
     run(&mut plant, &mut renderer, ticks, seen);
     let mass = inertia(settings.mass_kg + settings.hand.mass_kg);
@@ -230,7 +230,7 @@ fn swing_about(
         ..PlantSettings::bare(period)
     };
     let law = LawSettings {
-        pull: palpate_haptics::Pull::AsModel,
+        pull: palpate_haptics::PullPolicy::AsModel,
         ..LawSettings::of::<3>(THESIS, period)
     };
     let law = ForceLaw::new(law, Depth(depth)).expect("a law");
@@ -423,19 +423,19 @@ fn after_a_stall_the_force_ramps() {
             let wall = Rendered::Wall { stiffness: 0.3 };
             let mut renderer =
                 Renderer::new(wall, &settings, Some(&guard), Some(&ControllerSettings::of(0.11)));
-            let mut plant = Plant::new(&settings);
+            let mut plant = HapticPlant::new(&settings);
             let (mut last, mut worst, mut full) = (0.0f64, 0.0f64, 0.0f64);
             let mut tick = 0;
             while tick < 1500 {
                 let one = renderer.tick(plant.sense(), 1);
                 worst = worst.max((one.force.0 - last).abs());
                 last = one.force.0;
-                plant.tick(Command::Force(one.force));
+                plant.tick(PlantCommand::Force(one.force));
                 tick += 1;
                 if tick == 200 {
                     for _ in 0..stall_ms {
                         let held = if lets_go { Newtons(0.0) } else { one.force };
-                        plant.tick(Command::Force(held));
+                        plant.tick(PlantCommand::Force(held));
                     }
                     last = if lets_go { 0.0 } else { last };
                     let x = plant.sense().place;
@@ -448,7 +448,7 @@ fn after_a_stall_the_force_ramps() {
                     );
                     worst = worst.max((back.force.0 - last).abs());
                     last = back.force.0;
-                    plant.tick(Command::Force(back.force));
+                    plant.tick(PlantCommand::Force(back.force));
                     tick += stall_ms + 1;
                 }
                 full = full.max(one.force.0);

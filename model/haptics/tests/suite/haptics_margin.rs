@@ -2,7 +2,7 @@
 
 use palpate_haptics::Period;
 use palpate_haptics::margin::{
-    Cause, Device, Linear, Sampled, Watch, active_cycles, active_pokes, criterion,
+    Cause, Device, Linear, SampledStep, Watch, active_cycles, active_pokes, criterion,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::{ModifiedKelvin, admissibility};
@@ -12,7 +12,7 @@ use palpate_rheology::integrators::{Scheme, SeriesBody};
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 
 /// The right side of the criterion as its paper writes it, in plain complex numbers.
-fn as_written(sampled: &Sampled, delay: f64, th: f64) -> f64 {
+fn as_written(sampled: &SampledStep, delay: f64, th: f64) -> f64 {
     type C = (f64, f64);
     let times = |a: C, b: C| (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0);
     let over = |a: C, b: C| {
@@ -33,14 +33,14 @@ fn as_written(sampled: &Sampled, delay: f64, th: f64) -> f64 {
 #[test]
 fn known_walls() {
     let spring = Linear::spring(2.0);
-    let wall = Sampled::of(&spring, Scheme::Exact, 1e-3);
+    let wall = SampledStep::of(&spring, Scheme::Exact, 1e-3);
     for (delay, wanted) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
         let (needed, _) = criterion::needed(&wall, delay);
         assert!((needed / wanted - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
     let damped = Linear { damping: 3e-3, ..spring };
-    let wall = Sampled::of(&damped, Scheme::Exact, 1e-3);
+    let wall = SampledStep::of(&damped, Scheme::Exact, 1e-3);
     let (needed, th) = criterion::needed(&wall, 0.0);
     assert!((needed / 4e-3 - 1.0).abs() < 1e-12 && (th - std::f64::consts::PI).abs() < 1e-6);
 }
@@ -61,7 +61,7 @@ fn two_ends_are_the_whole_criterion_without_delay() {
             if scheme.stability_limit().is_some_and(|limit| tick / linear.tau >= limit) {
                 continue;
             }
-            let sampled = Sampled::of(&linear, scheme, tick);
+            let sampled = SampledStep::of(&linear, scheme, tick);
             let ends = sampled.slow().max(sampled.fast());
             let (needed, _) = criterion::needed(&sampled, 0.0);
             let size = linear.stiffness * (tick + linear.tau) + linear.damping;
@@ -86,14 +86,14 @@ fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
     {
         let linear = Linear { stiffness: k0, damping: c0, tau };
         let k_inf: f64 = c0 / tau;
-        let exact = Sampled::of(&linear, Scheme::Exact, tick);
+        let exact = SampledStep::of(&linear, Scheme::Exact, tick);
         let slow = k0 * tick / 2.0 + k0 * tau - c0;
         assert!((exact.slow() - slow).abs() < 1e-12 * (slow.abs() + c0));
         // At the fast end k_inf T/2 is the limit of short ticks; the next term is (T/tau)^2 / 12 of k_inf and k0.
         let h = tick / tau;
         let miss = (exact.fast() - 0.5 * k_inf * tick).abs();
         assert!(miss < 0.5 * tick * (k_inf + k0) * h, "{miss:e}");
-        let left = Sampled::of(&linear, Scheme::ExponentialLeft, tick);
+        let left = SampledStep::of(&linear, Scheme::ExponentialLeft, tick);
         let kept = (-h).exp();
         let wanted = 1.5 * k0 * tick + k0 * tick * kept / (1.0 - kept) - c0;
         assert!((left.slow() - wanted).abs() < 1e-12 * (wanted.abs() + c0));
@@ -137,7 +137,7 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
         assert!(whole.needed <= quick.needed + 1e-3 * size, "{watch:?} {quick:?} {whole:?}");
         if watch.device.delay_ticks == 0.0 {
             let (needed, _) = criterion::needed(
-                &Sampled::of(
+                &SampledStep::of(
                     &Linear::of(&watch.body, depth),
                     watch.scheme,
                     watch.period.seconds().0,

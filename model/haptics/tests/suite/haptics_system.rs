@@ -6,7 +6,7 @@ use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::simulation::{Simulation, SimulationSettings};
 use palpate_haptics::{
     BiasCalibration, BiasError, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags,
-    ForceGuard, GuardSettings, Input, LawSettings, MasterSlave, MasterSlaveSettings, Period,
+    ForceGuard, GuardSettings, MasterSlaveInput, LawSettings, MasterSlave, MasterSlaveSettings, Period,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -14,8 +14,8 @@ use palpate_model::{Depth, Newtons, Seconds, Volts};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 
-fn input(counts: i64, cell: f64) -> Input {
-    Input { counts, elapsed: 1, cell: Newtons(cell), slave_pulses: None, is_on: true }
+fn input(counts: i64, cell: f64) -> MasterSlaveInput {
+    MasterSlaveInput { counts, elapsed: 1, cell: Newtons(cell), slave_pulses: None, is_on: true }
 }
 
 /// L8: a force at the threshold with noise: contact comes and goes hundreds of times a second without hysteresis and not
@@ -274,7 +274,7 @@ fn a_late_slave_lags_and_turns_the_impedance() {
                     let counts = (place(t) / count).round() as i64;
                     // The slave is where it was sent so many ticks before; with no delay where it is sent now.
                     let reported = (late > 0).then(|| sent[sent.len().saturating_sub(late)]);
-                    let one = Input { slave_pulses: reported, ..input(counts, 1.0) };
+                    let one = MasterSlaveInput { slave_pulses: reported, ..input(counts, 1.0) };
                     let output = system.tick(&one);
                     let snapshot = system.snapshot();
                     sent.push(snapshot.pulses);
@@ -331,11 +331,11 @@ fn stalls_and_switches_of_the_whole_are_ramped() {
     }
     assert!(simulation.system().snapshot().force.0 > 1.0);
     let mut system = *simulation.system();
-    let one = Input { counts: system.snapshot().counts, ..input(0, 1.0) };
+    let one = MasterSlaveInput { counts: system.snapshot().counts, ..input(0, 1.0) };
     for i in 0..400 {
         let before = system.snapshot().force.0;
         let is_on = i > 100;
-        let output = system.tick(&Input { is_on, ..one });
+        let output = system.tick(&MasterSlaveInput { is_on, ..one });
         assert!((output.force.0 - before).abs() <= 0.5 + 1e-12);
         assert_eq!(output.flags.has(Flags::OFF), !is_on);
         assert_eq!(output.flags.has(Flags::SOFT_START), is_on);
@@ -473,7 +473,7 @@ fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
         [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, f64::MIN_POSITIVE, -0.0];
     let mut random = SplitMix::seeded(29);
     let mut counts = 0i64;
-    let inputs: Vec<Input> = (0..50_000)
+    let inputs: Vec<MasterSlaveInput> = (0..50_000)
         .map(|i| {
             counts = match random.below(500) {
                 0 => i64::MAX,
@@ -481,7 +481,7 @@ fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
                 2 => 0,
                 _ => counts.saturating_add(random.below(9) as i64 - 3),
             };
-            Input {
+            MasterSlaveInput {
                 elapsed: [1, 1, 1, 1, 1, 1, 0, 7, 5000, u64::MAX][random.below(10)],
                 cell: Newtons(if i % 17 == 0 {
                     wild[random.below(wild.len())]
@@ -540,7 +540,7 @@ fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
         }
     }
     let whole = again.snapshot();
-    let torn = palpate_haptics::Snapshot { tick: whole.tick ^ 1, ..whole };
+    let torn = palpate_haptics::MasterSlaveSnapshot { tick: whole.tick ^ 1, ..whole };
     assert!(!torn.is_whole());
 }
 

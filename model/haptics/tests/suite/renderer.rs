@@ -1,6 +1,6 @@
 //! A loop of a spring or a law on a simulated device, with or without guard and controller.
 
-use palpate_haptics::closed_loop::{Command, Plant, PlantSettings, Sensed};
+use palpate_haptics::closed_loop::{PlantCommand, HapticPlant, PlantSettings, SensedPosition};
 use palpate_haptics::{
     BuzzDetector, BuzzSettings, ControllerSettings, Flags, ForceGuard, ForceLaw, GuardSettings,
     PassivityController, PassivityObserver, Period,
@@ -35,7 +35,7 @@ pub struct Renderer {
     buzz: BuzzDetector,
     count_mm: f64,
     period: Period,
-    last: Option<Sensed>,
+    last: Option<SensedPosition>,
 }
 
 /// What a renderer did in a tick.
@@ -76,7 +76,7 @@ impl Renderer {
     }
 
     /// One tick, `elapsed` ticks after the last.
-    pub fn tick(&mut self, sensed: Sensed, elapsed: u64) -> RendererTick {
+    pub fn tick(&mut self, sensed: SensedPosition, elapsed: u64) -> RendererTick {
         let x = sensed.place;
         let moved = x - self.last.unwrap_or(sensed).place;
         self.last = Some(sensed);
@@ -132,14 +132,14 @@ pub struct RunTick {
 
 /// Runs a loop from its start for so many ticks and shows each to `seen`, which ends it by returning false.
 pub fn run(
-    plant: &mut Plant,
+    plant: &mut HapticPlant,
     renderer: &mut Renderer,
     ticks: u64,
     mut seen: impl FnMut(&RunTick) -> bool,
 ) {
     for tick in 1..=ticks {
         let rendered = renderer.tick(plant.sense(), 1);
-        plant.tick(Command::Force(rendered.force));
+        plant.tick(PlantCommand::Force(rendered.force));
         let [x, v] = plant.motion();
         let one = RunTick {
             t: renderer.period.time_of(tick).seconds(),

@@ -55,7 +55,7 @@ fn a_device_under_a_constant_force_moves_as_mass_and_damping_say() {
         assert!((x[0] - place).abs() < 1e-4 * place.abs().max(1e-3), "{t}: {x:?} {place}");
         assert!((x[2] + 2.0 * place).abs() < 2e-4 * place.abs().max(1e-3), "{t}");
         assert_eq!(x[1], 0.0);
-        // Sensed within half a step, in whole steps.
+        // SensedPosition within half a step, in whole steps.
         let sensed = device.pose().at[0];
         assert!((sensed - x[0]).abs() <= 0.5 * settings.step_mm + 1e-12);
         let steps = sensed / settings.step_mm;
@@ -108,13 +108,13 @@ fn energy_never_comes_out_of_a_device_whatever_it_is_told() {
 #[test]
 fn a_force_beyond_the_device_keeps_its_direction_and_is_told() {
     let settings = DeviceSettings::default();
-    let (force, is_less) = settings.given([3.0, 4.0, 12.0]);
+    let (force, is_less) = settings.limit_force([3.0, 4.0, 12.0]);
     assert!(is_less);
     for (part, of) in force.iter().zip([3.0, 4.0, 12.0]) {
         assert!((part - of * 3.3 / 13.0).abs() < 1e-12);
     }
-    assert_eq!(settings.given([1.0, -2.0, 2.0]), ([1.0, -2.0, 2.0], false));
-    assert_eq!(settings.given([f64::NAN; 3]), ([0.0; 3], true));
+    assert_eq!(settings.limit_force([1.0, -2.0, 2.0]), ([1.0, -2.0, 2.0], false));
+    assert_eq!(settings.limit_force([f64::NAN; 3]), ([0.0; 3], true));
 }
 
 #[test]

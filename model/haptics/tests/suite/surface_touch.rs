@@ -2,7 +2,7 @@
 
 use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, Recovery, Shear, Side, Surface,
-    Touch, TouchState,
+    ProxyTouch, TouchState,
 };
 use palpate_test_support::naive_surface as naive;
 use palpate_test_support::record::Noise;
@@ -50,7 +50,7 @@ fn normals_of_a_plane_are_its_normal_everywhere() {
             let (z, normal) = plane.at(x, y).unwrap();
             assert!((z - a * x - b * y).abs() < 1e-12);
             assert!(apart(normal, expected) < 1e-12);
-            assert!(apart(plane.shaded(x, y).unwrap(), expected) < 1e-12);
+            assert!(apart(plane.shading_normal(x, y).unwrap(), expected) < 1e-12);
         }
         assert!(plane.at(4.9, 0.0).is_none() && plane.at(0.0, f64::NAN).is_none());
     }
@@ -168,14 +168,14 @@ fn on_a_slope_a_contact_slips_where_the_slope_is_more_than_the_friction() {
 }
 
 /// A wavy surface and random paths over and into it.
-fn wander(friction: f64, most_step: f64, mut see: impl FnMut(Option<&Touch>, &Touch, [f64; 3])) {
+fn wander(friction: f64, most_step: f64, mut see: impl FnMut(Option<&ProxyTouch>, &ProxyTouch, [f64; 3])) {
     let grid = Grid::new(61, 61, 0.5).expect("a grid");
     let waves = heights(&grid, |x, y| (0.5 * x).sin() + (0.4 * y).cos());
     let waves = Heights::new(grid, &waves).expect("heights");
     let mut random = Noise::seeded(3);
     let mut proxy = Proxy::new(friction, most_step).expect("a proxy");
     let mut device = [15.0, 15.0, 3.0];
-    let mut last: Option<Touch> = None;
+    let mut last: Option<ProxyTouch> = None;
     for tick in 0..20_000 {
         let z = -4.0 * (0.01 * f64::from(tick)).sin();
         device[0] = (device[0] + 0.05 * random.normal()).clamp(0.0, 30.0);
@@ -196,7 +196,7 @@ fn the_contact_point_is_on_the_surface_within_its_cone_and_its_step() {
         if touch.is_contact() {
             contacts += 1;
             assert!(touch.depth > 0.0);
-            assert!((dot(touch.shaded, touch.shaded) - 1.0).abs() < 1e-12);
+            assert!((dot(touch.shading_normal, touch.shading_normal) - 1.0).abs() < 1e-12);
             assert!(dot(touch.aside, touch.normal).abs() < 1e-9);
             let way = [0, 1, 2].map(|axis| touch.point[axis] - device[axis]);
             let parts = [0, 1, 2].map(|a| touch.depth * touch.normal[a] + touch.aside[a]);
