@@ -141,8 +141,11 @@ impl Key {
     /// The value of a text, or what is wrong with it.
     pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
         let value = value.trim();
-        let refused =
-            |expected: String| AboutError::Value { key: self.name, value: value.to_owned(), expected };
+        let refused = |expected: String| AboutError::Value {
+            key: self.name,
+            value: value.to_owned(),
+            expected,
+        };
         match self.kind {
             Kind::Text if value.is_empty() => Err(refused("some words".into())),
             Kind::Text => Ok(value.into()),
@@ -187,11 +190,11 @@ impl About {
     /// What was told, in the order of [`KEYS`], then what this version does not know. Text without quotes.
     pub fn lines(&self) -> Vec<(&str, String)> {
         let place = |name: &str| KEYS.iter().position(|key| key.name == name);
-        let mut told: Vec<(&str, &Value)> =
+        let mut entries: Vec<(&str, &Value)> =
             self.values.iter().map(|(k, v)| (k.as_str(), v)).collect();
-        told.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
+        entries.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
         let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        told.into_iter().map(|(name, value)| (name, plain(value))).collect()
+        entries.into_iter().map(|(name, value)| (name, plain(value))).collect()
     }
 }
 
@@ -290,7 +293,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_refused_with_what_can() {
-        for (pair, told) in [
+        for (pair, expected) in [
             ("specimen.colour=red", "specimen.thickness_mm"),
             ("specimen", "KEY=VALUE"),
             ("specimen.thickness_mm=0", "above 0"),
@@ -303,7 +306,7 @@ mod tests {
         ] {
             let mut labels = Labels::default();
             let refusal = labels.tell_pair(pair).unwrap_err().to_string();
-            assert!(refusal.contains(told), "{pair}: {refusal}");
+            assert!(refusal.contains(expected), "{pair}: {refusal}");
             assert_eq!(labels, Labels::default());
         }
         let mut labels = Labels::default();

@@ -125,8 +125,8 @@ impl Panel {
         for (mark, text) in y_marks {
             let [_, y] = self.at([0.0, *mark]);
             svg.line(&[[left, y], [right, y]], look.grid, 0.6);
-            let beside = [left - 6.0, y + 0.35 * FONT];
-            svg.text(beside, ink.anchored(Anchor::End), text);
+            let at = [left - 6.0, y + 0.35 * FONT];
+            svg.text(at, ink.anchored(Anchor::End), text);
         }
         svg.line(&[[left, top], [left, bottom], [right, bottom]], look.text, 1.0);
         let middle = ink.anchored(Anchor::Middle);

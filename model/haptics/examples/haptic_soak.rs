@@ -5,7 +5,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example speaks to its user")]
 
 use palpate_haptics::{
-    Flags, MasterSlaveInput, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, MasterSlaveSnapshot,
+    Flags, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveSettings,
+    MasterSlaveSnapshot, Period,
 };
 use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;

@@ -101,11 +101,11 @@ fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
         let (node, z) = case.tool(n, tick);
         let contact = [Contact::at(&grid, node, z, Side::Push)];
         let start = Instant::now();
-        let told = black_box(surface.tick(black_box(&contact)));
+        let report = black_box(surface.tick(black_box(&contact)));
         let taken = start.elapsed().as_secs_f64();
         if tick >= ticks / 10 {
             times.push(taken * 1e6);
-            moved += told.moved.moved;
+            moved += report.moved.moved;
         }
     }
     line(method.name(), &mut times, moved as f64 / ticks as f64)

@@ -148,12 +148,12 @@ fn cut(points: &[(f64, f64)]) -> Option<[usize; 2]> {
     // Rounding is no misfit: a part in 1e9 of the whole.
     let floor = 1e-18 * sums.flat(0, n).max(f64::MIN_POSITIVE);
     let score = |from: usize, to: usize| {
-        let left = sums.flat(0, from) + sums.line(from, to) + sums.flat(to, n);
+        let residual = sums.flat(0, from) + sums.line(from, to) + sums.flat(to, n);
         // A cut has a level and a place, and a place is chosen among many: twice what a number costs, as for change
         // points (Zhang & Siegmund, Biometrics 63 (2007) 22-32), and once more for the level's own scatter.
         let cuts = usize::from(from > 0) + usize::from(to < n);
         let numbers = (2 + 4 * cuts) as f64;
-        n as f64 * ((left + floor) / n as f64).ln() + numbers * (n as f64).ln()
+        n as f64 * ((residual + floor) / n as f64).ln() + numbers * (n as f64).ln()
     };
     let all = (0..=n - LINE_MIN).flat_map(|from| (from + LINE_MIN..=n).map(move |to| [from, to]));
     // A flat of one point is that point's error.
@@ -193,7 +193,7 @@ impl Branch {
         mean(self.line())
     }
 
-    fn told(&self, slope: f64) -> BiasBranch {
+    fn summary(&self, slope: f64) -> BiasBranch {
         let (u, f) = self.means();
         let [from, to] = self.ends;
         let level = |points: &[(f64, f64)]| (!points.is_empty()).then(|| Newtons(mean(points).1));
@@ -245,8 +245,8 @@ impl BiasCalibration {
         Ok(Self {
             slope,
             slope_error,
-            rising: rising.told(slope),
-            falling: falling.as_ref().map(|branch| branch.told(slope)),
+            rising: rising.summary(slope),
+            falling: falling.as_ref().map(|branch| branch.summary(slope)),
             residual,
             points: count,
         })

@@ -96,7 +96,8 @@ impl CheckSettings {
             ("depth", self.depth.0, "mm"),
             ("samples", self.samples_hz, "Hz"),
         ];
-        let refusal = |name, value, unit, should| FeedbackCheckError::Setting { name, value, unit, should };
+        let refusal =
+            |name, value, unit, should| FeedbackCheckError::Setting { name, value, unit, should };
         for (name, value, unit) in above {
             if !(value > 0.0 && value.is_finite()) {
                 let should = "it is a finite number above zero";

@@ -5,7 +5,8 @@
 //! [`HapticPlant::sense`] and [`HapticPlant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
 
 use super::rig::{
-    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
+    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces,
+    ThermalState,
 };
 use super::{DELAY_MAX, Period};
 use palpate_model::units::{MmPerS, Newtons};

@@ -21,7 +21,8 @@ pub struct GuardSettings {
     pub contact_ramp: Seconds,
     /// The drive lets go by itself after so long without a command; `None` for one that holds the last
     /// command for ever.
-    pub lets_go_after: Option<Seconds>,
+    #[serde(rename = "lets_go_after")]
+    pub release_after: Option<Seconds>,
 }
 
 impl Default for GuardSettings {
@@ -36,7 +37,7 @@ impl Default for GuardSettings {
             stall: Seconds(0.005),
             stall_ramp: Seconds(0.25),
             contact_ramp: Seconds(0.02),
-            lets_go_after: None,
+            release_after: None,
         }
     }
 }
@@ -50,7 +51,7 @@ impl GuardSettings {
         stall: Seconds(1e3),
         stall_ramp: Seconds(0.0),
         contact_ramp: Seconds(0.0),
-        lets_go_after: None,
+        release_after: None,
     };
 }
 
@@ -63,7 +64,7 @@ pub struct ForceGuard {
     force_max: f64,
     change_max: f64,
     stall: u64,
-    lets_go_after: Option<u64>,
+    release_after: Option<u64>,
     start: Ramp,
     after_stall: Ramp,
     after_contact: Ramp,
@@ -113,7 +114,7 @@ impl ForceGuard {
             force_max: bound(settings.force_max.0),
             change_max: bound(settings.slew_n_per_ms) * period.millis(),
             stall: period.ticks_in(settings.stall),
-            lets_go_after: settings.lets_go_after.map(|span| period.ticks_in(span)),
+            release_after: settings.release_after.map(|span| period.ticks_in(span)),
             start: Ramp::new(period, settings.soft_start, false),
             after_stall: Ramp::new(period, settings.stall_ramp, true),
             after_contact: Ramp::new(period, settings.contact_ramp, false),
@@ -136,7 +137,7 @@ impl ForceGuard {
     /// Bounds `force`, `elapsed` ticks after the last call: one, unless the loop was away.
     #[must_use]
     pub fn tick(&mut self, force: Newtons, is_touching: bool, elapsed: u64) -> GuardTick {
-        if self.lets_go_after.is_some_and(|ticks| elapsed > ticks) {
+        if self.release_after.is_some_and(|ticks| elapsed > ticks) {
             self.last = 0.0;
         }
         if elapsed > self.stall {
@@ -253,7 +254,7 @@ mod tests {
     #[test]
     fn a_drive_that_lets_go_is_met_at_zero() {
         let settings = GuardSettings {
-            lets_go_after: Some(Seconds(0.02)),
+            release_after: Some(Seconds(0.02)),
             soft_start: Seconds(0.0),
             ..GuardSettings::default()
         };

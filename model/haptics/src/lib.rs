@@ -37,14 +37,15 @@ mod torque;
 
 pub use buzz::{Buzz, BuzzDetector, BuzzSettings};
 pub use calibrate::{BiasBranch, BiasCalibration, BiasError, BiasPoint};
-pub use contact::{ContactDetector, ContactThresholdError, ContactSettings};
+pub use contact::{ContactDetector, ContactSettings, ContactThresholdError};
 pub use controller::{ControllerSettings, ControllerTick, PassivityController};
 pub use device::HapticDevice;
 pub use flags::Flags;
 pub use force::{ForceLaw, LawError, LawSettings, LawTick, PullPolicy};
 pub use guard::{ForceGuard, GuardSettings, GuardTick};
 pub use master_slave::{
-    MasterSlaveInput, MasterSlave, MasterSlaveError, MasterSlaveSettings, MasterSlaveOutput, MasterSlaveSnapshot,
+    MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
+    MasterSlaveSnapshot,
 };
 pub use observer::{DELAY_MAX, PassivityObserver};
 pub use period::{Period, PeriodError};

@@ -21,14 +21,14 @@ pub const DELAY_MAX: usize = 32;
 
 impl Default for PassivityObserver {
     fn default() -> Self {
-        Self::late(0)
+        Self::with_delay(0)
     }
 }
 
 impl PassivityObserver {
     /// For forces that come so many ticks late, at most [`DELAY_MAX`].
     #[must_use]
-    pub fn late(delay_ticks: usize) -> Self {
+    pub fn with_delay(delay_ticks: usize) -> Self {
         Self {
             energy: 0.0,
             carry: 0.0,
@@ -46,12 +46,12 @@ impl PassivityObserver {
     /// The device moved by `moved` mm under the force held, and feels `force` N from now on. What is not
     /// a number counts as zero.
     pub fn tick(&mut self, moved: f64, force: f64) {
-        self.moved(moved);
+        self.record_move(moved);
         self.hold(force);
     }
 
     /// The first half of a tick: the energy of a move.
-    pub fn moved(&mut self, moved: f64) {
+    pub fn record_move(&mut self, moved: f64) {
         const RING: usize = DELAY_MAX + 1;
         let work = self.forces[(self.tick + RING - self.delay) % RING] * moved;
         if !work.is_finite() {
@@ -76,7 +76,7 @@ impl PassivityObserver {
     }
 
     /// Keeps this share of what was absorbed; what is owed stays.
-    pub fn keep(&mut self, share: f64) {
+    pub fn scale_credit(&mut self, share: f64) {
         if self.energy > 0.0 {
             self.energy *= share;
             self.carry *= share;
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_late_force_counts_when_it_comes() {
-        let mut late = PassivityObserver::late(2);
+        let mut late = PassivityObserver::with_delay(2);
         let forces = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         for force in forces {
             late.tick(0.5, force);
@@ -127,7 +127,7 @@ mod tests {
         observer.tick(f64::NAN, f64::INFINITY);
         observer.tick(5.0, 1.0);
         assert_eq!(observer.energy(), before);
-        observer.keep(0.5);
+        observer.scale_credit(0.5);
         assert!((observer.energy() - 0.5 * before).abs() < 1e-9);
     }
 }

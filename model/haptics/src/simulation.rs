@@ -1,9 +1,10 @@
 //! The whole system on a simulated device: master, hand, slave and the specimen under it.
 
-use super::closed_loop::{PlantCommand, HapticPlant, PlantSettings, SensedPosition};
+use super::closed_loop::{HapticPlant, PlantCommand, PlantSettings, SensedPosition};
 use super::force::{ForceLaw, LawSettings, PullPolicy};
 use super::master_slave::{
-    MasterSlaveInput, MasterSlave, MasterSlaveError, MasterSlaveSettings, MasterSlaveOutput, MasterSlaveSnapshot,
+    MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
+    MasterSlaveSnapshot,
 };
 use super::rig::{Hand, HandPath};
 use super::torque::{DriveKind, TorqueSettings};
@@ -172,7 +173,8 @@ impl Simulation {
     /// One tick with a slave elsewhere, whose cell felt this last, and with force only if it is wanted.
     pub fn tick_with(&mut self, cell: Newtons, is_on: bool) -> SimulationTick {
         let SensedPosition { counts, .. } = self.plant.sense();
-        let input = MasterSlaveInput { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
+        let input =
+            MasterSlaveInput { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
         self.away = 0;
         self.last = self.system.tick(&input);
         self.command = PlantCommand::Drive(self.torque.drive(self.last.bias));

@@ -1,4 +1,4 @@
-//! From the force to be felt to the bias voltage of the master's motor.
+//! From the force on the hand to the bias voltage of the master's motor.
 
 use super::Flags;
 use super::rig::{DriveInput, Motor, Pinion};
@@ -157,9 +157,9 @@ impl TorqueSettings {
             0.0
         };
         // Friction is against the motion; what helps it is less force against it.
-        let felt = wanted - help * self.friction().0;
-        let torque = felt * self.pinion.radius_mm();
-        let volts = felt * self.volts_per_newton();
+        let effective = wanted - help * self.friction().0;
+        let torque = effective * self.pinion.radius_mm();
+        let volts = effective * self.volts_per_newton();
         let most = self.converter.volts_max;
         let within = volts.clamp(-most, most);
         let bias = match self.converter.bits {

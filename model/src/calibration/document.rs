@@ -291,8 +291,11 @@ impl Calibration {
                     before_g: before.mass_g,
                 });
             }
-            let reading =
-                CalibrationReading { direction: Direction::Loading, volts: here.volts, noise_of_mean: None };
+            let reading = CalibrationReading {
+                direction: Direction::Loading,
+                volts: here.volts,
+                noise_of_mean: None,
+            };
             points.push(CalibrationPoint::averaged(here.mass_g, vec![reading]));
         }
         Ok(points)
@@ -315,7 +318,10 @@ impl Calibration {
         readings.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let groups = readings.chunk_by(|(a, _), (b, _)| b - a <= SAME_MASS);
         let point = |group: &[(f64, CalibrationReading)]| {
-            CalibrationPoint::averaged(group[0].0, group.iter().map(|(_, reading)| *reading).collect())
+            CalibrationPoint::averaged(
+                group[0].0,
+                group.iter().map(|(_, reading)| *reading).collect(),
+            )
         };
         Ok(groups.map(point).collect())
     }

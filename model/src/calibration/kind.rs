@@ -125,7 +125,8 @@ fn miss(points: &[CalibrationPoint], i: usize, j: usize) -> f64 {
 
 /// Which points have these masses: in order, from the first to the last.
 fn break_indices(points: &[CalibrationPoint], through_g: &[f64]) -> Option<Vec<usize>> {
-    let near = |point: &CalibrationPoint, mass: f64| (point.mass_g - mass).abs() <= 1e-6 * (1.0 + mass);
+    let near =
+        |point: &CalibrationPoint, mass: f64| (point.mass_g - mass).abs() <= 1e-6 * (1.0 + mass);
     let place = |&mass: &f64| points.iter().position(|point| near(point, mass));
     let breaks: Vec<usize> = through_g.iter().map(place).collect::<Option<_>>()?;
     let is_whole = breaks.first() == Some(&0) && breaks.last() == Some(&(points.len() - 1));

@@ -2,7 +2,7 @@
 
 use super::CalibrationError;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, CalibrationPoint};
+use super::document::{Calibration, CalibrationPoint, Direction};
 use super::uncertainty::ForceUncertainty;
 use crate::units::{Newtons, Volts};
 use serde::Serialize;
@@ -198,7 +198,11 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The flat stretch, as it shows to somebody who lays weight after weight: it begins where the next weight
 /// hardly moves the signal and goes on as long as the signal, seen from there, lags behind.
-fn flat(points: &[CalibrationPoint], curve: &Curve, uncertainty: &ForceUncertainty) -> Option<FlatStretch> {
+fn flat(
+    points: &[CalibrationPoint],
+    curve: &Curve,
+    uncertainty: &ForceUncertainty,
+) -> Option<FlatStretch> {
     let chord = |i: usize, j: usize| {
         (points[j].volts.0 - points[i].volts.0) / (points[j].newtons.0 - points[i].newtons.0)
     };

@@ -8,7 +8,7 @@
 use super::CalibrationError;
 use super::choice::left_out_volts;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, CalibrationPoint};
+use super::document::{Calibration, CalibrationPoint, Direction};
 use super::quality::{repeatability, rms};
 use crate::units::{Newtons, Volts};
 use serde::{Deserialize, Serialize};
@@ -369,7 +369,10 @@ impl<'a> ComponentBuilder<'a> {
 }
 
 /// Standard deviation in V of the mean of directions' means; `None` if a reading's own is not known.
-fn mean_sigma(point: &CalibrationPoint, sigma: impl Fn(&super::CalibrationReading) -> Option<Volts>) -> Option<f64> {
+fn mean_sigma(
+    point: &CalibrationPoint,
+    sigma: impl Fn(&super::CalibrationReading) -> Option<Volts>,
+) -> Option<f64> {
     let mut square = 0.0;
     let mut ways = 0;
     for direction in [Direction::Loading, Direction::Unloading] {

@@ -168,7 +168,8 @@ impl Calibration {
         let digit = self.reading_resolution().unwrap_or(Volts(0.0)).0;
         let allowed = spread.max(digit);
         for direction in [Direction::Loading, Direction::Unloading] {
-            let mean = |point: &super::CalibrationPoint| Some((point.mass_g, point.mean(direction)?.0));
+            let mean =
+                |point: &super::CalibrationPoint| Some((point.mass_g, point.mean(direction)?.0));
             let taken: Vec<(f64, f64)> = points.iter().filter_map(mean).collect();
             let fall = taken.windows(2).find(|pair| pair[0].1 - pair[1].1 > allowed);
             if let Some(&[(before_g, before_volts), (mass_g, volts)]) = fall {

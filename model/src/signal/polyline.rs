@@ -252,8 +252,8 @@ fn walk([from, to]: [[f64; 2]; 2], mut visit: impl FnMut([usize; 2]) -> bool) {
     let between = way.map(|way| if way == 0.0 { f64::INFINITY } else { CELL / way.abs() });
     // As many steps as there are edges: rounding cannot make it go on.
     let steps = (last[0] - cell[0]).abs() + (last[1] - cell[1]).abs();
-    for left in (0..=steps).rev() {
-        if !visit(cell.map(|one| one.max(0) as usize)) || left == 0 {
+    for remaining in (0..=steps).rev() {
+        if !visit(cell.map(|one| one.max(0) as usize)) || remaining == 0 {
             return;
         }
         let is_there = [cell[0] == last[0], cell[1] == last[1]];

@@ -241,7 +241,11 @@ impl Pyramid {
         }
         if column == 1 {
             for (value, index) in self.values[from..to].iter().zip(from..) {
-                draw(if value.is_finite() { PyramidMark::Point(index, *value) } else { PyramidMark::Gap });
+                draw(if value.is_finite() {
+                    PyramidMark::Point(index, *value)
+                } else {
+                    PyramidMark::Gap
+                });
             }
             return;
         }

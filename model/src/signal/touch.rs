@@ -13,7 +13,7 @@
 //! a millimetre earlier. So where the residuals remember, a body with both viscous forces is tried as well, and
 //! preferred if it leaves less than chance would explain.
 
-use super::contact::{ContactFitError, ContactEstimate};
+use super::contact::{ContactEstimate, ContactFitError};
 use crate::linalg::Triangle;
 use crate::units::{Depth, Newtons, Position, Seconds};
 use crate::viscoelastic::{KelvinState, ModifiedKelvin};

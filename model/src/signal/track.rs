@@ -4,7 +4,7 @@
 //! Memory: 8 bytes a sample for its time, and for each quantity 4 bytes for its value as an f32, which has the
 //! digits of a 24-bit converter, and 0.67 bytes for its [`Pyramid`].
 
-use super::pyramid::{PyramidMark, Pyramid, column_for};
+use super::pyramid::{Pyramid, PyramidMark, column_for};
 use std::sync::Arc;
 
 /// Samples in a segment: as many as the log has in its largest block.
@@ -130,7 +130,12 @@ impl Track {
         let segment = after.saturating_sub(1);
         let times = &self.segments.get(segment)?.times;
         let within = times.partition_point(|one| *one <= t).saturating_sub(1);
-        Some(TrackPosition { index: self.before[segment] + within, t: times[within], segment, within })
+        Some(TrackPosition {
+            index: self.before[segment] + within,
+            t: times[within],
+            segment,
+            within,
+        })
     }
 
     /// A quantity at a place; `None` in a gap.

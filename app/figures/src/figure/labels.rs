@@ -27,7 +27,7 @@ pub(super) fn pushed_apart(wanted: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> 
 }
 
 /// Where a point's name stands: beside it, or else as little above or below as leaves other points and names uncovered.
-pub(super) fn beside(
+pub(super) fn label_position(
     [x, y]: [f64; 2],
     [top, bottom]: [f64; 2],
     points: &[[f64; 2]],
@@ -41,10 +41,10 @@ pub(super) fn beside(
             && !labels.iter().any(|label| covers(label, -LABEL, LABEL))
             && !points.iter().any(|point| covers(&[point[0], point[1] + 0.35 * FONT], -SIZE, LABEL))
     };
-    let beside = |lines: f64| [x + 12.0, y + 0.35 * FONT + lines * FONT];
+    let candidate = |lines: f64| [x + 12.0, y + 0.35 * FONT + lines * FONT];
     // Each line farther is tried above and below; a dozen points never need more.
     let lines = (0..24).map(|i| f64::from(i / 2 + i % 2) * if i % 2 == 0 { 1.0 } else { -1.0 });
-    lines.map(beside).find(is_free).unwrap_or(beside(0.0))
+    lines.map(candidate).find(is_free).unwrap_or(candidate(0.0))
 }
 
 #[cfg(test)]
@@ -68,7 +68,7 @@ mod tests {
         let mut labels: Vec<[f64; 2]> = Vec::new();
         let marks = [[400.0, 200.0], [400.0, 202.0], [400.0, 204.0]];
         for mark in marks {
-            labels.push(beside(mark, [64.0, 490.0], &marks, &labels));
+            labels.push(label_position(mark, [64.0, 490.0], &marks, &labels));
         }
         for (index, one) in labels.iter().enumerate() {
             for other in &labels[index + 1..] {
@@ -76,7 +76,7 @@ mod tests {
             }
         }
         let other = [[420.0, 300.0], [430.0, 300.0]];
-        let [_, y] = beside(other[0], [64.0, 490.0], &other, &[]);
+        let [_, y] = label_position(other[0], [64.0, 490.0], &other, &[]);
         // To rounding: it is moved by just so much.
         assert!((y - 300.0 - 0.35 * FONT).abs() >= FONT - 1e-9, "{y}");
     }

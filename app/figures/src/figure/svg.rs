@@ -1,6 +1,6 @@
 //! A plot drawn into a rectangle of a picture for a file.
 
-use super::labels::{beside, pushed_apart};
+use super::labels::{label_position, pushed_apart};
 use super::{Ink, Labels, Plot, Scale, Series, Shape, Stretch};
 use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
 use crate::tokens::LIGHT;
@@ -170,7 +170,7 @@ impl Plot {
                 continue;
             };
             for (place, [name, _]) in self.placed(panel, &one.points).into_iter().zip(names) {
-                let at = beside(place, [top, bottom], &points, &labels);
+                let at = label_position(place, [top, bottom], &points, &labels);
                 labels.push(at);
                 svg.text(at, text, name);
             }

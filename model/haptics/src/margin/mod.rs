@@ -134,7 +134,7 @@ impl Watch {
         }
         let linear = Linear::of(&self.body, depth);
         let sampled = SampledStep::of(&linear, self.scheme, self.period.seconds().0);
-        let (needed, _) = criterion::needed(&sampled, self.device.delay_ticks.max(0.0));
+        let (needed, _) = criterion::damping_needed(&sampled, self.device.delay_ticks.max(0.0));
         Margin { needed: needed + self.moving(speed), ..self.at(depth, speed) }
     }
 

@@ -96,7 +96,7 @@ impl MasterSlave {
         let mm_per_pulse = settings.slave.mm_per_pulse;
         let ratio = GearRatio::one_to_one(pinion, &settings.encoder, mm_per_pulse)?;
         let count_mm = settings.count_mm();
-        let heard = settings.buzz.unwrap_or(BuzzSettings::of(count_mm));
+        let buzz_settings = settings.buzz.unwrap_or(BuzzSettings::of(count_mm));
         let depth = Depth(0.0 - settings.surface_mm);
         let watch = settings.watch();
         let delay_ticks = settings.delay_ticks.round() as usize;
@@ -107,8 +107,8 @@ impl MasterSlave {
             law: ForceLaw::new(settings.law, depth)?,
             guard: ForceGuard::new(&settings.guard, period),
             controller: controller.map(|one| PassivityController::new(&one, period)),
-            observer: PassivityObserver::late(delay_ticks),
-            buzz: BuzzDetector::new(&heard, period, 0.0),
+            observer: PassivityObserver::with_delay(delay_ticks),
+            buzz: BuzzDetector::new(&buzz_settings, period, 0.0),
             contact: ContactDetector::new(settings.contact),
             counter: EncoderCounter::new(&settings.encoder, period),
             gear: Gear::new(ratio, &settings.slave, period),
@@ -160,7 +160,7 @@ impl MasterSlave {
 
     /// What of the model's force is asked for: a winding too hot gets no more than it may have for ever, until it
     /// has cooled.
-    fn asked(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
+    fn bounded_force(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
         let lasting = if is_hot {
             self.torque.motor.continuous / self.torque.pinion.radius_mm()
         } else {
@@ -179,8 +179,8 @@ impl MasterSlave {
         };
         // While what made it buzz lasts, so does the caution.
         let is_close = touch.is_touching && !self.snapshot.margin.is_enough();
-        if touch.has_buzz || (controller.is_hushed() && is_close) {
-            controller.heard_buzz();
+        if touch.has_buzz || (controller.is_credit_withheld() && is_close) {
+            controller.report_buzz();
         }
         let moved = (touch.moved, self.count_mm);
         let one = controller.tick(moved, touch.elapsed, guarded, touch.is_touching);
@@ -190,7 +190,7 @@ impl MasterSlave {
                 ..one
             };
         }
-        controller.rendered(damped.force);
+        controller.set_rendered_force(damped.force);
         damped
     }
 
@@ -211,7 +211,7 @@ impl MasterSlave {
         let (law, law_flags) = self.lead(before.depth, wanted, elapsed);
         flags |= law_flags;
         let is_hot = self.thermal.winding_c > self.torque.motor.thermal.winding_max_c;
-        let asked = self.asked(law.force, input.is_on, is_hot);
+        let asked = self.bounded_force(law.force, input.is_on, is_hot);
         flags |= Flags::OFF.when(!input.is_on) | Flags::HOT.when(is_hot);
         if input.is_on && before.flags.has(Flags::OFF) {
             self.guard.restart();
@@ -220,12 +220,17 @@ impl MasterSlave {
         flags |= guarded.flags;
         // What the loop makes of it.
         let master_mm = input.counts.saturating_sub(origin) as f64 * self.count_mm;
-        self.observer.moved(moved as f64 * self.count_mm);
+        self.observer.record_move(moved as f64 * self.count_mm);
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(master_mm, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
-        let touch =
-            ControllerInput { is_touching, is_on: input.is_on, has_buzz: buzz.is_some(), moved, elapsed };
+        let touch = ControllerInput {
+            is_touching,
+            is_on: input.is_on,
+            has_buzz: buzz.is_some(),
+            moved,
+            elapsed,
+        };
         let damped = self.damp(guarded.force, &touch);
         let force = damped.force.0;
         flags |= damped.flags;

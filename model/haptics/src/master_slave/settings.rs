@@ -1,7 +1,7 @@
 //! What a master-slave system is made of, and what makes none.
 
 use crate::buzz::BuzzSettings;
-use crate::contact::{ContactThresholdError, ContactSettings};
+use crate::contact::{ContactSettings, ContactThresholdError};
 use crate::controller::ControllerSettings;
 use crate::force::{LawError, LawSettings};
 use crate::guard::GuardSettings;

@@ -7,19 +7,19 @@
 //! hands.
 
 mod device;
-mod led;
+mod hand_led;
+mod no_force_reason;
 mod path;
 mod settings;
-mod why;
 
 pub use device::{DeviceSettings, Hand6, Pose, SimulatedDevice};
-pub use led::LedScene;
+pub use hand_led::LedScene;
+pub use no_force_reason::WhyNoForce;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
-pub use why::WhyNoForce;
 
 use crate::surface::{
-    Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, ProxyTouch, TouchState,
+    Contact, HeightField, Proxy, ProxyTouch, Recovery, Rect, Side, Surface, TouchState,
 };
 use crate::{
     BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
@@ -102,7 +102,7 @@ impl Scene {
         let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
         let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
-        let heard = BuzzSettings::of(settings.device.step_mm);
+        let buzz_settings = BuzzSettings::of(settings.device.step_mm);
         Ok(Self {
             surface,
             proxy: Proxy::new(settings.friction, f64::INFINITY)?,
@@ -110,7 +110,7 @@ impl Scene {
             guard: ForceGuard::new(&settings.guard, period),
             controller: settings.controller.map(|one| PassivityController::new(&one, period)),
             observer: PassivityObserver::default(),
-            buzz: BuzzDetector::new(&heard, period, below),
+            buzz: BuzzDetector::new(&buzz_settings, period, below),
             below,
             last: SceneTick {
                 device: pose.at,
@@ -174,12 +174,12 @@ impl Scene {
             TouchState::Outside => before.min(0.0),
             TouchState::NotANumber => before,
         };
-        let (wanted, mut flags) = self.led(before, elapsed);
+        let (wanted, mut flags) = self.advance_law(before, elapsed);
         let guarded = self.guard.tick(wanted, is_contact, elapsed);
         flags |= guarded.flags;
         // What the loop makes of it, along the normal.
         let counts = ((self.below - before) / self.settings.device.step_mm).round() as i64;
-        self.observer.moved(self.below - before);
+        self.observer.record_move(self.below - before);
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(self.below, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
@@ -187,7 +187,7 @@ impl Scene {
         let mut injected_damping = 0.0;
         if let Some(controller) = &mut self.controller {
             if buzz.is_some() {
-                controller.heard_buzz();
+                controller.report_buzz();
             }
             let step = self.settings.device.step_mm;
             let one = controller.tick((counts, step), elapsed, along, is_contact);
@@ -195,11 +195,11 @@ impl Scene {
             injected_damping = one.damping;
             flags |= one.flags;
         }
-        let asked = self.felt(&touch, along);
+        let asked = self.force_on_hand(&touch, along);
         let (force, is_saturated) = self.settings.device.limit_force(asked);
         let given = Newtons(dot(force, touch.normal));
         if let Some(controller) = &mut self.controller {
-            controller.rendered(given);
+            controller.set_rendered_force(given);
         }
         self.observer.hold(given.0);
         self.press(&touch);
@@ -229,7 +229,7 @@ impl Scene {
     }
 
     /// The law's force, after it was led straight through what was missed.
-    fn led(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
+    fn advance_law(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
         let steps = elapsed.min(LED_MAX);
         let way = (self.below - before) / steps as f64;
         let mut flags = Flags::NONE;
@@ -245,7 +245,7 @@ impl Scene {
 
     /// The force on the hand where `along` is what there is along the normal: friction goes with what the model gives, and damping
     /// has none.
-    fn felt(&self, touch: &ProxyTouch, along: Newtons) -> [f64; 3] {
+    fn force_on_hand(&self, touch: &ProxyTouch, along: Newtons) -> [f64; 3] {
         let push = along.0.max(0.0);
         let with_friction = touch.force(push);
         let pull = along.0 - if touch.is_contact() { push } else { 0.0 };
@@ -258,9 +258,9 @@ impl Scene {
         let contact = Contact { x, y, z: z - touch.depth, side: Side::Push };
         let contacts = [contact];
         let contacts = if touch.is_contact() { &contacts[..] } else { &[] };
-        let told = self.surface.tick(contacts);
-        self.dirty = told.dirty;
-        self.moved = told.moved.moved;
+        let report = self.surface.tick(contacts);
+        self.dirty = report.dirty;
+        self.moved = report.moved.moved;
     }
 
     fn row_hash(&self, tick: u64) -> u64 {

@@ -1,7 +1,9 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, SurfaceRecoveryError};
+use crate::surface::{
+    Cut, Grid, HeightField, MeshError, Method, MethodError, SurfaceRecoveryError,
+};
 use crate::surface::{ProxyError, Shear};
 use crate::{ControllerSettings, GuardSettings, LawError, Period};
 use palpate_model::units::Newtons;

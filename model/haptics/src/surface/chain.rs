@@ -64,21 +64,24 @@ impl Stamps {
 
 /// How far a height is beyond what is allowed of it, in mm; above zero: it has to move.
 #[inline(always)]
-pub(super) fn beyond<const PULL: bool>(z: f64, allowed: f64) -> f64 {
+pub(super) fn excess<const PULL: bool>(z: f64, allowed: f64) -> f64 {
     if PULL { allowed - z } else { z - allowed }
 }
 
 /// The furthest that a neighbour of a node at `z` may be.
 #[inline(always)]
-pub(super) fn allowed<const PULL: bool>(z: f64, limit: f64) -> f64 {
+pub(super) fn limit_height<const PULL: bool>(z: f64, limit: f64) -> f64 {
     if PULL { z - limit } else { z + limit }
 }
 
 /// What a pass tells where nothing is to move: the contact does not reach its node, or the node is pinned.
 #[inline(always)]
-pub(super) fn unmoved<const PULL: bool>(field: &HeightField, poke: Poke) -> Option<MoveCounts> {
+pub(super) fn blocked_move<const PULL: bool>(
+    field: &HeightField,
+    poke: Poke,
+) -> Option<MoveCounts> {
     let node = field.grid.index(poke.node);
-    if beyond::<PULL>(field.now[node], poke.z) <= 0.0 {
+    if excess::<PULL>(field.now[node], poke.z) <= 0.0 {
         return Some(MoveCounts::default());
     }
     field.is_pinned(poke.node).then(|| MoveCounts { held: 1, ..MoveCounts::default() })
@@ -118,10 +121,10 @@ impl Chain {
         cut: Cut,
         poke: Poke,
     ) -> MoveCounts {
-        if let Some(told) = unmoved::<PULL>(field, poke) {
-            return told;
+        if let Some(counts) = blocked_move::<PULL>(field, poke) {
+            return counts;
         }
-        let mut told = MoveCounts::default();
+        let mut counts = MoveCounts::default();
         let seed = field.grid.index(poke.node);
         self.rows = [poke.node.row, poke.node.row + 1];
         self.put(field, poke.node, seed, poke.z);
@@ -135,12 +138,12 @@ impl Chain {
                 continue;
             }
             let index = field.grid.index(Node { column, row });
-            let allowed = allowed::<PULL>(field.now[index], shear);
+            let allowed = limit_height::<PULL>(field.now[index], shear);
             let mut offer = |column, row, index| {
-                told.visited += 1;
+                counts.visited += 1;
                 // Nodes that moved are mostly where they may be: looking at the height first saves
                 // looking at the mark.
-                if beyond::<PULL>(field.now[index], allowed) > cut.threshold()
+                if excess::<PULL>(field.now[index], allowed) > cut.threshold()
                     && !self.stamps.has(index)
                 {
                     let node = Node { column, row };
@@ -163,8 +166,8 @@ impl Chain {
             }
         }
         finish::<PULL>(field, poke.z, self.rows);
-        told.moved = self.moved;
-        told
+        counts.moved = self.moved;
+        counts
     }
 
     #[inline(always)]
@@ -189,11 +192,11 @@ pub(super) fn finish<const PULL: bool>(field: &mut HeightField, z: f64, rows: [u
     let whole = field.grid.whole();
     field.displaced.widen(Rect { rows: rows.map(u32::from), ..whole });
     field.displaced.tighten();
-    reaches::<PULL>(field, z);
+    extend_bounds::<PULL>(field, z);
 }
 
 /// Notes how far nodes may now be.
-pub(super) fn reaches<const PULL: bool>(field: &mut HeightField, z: f64) {
+pub(super) fn extend_bounds<const PULL: bool>(field: &mut HeightField, z: f64) {
     let [lowest, highest] = &mut field.bounds;
     if PULL {
         *highest = highest.max(z);

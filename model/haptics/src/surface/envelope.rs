@@ -10,11 +10,11 @@
 //! A minimum needs no order, no marks and no queue: rows are worked through from one end to the other,
 //! recovery and all contacts in one go over memory, no further than a contact can reach.
 
-use super::chain::{beyond, reaches};
+use super::chain::{excess, extend_bounds};
 use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node, Rect};
 use super::mesh::{HeightField, Pins};
-use super::recover::{Recovery, trimmed};
+use super::recover::{Recovery, trim_span};
 use palpate_rheology::vectors::wide;
 
 /// Contacts that are worked through together.
@@ -59,25 +59,25 @@ pub(super) fn tick(
     cut: Cut,
     pokes: &[Poke],
 ) -> MoveCounts {
-    let mut told = MoveCounts::default();
+    let mut counts = MoveCounts::default();
     let mut cones = [NO_CONE; TOGETHER];
     let mut count = 0;
     let mut touched = Rect::EMPTY;
     for &poke in pokes {
-        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count], &mut told) {
+        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count], &mut counts) {
             cones[count] = cone;
             count += 1;
             touched = touched.union(cone.rect(&field.grid));
             match poke.side {
-                Side::Push => reaches::<false>(field, poke.z),
-                Side::Pull => reaches::<true>(field, poke.z),
+                Side::Push => extend_bounds::<false>(field, poke.z),
+                Side::Pull => extend_bounds::<true>(field, poke.z),
             }
         }
     }
     let cones = &cones[..count];
     if cones.is_empty() {
         recovery.step_field(field);
-        return told;
+        return counts;
     }
     field.displaced.widen(touched);
     let border = usize::from(field.pins == Pins::Border);
@@ -96,16 +96,16 @@ pub(super) fn tick(
                     span
                 } else {
                     let mut work = Row { now, rest, row, ends: [border, columns - border], span };
-                    work.press_all(cones, shape, recovery, cut, &mut told);
+                    work.press_all(cones, shape, recovery, cut, &mut counts);
                     work.span
                 };
-                field.displaced.set(row, trimmed(now, rest, span));
+                field.displaced.set(row, trim_span(now, rest, span));
             }
         },
     );
     field.displaced.tighten();
     field.forget_bounds();
-    told
+    counts
 }
 
 /// The cone of a contact, if it moves anything.
@@ -116,7 +116,7 @@ fn cone(
     cut: Cut,
     poke: Poke,
     before: &[Cone],
-    told: &mut MoveCounts,
+    counts: &mut MoveCounts,
 ) -> Option<Cone> {
     let index = field.grid.index(poke.node);
     // The touched node as it will be when this contact's turn comes.
@@ -130,14 +130,14 @@ fn cone(
         };
     }
     let (above, furthest) = match poke.side {
-        Side::Push => (beyond::<false>(z, poke.z), field.bounds[1] - poke.z),
-        Side::Pull => (beyond::<true>(z, poke.z), poke.z - field.bounds[0]),
+        Side::Push => (excess::<false>(z, poke.z), field.bounds[1] - poke.z),
+        Side::Pull => (excess::<true>(z, poke.z), poke.z - field.bounds[0]),
     };
     if above <= 0.0 {
         return None;
     }
     if field.is_pinned(poke.node) {
-        told.held += 1;
+        counts.held += 1;
         return None;
     }
     // Steps beyond which even the furthest height is allowed; one more for the rounding of the
@@ -166,7 +166,7 @@ impl Cone {
         } else {
             (height::<PULL>(self.poke.z, f64::from(steps), shear), cut.threshold())
         };
-        let moves = beyond::<PULL>(z, allowed) > threshold;
+        let moves = excess::<PULL>(z, allowed) > threshold;
         (if moves { allowed } else { z }, moves)
     }
 
@@ -198,7 +198,7 @@ impl Row<'_> {
         shape: &Envelope,
         recovery: Recovery,
         cut: Cut,
-        told: &mut MoveCounts,
+        counts: &mut MoveCounts,
     ) {
         let mut recovery = Some(recovery);
         for cone in cones {
@@ -231,8 +231,8 @@ impl Row<'_> {
                 Side::Pull => self.press::<true>(cone, away, reached, shape, step, cut),
             };
             self.span = join(self.span, reached);
-            told.moved += moved;
-            told.visited += reached[1] - reached[0];
+            counts.moved += moved;
+            counts.visited += reached[1] - reached[0];
         }
         self.recover(recovery);
     }
@@ -267,14 +267,14 @@ impl Row<'_> {
         for ((now, &rest), steps) in now.iter_mut().zip(rest).zip(steps) {
             let free = recovery.step(*now, rest);
             let allowed = height::<PULL>(z, far + steps, shear);
-            let moves = beyond::<PULL>(free, allowed) > threshold;
+            let moves = excess::<PULL>(free, allowed) > threshold;
             *now = if moves { allowed } else { free };
             moved += usize::from(moves);
         }
         if away == 0 {
             // The touched node itself: no threshold, and no product of nothing and an infinite limit.
-            let counted = beyond::<PULL>(touched, height::<PULL>(z, 0.0, shear)) > threshold;
-            let moves = beyond::<PULL>(touched, z) > 0.0;
+            let counted = excess::<PULL>(touched, height::<PULL>(z, 0.0, shear)) > threshold;
+            let moves = excess::<PULL>(touched, z) > 0.0;
             self.now[column] = if moves { z } else { touched };
             moved = moved + usize::from(moves) - usize::from(counted);
         }

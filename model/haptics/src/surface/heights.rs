@@ -21,7 +21,7 @@ impl<'a> Heights<'a> {
     }
 
     /// Of a grid that they were made for.
-    pub(super) fn made_for(grid: Grid, of: &'a [f64]) -> Self {
+    pub(super) fn for_grid(grid: Grid, of: &'a [f64]) -> Self {
         Self { grid, of }
     }
 

@@ -60,7 +60,7 @@ impl HeightField {
     /// Refused where the surface at rest has steps beyond its own limits: what a chain makes of such a
     /// surface depends on the order of its moves.
     pub fn new(grid: Grid, rest: Vec<f64>, shear: Shear) -> Result<Self, MeshError> {
-        counted("rest heights", rest.len(), &grid)?;
+        check_count("rest heights", rest.len(), &grid)?;
         for (index, &height) in rest.iter().enumerate() {
             if height.is_nan() || height.abs() > HIGHEST_MM {
                 let (column, row) = (index % grid.columns(), index / grid.columns());
@@ -70,7 +70,7 @@ impl HeightField {
         let limits = match &shear {
             Shear::Uniform(limit) => std::slice::from_ref(limit),
             Shear::PerNode(limits) => {
-                counted("MaxShears", limits.len(), &grid)?;
+                check_count("MaxShears", limits.len(), &grid)?;
                 limits
             }
         };
@@ -105,7 +105,7 @@ impl HeightField {
     /// With nodes that never move.
     pub fn pinned(mut self, pins: Pins) -> Result<Self, MeshError> {
         if let Pins::Nodes(marks) = &pins {
-            counted("marks of pinned nodes", marks.len(), &self.grid)?;
+            check_count("marks of pinned nodes", marks.len(), &self.grid)?;
         }
         self.pins = pins;
         Ok(self)
@@ -128,12 +128,12 @@ impl HeightField {
 
     /// The surface at rest.
     pub fn at_rest(&self) -> Heights<'_> {
-        Heights::made_for(self.grid, &self.rest)
+        Heights::for_grid(self.grid, &self.rest)
     }
 
     /// The surface now.
-    pub fn as_it_is(&self) -> Heights<'_> {
-        Heights::made_for(self.grid, &self.now)
+    pub fn current(&self) -> Heights<'_> {
+        Heights::for_grid(self.grid, &self.now)
     }
 
     /// MaxShear.
@@ -230,7 +230,7 @@ impl HeightField {
     }
 }
 
-fn counted(what: &'static str, given: usize, grid: &Grid) -> Result<(), MeshError> {
+fn check_count(what: &'static str, given: usize, grid: &Grid) -> Result<(), MeshError> {
     let nodes = grid.nodes();
     if given == nodes { Ok(()) } else { Err(MeshError::Count { what, given, nodes }) }
 }

@@ -11,7 +11,6 @@
 
 mod chain;
 mod contact;
-mod curves;
 mod envelope;
 mod grid;
 mod heights;
@@ -20,19 +19,20 @@ mod mesh_error;
 mod plan;
 mod proxy;
 mod recover;
+mod scene_curves;
+mod shape_error;
 mod sorted;
-mod trade;
 
 pub use contact::{Contact, Cut, CutError, MoveCounts, Side};
-pub use curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
 pub use grid::{Grid, MOST_NODES, Node, Rect};
 pub use heights::Heights;
 pub use mesh::{HIGHEST_MM, HeightField, INERT, Pins, Shear};
 pub use mesh_error::MeshError;
-pub use plan::{OmittedPart, Needs, NoPlan, ScenePlan, plan, slower};
+pub use plan::{Needs, NoPlan, OmittedPart, ScenePlan, plan, slower};
 pub use proxy::{Proxy, ProxyError, ProxyTouch, TouchState};
-pub use recover::{Recovery, SurfaceRecoveryError, SETTLED_MM};
-pub use trade::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
+pub use recover::{Recovery, SETTLED_MM, SurfaceRecoveryError};
+pub use scene_curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
+pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 
 use chain::Chain;
 use contact::Poke;
@@ -154,7 +154,8 @@ impl Surface {
 
     /// One tick of recovery, then the contacts one after the other.
     pub fn tick(&mut self, contacts: &[Contact]) -> SurfaceTick {
-        let mut told = SurfaceTick { dirty: self.field.displaced.bounds(), ..SurfaceTick::default() };
+        let mut report =
+            SurfaceTick { dirty: self.field.displaced.bounds(), ..SurfaceTick::default() };
         let mut recovery = self.recovery;
         let mut rest = contacts;
         loop {
@@ -166,17 +167,17 @@ impl Surface {
                     Some((poke, clamped)) => {
                         pokes[count] = poke;
                         count += 1;
-                        told.clamped += usize::from(clamped);
+                        report.clamped += usize::from(clamped);
                     }
-                    None => told.ignored += 1,
+                    None => report.ignored += 1,
                 }
             }
-            told.moved.add(self.solve(recovery, &pokes[..count]));
-            told.dirty = told.dirty.union(self.field.displaced.bounds());
+            report.moved.add(self.solve(recovery, &pokes[..count]));
+            report.dirty = report.dirty.union(self.field.displaced.bounds());
             recovery = Recovery::NONE;
             rest = others;
             if rest.is_empty() {
-                return told;
+                return report;
             }
         }
     }

@@ -5,8 +5,8 @@
 //! A mesh costs its time multiplied by the share that the cut leaves; times add. So the cheapest pair for
 //! the shape and the cheapest pair for the force are the cheapest of all.
 
-use super::curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
 use super::mesh::INERT;
+use super::scene_curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
 use palpate_model::units::Newtons;
 use palpate_rheology::tolerance::Tolerance;
 use serde::Serialize;
@@ -88,13 +88,13 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
         }
     }
     curves.checked().map_err(refuse)?;
-    let shapes = curves.shapes(slower);
-    let forces = curves.forces(slower);
+    let shapes = curves.shape_pairs(slower);
+    let forces = curves.force_pairs(slower);
     let shape = cheapest(&shapes, needs.shape_mm);
     let force = cheapest(&forces, force_n);
     let why = match (shape, force) {
         (Some(shape), Some(force)) if shape.cost + force.cost <= needs.budget_us => {
-            return Ok(curves.planned(shape, force, slower));
+            return Ok(curves.assemble_plan(shape, force, slower));
         }
         (Some(shape), Some(force)) => format!(
             "the cheapest that holds {} mm and {force_n:.3} N takes {:.1} us a tick, and the budget is {} us",
@@ -105,15 +105,15 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
         (None, _) => format!(
             "nothing measured holds a shape to {} mm; the most exact is off by {} mm",
             needs.shape_mm,
-            least(&shapes)
+            least_error(&shapes)
         ),
         (_, None) => format!(
             "nothing measured holds a force to {force_n:.3} N; the most exact is off by {:.3} N",
-            least(&forces)
+            least_error(&forces)
         ),
     };
     let nearest = nearest([&shapes, &forces], [needs.shape_mm, force_n], needs.budget_us)
-        .map(|[shape, force]| curves.planned(shape, force, slower));
+        .map(|[shape, force]| curves.assemble_plan(shape, force, slower));
     let advice = match &nearest {
         Some(plan) => format!(
             "; within the budget, {} nodes a side and the family {} are off by {:.3} mm and {:.3} N",
@@ -141,7 +141,7 @@ fn cheapest(pairs: &[Pair], tolerance: f64) -> Option<Pair> {
     })
 }
 
-fn least(pairs: &[Pair]) -> f64 {
+fn least_error(pairs: &[Pair]) -> f64 {
     let errors = pairs.iter().map(|pair| pair.error);
     errors.fold(f64::INFINITY, f64::min)
 }
@@ -149,7 +149,7 @@ fn least(pairs: &[Pair]) -> f64 {
 /// The two within a budget together whose errors are beyond their tolerances by the least factor; of
 /// equal ones the cheapest.
 fn nearest(pairs: [&[Pair]; 2], tolerances: [f64; 2], budget: f64) -> Option<[Pair; 2]> {
-    let [shapes, forces] = pairs.map(front);
+    let [shapes, forces] = pairs.map(pareto_front);
     let mut best: Option<([f64; 2], [Pair; 2])> = None;
     for shape in &shapes {
         for force in &forces {
@@ -165,7 +165,7 @@ fn nearest(pairs: [&[Pair]; 2], tolerances: [f64; 2], budget: f64) -> Option<[Pa
 }
 
 /// Those than which nothing is both cheaper and more exact, the cheapest first.
-fn front(pairs: &[Pair]) -> Vec<Pair> {
+fn pareto_front(pairs: &[Pair]) -> Vec<Pair> {
     let mut sorted = pairs.to_vec();
     sorted.sort_by(|a, b| {
         let by_cost = a.cost.total_cmp(&b.cost);
@@ -181,7 +181,7 @@ fn front(pairs: &[Pair]) -> Vec<Pair> {
 }
 
 impl SceneCurves {
-    fn planned(&self, shape: Pair, force: Pair, slower: f64) -> ScenePlan {
+    fn assemble_plan(&self, shape: Pair, force: Pair, slower: f64) -> ScenePlan {
         let (mesh, cut) = (&self.meshes[shape.indices[0]], &self.cuts[shape.indices[1]]);
         let step = &self.steps[force.indices[0]];
         let family = &self.families[force.indices[1]];
@@ -211,7 +211,12 @@ impl SceneCurves {
         let mut drop = |what: String, error: [f64; 2], unit, saved_us: f64| {
             // What is as exact as the most exact leaves nothing out.
             if error[0] > error[1] {
-                dropped.push(OmittedPart { what, error: error[0], unit, saved_us: slower * saved_us });
+                dropped.push(OmittedPart {
+                    what,
+                    error: error[0],
+                    unit,
+                    saved_us: slower * saved_us,
+                });
             }
         };
         if let Some(finest) = finest {

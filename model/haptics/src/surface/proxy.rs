@@ -147,7 +147,8 @@ impl Proxy {
             // Below the surface and yet not under the plane of the contact point, as behind a ridge:
             // the contact begins anew above the device.
             self.at = Some([x, y]);
-            touch(surface, [x, y], device, true).unwrap_or(ProxyTouch::without(TouchState::Free, device))
+            touch(surface, [x, y], device, true)
+                .unwrap_or(ProxyTouch::without(TouchState::Free, device))
         })
     }
 
@@ -160,11 +161,13 @@ impl Proxy {
         entered: bool,
     ) -> ([f64; 2], bool) {
         let goal = goal(surface, from, device);
-        let (Some((start, _)), Some((end, normal))) = (on(surface, from), on(surface, goal)) else {
+        let (Some((start, _)), Some((end, normal))) =
+            (surface_point(surface, from), surface_point(surface, goal))
+        else {
             return (from, false);
         };
-        let depth = dot(minus(end, device), normal).max(0.0);
-        let way = minus(start, end);
+        let depth = dot(difference(end, device), normal).max(0.0);
+        let way = difference(start, end);
         let length = dot(way, way).sqrt();
         // The contact point stays while it is within the cone of friction around the goal.
         let held = self.friction * depth;
@@ -189,7 +192,7 @@ fn entry(surface: Heights, last: Option<[f64; 3]>, device: [f64; 3]) -> [f64; 2]
     let Some(last) = last else {
         return straight;
     };
-    let way = minus(device, last);
+    let way = difference(device, last);
     let along = |share: f64| [0, 1, 2].map(|axis| last[axis] + share * way[axis]);
     let is_below = |share: f64| {
         let [x, y, z] = along(share);
@@ -214,10 +217,10 @@ fn goal(surface: Heights, from: [f64; 2], device: [f64; 3]) -> [f64; 2] {
     let [wide, high] = surface.grid().extent();
     let mut at = from;
     for _ in 0..ROUNDS {
-        let Some((point, normal)) = on(surface, at) else {
+        let Some((point, normal)) = surface_point(surface, at) else {
             return at;
         };
-        let depth = dot(minus(point, device), normal);
+        let depth = dot(difference(point, device), normal);
         let next = [
             (device[0] + depth * normal[0]).clamp(0.0, wide),
             (device[1] + depth * normal[1]).clamp(0.0, high),
@@ -233,8 +236,8 @@ fn goal(surface: Heights, from: [f64; 2], device: [f64; 3]) -> [f64; 2] {
 
 /// The contact at a place, if the device is under its plane.
 fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Option<ProxyTouch> {
-    let (point, normal) = on(surface, at)?;
-    let way = minus(point, device);
+    let (point, normal) = surface_point(surface, at)?;
+    let way = difference(point, device);
     let depth = dot(way, normal);
     (depth > 0.0).then(|| ProxyTouch {
         state: if slides { TouchState::Slides } else { TouchState::Sticks },
@@ -246,12 +249,12 @@ fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Opti
     })
 }
 
-fn on(surface: Heights, [x, y]: [f64; 2]) -> Option<([f64; 3], [f64; 3])> {
+fn surface_point(surface: Heights, [x, y]: [f64; 2]) -> Option<([f64; 3], [f64; 3])> {
     let (z, normal) = surface.at(x, y)?;
     Some(([x, y, z], normal))
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| a[axis] - b[axis])
 }
 

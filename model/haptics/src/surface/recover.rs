@@ -94,7 +94,7 @@ impl Recovery {
                         let now = &mut field.now[first..first + columns];
                         let rest = &field.rest[row * field.rest_stride..][..columns];
                         self.step_row(&mut now[from..to], &rest[from..to]);
-                        field.displaced.set(row, trimmed(now, rest, [from, to]));
+                        field.displaced.set(row, trim_span(now, rest, [from, to]));
                     }
                 }
             },
@@ -106,7 +106,7 @@ impl Recovery {
 
 /// The part of a span outside of which a row is at rest.
 #[inline(always)]
-pub(super) fn trimmed(now: &[f64], rest: &[f64], [mut from, mut to]: [usize; 2]) -> [usize; 2] {
+pub(super) fn trim_span(now: &[f64], rest: &[f64], [mut from, mut to]: [usize; 2]) -> [usize; 2] {
     while from < to && now[from] == rest[from] {
         from += 1;
     }

@@ -7,7 +7,7 @@
 //! along the shortest way to `p`, a violation is `z(p) - D(p)`, and along a way it never grows, because
 //! `z` itself keeps to the limits; so the largest first settles every node at `min(z, D)`.
 
-use super::chain::{Stamps, allowed, beyond, finish, unmoved};
+use super::chain::{Stamps, blocked_move, excess, finish, limit_height};
 use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node};
 use super::mesh::HeightField;
@@ -63,24 +63,29 @@ impl Sorted {
         }
     }
 
-    fn spread<const PULL: bool>(&mut self, field: &mut HeightField, cut: Cut, poke: Poke) -> MoveCounts {
-        if let Some(told) = unmoved::<PULL>(field, poke) {
-            return told;
+    fn spread<const PULL: bool>(
+        &mut self,
+        field: &mut HeightField,
+        cut: Cut,
+        poke: Poke,
+    ) -> MoveCounts {
+        if let Some(counts) = blocked_move::<PULL>(field, poke) {
+            return counts;
         }
-        let mut told = MoveCounts::default();
+        let mut counts = MoveCounts::default();
         self.rows = [poke.node.row, poke.node.row + 1];
-        self.put::<PULL>(field, cut, poke, [poke.node, poke.node], poke.z, &mut told);
+        self.put::<PULL>(field, cut, poke, [poke.node, poke.node], poke.z, &mut counts);
         while let Some(next) = self.heap.pop() {
             let [node, sponsor] = next.nodes();
             if self.stamps.has(field.grid.index(node)) {
                 continue;
             }
             let from = field.now[field.grid.index(sponsor)];
-            let z = allowed::<PULL>(from, field.limit(sponsor, node));
-            self.put::<PULL>(field, cut, poke, [node, sponsor], z, &mut told);
+            let z = limit_height::<PULL>(from, field.limit(sponsor, node));
+            self.put::<PULL>(field, cut, poke, [node, sponsor], z, &mut counts);
         }
         finish::<PULL>(field, poke.z, self.rows);
-        told
+        counts
     }
 
     /// Moves a node and offers its neighbours a move.
@@ -92,14 +97,14 @@ impl Sorted {
         poke: Poke,
         [node, sponsor]: [Node; 2],
         z: f64,
-        told: &mut MoveCounts,
+        counts: &mut MoveCounts,
     ) {
         let index = field.grid.index(node);
         field.now[index] = z;
         field.displaced.include(node);
         self.stamps.set(index);
         self.rows = [self.rows[0].min(node.row), self.rows[1].max(node.row + 1)];
-        told.moved += 1;
+        counts.moved += 1;
         if poke.node.steps_to(node) >= cut.range() {
             return;
         }
@@ -107,10 +112,10 @@ impl Sorted {
             if other == sponsor {
                 continue;
             }
-            told.visited += 1;
+            counts.visited += 1;
             let index = field.grid.index(other);
-            let allowed = allowed::<PULL>(z, field.limit(node, other));
-            let violation = beyond::<PULL>(field.now[index], allowed);
+            let allowed = limit_height::<PULL>(z, field.limit(node, other));
+            let violation = excess::<PULL>(field.now[index], allowed);
             if violation > cut.threshold() && !self.stamps.has(index) && !field.is_pinned(other) {
                 self.heap.push(Candidate::new(violation, other, node));
             }

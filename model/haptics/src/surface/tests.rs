@@ -26,10 +26,10 @@ fn no_node_moves_twice_in_a_pass_and_the_queue_is_in_order_of_steps() {
     for _ in 0..200 {
         let poke = random_poke(&mut random, 31);
         let before = field.heights().to_vec();
-        let told = chain.poke(&mut field, 0.25, Cut::NONE, poke);
+        let counts = chain.poke(&mut field, 0.25, Cut::NONE, poke);
         let mut order: Vec<_> = chain.order().iter().map(|node| field.grid.index(*node)).collect();
         assert!(chain.order().is_sorted_by_key(|node| node.steps_to(poke.node)));
-        assert_eq!(order.len(), told.moved);
+        assert_eq!(order.len(), counts.moved);
         order.sort_unstable();
         assert!(order.windows(2).all(|pair| pair[0] != pair[1]));
         let changed = (0..before.len()).filter(|&index| before[index] != field.now[index]);

@@ -1,7 +1,7 @@
 //! Device, hand and loop together: rows L1 to L7, L10 and L11. Figures are printed; run with `--nocapture` to read them.
 
 use crate::renderer::{Rendered, Renderer, RunTick, run};
-use palpate_haptics::closed_loop::{PlantCommand, HapticPlant, PlantSettings};
+use palpate_haptics::closed_loop::{HapticPlant, PlantCommand, PlantSettings};
 use palpate_haptics::margin::{Device, Watch};
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::{
@@ -410,7 +410,7 @@ fn after_a_stall_the_force_ramps() {
         for lets_go in [false, true] {
             let guard = GuardSettings {
                 soft_start: Seconds(0.0),
-                lets_go_after: lets_go.then_some(Seconds(0.005)),
+                release_after: lets_go.then_some(Seconds(0.005)),
                 ..GuardSettings::default()
             };
             let path = HandPath::RampHold { from: 0.0, to: 20.0, speed: 30.0 };

@@ -35,13 +35,13 @@ fn known_walls() {
     let spring = Linear::spring(2.0);
     let wall = SampledStep::of(&spring, Scheme::Exact, 1e-3);
     for (delay, wanted) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
-        let (needed, _) = criterion::needed(&wall, delay);
+        let (needed, _) = criterion::damping_needed(&wall, delay);
         assert!((needed / wanted - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
     let damped = Linear { damping: 3e-3, ..spring };
     let wall = SampledStep::of(&damped, Scheme::Exact, 1e-3);
-    let (needed, th) = criterion::needed(&wall, 0.0);
+    let (needed, th) = criterion::damping_needed(&wall, 0.0);
     assert!((needed / 4e-3 - 1.0).abs() < 1e-12 && (th - std::f64::consts::PI).abs() < 1e-6);
 }
 
@@ -63,12 +63,12 @@ fn two_ends_are_the_whole_criterion_without_delay() {
             }
             let sampled = SampledStep::of(&linear, scheme, tick);
             let ends = sampled.slow().max(sampled.fast());
-            let (needed, _) = criterion::needed(&sampled, 0.0);
+            let (needed, _) = criterion::damping_needed(&sampled, 0.0);
             let size = linear.stiffness * (tick + linear.tau) + linear.damping;
             assert!((needed - ends).abs() < 1e-8 * size, "{scheme:?} {linear:?}: {needed} {ends}");
             for th in [0.01, 0.3, 1.0, 2.0, 3.0] {
                 for delay in [0.0, 1.0, 3.5] {
-                    let ours = criterion::needed_at(&sampled, delay, th);
+                    let ours = criterion::damping_needed_at(&sampled, delay, th);
                     let paper = as_written(&sampled, delay, th);
                     assert!((ours - paper).abs() < 1e-9 * size, "{scheme:?} {th}: {ours} {paper}");
                 }
@@ -136,7 +136,7 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
         let size = quick.needed.abs().max(1e-6);
         assert!(whole.needed <= quick.needed + 1e-3 * size, "{watch:?} {quick:?} {whole:?}");
         if watch.device.delay_ticks == 0.0 {
-            let (needed, _) = criterion::needed(
+            let (needed, _) = criterion::damping_needed(
                 &SampledStep::of(
                     &Linear::of(&watch.body, depth),
                     watch.scheme,

@@ -359,8 +359,8 @@ fn a_jump_is_followed_as_fast_as_allowed() {
         ("speed", LawSettings { speed_max: MmPerS(f64::NAN), ..settings }),
         ("largest force", LawSettings { force_max: Newtons(f64::INFINITY), ..settings }),
     ] {
-        let told = ForceLaw::new(wrong, Depth(0.0)).expect_err("a bound").to_string();
-        assert!(told.contains(name), "{told}");
+        let message = ForceLaw::new(wrong, Depth(0.0)).expect_err("a bound").to_string();
+        assert!(message.contains(name), "{message}");
     }
     assert!(ForceLaw::new(settings, Depth(f64::NAN)).is_err());
 }

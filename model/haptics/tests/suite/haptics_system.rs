@@ -6,7 +6,8 @@ use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::simulation::{Simulation, SimulationSettings};
 use palpate_haptics::{
     BiasCalibration, BiasError, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags,
-    ForceGuard, GuardSettings, MasterSlaveInput, LawSettings, MasterSlave, MasterSlaveSettings, Period,
+    ForceGuard, GuardSettings, LawSettings, MasterSlave, MasterSlaveInput, MasterSlaveSettings,
+    Period,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -194,8 +195,8 @@ fn a_check_that_cannot_be_is_refused() {
         (CheckSettings { samples_hz: 0.0, ..right }, "samples = 0"),
         (CheckSettings { friction_share: -1.0, ..right }, "share of friction"),
     ] {
-        let told = check(&wrong, |_| (), |_| ()).expect_err("no check").to_string();
-        assert!(told.contains(words), "{words}: {told}");
+        let message = check(&wrong, |_| (), |_| ()).expect_err("no check").to_string();
+        assert!(message.contains(words), "{words}: {message}");
     }
 }
 
@@ -429,23 +430,23 @@ fn a_voltage_drive_drags_and_a_current_drive_does_not() {
 #[test]
 fn settings_that_make_no_system_are_refused_in_words() {
     let right = MasterSlaveSettings::of(LawSettings::of::<3>(THESIS, Period::MILLISECOND));
-    let told = |change: &dyn Fn(&mut MasterSlaveSettings)| {
+    let message = |change: &dyn Fn(&mut MasterSlaveSettings)| {
         let mut wrong = right;
         change(&mut wrong);
         MasterSlave::new(&wrong).expect_err("no system").to_string()
     };
     for (text, words) in [
-        (told(&|one| one.law.body.tau_eps = f64::NAN), "tau_eps"),
-        (told(&|one| one.law.force_max = Newtons(-1.0)), "largest force"),
-        (told(&|one| one.contact.off = Newtons(1.0)), "no hysteresis"),
-        (told(&|one| one.encoder.lines = 0), "0 lines"),
-        (told(&|one| one.slave.mm_per_pulse = 0.0), "pulses per master count"),
-        (told(&|one| one.torque.motor.resistance = 0.0), "resistance = 0"),
-        (told(&|one| one.torque.motor.thermal.case_s = f64::NAN), "time constant of the case"),
-        (told(&|one| one.torque.friction_share = 2.0), "share of friction"),
-        (told(&|one| one.damping = f64::INFINITY), "damping = inf"),
-        (told(&|one| one.delay_ticks = 33.0), "delay = 33 ticks"),
-        (told(&|one| one.surface_mm = f64::NAN), "surface"),
+        (message(&|one| one.law.body.tau_eps = f64::NAN), "tau_eps"),
+        (message(&|one| one.law.force_max = Newtons(-1.0)), "largest force"),
+        (message(&|one| one.contact.off = Newtons(1.0)), "no hysteresis"),
+        (message(&|one| one.encoder.lines = 0), "0 lines"),
+        (message(&|one| one.slave.mm_per_pulse = 0.0), "pulses per master count"),
+        (message(&|one| one.torque.motor.resistance = 0.0), "resistance = 0"),
+        (message(&|one| one.torque.motor.thermal.case_s = f64::NAN), "time constant of the case"),
+        (message(&|one| one.torque.friction_share = 2.0), "share of friction"),
+        (message(&|one| one.damping = f64::INFINITY), "damping = inf"),
+        (message(&|one| one.delay_ticks = 33.0), "delay = 33 ticks"),
+        (message(&|one| one.surface_mm = f64::NAN), "surface"),
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }

@@ -1,6 +1,6 @@
 //! A loop of a spring or a law on a simulated device, with or without guard and controller.
 
-use palpate_haptics::closed_loop::{PlantCommand, HapticPlant, PlantSettings, SensedPosition};
+use palpate_haptics::closed_loop::{HapticPlant, PlantCommand, PlantSettings, SensedPosition};
 use palpate_haptics::{
     BuzzDetector, BuzzSettings, ControllerSettings, Flags, ForceGuard, ForceLaw, GuardSettings,
     PassivityController, PassivityObserver, Period,
@@ -67,7 +67,7 @@ impl Renderer {
             rendered,
             guard: guard.map(|one| ForceGuard::new(one, period)),
             controller: controller.map(|one| PassivityController::new(one, period)),
-            observer: PassivityObserver::late(plant.delay),
+            observer: PassivityObserver::with_delay(plant.delay),
             buzz: BuzzDetector::new(&heard, period, plant.x),
             count_mm,
             period,
@@ -98,12 +98,12 @@ impl Renderer {
             force = one.force;
             flags |= one.flags;
         }
-        self.observer.moved(moved);
+        self.observer.record_move(moved);
         let buzz = self.buzz.tick(x, elapsed, self.observer.energy());
         flags |= Flags::BUZZ.when(buzz.is_some());
         if let Some(controller) = &mut self.controller {
             if buzz.is_some() {
-                controller.heard_buzz();
+                controller.report_buzz();
             }
             let counts = (moved / self.count_mm).round() as i64;
             let one = controller.tick((counts, self.count_mm), elapsed, force, is_touching);

@@ -164,11 +164,11 @@ fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
     let flat = scene.hash();
     for tick in 0..200 {
         let x = 20.0 + 0.1 * f64::from(tick);
-        let told = scene.feel(pose(x, 31.2, -3.0), 1);
-        let node = scene.field().grid().nearest(told.proxy[0], told.proxy[1]).unwrap();
+        let report = scene.feel(pose(x, 31.2, -3.0), 1);
+        let node = scene.field().grid().nearest(report.proxy[0], report.proxy[1]).unwrap();
         let height = scene.field().heights()[scene.field().grid().index(node)];
-        assert!((height - (told.proxy[2] - told.depth)).abs() < 1e-12, "{told:?} {height}");
-        assert!(told.moved > 0, "{told:?}");
+        assert!((height - (report.proxy[2] - report.depth)).abs() < 1e-12, "{report:?} {height}");
+        assert!(report.moved > 0, "{report:?}");
         assert!(scene.field().worst_excess() < 1e-9);
     }
     assert_ne!(scene.hash(), flat);
@@ -189,9 +189,12 @@ fn a_fast_poke_never_pops_through() {
         let mut depth = 0.0;
         for tick in 0..200 {
             let z = 1.0 - speed * f64::from(tick);
-            let told = scene.feel(pose(x, y, z), 1);
-            assert!(told.depth >= depth && (told.depth - (-z).max(0.0)).abs() < 1e-9, "{told:?}");
-            depth = told.depth;
+            let report = scene.feel(pose(x, y, z), 1);
+            assert!(
+                report.depth >= depth && (report.depth - (-z).max(0.0)).abs() < 1e-9,
+                "{report:?}"
+            );
+            depth = report.depth;
         }
     }
 }
@@ -249,11 +252,11 @@ fn a_stall_is_led_through_and_the_force_rises_from_what_was_held() {
     let mut led = LedScene::new(settings).unwrap();
     let mut follow = |ticks: u32, depth: f64, stall: u64| {
         let hand = at(30.0, 30.0, -depth);
-        let mut told = led.tick_after(hand, stall);
+        let mut report = led.tick_after(hand, stall);
         for _ in 1..ticks {
-            told = led.tick(hand);
+            report = led.tick(hand);
         }
-        told
+        report
     };
     let before = follow(3000, 12.0, 1);
     let away = 50;

@@ -239,7 +239,7 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     assert_eq!(dropped.len(), 2);
     assert!(dropped[1].0.contains("0.0005 s") && dropped[1].1 == 1e-3);
     assert_eq!(first.inert.map(|(name, _)| name), ["MinDist", "MaxDist"]);
-    // It took longer than it may: with that, nothing holds 0.12 mm, and what is nearest is told.
+    // It took longer than it may: with that, nothing holds 0.12 mm, and the refusal names the nearest.
     let again = slower(&first, 1.0, 130.0);
     let none = plan(&needs, &curves, again).unwrap_err();
     assert!(none.why.contains("130.0 us") && none.why.contains("100 us"), "{}", none.why);

@@ -92,9 +92,9 @@ fn a_poke_of_a_flat_surface_is_the_closed_form_with_its_count_and_volume() {
             }
             for method in Method::ALL {
                 let mut surface = lasting(&field, method);
-                let told = surface.tick(&[push(&grid, n / 2, n / 2, -depth)]);
+                let report = surface.tick(&[push(&grid, n / 2, n / 2, -depth)]);
                 assert_eq!(surface.heights(), expected, "{n} {ratio} {method:?}");
-                assert_eq!(told.moved.moved, count, "{n} {ratio} {method:?}");
+                assert_eq!(report.moved.moved, count, "{n} {ratio} {method:?}");
                 if reach <= n / 2 {
                     let volume: f64 = -surface.heights().iter().sum::<f64>();
                     let rings: f64 = (1..=reach).map(|r| r as f64 * (depth - S * r as f64)).sum();
@@ -125,13 +125,13 @@ fn all_methods_agree_on_hills_with_the_closed_form_for_any_contacts() {
                 let seed = (grid.index(at), z);
                 naive::push(&mut plain, grid.columns(), |_, _| S, seed, Order::First);
             }
-            let told = surfaces.each_mut().map(|surface| surface.tick(&contacts));
+            let report = surfaces.each_mut().map(|surface| surface.tick(&contacts));
             for surface in &surfaces {
                 assert_eq!(surface.heights(), expected);
             }
             assert_eq!(plain, expected);
-            assert_eq!(told[0].moved.moved, told[1].moved.moved);
-            assert_eq!(told[1].moved.moved, told[2].moved.moved);
+            assert_eq!(report[0].moved.moved, report[1].moved.moved);
+            assert_eq!(report[1].moved.moved, report[2].moved.moved);
         }
     }
 }
@@ -354,9 +354,9 @@ fn a_threshold_leaves_out_no_more_than_itself() {
         let reach = ((depth - threshold) / S).ceil() as usize - 1;
         for method in Method::ALL {
             let cut = Cut::new(None, threshold).unwrap();
-            let told =
+            let report =
                 surface(&field, method, Recovery::NONE, cut).tick(&[push(&grid, 50, 50, -depth)]);
-            assert_eq!(told.moved.moved, 2 * reach * reach + 2 * reach + 1);
+            assert_eq!(report.moved.moved, 2 * reach * reach + 2 * reach + 1);
         }
     }
     assert!(Cut::new(None, f64::NAN).is_err() && Cut::new(None, -1.0).is_err());
@@ -414,24 +414,24 @@ fn edges_and_numbers_that_are_none() {
             none(0.0, inf, -1.0),
             none(0.0, 0.0, nan),
         ];
-        let told = surface.tick(&nothing);
-        assert_eq!((told.ignored, told.moved.moved), (6, 0));
+        let report = surface.tick(&nothing);
+        assert_eq!((report.ignored, report.moved.moved), (6, 0));
         // Above the surface: no touch, however far.
-        let told = surface.tick(&[none(1.0, 1.0, 2.0), none(1.0, 1.0, inf)]);
-        assert_eq!((told.ignored, told.clamped, told.moved.moved), (0, 1, 0));
+        let report = surface.tick(&[none(1.0, 1.0, 2.0), none(1.0, 1.0, inf)]);
+        assert_eq!((report.ignored, report.clamped, report.moved.moved), (0, 1, 0));
         assert_eq!(surface.heights(), surface.field().rest());
         // Downward without end.
         for z in [-inf, f64::MIN] {
-            let told = surface.tick(&[none(1.0, 1.0, z)]);
-            assert_eq!(told.clamped, 1);
+            let report = surface.tick(&[none(1.0, 1.0, z)]);
+            assert_eq!(report.clamped, 1);
             assert!(surface.heights().iter().all(|z| z.is_finite()));
             assert_eq!(surface.heights()[grid.index(node(2, 2))], -1e6);
         }
         // No shear: everything is level. Any shear: one node.
         for (shear, count) in [(0.0, 45), (inf, 1), (f64::MAX, 1), (5e-324, 45)] {
             let mut surface = lasting(&flat(shear), method);
-            let told = surface.tick(&[push(&grid, 4, 2, -1.0)]);
-            assert_eq!(told.moved.moved, count, "{shear} {method:?}");
+            let report = surface.tick(&[push(&grid, 4, 2, -1.0)]);
+            assert_eq!(report.moved.moved, count, "{shear} {method:?}");
             let low = surface.heights().iter().filter(|z| **z == -1.0).count();
             assert_eq!(low, count);
         }
@@ -534,11 +534,11 @@ fn whatever_comes_in_heights_stay_numbers_within_a_kilometre() {
                     z: any(4.0),
                     side: if tick % 2 == 0 { Side::Push } else { Side::Pull },
                 });
-                let told = surface.tick(&contacts);
+                let report = surface.tick(&contacts);
                 let is_none = |contact: &&Contact| {
                     contact.z.is_nan() || grid.nearest(contact.x, contact.y).is_none()
                 };
-                assert_eq!(told.ignored, contacts.iter().filter(is_none).count());
+                assert_eq!(report.ignored, contacts.iter().filter(is_none).count());
                 assert!(surface.heights().iter().all(|z| z.abs() <= 1e6));
             }
         }

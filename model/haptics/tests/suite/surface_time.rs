@@ -90,14 +90,14 @@ fn everything_that_changed_is_in_the_dirty_rectangle() {
                 let [column, row] = [0, 1].map(|_| (51.0 * random.uniform()) as u16);
                 contacts.push(at(&surface, column, row, -2.0 * random.uniform(), Side::Push));
             }
-            let told = surface.tick(&contacts);
+            let report = surface.tick(&contacts);
             for (index, (now, was)) in surface.heights().iter().zip(&before).enumerate() {
                 let [column, row] = [index % 51, index / 51].map(|i| i as u32);
-                let inside = (told.dirty.columns[0]..told.dirty.columns[1]).contains(&column)
-                    && (told.dirty.rows[0]..told.dirty.rows[1]).contains(&row);
+                let inside = (report.dirty.columns[0]..report.dirty.columns[1]).contains(&column)
+                    && (report.dirty.rows[0]..report.dirty.rows[1]).contains(&row);
                 assert!(inside || now == was, "{method:?} {tick}");
             }
-            quiet += usize::from(told.dirty.is_empty());
+            quiet += usize::from(report.dirty.is_empty());
             before.copy_from_slice(surface.heights());
         }
         assert!(quiet > 50, "{quiet}");

@@ -1,8 +1,8 @@
 //! Normals and the contact point against planes and paraboloids.
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, Recovery, Shear, Side, Surface,
-    ProxyTouch, TouchState,
+    Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, ProxyTouch, Recovery, Shear,
+    Side, Surface, TouchState,
 };
 use palpate_test_support::naive_surface as naive;
 use palpate_test_support::record::Noise;
@@ -168,7 +168,11 @@ fn on_a_slope_a_contact_slips_where_the_slope_is_more_than_the_friction() {
 }
 
 /// A wavy surface and random paths over and into it.
-fn wander(friction: f64, most_step: f64, mut see: impl FnMut(Option<&ProxyTouch>, &ProxyTouch, [f64; 3])) {
+fn wander(
+    friction: f64,
+    most_step: f64,
+    mut see: impl FnMut(Option<&ProxyTouch>, &ProxyTouch, [f64; 3]),
+) {
     let grid = Grid::new(61, 61, 0.5).expect("a grid");
     let waves = heights(&grid, |x, y| (0.5 * x).sin() + (0.4 * y).cos());
     let waves = Heights::new(grid, &waves).expect("heights");
@@ -204,17 +208,17 @@ fn the_contact_point_is_on_the_surface_within_its_cone_and_its_step() {
         }
     });
     assert!(contacts > 5000);
-    let mut anew = 0;
+    let mut restarts = 0;
     wander(0.0, 0.02, |last, touch, device| {
         if let Some(last) = last.filter(|last| last.is_contact() && touch.is_contact()) {
             let step = (touch.point[0] - last.point[0]).hypot(touch.point[1] - last.point[1]);
-            // Or it began anew, straight above the device.
-            let is_anew = step > 0.02 + 1e-12;
-            assert!(!is_anew || touch.point[..2] == device[..2], "{step}");
-            anew += usize::from(is_anew);
+            // Or it starts again, straight above the device.
+            let has_restarted = step > 0.02 + 1e-12;
+            assert!(!has_restarted || touch.point[..2] == device[..2], "{step}");
+            restarts += usize::from(has_restarted);
         }
     });
-    assert!(anew < 20, "{anew}");
+    assert!(restarts < 20, "{restarts}");
 }
 
 #[test]
@@ -286,5 +290,5 @@ fn depth_is_of_the_rest_surface_for_the_one_that_followed_the_tool_has_none() {
     surface.tick(&[tool]);
     let depth = |surface| Proxy::new(0.0, 1.0).unwrap().follow(surface, device).depth;
     assert!((depth(surface.field().at_rest()) - 2.0).abs() < 1e-12);
-    assert_eq!(depth(surface.field().as_it_is()), 0.0);
+    assert_eq!(depth(surface.field().current()), 0.0);
 }

@@ -100,7 +100,7 @@ impl SceneCurves {
     }
 
     /// Every mesh with every cut.
-    pub(super) fn shapes(&self, slower: f64) -> Vec<Pair> {
+    pub(super) fn shape_pairs(&self, slower: f64) -> Vec<Pair> {
         let mut pairs = Vec::new();
         for (i, mesh) in self.meshes.iter().enumerate() {
             for (j, cut) in self.cuts.iter().enumerate() {
@@ -115,7 +115,7 @@ impl SceneCurves {
     }
 
     /// Every step with every family.
-    pub(super) fn forces(&self, slower: f64) -> Vec<Pair> {
+    pub(super) fn force_pairs(&self, slower: f64) -> Vec<Pair> {
         let mut pairs = Vec::new();
         for (i, step) in self.steps.iter().enumerate() {
             for (j, family) in self.families.iter().enumerate() {

@@ -85,7 +85,7 @@ impl PokeScene {
         for &place in &self.places {
             self.poke(&mut field, cut, place);
             self.poke(&mut truth, truth_cut, place);
-            let shape = field.as_it_is();
+            let shape = field.current();
             for (index, truth) in truth.now.iter().enumerate() {
                 let steps = [index % truth_nodes, index / truth_nodes];
                 // The last node of one mesh may be a rounding beyond that of the other.
