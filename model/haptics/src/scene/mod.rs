@@ -99,7 +99,7 @@ impl Scene {
         let period = settings.period;
         let pose = SimulatedDevice::of(&settings)?.pose();
         let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
-        let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
+        let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut);
         let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
         let buzz_settings = BuzzSettings::of(settings.device.step_mm);

@@ -1,10 +1,8 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::surface::{
-    Cut, Grid, HeightField, MeshError, Method, MethodError, SurfaceRecoveryError,
-};
-use crate::surface::{ProxyError, Shear};
+use crate::surface::ProxyError;
+use crate::surface::{Cut, Grid, HeightField, MeshError, Method, SurfaceRecoveryError};
 use crate::{ControllerSettings, GuardSettings, LawError, Period};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -111,8 +109,7 @@ impl SceneSettings {
         // A spacing that is none is refused with the grid.
         let spacing = self.side_mm / self.nodes.saturating_sub(1) as f64;
         let grid = Grid::new(self.nodes, self.nodes, spacing)?;
-        let shear = Shear::Uniform(self.max_shear_mm);
-        Ok(HeightField::new(grid, vec![0.0; grid.nodes()], shear)?)
+        Ok(HeightField::flat(grid, self.max_shear_mm)?)
     }
 }
 
@@ -131,9 +128,6 @@ pub enum SceneError {
     /// Its way back to rest.
     #[error(transparent)]
     Recovery(#[from] SurfaceRecoveryError),
-    /// How its surface is found.
-    #[error(transparent)]
-    Method(#[from] MethodError),
     /// Its device.
     #[error("a device with {name} = {value} is not possible; {name} is {wanted}")]
     Device {

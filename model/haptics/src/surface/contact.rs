@@ -104,14 +104,11 @@ pub struct MoveCounts {
     pub moved: usize,
     /// Nodes or links looked at for it.
     pub visited: usize,
-    /// Contacts that would have moved a pinned node, and so moved nothing.
-    pub held: usize,
 }
 
 impl MoveCounts {
     pub(super) fn add(&mut self, other: Self) {
         self.moved += other.moved;
         self.visited += other.visited;
-        self.held += other.held;
     }
 }

@@ -13,7 +13,7 @@
 use super::chain::{excess, extend_bounds};
 use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node, Rect};
-use super::mesh::{HeightField, Pins};
+use super::mesh::HeightField;
 use super::recover::{Recovery, trim_span};
 use palpate_rheology::vectors::wide;
 
@@ -64,7 +64,7 @@ pub(super) fn tick(
     let mut count = 0;
     let mut touched = Rect::EMPTY;
     for &poke in pokes {
-        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count], &mut counts) {
+        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count]) {
             cones[count] = cone;
             count += 1;
             touched = touched.union(cone.rect(&field.grid));
@@ -80,8 +80,7 @@ pub(super) fn tick(
         return counts;
     }
     field.displaced.widen(touched);
-    let border = usize::from(field.pins == Pins::Border);
-    let [columns, rows] = [field.grid.columns(), field.grid.rows()];
+    let columns = field.grid.columns();
     let touched = field.displaced.active_rows();
     wide(
         #[inline(always)]
@@ -90,15 +89,9 @@ pub(super) fn tick(
                 let first = row * columns;
                 let now = &mut field.now[first..first + columns];
                 let rest = &field.rest[row * field.rest_stride..][..columns];
-                let span = field.displaced.row(row);
-                let span = if row < border || row >= rows - border {
-                    recovery.step_row(&mut now[span[0]..span[1]], &rest[span[0]..span[1]]);
-                    span
-                } else {
-                    let mut work = Row { now, rest, row, ends: [border, columns - border], span };
-                    work.press_all(cones, shape, recovery, cut, &mut counts);
-                    work.span
-                };
+                let mut work = Row { now, rest, row, span: field.displaced.row(row) };
+                work.press_all(cones, shape, recovery, cut, &mut counts);
+                let span = work.span;
                 field.displaced.set(row, trim_span(now, rest, span));
             }
         },
@@ -116,7 +109,6 @@ fn cone(
     cut: Cut,
     poke: Poke,
     before: &[Cone],
-    counts: &mut MoveCounts,
 ) -> Option<Cone> {
     let index = field.grid.index(poke.node);
     // The touched node as it will be when this contact's turn comes.
@@ -134,10 +126,6 @@ fn cone(
         Side::Pull => (excess::<true>(z, poke.z), poke.z - field.bounds[0]),
     };
     if above <= 0.0 {
-        return None;
-    }
-    if field.is_pinned(poke.node) {
-        counts.held += 1;
         return None;
     }
     // Steps beyond which even the furthest height is allowed; one more for the rounding of the
@@ -183,8 +171,6 @@ struct Row<'a> {
     now: &'a mut [f64],
     rest: &'a [f64],
     row: usize,
-    /// Columns that may move: from, and to before which.
-    ends: [usize; 2],
     /// Columns that may be displaced.
     span: [usize; 2],
 }
@@ -207,9 +193,8 @@ impl Row<'_> {
             };
             let column = usize::from(cone.poke.node.column);
             let reach = cone.reach - away;
-            let [start, end] = self.ends;
-            let mut reached =
-                [column.saturating_sub(reach).max(start), (column + reach + 1).min(end)];
+            let end = self.now.len();
+            let mut reached = [column.saturating_sub(reach), (column + reach + 1).min(end)];
             // Nodes beyond the reach are where a cone allows them, so that it may be laid over them as
             // well; but not beyond a range.
             let is_free = cone.reach < cut.range() as usize;
@@ -217,7 +202,7 @@ impl Row<'_> {
                 reached = join(self.span, reached);
                 let over = (reached[1] - reached[0]).next_multiple_of(LANES);
                 reached[1] = (reached[0] + over).min(end);
-                reached[0] = reached[1].saturating_sub(over).max(start);
+                reached[0] = reached[1].saturating_sub(over);
             }
             let step = match recovery.take() {
                 Some(recovery) if is_free => recovery,
@@ -284,7 +269,7 @@ impl Row<'_> {
 
 /// The furthest that a node so many steps from a contact may be.
 #[inline(always)]
-fn height<const PULL: bool>(z: f64, steps: f64, shear: f64) -> f64 {
+pub(super) fn height<const PULL: bool>(z: f64, steps: f64, shear: f64) -> f64 {
     let slope = shear * steps;
     if PULL { z - slope } else { z + slope }
 }

@@ -91,19 +91,6 @@ impl Grid {
     pub fn whole(&self) -> Rect {
         Rect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
     }
-
-    /// The neighbours along the axes, those that there are.
-    #[inline(always)]
-    pub(super) fn neighbours(&self, node: Node) -> [Option<Node>; 4] {
-        let Node { column, row } = node;
-        let at = |column, row| Node { column, row };
-        [
-            (column > 0).then(|| at(column - 1, row)),
-            (column + 1 < self.columns).then(|| at(column + 1, row)),
-            (row > 0).then(|| at(column, row - 1)),
-            (row + 1 < self.rows).then(|| at(column, row + 1)),
-        ]
-    }
 }
 
 impl Node {

@@ -5,9 +5,8 @@
 //! constant. [`Surface::tick`] does both; it allocates nothing, locks nothing, and gives the same bits
 //! for the same contacts.
 //!
-//! Three ways give the shape. [`Method::Chain`] is ChainMail as published; [`Method::Envelope`] is its
-//! closed form, many times faster; both need one MaxShear for all. [`Method::Sorted`] takes a MaxShear
-//! for each node.
+//! Two methods give the same shape: [`Method::Chain`] is ChainMail as published, [`Method::Envelope`] its
+//! closed form, many times faster.
 
 mod chain;
 mod contact;
@@ -21,12 +20,11 @@ mod proxy;
 mod recover;
 mod scene_curves;
 mod shape_error;
-mod sorted;
 
 pub use contact::{Contact, Cut, CutError, MoveCounts, Side};
 pub use grid::{Grid, MOST_NODES, Node, Rect};
 pub use heights::Heights;
-pub use mesh::{HIGHEST_MM, HeightField, INERT, Pins, Shear};
+pub use mesh::{HIGHEST_MM, HeightField, INERT};
 pub use mesh_error::MeshError;
 pub use plan::{Needs, NoPlan, OmittedPart, ScenePlan, plan, slower};
 pub use proxy::{Proxy, ProxyError, ProxyTouch, TouchState};
@@ -37,8 +35,6 @@ pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 use chain::Chain;
 use contact::Poke;
 use envelope::Envelope;
-use sorted::Sorted;
-use thiserror::Error;
 
 palpate_model::named! {
     /// How the shape is found.
@@ -48,48 +44,14 @@ palpate_model::named! {
         Envelope = "closed form",
         /// First moved first processed.
         Chain = "first moved first",
-        /// Largest violation first.
-        Sorted = "largest violation first",
     }
-}
-
-impl Method {
-    /// The fastest that is right for a field.
-    #[must_use]
-    pub fn fastest(field: &HeightField) -> Self {
-        match (field.shear(), field.pins()) {
-            (Shear::PerNode(_), _) => Self::Sorted,
-            (Shear::Uniform(_), Pins::Nodes(_)) => Self::Chain,
-            (Shear::Uniform(_), _) => Self::Envelope,
-        }
-    }
-}
-
-/// A method that would be wrong on a field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum MethodError {
-    /// Limits differ.
-    #[error(
-        "'{}' needs one MaxShear for all, and this mesh has one for each node; use '{}'",
-        .0.name(),
-        Method::Sorted.name()
-    )]
-    Shear(Method),
-    /// Ways around pinned nodes have no closed form.
-    #[error(
-        "'{}' does not go around single pinned nodes; pin the border only or use '{}'",
-        Method::Envelope.name(),
-        Method::Chain.name()
-    )]
-    Pins,
 }
 
 /// A method with its storage.
 #[derive(Clone, Debug)]
 enum Solver {
     Envelope(Envelope),
-    Chain { shear: f64, chain: Chain },
-    Sorted(Sorted),
+    Chain(Chain),
 }
 
 /// A height field, how it is moved and how it returns.
@@ -116,25 +78,13 @@ pub struct SurfaceTick {
 
 impl Surface {
     /// With everything a tick needs allocated.
-    pub fn new(
-        field: HeightField,
-        method: Method,
-        recovery: Recovery,
-        cut: Cut,
-    ) -> Result<Self, MethodError> {
-        let uniform = match field.shear() {
-            Shear::Uniform(shear) => Ok(*shear),
-            Shear::PerNode(_) => Err(MethodError::Shear(method)),
-        };
+    #[must_use]
+    pub fn new(field: HeightField, method: Method, recovery: Recovery, cut: Cut) -> Self {
         let solver = match method {
-            Method::Envelope if matches!(field.pins(), Pins::Nodes(_)) => {
-                return Err(MethodError::Pins);
-            }
-            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), uniform?)),
-            Method::Chain => Solver::Chain { shear: uniform?, chain: Chain::new(field.grid()) },
-            Method::Sorted => Solver::Sorted(Sorted::new(field.grid())),
+            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), field.shear())),
+            Method::Chain => Solver::Chain(Chain::new(field.grid())),
         };
-        Ok(Self { field, solver, recovery, cut })
+        Self { field, solver, recovery, cut }
     }
 
     /// The field.
@@ -184,19 +134,17 @@ impl Surface {
 
     fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> MoveCounts {
         let Self { field, solver, cut, .. } = self;
-        if let Solver::Envelope(shape) = solver {
-            return envelope::tick(field, shape, recovery, *cut, pokes);
+        match solver {
+            Solver::Envelope(shape) => envelope::tick(field, shape, recovery, *cut, pokes),
+            Solver::Chain(chain) => {
+                recovery.step_field(field);
+                let mut moved = MoveCounts::default();
+                for &poke in pokes {
+                    moved.add(chain.poke(field, field.shear(), *cut, poke));
+                }
+                moved
+            }
         }
-        recovery.step_field(field);
-        let mut moved = MoveCounts::default();
-        for &poke in pokes {
-            moved.add(match solver {
-                Solver::Chain { shear, chain } => chain.poke(field, *shear, *cut, poke),
-                Solver::Sorted(sorted) => sorted.poke(field, *cut, poke),
-                Solver::Envelope(_) => MoveCounts::default(),
-            });
-        }
-        moved
     }
 }
 

@@ -5,7 +5,7 @@
 use super::contact::{Contact, Cut, Side};
 use super::envelope::{self, Envelope};
 use super::grid::Grid;
-use super::mesh::{HeightField, Shear};
+use super::mesh::HeightField;
 use super::mesh_error::MeshError;
 use super::recover::Recovery;
 use palpate_rheology::integrators::{IntegratorError, Scheme, SeriesBody};
@@ -70,7 +70,7 @@ impl PokeScene {
         let places = (0..grid.nodes())
             .map(|index| [index % nodes, index / nodes].map(|steps| steps as f64 * grid.spacing()));
         let rest = places.map(|[x, y]| (self.rest)(x, y)).collect();
-        HeightField::new(grid, rest, Shear::Uniform(self.slope * grid.spacing()))
+        HeightField::new(grid, rest, self.slope * grid.spacing())
     }
 
     fn compare(
@@ -104,9 +104,8 @@ impl PokeScene {
     /// One poke of the surface at rest.
     fn poke(&self, field: &mut HeightField, cut: Cut, [x, y]: [f64; 2]) {
         let contact = Contact { x, y, z: (self.rest)(x, y) - self.depth, side: Side::Push };
-        let shear = self.slope * field.grid.spacing();
         let pokes = contact.poke(&field.grid).map(|(poke, _)| poke);
-        let shape = Envelope::new(&field.grid, shear);
+        let shape = Envelope::new(&field.grid, field.shear());
         envelope::tick(field, &shape, Recovery::ELASTIC, cut, pokes.as_slice());
     }
 }

@@ -7,6 +7,7 @@ use palpate_haptics::scene::{
 use palpate_haptics::{Flags, Period};
 use palpate_model::random::SplitMix;
 use palpate_model::units::Depth;
+use palpate_test_support::naive_surface as naive;
 
 fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, SceneTick)) -> Scene {
     let mut led = LedScene::new(settings).expect("a scene");
@@ -169,7 +170,10 @@ fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
         let height = scene.field().heights()[scene.field().grid().index(node)];
         assert!((height - (report.proxy[2] - report.depth)).abs() < 1e-12, "{report:?} {height}");
         assert!(report.moved > 0, "{report:?}");
-        assert!(scene.field().worst_excess() < 1e-9);
+        let (heights, settings) = (scene.field().heights(), scene.settings());
+        // Every link of the mesh is looked at, so not in every tick.
+        let worst = |z| naive::worst_excess(z, settings.nodes, |_, _| settings.max_shear_mm);
+        assert!(tick % 20 != 0 || worst(heights) < 1e-9);
     }
     assert_ne!(scene.hash(), flat);
     for _ in 0..2000 {

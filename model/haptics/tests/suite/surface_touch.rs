@@ -1,8 +1,8 @@
 //! Normals and the contact point against planes and paraboloids.
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, ProxyTouch, Recovery, Shear,
-    Side, Surface, TouchState,
+    Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, ProxyTouch, Recovery, Side,
+    Surface, TouchState,
 };
 use palpate_test_support::naive_surface as naive;
 use palpate_test_support::record::Noise;
@@ -283,8 +283,8 @@ fn places_that_are_none_give_no_contact_and_say_why() {
 #[test]
 fn depth_is_of_the_rest_surface_for_the_one_that_followed_the_tool_has_none() {
     let grid = Grid::new(51, 51, 0.5).unwrap();
-    let field = HeightField::new(grid, vec![0.0; 51 * 51], Shear::Uniform(0.1)).unwrap();
-    let mut surface = Surface::new(field, Method::Envelope, Recovery::ELASTIC, Cut::NONE).unwrap();
+    let field = HeightField::new(grid, vec![0.0; 51 * 51], 0.1).unwrap();
+    let mut surface = Surface::new(field, Method::Envelope, Recovery::ELASTIC, Cut::NONE);
     let device = [12.5, 12.5, -2.0];
     let tool = Contact { x: 12.5, y: 12.5, z: -2.0, side: Side::Push };
     surface.tick(&[tool]);
