@@ -50,7 +50,7 @@ fn fresh(settings: &MasterSlaveSettings) -> Result<MasterSlaveSnapshot, MasterSl
 fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
     let settings =
         MasterSlaveSettings::of(LawSettings::of::<3>(ModifiedKelvin::THESIS, Period::MILLISECOND));
-    let wanted = fresh(&settings)?;
+    let expected = fresh(&settings)?;
     let mut system = MasterSlave::new(&settings)?;
     let mut worst = 0.0f64;
     let mut is_right = true;
@@ -59,9 +59,9 @@ fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
         is_right &= one.force.is_finite() && one.energy.is_finite() && one.bias.is_finite();
         is_right &= !one.flags.has_any(Flags::NO_FORCE | Flags::DEPTH_NAN | Flags::PULSE_RATE);
         if i % ROUND == MOVING / 2 && i > ROUND {
-            let off = (one.model.0 / wanted.model.0 - 1.0).abs();
+            let off = (one.model.0 / expected.model.0 - 1.0).abs();
             worst = worst.max(off);
-            is_right &= one.depth == wanted.depth && one.pulses == wanted.pulses;
+            is_right &= one.depth == expected.depth && one.pulses == expected.pulses;
         }
         if i % 10_000_000 == 0 {
             eprintln!("{i} of {ticks} ticks");

@@ -5,8 +5,7 @@
 //! [`HapticPlant::sense`] and [`HapticPlant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
 
 use super::rig::{
-    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces,
-    ThermalState,
+    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackForces, ThermalState,
 };
 use super::{DELAY_MAX, Period};
 use palpate_model::units::{MmPerS, Newtons};
@@ -14,7 +13,6 @@ use palpate_model::units::{MmPerS, Newtons};
 /// A device and the hand on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantSettings {
-    /// The loop's tick.
     pub period: Period,
     /// Parts of a tick in which the device moves.
     pub parts: u32,
@@ -30,7 +28,6 @@ pub struct PlantSettings {
     pub delay: usize,
     /// The motor on its pinion; `None` for a source of force without faults.
     pub motor: Option<(Motor, Pinion)>,
-    /// The hand.
     pub hand: Hand,
     /// Place at the start, in mm.
     pub x: f64,
@@ -62,7 +59,7 @@ impl PlantSettings {
     }
 }
 
-/// What a loop tells the device.
+/// What a loop commands the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlantCommand {
     /// So many N against motion into the tissue; a motor takes it as no command.
@@ -71,7 +68,7 @@ pub enum PlantCommand {
     Drive(DriveInput),
 }
 
-/// What a loop is told.
+/// What a loop reads from the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensedPosition {
     /// Counts of the encoder; zero for one without steps.
@@ -80,23 +77,25 @@ pub struct SensedPosition {
     pub place: f64,
 }
 
-/// The device with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct HapticPlant {
     settings: PlantSettings,
-    rack: Rack,
+    /// True motion and energies.
+    pub rack: Rack,
     motor: MotorState,
-    thermal: ThermalState,
+    /// Temperatures of the motor.
+    pub thermal: ThermalState,
     queue: [PlantCommand; DELAY_MAX + 1],
     tick: u64,
     /// The tick at which the hand's path began.
     begun: u64,
-    hand_force: f64,
-    motor_force: f64,
+    /// Force of the hand, in N, at the end of the last part of a tick.
+    pub hand_force: f64,
+    /// Force of the motor into the tissue then, in N.
+    pub motor_force: f64,
 }
 
 impl HapticPlant {
-    /// At its start.
     #[must_use]
     pub fn new(settings: &PlantSettings) -> Self {
         let mass_kg = settings.mass_kg + settings.hand.mass_kg;
@@ -140,36 +139,6 @@ impl HapticPlant {
             let place = self.rack.x;
             SensedPosition { counts: 0, place }
         }
-    }
-
-    /// True place in mm and speed in mm/s.
-    pub fn motion(&self) -> [f64; 2] {
-        [self.rack.x, self.rack.v]
-    }
-
-    /// Force of the hand, then of the motor into the tissue, at the end of the last part of a tick, in N.
-    pub fn forces(&self) -> [f64; 2] {
-        [self.hand_force, self.motor_force]
-    }
-
-    /// Temperatures of the motor.
-    pub fn thermal(&self) -> ThermalState {
-        self.thermal
-    }
-
-    /// Current of the motor in A.
-    pub fn amps(&self) -> f64 {
-        self.motor.amps
-    }
-
-    /// Where the energies went, in N mm.
-    pub fn energies(&self) -> RackEnergies {
-        self.rack.energies
-    }
-
-    /// Energy of its motion, in N mm.
-    pub fn kinetic(&self) -> f64 {
-        self.rack.kinetic()
     }
 
     /// Moves through one tick. The hand's path begins with the first.

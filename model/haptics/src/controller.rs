@@ -39,7 +39,6 @@ impl ControllerSettings {
     }
 }
 
-/// What a controller did in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerTick {
     /// The force with the damping.
@@ -48,7 +47,6 @@ pub struct ControllerTick {
     pub damping: f64,
     /// Energy absorbed so far, in N mm; below zero it is owed.
     pub energy: f64,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -66,7 +64,6 @@ pub struct PassivityController {
     force_max: f64,
     credit_decay: f64,
     tick_s: f64,
-    injected: f64,
     hush: u64,
     hush_remaining: u64,
 }
@@ -84,15 +81,9 @@ impl PassivityController {
             force_max: settings.force_max.0.max(0.0),
             credit_decay: (-tick_s / settings.leak.0.max(tick_s)).exp(),
             tick_s,
-            injected: 0.0,
             hush: period.ticks_in(settings.hush),
             hush_remaining: 0,
         }
-    }
-
-    /// Energy that damping has taken, in N mm.
-    pub fn injected(&self) -> f64 {
-        self.injected
     }
 
     /// Energy absorbed so far, in N mm.
@@ -140,9 +131,8 @@ impl PassivityController {
         }
         let added = (damping * speed).clamp(-self.force_max, self.force_max);
         let added = if added.is_finite() { added } else { 0.0 };
-        self.injected += added * speed * self.tick_s;
-        let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
-        let total = wanted + added;
+        let requested = if force.0.is_finite() { force.0 } else { 0.0 };
+        let total = requested + added;
         self.observer.hold(total);
         ControllerTick { force: Newtons(total), damping, energy, flags }
     }
@@ -180,7 +170,6 @@ mod tests {
         // Going on at that speed pays it back exactly.
         let tick = one.tick((-2, COUNT), 1, Newtons(0.0), true);
         assert!(tick.energy.abs() < 1e-15 && tick.damping == 0.0);
-        assert!((one.injected() - 4.0 * COUNT).abs() < 1e-12);
     }
 
     #[test]

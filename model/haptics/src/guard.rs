@@ -1,4 +1,4 @@
-//! What keeps the rendered force within bounds, whatever the model asks for.
+//! The guard that keeps the rendered force within bounds, whatever the model asks for.
 
 use super::{Flags, Period};
 use palpate_model::units::{Newtons, Seconds};
@@ -28,7 +28,7 @@ pub struct GuardSettings {
 impl Default for GuardSettings {
     /// 10 N is below what the motor may give for long. 0.5 N/ms is three times what the thesis body asks
     /// for at 100 mm/s and 30 mm. A stall of 5 ms is five ticks of 1 kHz. Ramps of a quarter of a second and more leave a
-    /// hand the time to notice; that of contact is short beside a poke.
+    /// hand the time to notice; that of contact is short compared with a poke.
     fn default() -> Self {
         Self {
             force_max: Newtons(10.0),
@@ -95,12 +95,9 @@ impl Ramp {
     }
 }
 
-/// What a guard lets through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardTick {
-    /// The force.
     pub force: Newtons,
-    /// What it did.
     pub flags: Flags,
 }
 
@@ -129,7 +126,7 @@ impl ForceGuard {
         Newtons(self.last)
     }
 
-    /// Force is wanted again: it rises as after the start.
+    /// Force is requested again: it rises as after the start.
     pub fn restart(&mut self) {
         self.start.done = 0;
     }
@@ -156,9 +153,9 @@ impl ForceGuard {
             | Flags::CONTACT_RAMP.when(contacts && is_touching)
             | Flags::NO_CONTACT.when(!is_touching)
             | Flags::NO_FORCE.when(force.0.is_nan());
-        let wanted = if is_touching && !force.0.is_nan() { force.0 } else { 0.0 };
-        let bounded = wanted.clamp(-self.force_max, self.force_max);
-        flags |= Flags::FORCE_MAX.when(bounded != wanted);
+        let requested = if is_touching && !force.0.is_nan() { force.0 } else { 0.0 };
+        let bounded = requested.clamp(-self.force_max, self.force_max);
+        flags |= Flags::FORCE_MAX.when(bounded != requested);
         let risen = bounded * start.min(contact);
         // A device that held its force goes on from there: a loop that is late again and again would else never reach it.
         let known = risen.clamp(self.held.min(0.0), self.held.max(0.0));

@@ -31,6 +31,7 @@ mod observer;
 mod period;
 pub mod rig;
 pub mod scene;
+mod setting_error;
 pub mod simulation;
 pub mod surface;
 mod torque;
@@ -49,7 +50,8 @@ pub use master_slave::{
 };
 pub use observer::{DELAY_MAX, PassivityObserver};
 pub use period::{Period, PeriodError};
-pub use torque::{Converter, DriveKind, TorqueError, TorqueSettings, TorqueTick};
+pub use setting_error::{SettingError, SettingRange};
+pub use torque::{Converter, DriveKind, TorqueSettings, TorqueTick};
 
 /// Mass in N s^2/mm of so many kg: 1 N = 1 kg m/s^2 = 1000 kg mm/s^2.
 #[must_use]

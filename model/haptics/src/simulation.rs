@@ -6,18 +6,15 @@ use super::master_slave::{
     MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
     MasterSlaveSnapshot,
 };
-use super::rig::{Hand, HandPath};
-use super::torque::{DriveKind, TorqueSettings};
+use super::rig::Hand;
+use super::torque::TorqueSettings;
 use super::{GuardSettings, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
-/// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulationSettings {
-    /// The system.
     pub system: MasterSlaveSettings,
-    /// The device and the hand.
     pub plant: PlantSettings,
     /// The specimen that the slave presses.
     pub specimen: ModifiedKelvin,
@@ -38,33 +35,6 @@ impl SimulationSettings {
             ..PlantSettings::bare(period)
         };
         Self { system, plant, specimen: body }
-    }
-
-    /// The thesis body as it buzzes, or not: pressed to 25 mm by a firm grip that wants to 30, on a current drive without
-    /// friction, with an encoder of 15 um, forces two ticks of a millisecond late, and 0.5 N s/m of damping where 3.5 are
-    /// needed. Unguarded, the force is bounded by nothing but the drive and there is no controller. With the source's
-    /// voltage drive, which brings 17.6 N s/m and 0.8 N of friction, it is calm at that depth by itself.
-    #[must_use]
-    pub fn buzz(is_guarded: bool) -> Self {
-        let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
-        // Less damping than a firm grip has when it is asked to calm something.
-        let hand = Hand { damping: 0.002, ..Hand::firm(path) };
-        let mut all = Self::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
-        let (delay, damping) = (2, 0.5e-3);
-        all.plant.friction = [0.0; 2];
-        all.plant.damping = damping;
-        all.plant.delay = delay;
-        all.system.damping = damping;
-        all.system.delay_ticks = delay as f64;
-        all.system.torque = TorqueSettings {
-            drive: DriveKind::Current { amps_per_volt: 1.0 },
-            ..all.system.torque
-        };
-        all.system.torque.motor.friction = 0.0;
-        if let Some((motor, _)) = &mut all.plant.motor {
-            motor.friction = 0.0;
-        }
-        if is_guarded { all } else { all.unguarded() }
     }
 
     /// The same without guard and controller: the force is bounded by nothing but the drive.
@@ -92,11 +62,8 @@ pub struct SimulationTick {
     pub motor: Newtons,
     /// Temperature of the winding in degrees Celsius.
     pub winding_c: f64,
-    /// What the system was told.
     pub input: MasterSlaveInput,
-    /// What it answered.
     pub output: MasterSlaveOutput,
-    /// Its state.
     pub snapshot: MasterSlaveSnapshot,
 }
 
@@ -147,7 +114,6 @@ impl Simulation {
         })
     }
 
-    /// The device.
     pub fn plant(&self) -> &HapticPlant {
         &self.plant
     }
@@ -157,7 +123,6 @@ impl Simulation {
         self.plant.lead(to, speed);
     }
 
-    /// The system.
     pub fn system(&self) -> &MasterSlave {
         &self.system
     }
@@ -199,15 +164,14 @@ impl Simulation {
     fn moved(&mut self, input: MasterSlaveInput) -> SimulationTick {
         self.plant.tick(self.command);
         self.tick += 1;
-        let [x, v] = self.plant.motion();
-        let [hand, motor] = self.plant.forces();
+        let HapticPlant { rack, thermal, hand_force, motor_force, .. } = self.plant;
         SimulationTick {
             t: self.period.time_of(self.tick).seconds(),
-            x,
-            v: MmPerS(v),
-            hand: Newtons(hand),
-            motor: Newtons(-motor),
-            winding_c: self.plant.thermal().winding_c,
+            x: rack.x,
+            v: MmPerS(rack.v),
+            hand: Newtons(hand_force),
+            motor: Newtons(-motor_force),
+            winding_c: thermal.winding_c,
             input,
             output: self.last,
             snapshot: self.system.snapshot(),

@@ -1,4 +1,4 @@
-//! Which curve goes through the points.
+//! Kinds of calibration curves.
 
 use super::curve::Curve;
 use super::document::CalibrationPoint;
@@ -6,7 +6,6 @@ use super::error::CalibrationError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A kind of curve.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum CurveKind {
@@ -39,10 +38,6 @@ impl fmt::Display for CurveKind {
 }
 
 impl CurveKind {
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::Monotone
-    }
-
     /// Whether the curve goes through every one of these points.
     pub fn meets_all(&self, points: &[CalibrationPoint]) -> bool {
         match self {

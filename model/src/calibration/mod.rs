@@ -26,7 +26,7 @@ pub use document::{
 pub use error::CalibrationError;
 pub use kind::CurveKind;
 pub use quality::{FlatStretch, Hysteresis, PointQuality, Quality};
-pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady, Unsettled};
+pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady};
 pub use uncertainty::{ForceUncertainty, Term};
 pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckResult, KnownWeight, WeightCheckError};
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -1,4 +1,4 @@
-//! What a calibration is like: hysteresis, repeatability, zero shift, sensitivity, and where it is flat.
+//! Quality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
 
 use super::CalibrationError;
 use super::curve::Curve;
@@ -38,7 +38,6 @@ impl<'a> TaredCurve<'a> {
 /// One weight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PointQuality {
-    /// Mass in g.
     pub mass_g: f64,
     /// Its weight in N.
     pub force_n: f64,
@@ -94,10 +93,9 @@ pub struct Hysteresis {
     pub rms_n: f64,
 }
 
-/// What a calibration is like.
+/// Figures of merit of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// Every weight.
     pub points: Vec<PointQuality>,
     /// Loading against unloading, where both were taken.
     pub hysteresis: Option<Hysteresis>,
@@ -107,16 +105,14 @@ pub struct Quality {
     pub zero_shift_v: Option<f64>,
     /// The same in N, at the sensitivity of the empty cell.
     pub zero_shift_n: Option<f64>,
-    /// Flat stretches.
     pub flat: Vec<FlatStretch>,
     /// Forces beyond this in N are extrapolated.
     pub force_max_n: f64,
-    /// What a reader must know, one sentence each.
+    /// Findings for a reader, one sentence each.
     pub findings: Vec<String>,
 }
 
 impl Calibration {
-    /// What this calibration is like.
     pub fn quality(&self) -> Result<Quality, CalibrationError> {
         let points = self.points()?;
         let curve = self.curve.through(&points)?;
@@ -196,7 +192,7 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (square / f64::from(count)).sqrt())
 }
 
-/// The flat stretch, as it shows to somebody who lays weight after weight: it begins where the next weight
+/// The flat stretch, as it appears while weight after weight is laid on: it begins where the next weight
 /// hardly moves the signal and goes on as long as the signal, seen from there, lags behind.
 fn flat(
     points: &[CalibrationPoint],

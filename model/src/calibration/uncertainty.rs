@@ -22,7 +22,7 @@ const GAP_SHARE: f64 = 0.25;
 const HALVINGS: u32 = 20;
 
 crate::named! {
-    /// Where an error comes from.
+    /// Source of an error.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Term {
@@ -63,7 +63,6 @@ pub struct ForceUncertainty {
 }
 
 impl ForceUncertainty {
-    /// That of a calibration's forces.
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
         let maker = ComponentBuilder::of(calibration)?;
         let mut not_stated = Vec::new();
@@ -116,7 +115,7 @@ impl ForceUncertainty {
         &self.not_stated
     }
 
-    /// Whether a force lies beyond the weights, where the true uncertainty is larger than what is told.
+    /// Whether a force lies beyond the weights, where the true uncertainty is larger than [`Self::sigma`].
     pub fn is_extrapolated(&self, force: Newtons) -> bool {
         !(self.range.0.0..=self.range.1.0).contains(&force.0)
     }
@@ -146,7 +145,6 @@ impl ForceUncertainty {
     }
 }
 
-/// What is needed to make the components.
 struct ComponentBuilder<'a> {
     calibration: &'a Calibration,
     points: Vec<CalibrationPoint>,
@@ -322,49 +320,40 @@ impl<'a> ComponentBuilder<'a> {
         }
         let last = self.points.len() - 1;
         let newtons = |i: usize| self.points[i].newtons.0;
-        let mut components = Vec::new();
+        let component = |shift: &dyn Fn(f64) -> f64| Component {
+            term: Term::Interpolation,
+            shifts: self.nodes.iter().map(|force| shift(*force)).collect(),
+        };
+        let sensitivity = |force: f64| self.curve.sensitivity_at(Newtons(force));
         if self.calibration.curve.meets_all(&self.points) {
-            for i in 0..last {
+            let arch = |i: usize| {
                 let near = left_out[i..=i + 1].iter().flatten().copied();
                 let sigma = GAP_SHARE * rms(near).unwrap_or(0.0);
                 let (from, to) = (newtons(i), newtons(i + 1));
-                let arch = |&force: &f64| {
+                component(&|force| {
                     let s = (force - from) / (to - from);
                     if !(0.0..=1.0).contains(&s) {
                         return 0.0;
                     }
-                    let error =
-                        4.0 * s * (1.0 - s) * sigma / self.curve.sensitivity_at(Newtons(force));
+                    let error = 4.0 * s * (1.0 - s) * sigma / sensitivity(force);
                     error.min(force - from).min(to - force)
-                };
-                components.push(Component {
-                    term: Term::Interpolation,
-                    shifts: self.nodes.iter().map(arch).collect(),
-                });
-            }
-        } else {
-            let sigma = rms(left_out.iter().flatten().copied()).unwrap_or(0.0);
-            for i in 0..=last {
-                if newtons(i) == 0.0 {
-                    // The tare puts this one right.
-                    continue;
-                }
-                let hat = |&force: &f64| {
-                    let side = if force < newtons(i) { i.checked_sub(1) } else { Some(i + 1) };
-                    let next = side.filter(|next| *next <= last).map(newtons);
-                    let height = match next {
-                        Some(next) => (1.0 - (force - newtons(i)) / (next - newtons(i))).max(0.0),
-                        None => 1.0,
-                    };
-                    height * sigma / self.curve.sensitivity_at(Newtons(force))
-                };
-                components.push(Component {
-                    term: Term::Interpolation,
-                    shifts: self.nodes.iter().map(hat).collect(),
-                });
-            }
+                })
+            };
+            return Some((0..last).map(arch).collect());
         }
-        Some(components)
+        let sigma = rms(left_out.iter().flatten().copied()).unwrap_or(0.0);
+        let hat = |i: usize| {
+            component(&|force| {
+                let side = if force < newtons(i) { i.checked_sub(1) } else { Some(i + 1) };
+                let next = side.filter(|next| *next <= last).map(newtons);
+                let height = next.map_or(1.0, |next| {
+                    (1.0 - (force - newtons(i)) / (next - newtons(i))).max(0.0)
+                });
+                height * sigma / sensitivity(force)
+            })
+        };
+        // The tare corrects the point without a weight.
+        Some((0..=last).filter(|i| newtons(*i) != 0.0).map(hat).collect())
     }
 }
 

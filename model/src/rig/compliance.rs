@@ -1,4 +1,4 @@
-//! How far a rig gives way under force, from a run against something stiff, and what that does to depth.
+//! Machine compliance of a rig, from a run against something stiff, and the correction of depth by it.
 
 use crate::units::{Depth, Newtons, Position};
 use thiserror::Error;
@@ -10,8 +10,8 @@ pub struct StiffSample {
     pub position: Position,
     /// Force above tare.
     pub force: Newtons,
-    /// Its standard uncertainty beside that of the others: only ratios matter. Where a load cell hardly answers,
-    /// forces are worth little.
+    /// Its standard uncertainty relative to that of the others: only ratios matter. Where a load cell is
+    /// insensitive, forces have little weight.
     pub sigma: Newtons,
 }
 
@@ -22,7 +22,7 @@ pub struct Compliance {
     pub mm_per_newton: f64,
     /// Its standard error.
     pub std_error: f64,
-    /// Where the straight line has no force: the stiff surface, from home.
+    /// Position from home at which the straight line has no force: the stiff surface.
     pub surface: Position,
     /// Its standard error in mm.
     pub surface_std_error_mm: f64,
@@ -40,14 +40,13 @@ pub enum ComplianceError {
         "only {samples} samples are above the seating force of {seating:.2}; at least {SAMPLES_MIN} are needed, so press further or more slowly"
     )]
     TooShort {
-        /// How many there are.
         samples: usize,
         /// The seating force.
         seating: Newtons,
     },
     /// The force does not rise with position.
     #[error(
-        "the force does not rise with position, so nothing stiff was touched; check what stands before the probe"
+        "the force does not rise with position, so the probe did not touch anything stiff; check what is in front of the probe"
     )]
     NotRising,
     /// Not a straight line.
@@ -57,7 +56,6 @@ pub enum ComplianceError {
     Curved {
         /// Greatest deviation of a parabola from the line as a share of the force range, in percent.
         bend: f64,
-        /// What is allowed, in percent.
         limit: f64,
     },
 }
@@ -202,7 +200,7 @@ impl Line {
     }
 }
 
-/// A depth with what a rig's compliance takes from it. It stands beside the raw depth, never in its place.
+/// A depth with what a rig's compliance takes from it. It never replaces the raw depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CorrectedDepth {
     /// `depth - compliance * force`.
@@ -212,7 +210,7 @@ pub struct CorrectedDepth {
 }
 
 impl Compliance {
-    /// How deep the probe really is where the axis is at a raw depth under a force.
+    /// Depth of the probe itself where the axis is at a raw depth under a force.
     ///
     /// Contact is found at forces far below those of a measurement, and the rig gives way by as little there.
     pub fn correct(&self, raw: Depth, force: Newtons, force_sigma: Newtons) -> CorrectedDepth {

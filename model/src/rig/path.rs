@@ -19,9 +19,7 @@ use thiserror::Error;
     "commanded path at {expected_pulses:.2} pulses but the controller reports {reported_pulses}; steps were lost or the axis was moved by hand, home it again"
 )]
 pub struct PathError {
-    /// Where the commanded course is, in pulses.
     pub expected_pulses: f64,
-    /// What the controller reported.
     pub reported_pulses: i64,
 }
 

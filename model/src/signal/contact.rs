@@ -1,4 +1,4 @@
-//! Where the tissue begins, from a slow pass at constant speed.
+//! The contact point, from a slow pass at constant speed.
 //!
 //! Past contact at `x_c` the depth grows as `d = x - x_c = v u`, and a Kelvin body answers
 //! `F = c + a_1 d psi_1(u / tau) + a_2 d^2 psi_2(u / tau)`: the closed form of the force model's
@@ -40,10 +40,7 @@ pub enum ContactFitError {
     #[error(
         "the slow pass has only {points} points; at least {POINTS_MIN} are needed, so approach more slowly"
     )]
-    TooShort {
-        /// How many there are.
-        points: usize,
-    },
+    TooShort { points: usize },
     /// Not a pass forward at one speed.
     #[error("the slow pass did not move forward at one speed, so contact cannot be located in it")]
     NotOneSpeed,
@@ -69,25 +66,39 @@ pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactFi
         return Err(ContactFitError::TooShort { points: points.len() });
     }
     let pass = Pass::new(points)?;
-    let (mut at, mut cost) = pass.scan().ok_or(ContactFitError::NoOnset)?;
-    // Gauss-Newton with step halving; it settles in a few steps from a scanned start.
-    for _ in 0..30 {
-        let Some(step) = pass.step(at) else { break };
-        let better = (0..12).find_map(|halving| {
-            let next = at.moved(step, 0.5f64.powi(halving));
-            let next_cost = pass.cost(next)?;
-            (next_cost < cost).then_some((next, next_cost))
-        });
-        let Some((next, next_cost)) = better else {
-            break;
-        };
-        let is_settled = (cost - next_cost) <= 1e-10 * cost;
+    let start = pass.scan().ok_or(ContactFitError::NoOnset)?;
+    let line = |at: Trial| {
+        let (step, pass) = (pass.step(at)?, &pass);
+        Some(move |share| {
+            let next = at.moved(step, share);
+            Some((next, pass.cost(next)?))
+        })
+    };
+    // It settles in a few steps from a scanned start.
+    let (at, _) = descend(start, 30, |cost| 1e-10 * cost, line);
+    pass.estimate(at).ok_or(ContactFitError::NoOnset)
+}
+
+/// Gauss-Newton with step halving. `line` gives the trials along the step at a trial, by the share of the step that
+/// is taken, each with its cost; a step that gains no more than `gain_min` of the cost is the last.
+pub(super) fn descend<T: Copy, L: Fn(f64) -> Option<(T, f64)>>(
+    (mut at, mut cost): (T, f64),
+    steps_max: usize,
+    gain_min: impl Fn(f64) -> f64,
+    line: impl Fn(T) -> Option<L>,
+) -> (T, f64) {
+    for _ in 0..steps_max {
+        let Some(trial) = line(at) else { break };
+        let better = (0..12)
+            .find_map(|halving| trial(0.5f64.powi(halving)).filter(|(_, next)| *next < cost));
+        let Some((next, next_cost)) = better else { break };
+        let is_settled = cost - next_cost <= gain_min(cost);
         (at, cost) = (next, next_cost);
         if is_settled {
             break;
         }
     }
-    pass.estimate(at).ok_or(ContactFitError::NoOnset)
+    (at, cost)
 }
 
 /// A trial contact position and relaxation time.

@@ -23,7 +23,6 @@ const NONE: u32 = PLACE;
 /// Most samples in one pyramid.
 pub const SAMPLES_MAX: usize = NONE as usize;
 
-/// What is drawn next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PyramidMark {
     /// A sample: its place and its value.
@@ -129,12 +128,10 @@ impl Pyramid {
         Self { values: Vec::with_capacity(samples), levels: Vec::new() }
     }
 
-    /// How many samples there are.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }

@@ -51,10 +51,8 @@ impl Segment {
     }
 }
 
-/// What was drawn of a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drawn {
-    /// Points handed out.
     pub points: usize,
     /// The most samples that share a lowest and a highest one; 1 where every sample is drawn.
     pub samples_per_column: usize,
@@ -63,7 +61,6 @@ pub struct Drawn {
 /// A place on a track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackPosition {
-    /// Number of the sample.
     pub index: usize,
     /// Its time in s.
     pub t: f64,
@@ -91,12 +88,10 @@ impl Track {
         self.segments.push(segment);
     }
 
-    /// How many samples there are.
     pub fn len(&self) -> usize {
         self.samples
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.samples == 0
     }

@@ -16,9 +16,7 @@ use super::ModifiedKelvin;
 /// A band of depth in mm; the end is infinite where the band never ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InadmissibleBand {
-    /// Where it begins.
     pub from: f64,
-    /// Where it ends.
     pub to: f64,
 }
 

@@ -1,21 +1,21 @@
-//! Where names stand beside points, so that none covers another.
+//! Positions of names next to points, so that none covers another.
 
 use crate::drawing::FONT;
 
 /// Height of a line of names at the right, in px.
 const LINE: f64 = FONT + 2.0;
-/// Width of a name beside a point, and half the width of the point, in px.
+/// Width of a name next to a point, and half the width of the point, in px.
 const LABEL: f64 = 78.0;
 const SIZE: f64 = 5.0;
 
 /// Heights for names at the right edge, as near to the ends of their lines as leaves all of them readable.
-pub(super) fn pushed_apart(wanted: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..wanted.len()).collect();
-    order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));
-    let mut places = vec![0.0; wanted.len()];
+pub(super) fn spread_heights(target: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..target.len()).collect();
+    order.sort_by(|a, b| target[*a].total_cmp(&target[*b]));
+    let mut places = vec![0.0; target.len()];
     let mut free = top;
     for &index in &order {
-        places[index] = wanted[index].max(free);
+        places[index] = target[index].max(free);
         free = places[index] + LINE;
     }
     let mut free = bottom;
@@ -26,7 +26,7 @@ pub(super) fn pushed_apart(wanted: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> 
     places
 }
 
-/// Where a point's name stands: beside it, or else as little above or below as leaves other points and names uncovered.
+/// Position of a point's name: next to it, or else as little above or below as leaves other points and names uncovered.
 pub(super) fn label_position(
     [x, y]: [f64; 2],
     [top, bottom]: [f64; 2],
@@ -52,8 +52,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_at_one_height_are_pushed_apart_and_stay_within() {
-        let places = pushed_apart(&[95.0, 95.0, 10.0, 95.0], [0.0, 100.0]);
+    fn names_at_one_height_are_spread_heights_and_stay_within() {
+        let places = spread_heights(&[95.0, 95.0, 10.0, 95.0], [0.0, 100.0]);
         assert_eq!(places[2], 10.0);
         let mut close = [places[0], places[1], places[3]];
         close.sort_by(f64::total_cmp);

@@ -25,12 +25,6 @@ impl Linear {
         Self { stiffness: slope, damping: body.tau_sig * x, tau: body.tau_eps }
     }
 
-    /// A spring without memory.
-    #[must_use]
-    pub fn spring(stiffness: f64) -> Self {
-        Self { stiffness, damping: 0.0, tau: 0.0 }
-    }
-
     /// Damping in N s/mm that the lag alone takes, at any tick: `k0 tau - c0`.
     pub fn lag(&self) -> f64 {
         self.stiffness * self.tau - self.damping

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub use settings::{MasterSlaveError, MasterSlaveSettings};
 pub use snapshot::MasterSlaveSnapshot;
 
-/// What comes in with a tick; the same inputs give the same outputs, bit by bit.
+/// Input of a tick; the same inputs give the same outputs, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MasterSlaveInput {
     /// Counts of the master's encoder.
@@ -29,11 +29,11 @@ pub struct MasterSlaveInput {
     pub cell: Newtons,
     /// Pulses at which the slave is, from its start; `None` if it is taken to be where it was sent.
     pub slave_pulses: Option<i64>,
-    /// Whether force is wanted at all.
+    /// Whether force is requested at all.
     pub is_on: bool,
 }
 
-/// What goes out.
+/// Output of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MasterSlaveOutput {
     /// Pulses for the slave in this tick.
@@ -42,7 +42,6 @@ pub struct MasterSlaveOutput {
     pub bias: Volts,
     /// The force it stands for.
     pub force: Newtons,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -76,7 +75,7 @@ const CAUGHT_UP: u64 = 64;
 /// A count in 0.1 s is 0.15 mm/s with the source's encoder, a fifth of its slowest check.
 const HEADING_S: f64 = 0.1;
 
-/// What the controller sees of a tick.
+/// Input of the passivity controller.
 struct ControllerInput {
     is_touching: bool,
     is_on: bool,
@@ -158,7 +157,7 @@ impl MasterSlave {
         (law, flags)
     }
 
-    /// What of the model's force is asked for: a winding too hot gets no more than it may have for ever, until it
+    /// The model's force, bounded where the winding is too hot: it gets no more than it may have for ever, until it
     /// has cooled.
     fn bounded_force(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
         let lasting = if is_hot {
@@ -166,11 +165,11 @@ impl MasterSlave {
         } else {
             f64::MAX
         };
-        let asked = if is_on { model.0 } else { 0.0 };
-        Newtons(asked.clamp(-lasting, lasting))
+        let requested = if is_on { model.0 } else { 0.0 };
+        Newtons(requested.clamp(-lasting, lasting))
     }
 
-    /// What the passivity controller makes of the guarded force.
+    /// The guarded force with the damping of the passivity controller.
     fn damp(&mut self, guarded: Newtons, touch: &ControllerInput) -> ControllerTick {
         let mut damped =
             ControllerTick { force: guarded, damping: 0.0, energy: 0.0, flags: Flags::NONE };
@@ -205,18 +204,18 @@ impl MasterSlave {
         let (moved, mut flags) = self.counter.tick(input.counts, elapsed);
         let gear = self.gear.tick(input.counts);
         let slave = input.slave_pulses.unwrap_or(gear.made) as f64 * self.mm_per_pulse;
-        let wanted = Depth(slave - self.surface_mm);
+        let target = Depth(slave - self.surface_mm);
         flags |= gear.flags | self.contact.tick(input.cell);
         let is_touching = self.contact.is_touching();
-        let (law, law_flags) = self.lead(before.depth, wanted, elapsed);
+        let (law, law_flags) = self.lead(before.depth, target, elapsed);
         flags |= law_flags;
         let is_hot = self.thermal.winding_c > self.torque.motor.thermal.winding_max_c;
-        let asked = self.bounded_force(law.force, input.is_on, is_hot);
+        let requested = self.bounded_force(law.force, input.is_on, is_hot);
         flags |= Flags::OFF.when(!input.is_on) | Flags::HOT.when(is_hot);
         if input.is_on && before.flags.has(Flags::OFF) {
             self.guard.restart();
         }
-        let guarded = self.guard.tick(asked, is_touching, elapsed);
+        let guarded = self.guard.tick(requested, is_touching, elapsed);
         flags |= guarded.flags;
         // What the loop makes of it.
         let master_mm = input.counts.saturating_sub(origin) as f64 * self.count_mm;

@@ -24,7 +24,7 @@ pub(super) struct Chain {
     rows: [u16; 2],
 }
 
-/// Which nodes moved in this pass.
+/// Marks of the nodes that moved in this pass.
 #[derive(Clone, Debug)]
 pub(super) struct Stamps {
     of: Box<[u32]>,

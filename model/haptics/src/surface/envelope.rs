@@ -34,7 +34,7 @@ struct Cone {
 
 const NO_CONE: Cone = Cone { poke: Poke::NOWHERE, reach: 0 };
 
-/// What is made once.
+/// Tables that are made once.
 #[derive(Clone, Debug)]
 pub(super) struct Envelope {
     shear: f64,

@@ -22,7 +22,7 @@ pub struct HeightField {
     pub(super) now: Box<[f64]>,
     /// MaxShear: how far neighbours may be apart in height, in mm.
     shear: f64,
-    /// Where `now` may differ from `rest`.
+    /// Nodes at which `now` may differ from `rest`.
     pub(super) displaced: Spans,
     /// Nothing is now below or above these.
     pub(super) bounds: [f64; 2],
@@ -71,7 +71,6 @@ impl HeightField {
         Self::new(grid, vec![0.0; grid.nodes()], shear)
     }
 
-    /// The grid.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -96,16 +95,8 @@ impl HeightField {
         Heights::for_grid(self.grid, &self.now)
     }
 
-    /// MaxShear in mm.
     pub fn shear(&self) -> f64 {
         self.shear
-    }
-
-    /// Forgets every displacement.
-    pub fn reset(&mut self) {
-        self.now.copy_from_slice(&self.rest);
-        self.displaced = Spans::none(&self.grid);
-        self.bounds = self.rest_bounds;
     }
 
     /// Bounds of the heights drawn back to those at rest, once all is.

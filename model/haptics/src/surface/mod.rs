@@ -21,23 +21,24 @@ mod recover;
 mod scene_curves;
 mod shape_error;
 
-pub use contact::{Contact, Cut, CutError, MoveCounts, Side};
+pub use contact::{Contact, Cut, MoveCounts, Side};
 pub use grid::{Grid, MOST_NODES, Node, Rect};
 pub use heights::Heights;
 pub use mesh::{HIGHEST_MM, HeightField, INERT};
 pub use mesh_error::MeshError;
 pub use plan::{Needs, NoPlan, OmittedPart, ScenePlan, plan, slower};
-pub use proxy::{Proxy, ProxyError, ProxyTouch, TouchState};
-pub use recover::{Recovery, SETTLED_MM, SurfaceRecoveryError};
+pub use proxy::{Proxy, ProxyTouch, TouchState};
+pub use recover::{Recovery, SETTLED_MM};
 pub use scene_curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
 pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 
 use chain::Chain;
 use contact::Poke;
 use envelope::Envelope;
+pub(crate) use proxy::dot;
 
 palpate_model::named! {
-    /// How the shape is found.
+    /// Algorithm that computes the shape.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Method {
         /// The closed form: the fast one.
@@ -63,7 +64,6 @@ pub struct Surface {
     cut: Cut,
 }
 
-/// What a tick did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceTick {
     /// Work and effect of the contacts.
@@ -87,7 +87,6 @@ impl Surface {
         Self { field, solver, recovery, cut }
     }
 
-    /// The field.
     pub fn field(&self) -> &HeightField {
         &self.field
     }
@@ -95,11 +94,6 @@ impl Surface {
     /// Heights now in mm, row by row.
     pub fn heights(&self) -> &[f64] {
         self.field.heights()
-    }
-
-    /// Forgets every displacement.
-    pub fn reset(&mut self) {
-        self.field.reset();
     }
 
     /// One tick of recovery, then the contacts one after the other.

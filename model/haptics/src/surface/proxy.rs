@@ -11,7 +11,7 @@
 //! normal turns with a sliding point, and depth with it.
 
 use super::heights::Heights;
-use thiserror::Error;
+use crate::{SettingError, SettingRange};
 
 /// Projections in a tick: as many as there are constraints on a point in space.
 const ROUNDS: usize = 3;
@@ -26,24 +26,10 @@ const MOST_FRICTION: f64 = 10.0;
 #[derive(Clone, Debug)]
 pub struct Proxy {
     friction: f64,
-    most_step: f64,
     /// Where the contact point is along x and y, while it touches.
     at: Option<[f64; 2]>,
     /// Where the device was, if it was somewhere.
     last: Option<[f64; 3]>,
-}
-
-/// A contact point that cannot be.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum ProxyError {
-    /// No friction coefficient.
-    #[error("a friction coefficient of {0} is not possible; it is from 0 to 10")]
-    Friction(f64),
-    /// No length.
-    #[error(
-        "a contact point that moves by at most {0} mm in a tick is not possible; it is a length above zero, and may be infinite"
-    )]
-    Step(f64),
 }
 
 /// Whether there is a contact, and why not.
@@ -55,13 +41,13 @@ pub enum TouchState {
     Sticks,
     /// The contact point slides.
     Slides,
-    /// The device is beside the mesh.
+    /// The device is outside the mesh.
     Outside,
     /// The device's place is no number: nothing changed.
     NotANumber,
 }
 
-/// What a device at a place touches.
+/// Contact of a device with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProxyTouch {
     /// Whether, and why not.
@@ -72,8 +58,6 @@ pub struct ProxyTouch {
     pub depth: f64,
     /// True unit normal of the surface at the contact point.
     pub normal: [f64; 3],
-    /// Smooth unit normal there, for a force without edges; signs and depths take the true one.
-    pub shading_normal: [f64; 3],
     /// The way from the device to the contact point without its part along the normal, in mm.
     pub aside: [f64; 3],
 }
@@ -94,29 +78,16 @@ impl ProxyTouch {
     }
 
     fn without(state: TouchState, point: [f64; 3]) -> Self {
-        Self {
-            state,
-            point,
-            depth: 0.0,
-            normal: [0.0, 0.0, 1.0],
-            shading_normal: [0.0, 0.0, 1.0],
-            aside: [0.0; 3],
-        }
+        Self { state, point, depth: 0.0, normal: [0.0, 0.0, 1.0], aside: [0.0; 3] }
     }
 }
 
 impl Proxy {
-    /// With a friction coefficient, and a length in mm by which the contact point moves along x and y in
-    /// a tick at most. A contact that begins anew, because its point lost the device behind a ridge, is
-    /// not held to that.
-    pub fn new(friction: f64, most_step: f64) -> Result<Self, ProxyError> {
-        if !(0.0..=MOST_FRICTION).contains(&friction) {
-            return Err(ProxyError::Friction(friction));
-        }
-        if most_step.is_nan() || most_step <= 0.0 {
-            return Err(ProxyError::Step(most_step));
-        }
-        Ok(Self { friction, most_step, at: None, last: None })
+    /// With a friction coefficient.
+    pub fn new(friction: f64) -> Result<Self, SettingError> {
+        let settings = [("friction coefficient", friction, "")];
+        SettingRange::UpTo(MOST_FRICTION).check("a contact point", &settings)?;
+        Ok(Self { friction, at: None, last: None })
     }
 
     /// One tick: the device is at `device` (mm).
@@ -137,15 +108,12 @@ impl Proxy {
             self.at = None;
             return ProxyTouch::without(state, device);
         }
-        let (from, entered) = match self.at {
-            Some(at) => (at, false),
-            None => (entry(surface, last, device), true),
-        };
-        let (at, slides) = self.moved(surface, from, device, entered);
+        let from = self.at.unwrap_or_else(|| entry(surface, last, device));
+        let (at, slides) = self.moved(surface, from, device);
         self.at = Some(at);
         touch(surface, at, device, slides).unwrap_or_else(|| {
             // Below the surface and yet not under the plane of the contact point, as behind a ridge:
-            // the contact begins anew above the device.
+            // the contact starts again above the device.
             self.at = Some([x, y]);
             touch(surface, [x, y], device, true)
                 .unwrap_or(ProxyTouch::without(TouchState::Free, device))
@@ -153,13 +121,7 @@ impl Proxy {
     }
 
     /// Where the contact point goes from `from`, and whether it slides.
-    fn moved(
-        &self,
-        surface: Heights,
-        from: [f64; 2],
-        device: [f64; 3],
-        entered: bool,
-    ) -> ([f64; 2], bool) {
+    fn moved(&self, surface: Heights, from: [f64; 2], device: [f64; 3]) -> ([f64; 2], bool) {
         let goal = goal(surface, from, device);
         let (Some((start, _)), Some((end, normal))) =
             (surface_point(surface, from), surface_point(surface, goal))
@@ -175,14 +137,7 @@ impl Proxy {
             return (from, false);
         }
         let share = held / length;
-        let mut to = [0, 1].map(|axis| goal[axis] + share * (from[axis] - goal[axis]));
-        let step = (to[0] - from[0]).hypot(to[1] - from[1]);
-        // The first point of a contact is where it is; only later ones are moved to.
-        if step > self.most_step && !entered {
-            let share = self.most_step / step;
-            to = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
-        }
-        (to, true)
+        ([0, 1].map(|axis| goal[axis] + share * (from[axis] - goal[axis])), true)
     }
 }
 
@@ -244,7 +199,6 @@ fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Opti
         point,
         depth,
         normal,
-        shading_normal: surface.shading_normal(at[0], at[1]).unwrap_or(normal),
         aside: [0, 1, 2].map(|axis| way[axis] - depth * normal[axis]),
     })
 }
@@ -258,6 +212,6 @@ fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| a[axis] - b[axis])
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

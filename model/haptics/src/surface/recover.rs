@@ -9,15 +9,15 @@
 //! the second the lower or upper envelope of two fields that are.
 
 use super::mesh::HeightField;
+use crate::{SettingError, SettingRange};
 use palpate_model::units::Seconds;
 use palpate_rheology::vectors::wide;
-use thiserror::Error;
 
 /// How far beyond rest a recovering node aims, in mm: a nanometre, a ten-thousandth of what any
 /// display or motor of this size resolves.
 pub const SETTLED_MM: f64 = 1e-6;
 
-/// How displaced nodes return before each tick's pokes.
+/// Exponential return of displaced nodes, before the contacts of each tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recovery {
     /// Share of the way to rest in a tick.
@@ -26,31 +26,18 @@ pub struct Recovery {
     creep: f64,
 }
 
-/// A recovery that cannot be.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error(
-    "a recovery with a time constant of {tau} s at ticks of {tick} s is not possible; the tick is a finite time above zero, the time constant zero or more (infinite: never)"
-)]
-pub struct SurfaceRecoveryError {
-    /// Time constant in s.
-    pub tau: f64,
-    /// SurfaceTick in s.
-    pub tick: f64,
-}
-
 impl Recovery {
     /// At rest again at once: every tick starts from the rest surface, so that the shape depends on
     /// this tick's contacts alone.
     pub const ELASTIC: Self = Self { share: 1.0, creep: SETTLED_MM };
-    /// Never.
     pub const NONE: Self = Self { share: 0.0, creep: 0.0 };
 
     /// With a time constant, such as the `tau_eps` of the force model, at a constant tick.
-    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, SurfaceRecoveryError> {
+    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, SettingError> {
+        const RECOVERY: &str = "a recovery";
         let (tau, tick) = (tau.0, tick.0);
-        if !(tick > 0.0 && tick.is_finite() && tau >= 0.0) {
-            return Err(SurfaceRecoveryError { tau, tick });
-        }
+        SettingRange::Positive.check(RECOVERY, &[("tick", tick, " s")])?;
+        SettingRange::MayBeInfinite.check(RECOVERY, &[("time constant", tau, " s")])?;
         // tau = 0 gives exp(-inf) = 0: elastic.
         let share = -(-tick / tau).exp_m1();
         Ok(Self { share, creep: share * SETTLED_MM })

@@ -33,7 +33,7 @@ pub struct PokeScene {
     pub places: Vec<[f64; 2]>,
 }
 
-/// How far a shape is from another.
+/// Difference of two shapes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShapeError {
     /// Root of the mean square over the area and all pokes, in mm.
@@ -43,13 +43,7 @@ pub struct ShapeError {
 }
 
 impl PokeScene {
-    /// The shape on a mesh of `nodes` a side against that on [`REFERENCE_NODES`], between nodes
-    /// interpolated.
-    pub fn mesh_error(&self, nodes: usize) -> Result<ShapeError, MeshError> {
-        self.mesh_error_against(nodes, REFERENCE_NODES)
-    }
-
-    /// The same against another mesh.
+    /// The shape on a mesh of `nodes` a side against that on a mesh of `reference` nodes, between nodes interpolated.
     pub fn mesh_error_against(
         &self,
         nodes: usize,

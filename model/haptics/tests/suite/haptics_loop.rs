@@ -22,9 +22,9 @@ fn period(us: u64) -> Period {
 
 /// L7 in every run: the energies of all ports and losses add up, and no loss is a gain.
 fn balanced(plant: &HapticPlant, started_with: f64) {
-    let all = plant.energies();
+    let all = plant.rack.energies;
     let put_in = all.motor + all.hand + started_with;
-    let gone = all.damping + all.friction + plant.kinetic();
+    let gone = all.damping + all.friction + plant.rack.kinetic();
     let size = all.motor.abs() + all.hand.abs() + all.damping + gone.abs() + started_with;
     assert!((put_in - gone).abs() <= 1e-11 * size, "residual {:e} of {size:e} N mm", put_in - gone);
     assert!(all.damping >= 0.0 && all.friction >= -1e-9 * size, "{all:?}");
@@ -193,12 +193,12 @@ fn without_damping_friction_holds_up_to_an_amplitude() {
             let middle = 0.5 * (low + high);
             if grows(middle) { high = middle } else { low = middle }
         }
-        let wanted = 8.0 * friction / (std::f64::consts::PI * stiffness * 1e-3);
+        let expected = 8.0 * friction / (std::f64::consts::PI * stiffness * 1e-3);
         println!(
-            "L4: {stiffness} N/mm grows from {low:.1} mm/s on, {wanted:.1} by the balance of energies"
+            "L4: {stiffness} N/mm grows from {low:.1} mm/s on, {expected:.1} by the balance of energies"
         );
         // The balance is of a sine; the first quarter of the swing has lost some speed already.
-        assert!((low / wanted - 1.0).abs() < 0.15, "{stiffness}: {low} {wanted}");
+        assert!((low / expected - 1.0).abs() < 0.15, "{stiffness}: {low} {expected}");
     }
 }
 

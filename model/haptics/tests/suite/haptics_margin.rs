@@ -32,11 +32,11 @@ fn as_written(sampled: &SampledStep, delay: f64, th: f64) -> f64 {
 /// A spring with a damper by differences needs `K T / 2 + B`, and a delay of `d` ticks `K (T/2 + d T)`.
 #[test]
 fn known_walls() {
-    let spring = Linear::spring(2.0);
+    let spring = Linear { stiffness: 2.0, damping: 0.0, tau: 0.0 };
     let wall = SampledStep::of(&spring, Scheme::Exact, 1e-3);
-    for (delay, wanted) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
+    for (delay, expected) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
         let (needed, _) = criterion::damping_needed(&wall, delay);
-        assert!((needed / wanted - 1.0).abs() < 1e-9, "{delay}: {needed}");
+        assert!((needed / expected - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
     let damped = Linear { damping: 3e-3, ..spring };
@@ -94,11 +94,11 @@ fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
         let miss = (exact.fast() - 0.5 * k_inf * tick).abs();
         assert!(miss < 0.5 * tick * (k_inf + k0) * h, "{miss:e}");
         let left = SampledStep::of(&linear, Scheme::ExponentialLeft, tick);
-        let kept = (-h).exp();
-        let wanted = 1.5 * k0 * tick + k0 * tick * kept / (1.0 - kept) - c0;
-        assert!((left.slow() - wanted).abs() < 1e-12 * (wanted.abs() + c0));
-        let wanted = 0.5 * tick * (1.0 - kept) / (1.0 + kept) * (2.0 * c0 / tick - k0);
-        assert!((left.fast() - wanted).abs() < 1e-12 * (wanted.abs() + c0));
+        let decay = (-h).exp();
+        let expected = 1.5 * k0 * tick + k0 * tick * decay / (1.0 - decay) - c0;
+        assert!((left.slow() - expected).abs() < 1e-12 * (expected.abs() + c0));
+        let expected = 0.5 * tick * (1.0 - decay) / (1.0 + decay) * (2.0 * c0 / tick - k0);
+        assert!((left.fast() - expected).abs() < 1e-12 * (expected.abs() + c0));
         // In slow motion it needs more: that is the mutant's price.
         assert!(left.slow() > exact.slow() + 0.49 * k0 * tick);
     }
@@ -214,11 +214,11 @@ fn a_verdict_says_it_in_words() {
     assert_eq!(verdict.worst.cause, Cause::Lag);
     assert!((verdict.worst.needed * 1e3 - 54.58).abs() < 0.05, "{:?}", verdict.worst);
     assert!(!verdict.is_calm() && (verdict.ratio().expect("a need") - 0.322).abs() < 1e-3);
-    let said = verdict.sentences();
-    println!("{said:#?}");
-    assert!(said[0].contains("0.32"));
+    let sentences = verdict.sentences();
+    println!("{sentences:#?}");
+    assert!(sentences[0].contains("0.32"));
     for fact in ["below 0.", "0.810 N", "0.712 mm", "1.430 mm"] {
-        assert!(said[1..].iter().any(|one| one.contains(fact)), "{fact}");
+        assert!(sentences[1..].iter().any(|one| one.contains(fact)), "{fact}");
     }
     // Enough of everything.
     let calm = Device { damping: 0.06, ..device };

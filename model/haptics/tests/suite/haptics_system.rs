@@ -5,9 +5,9 @@ use palpate_haptics::check::{CheckSettings, calibration_points, check};
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::simulation::{Simulation, SimulationSettings};
 use palpate_haptics::{
-    BiasCalibration, BiasError, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags,
-    ForceGuard, GuardSettings, LawSettings, MasterSlave, MasterSlaveInput, MasterSlaveSettings,
-    Period,
+    BiasCalibration, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags, ForceGuard,
+    GuardSettings, LawSettings, MasterSlave, MasterSlaveInput, MasterSlaveSettings, Period,
+    TorqueSettings,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -34,19 +34,18 @@ fn hysteresis_as_wide_as_the_noise_keeps_contact() {
             ContactSettings { on: Newtons(0.2 + 0.5 * width), off: Newtons(0.2 - 0.5 * width) };
         let mut contact = ContactDetector::new(settings.checked().expect("thresholds"));
         let mut guard = ForceGuard::new(&GuardSettings::default(), Period::MILLISECOND);
-        let mut last = 0.0;
+        let (mut last, mut changes) = (0.0, 0u32);
         for one in &noise {
+            let before = contact.is_touching();
             contact.tick(Newtons(0.2 + one));
+            changes += u32::from(contact.is_touching() != before);
             let force = guard.tick(Newtons(3.0), contact.is_touching(), 1).force.0;
             assert!((force - last).abs() <= 0.5 + 1e-12);
             last = force;
         }
-        rates.push(contact.changes() as f64 / 20.0);
-        println!(
-            "L8: hysteresis of {:.1} sigma: {:.2} changes a second",
-            width / sigma,
-            contact.changes() as f64 / 20.0
-        );
+        let rate = f64::from(changes) / 20.0;
+        rates.push(rate);
+        println!("L8: hysteresis of {:.1} sigma: {rate:.2} changes a second", width / sigma);
     }
     assert!(rates[0] > 100.0 && rates.windows(2).all(|pair| pair[1] < pair[0]) && rates[4] < 2.0);
     assert!(ContactSettings { on: Newtons(0.1), off: Newtons(0.2) }.checked().is_err());
@@ -81,7 +80,7 @@ fn measured(
     points
 }
 
-/// L9: slope within its interval, dead band, ceiling and hysteresis found, no answer beyond the line.
+/// L9: slope within its interval, dead band, ceiling and hysteresis found.
 #[test]
 fn a_calibration_finds_slope_dead_band_ceiling_and_hysteresis() {
     let (slope, friction, ceiling) = (5.25, 0.81, 12.0);
@@ -93,23 +92,21 @@ fn a_calibration_finds_slope_dead_band_ceiling_and_hysteresis() {
         count += 1;
         assert!((fit.slope - slope).abs() < 5.0 * fit.slope_error, "{seed}: {fit:?}");
         assert!((fit.residual / 0.05 - 1.0).abs() < 0.35, "{seed}: {}", fit.residual);
-        assert!((fit.hysteresis().expect("both ways").0 - 2.0 * friction).abs() < 0.08);
-        // 0.81 N over 5.25 N/V.
-        assert!((fit.begins().0 - friction / slope).abs() < 0.03, "{seed}: {}", fit.begins());
         assert!(
             fit.rising.dead.is_some()
                 && (fit.rising.ceiling.expect("a ceiling").0 - ceiling).abs() < 0.05
         );
         let falling = fit.falling.expect("the way down");
         assert!(falling.dead.is_none() && falling.ceiling.is_some());
-        let bias = fit.bias_for(Newtons(6.0)).expect("within");
-        assert!((bias.0 - (6.0 + friction) / slope).abs() < 0.01);
-        for beyond in [12.5, 0.0 - 1.0, f64::NAN, f64::INFINITY] {
-            assert!(
-                matches!(fit.bias_for(Newtons(beyond)), Err(BiasError::Beyond { .. })),
-                "{beyond}"
-            );
-        }
+        // Up and down are apart by twice the friction, and the dead band ends at 0.81 N over 5.25 N/V.
+        assert!(
+            (falling.offset - fit.rising.offset - 2.0 * friction).abs() < 0.08,
+            "{seed}: {fit:?}"
+        );
+        assert!(
+            (-fit.rising.offset / fit.slope - friction / slope).abs() < 0.03,
+            "{seed}: {fit:?}"
+        );
     }
     // 95 of 100 within two standard errors; 88 is three and a half standard deviations fewer.
     println!("L9: slope within two standard errors in {within} of {count}");
@@ -130,7 +127,8 @@ fn a_calibration_that_tells_nothing_is_refused() {
     assert!(
         (fit.slope - 5.0).abs() < 1e-9 && fit.rising.dead.is_none() && fit.rising.ceiling.is_none()
     );
-    assert!(fit.hysteresis().expect("both").0.abs() < 1e-9 && fit.begins().0 < 0.0);
+    let falling = fit.falling.expect("the way down");
+    assert!((falling.offset - fit.rising.offset).abs() < 1e-9 && fit.rising.offset > 0.0);
 }
 
 /// The thesis's figure: a slider pushes the rack at 0.75 mm/s to 30 mm and holds; commanded torque and measured force
@@ -191,7 +189,7 @@ fn a_check_that_cannot_be_is_refused() {
         (CheckSettings { speed: palpate_model::MmPerS(0.0), ..right }, "speed = 0"),
         (CheckSettings { depth: Depth(f64::NAN), ..right }, "depth = NaN"),
         (CheckSettings { hold: Seconds(f64::NAN), ..right }, "hold = NaN"),
-        (CheckSettings { hold: Seconds(f64::INFINITY), ..right }, "at most a day"),
+        (CheckSettings { hold: Seconds(f64::INFINITY), ..right }, "duration = inf"),
         (CheckSettings { samples_hz: 0.0, ..right }, "samples = 0"),
         (CheckSettings { friction_share: -1.0, ..right }, "share of friction"),
     ] {
@@ -200,13 +198,37 @@ fn a_check_that_cannot_be_is_refused() {
     }
 }
 
+/// The thesis body as it buzzes, or not: pressed to 25 mm by a firm grip that wants to 30, on a current drive without
+/// friction, with an encoder of 15 um, forces two ticks of a millisecond late, and 0.5 N s/m of damping where 3.5 are
+/// needed. Unguarded, the force is bounded by nothing but the drive and there is no controller. With the source's
+/// voltage drive, which brings 17.6 N s/m and 0.8 N of friction, it is calm at that depth by itself.
+fn buzzing(is_guarded: bool) -> SimulationSettings {
+    let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
+    // Less damping than a firm grip has when it is asked to calm something.
+    let hand = Hand { damping: 0.002, ..Hand::firm(path) };
+    let mut all = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
+    let (delay, damping) = (2, 0.5e-3);
+    all.plant.friction = [0.0; 2];
+    all.plant.damping = damping;
+    all.plant.delay = delay;
+    all.system.damping = damping;
+    all.system.delay_ticks = delay as f64;
+    all.system.torque =
+        TorqueSettings { drive: DriveKind::Current { amps_per_volt: 1.0 }, ..all.system.torque };
+    all.system.torque.motor.friction = 0.0;
+    if let Some((motor, _)) = &mut all.plant.motor {
+        motor.friction = 0.0;
+    }
+    if is_guarded { all } else { all.unguarded() }
+}
+
 /// Without guard the thesis body buzzes on a device with less damping than it needs; with it, it does not. The margin
 /// knew before.
 #[test]
 fn the_thesis_body_buzzes_without_guard_and_not_with_it() {
     let mut swings = Vec::new();
     for is_guarded in [false, true] {
-        let settings = SimulationSettings::buzz(is_guarded);
+        let settings = buzzing(is_guarded);
         let verdict = settings.system.watch().before_play(Depth(30.0), palpate_model::MmPerS(0.0));
         assert!(!verdict.is_calm());
         let there = settings.system.watch().exactly_at(Depth(25.0), palpate_model::MmPerS(0.0));
@@ -241,7 +263,7 @@ fn the_thesis_body_buzzes_without_guard_and_not_with_it() {
     // What is left with the guard is the tissue's creep under the hand.
     assert!(swings[0] > 5.0 && swings[1] < 0.3, "{swings:?}");
     // The source's own drive, unguarded and as late, damps enough.
-    let mut settings = SimulationSettings::buzz(false);
+    let mut settings = buzzing(false);
     let source = MasterSlaveSettings::of(settings.system.law).torque;
     settings.system.torque = source;
     settings.plant.motor = Some((source.motor, source.pinion));
@@ -299,16 +321,16 @@ fn a_late_slave_lags_and_turns_the_impedance() {
             });
             let size = sine.hypot(cosine) / (4.0 * stiffness);
             let turned = (-sine).atan2(-cosine);
-            let wanted = w * late as f64 * 1e-3;
+            let expected = w * late as f64 * 1e-3;
             println!(
                 "G4: {late} ms late, {hz} Hz: |Zt/Ze| {size:.4}, turned by {:.2} degrees",
                 turned.to_degrees()
             );
             assert!((size - 1.0).abs() < 0.01, "{size}");
-            let miss = (turned - wanted).rem_euclid(std::f64::consts::TAU);
+            let miss = (turned - expected).rem_euclid(std::f64::consts::TAU);
             assert!(
                 miss.min(std::f64::consts::TAU - miss) < 0.01,
-                "{late} {hz}: {turned} {wanted}"
+                "{late} {hz}: {turned} {expected}"
             );
         }
     }
@@ -403,7 +425,7 @@ fn a_hot_winding_gets_what_it_may_have_for_long() {
 /// and hand balance to rounding (L7).
 #[test]
 fn a_voltage_drive_drags_and_a_current_drive_does_not() {
-    for (drive, wanted) in [
+    for (drive, expected) in [
         (DriveKind::Voltage { gain: 1.0 }, 0.81 + 1.764),
         (DriveKind::Current { amps_per_volt: 1.0 }, 0.81),
     ] {
@@ -415,14 +437,16 @@ fn a_voltage_drive_drags_and_a_current_drive_does_not() {
         let mut simulation = Simulation::new(&settings).expect("a simulation");
         let drag = (0..900).map(|_| simulation.tick().hand.0).last().expect("ticks");
         let plant = simulation.plant();
-        let energies = plant.energies();
-        let residual =
-            energies.motor + energies.hand - energies.damping - energies.friction - plant.kinetic();
+        let energies = plant.rack.energies;
+        let residual = energies.motor + energies.hand
+            - energies.damping
+            - energies.friction
+            - plant.rack.kinetic();
         println!(
             "{drive:?}: {drag:.3} N at 0.1 m/s; L7: residual {residual:.1e} of {:.1} N mm",
             energies.hand
         );
-        assert!((drag - wanted).abs() < 0.01, "{drag}");
+        assert!((drag - expected).abs() < 0.01, "{drag}");
         assert!(residual.abs() < 1e-11 * energies.hand && energies.friction > 0.0);
     }
 }
@@ -439,7 +463,7 @@ fn settings_that_make_no_system_are_refused_in_words() {
         (message(&|one| one.law.body.tau_eps = f64::NAN), "tau_eps"),
         (message(&|one| one.law.force_max = Newtons(-1.0)), "largest force"),
         (message(&|one| one.contact.off = Newtons(1.0)), "no hysteresis"),
-        (message(&|one| one.encoder.lines = 0), "0 lines"),
+        (message(&|one| one.encoder.lines = 0), "lines = 0"),
         (message(&|one| one.slave.mm_per_pulse = 0.0), "pulses per master count"),
         (message(&|one| one.torque.motor.resistance = 0.0), "resistance = 0"),
         (message(&|one| one.torque.motor.thermal.case_s = f64::NAN), "time constant of the case"),

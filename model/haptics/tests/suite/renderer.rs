@@ -62,13 +62,13 @@ impl Renderer {
     ) -> Self {
         let period = plant.period;
         let count_mm = if plant.count_mm > 0.0 { plant.count_mm } else { STEPLESS_MM };
-        let heard = BuzzSettings::of(plant.count_mm.max(0.001));
+        let buzz_settings = BuzzSettings::of(plant.count_mm.max(0.001));
         Self {
             rendered,
             guard: guard.map(|one| ForceGuard::new(one, period)),
             controller: controller.map(|one| PassivityController::new(one, period)),
             observer: PassivityObserver::with_delay(plant.delay),
-            buzz: BuzzDetector::new(&heard, period, plant.x),
+            buzz: BuzzDetector::new(&buzz_settings, period, plant.x),
             count_mm,
             period,
             last: None,
@@ -140,12 +140,11 @@ pub fn run(
     for tick in 1..=ticks {
         let rendered = renderer.tick(plant.sense(), 1);
         plant.tick(PlantCommand::Force(rendered.force));
-        let [x, v] = plant.motion();
         let one = RunTick {
             t: renderer.period.time_of(tick).seconds(),
-            x,
-            v,
-            absorbed: -plant.energies().motor,
+            x: plant.rack.x,
+            v: plant.rack.v,
+            absorbed: -plant.rack.energies.motor,
             rendered,
         };
         if !seen(&one) {

@@ -44,8 +44,9 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
         let itself = scene.mesh_error_against(101, 101).unwrap();
         assert!(itself.linf_mm < 1e-12);
     }
-    assert!(scene(|_, _| 0.0).mesh_error(1).is_err());
-    assert!(scene(|x, _| x).mesh_error(51).unwrap_err().to_string().contains("MaxShear"));
+    assert!(scene(|_, _| 0.0).mesh_error_against(1, 101).is_err());
+    let steep = scene(|x, _| x).mesh_error_against(51, 101).unwrap_err();
+    assert!(steep.to_string().contains("MaxShear"));
 }
 
 #[test]
