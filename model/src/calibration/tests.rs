@@ -201,7 +201,7 @@ fn weights_must_be_known_and_add_up() {
 }
 
 #[test]
-fn segments_go_where_they_are_told_or_nearest() {
+fn segments_go_through_the_given_or_the_nearest_weights() {
     let points = Calibration::thesis().points().unwrap();
     let through = |masses: &[f64]| CurveKind::Segments { through_g: masses.to_vec() };
     let curve = through(&[0.0, 340.0, 640.0, 1040.0]).through(&points).unwrap();

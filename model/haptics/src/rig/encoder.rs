@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn faster_than_its_channels_is_told() {
+    fn faster_than_its_channels_is_reported() {
         // 100 kHz of lines are 400 counts a millisecond.
         let mut counter = EncoderCounter::new(&Encoder::default(), Period::MILLISECOND);
         assert_eq!(counter.tick(1_000_000, 1), (0, Flags::NONE));

@@ -109,7 +109,7 @@ fn energy_never_comes_out_of_a_device_whatever_the_hand_and_the_force() {
 }
 
 #[test]
-fn a_force_beyond_the_device_keeps_its_direction_and_is_told() {
+fn a_force_beyond_the_device_keeps_its_direction_and_is_reported() {
     let settings = DeviceSettings::default();
     let (force, is_less) = settings.limit_force([3.0, 4.0, 12.0]);
     assert!(is_less);
@@ -227,7 +227,7 @@ fn the_force_is_bounded_and_its_part_across_is_within_friction() {
 }
 
 #[test]
-fn why_there_is_no_force_is_told() {
+fn the_reason_for_no_force_is_reported() {
     let settings = SceneSettings::default();
     let mut scene = Scene::new(settings).unwrap();
     let mut why = |x: f64, z: f64, ticks: u32| {
