@@ -50,7 +50,7 @@ pub fn error_alone(error: f64) -> String {
     }
 }
 
-/// Digits that an error supports, and the power of ten.
+/// How many digits an error supports, and in which power of ten.
 struct Digits {
     exponent: i32,
     decimals: usize,
@@ -100,6 +100,17 @@ pub fn plain(value: f64) -> String {
     }
 }
 
+/// A number to so many significant digits, without an exponent where people write none.
+#[must_use]
+pub fn significant(value: f64, count: i32) -> String {
+    let magnitude = value.abs().log10().floor();
+    if !magnitude.is_finite() {
+        return shortest(value);
+    }
+    let decimals = (f64::from(count) - 1.0 - magnitude).max(0.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// A number as short as it can be written, without the rounding of its arithmetic.
 #[must_use]
 pub fn shortest(value: f64) -> String {
@@ -123,6 +134,15 @@ pub fn clock(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_written_as_people_do() {
+        assert_eq!(shortest(49.0 * 0.03), "1.47");
+        assert_eq!(shortest(8.1), "8.1");
+        assert_eq!(significant(0.000_434_5, 4), "0.0004345");
+        assert_eq!(significant(1234.5, 3), "1234");
+        assert_eq!(significant(0.0, 3), "0");
+    }
 
     #[test]
     fn the_error_rules_the_digits() {

@@ -13,17 +13,6 @@ use thiserror::Error;
 /// Number of elastic terms a law steps; bodies of fewer are [padded](SeriesBody::padded).
 const N: usize = POWER_MAX;
 
-/// What becomes of a force below zero, which the model has where the probe leaves faster than the
-/// tissue follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PullPolicy {
-    /// Zero: tissue does not stick to the probe.
-    Never,
-    /// As the model has it, for comparisons.
-    AsModel,
-}
-
 /// Integration scheme and bounds of a force law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LawSettings {
@@ -37,7 +26,9 @@ pub struct LawSettings {
     /// Fastest the depth may move; the law follows faster ones at this speed.
     pub speed_max: MmPerS,
     pub force_max: Newtons,
-    pub pull: PullPolicy,
+    /// Whether the force may be below zero, as the model has it where the probe leaves faster than the tissue follows.
+    /// Real tissue does not stick to the probe; this is for comparisons.
+    pub is_pull_allowed: bool,
 }
 
 impl LawSettings {
@@ -52,7 +43,7 @@ impl LawSettings {
             depth_max: Depth(30.0),
             speed_max: MmPerS(1000.0),
             force_max: Newtons(10.0),
-            pull: PullPolicy::Never,
+            is_pull_allowed: false,
         }
     }
 }
@@ -84,7 +75,7 @@ pub struct LawTick {
 /// A body at a constant tick, with its state; nothing in a tick allocates, and any input gives a finite
 /// force.
 ///
-/// The force is never below zero unless [`PullPolicy::AsModel`], and zero with the probe above the surface,
+/// The force is never below zero unless [`LawSettings::is_pull_allowed`], and zero with the probe above the surface,
 /// where the model's memory goes on fading.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
@@ -198,7 +189,7 @@ impl ForceLaw {
         if to <= 0.0 {
             flags |= Flags::ABOVE_SURFACE;
             force = 0.0;
-        } else if force < 0.0 && self.settings.pull == PullPolicy::Never {
+        } else if force < 0.0 && !self.settings.is_pull_allowed {
             flags |= Flags::PULL;
             force = 0.0;
         }

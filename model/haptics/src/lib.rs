@@ -42,7 +42,7 @@ pub use contact::{ContactDetector, ContactSettings, ContactThresholdError};
 pub use controller::{ControllerSettings, ControllerTick, PassivityController};
 pub use device::HapticDevice;
 pub use flags::Flags;
-pub use force::{ForceLaw, LawError, LawSettings, LawTick, PullPolicy};
+pub use force::{ForceLaw, LawError, LawSettings, LawTick};
 pub use guard::{ForceGuard, GuardSettings, GuardTick};
 pub use master_slave::{
     MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,

@@ -1,7 +1,7 @@
 //! The whole system on a simulated device: master, hand, slave and the specimen under it.
 
 use super::closed_loop::{HapticPlant, PlantCommand, PlantSettings, SensedPosition};
-use super::force::{ForceLaw, LawSettings, PullPolicy};
+use super::force::{ForceLaw, LawSettings};
 use super::master_slave::{
     MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
     MasterSlaveSnapshot,
@@ -88,7 +88,6 @@ impl Simulation {
         let period = settings.system.law.period;
         let surface = Depth(-settings.system.surface_mm);
         let specimen = LawSettings {
-            pull: PullPolicy::Never,
             force_max: Newtons(1e3),
             speed_max: MmPerS(1e6),
             ..LawSettings::of::<3>(settings.specimen, period)

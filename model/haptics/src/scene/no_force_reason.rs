@@ -18,7 +18,7 @@ palpate_model::named! {
         /// The stylus is outside the mesh.
         Outside = "the stylus is outside the tissue",
         /// The place is no number.
-        NotANumber = "the device reports no place",
+        NotANumber = "the device reports no position",
         /// The model has no force.
         NoModel = "the model has no force for this move",
         /// The tissue follows more slowly than the stylus leaves.

@@ -229,10 +229,7 @@ fn swing_about(
         held: Newtons(held),
         ..PlantSettings::bare(period)
     };
-    let law = LawSettings {
-        pull: palpate_haptics::PullPolicy::AsModel,
-        ..LawSettings::of::<3>(THESIS, period)
-    };
+    let law = LawSettings { is_pull_allowed: true, ..LawSettings::of::<3>(THESIS, period) };
     let law = ForceLaw::new(law, Depth(depth)).expect("a law");
     let renderer = Renderer::new(Rendered::Law(law), &settings, None, None);
     let (mut early, mut late, mut least, mut taken, mut before) =

@@ -2,9 +2,7 @@
 //! the step across the surface are tested beside the integrators (`model/rheology/src/integrators/tests.rs`), extremes of every
 //! number in `model/rheology/src/extremes/`; here is what the law adds and what only it can show.
 
-use palpate_haptics::{
-    Flags, ForceLaw, LawError, LawSettings, PassivityObserver, Period, PullPolicy,
-};
+use palpate_haptics::{Flags, ForceLaw, LawError, LawSettings, PassivityObserver, Period};
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons};
@@ -186,7 +184,7 @@ fn a_small_sine_loses_what_its_formula_says() {
             let period = Period::of_nanos((1e9 / hz / f64::from(per_cycle)).round() as u64);
             let mut settings = settings(1000);
             settings.period = period.expect("a period");
-            settings.pull = PullPolicy::AsModel;
+            settings.is_pull_allowed = true;
             let mut law = ForceLaw::new(settings, Depth(depth)).expect("a law");
             let cycles = (12.0 * tau * hz).ceil() as u32 + 1;
             let (mut work, mut x, mut force) = (0.0, depth, THESIS.elastic(Depth(depth)).0);
@@ -252,7 +250,7 @@ fn without_memory_the_force_is_the_forcing() {
     for (tau_eps, tolerance) in [(1e-9, 2e-6), (1e-300, 1e-15), (1e-320, 1e-15), (0.0, 1e-15)] {
         let body = ModifiedKelvin { tau_eps, ..THESIS };
         let mut law = law(LawSettings {
-            pull: PullPolicy::AsModel,
+            is_pull_allowed: true,
             body: SeriesBody::from(body).padded(),
             ..settings(1_000_000)
         });
