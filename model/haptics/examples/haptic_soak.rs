@@ -1,6 +1,6 @@
 //! A hundred million virtual ticks, 28 hours at 1 kHz: `cargo run --release -p palpate-haptics --example haptic_soak [TICKS]`.
 //!
-//! The system goes in and out again and again; in every round it is held beside the same system started afresh. Ends with
+//! The system goes in and out again and again; in every round it is compared with the same system started afresh. Ends with
 //! exit code 1 where anything differs or is no number.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example speaks to its user")]
 

@@ -120,7 +120,7 @@ mod tests {
         for _ in 0..1_000_000 {
             step(&mut observer, 1e-4, 1e-7);
         }
-        // A plain sum would lose every one of them: 1e-11 beside 1e6 is below its last digit.
+        // A plain sum would lose every one of them: 1e-11 added to 1e6 is below its last digit.
         assert!((observer.energy() - 1e6 - 1e-5).abs() < 2e-10);
         let before = observer.energy();
         step(&mut observer, f64::NAN, f64::INFINITY);

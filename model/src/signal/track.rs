@@ -246,7 +246,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix;
 
-    /// Segments of any length at a rate that changes, with gaps; the raw samples beside them.
+    /// Segments of any length at a rate that changes, with gaps; with the raw samples.
     fn track(random: &mut SplitMix, segments: usize) -> (Track, Vec<(f64, f32)>) {
         let (mut track, mut raw, mut t) = (Track::default(), Vec::new(), 0.0);
         for _ in 0..segments {

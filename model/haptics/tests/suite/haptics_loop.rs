@@ -278,7 +278,7 @@ fn the_margin_s_damping_is_enough_and_a_part_of_it_is_not() {
         for (mass, stiffness) in [(0.05, 0.2), (0.2, 0.8), (0.05, 3.0), (2.0, 0.05), (5.0, 0.01)] {
             let (growth, least, start) = swing_about(depth, mass, stiffness, needed, delay);
             assert!(growth < 1.0, "{depth} mm, hand {mass} kg {stiffness} N/mm: {growth}");
-            // Swings of 1 mm/s are small beside most depths, not quite beside 0.3 mm.
+            // Swings of 1 mm/s are small compared with most depths, not quite with 0.3 mm.
             assert!(
                 least > -0.02 * start,
                 "{depth} mm, {mass} kg {stiffness} N/mm: {least:e} of {start:e}"

@@ -1,4 +1,4 @@
-//! The margin: closed forms beside the criterion at every frequency, bands of the thesis body, sentences.
+//! The margin: closed forms against the criterion at every frequency, bands of the thesis body, sentences.
 
 use palpate_haptics::Period;
 use palpate_haptics::margin::{
@@ -77,7 +77,7 @@ fn two_ends_are_the_whole_criterion_without_delay() {
     }
 }
 
-/// The exact step needs `max(k0 T/2 + k0 tau - c0, k_inf T/2)` for ticks short beside `tau`; the left-edge exponential
+/// The exact step needs `max(k0 T/2 + k0 tau - c0, k_inf T/2)` for ticks much shorter than `tau`; the left-edge exponential
 /// half a tick of `k0` more, and less at the fast end.
 #[test]
 fn the_exact_and_the_left_edge_step_have_their_closed_forms() {

@@ -1,5 +1,5 @@
-//! The force law against closed forms: rows M1 to M8. Orders of convergence, limits of stability, the textbook step and
-//! the step across the surface are tested beside the integrators (`model/rheology/src/integrators/tests.rs`), extremes of every
+//! The force law against closed forms: rows M1 to M7. Orders of convergence, limits of stability, the textbook step and
+//! the step across the surface are tested with the integrators (`model/rheology/src/integrators/tests.rs`), extremes of every
 //! number in `model/rheology/src/extremes/`; here is what the law adds and what only it can show.
 
 use palpate_haptics::{Flags, ForceLaw, LawError, LawSettings, PassivityObserver, Period};
@@ -198,7 +198,7 @@ fn a_small_sine_loses_what_its_formula_says() {
                 (x, force) = (to, next);
             }
             let miss = (work / expected - 1.0).abs();
-            // The amplitude squared beside the depth squared, 1e-8, and what is left of the start, e^-12.
+            // The amplitude squared over the depth squared, 1e-8, and what is left of the start, e^-12.
             assert!(miss < 2e-5, "{depth} mm {hz} Hz: {work:e} {expected:e} {miss:e}");
         }
     }
