@@ -1,6 +1,6 @@
-//! What a reader asks of a record beside its samples: the specimen, the probe, the place in a series.
+//! What a record says about a session apart from its samples: specimen, probe, place in a series.
 //!
-//! [`KEYS`] is the one list of what can be told. The command line, protocol files that ask before a start
+//! [`KEYS`] is the one list of possible entries. The command line, protocol files that ask before a start
 //! and the manifest all use it.
 
 use serde::{Deserialize, Serialize};
@@ -8,16 +8,14 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
-/// What a value must be.
+/// Type and range of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// Words.
     Text,
     /// A number of the unit, above the limit or, if `is_limit_allowed`, at it.
     Number {
         /// Unit, as it ends the key.
         unit: &'static str,
-        /// Lowest value.
         above: f64,
         /// Whether the limit itself is possible.
         is_limit_allowed: bool,
@@ -26,14 +24,14 @@ pub enum Kind {
     Count,
 }
 
-/// One thing that can be told about a session.
+/// One possible entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
     /// Its name, the unit at its end.
     pub name: &'static str,
-    /// What it means, for a person who is asked.
+    /// Explanation for the person who is asked.
     pub meaning: &'static str,
-    /// What a value must be.
+    /// Type and range of a value.
     pub kind: Kind,
 }
 
@@ -49,7 +47,7 @@ const fn length(name: &'static str, meaning: &'static str) -> Key {
     Key { name, meaning, kind: Kind::Number { unit: "mm", above: 0.0, is_limit_allowed: false } }
 }
 
-/// Everything that can be told, in the order it is shown. The first three are labels of their own in the
+/// Every possible entry, in the order it is shown. The first three are fields of their own in the
 /// manifest.
 pub const KEYS: &[Key] = &[
     text("operator", "who runs it"),
@@ -85,39 +83,22 @@ pub const KEYS: &[Key] = &[
     count("series.repeats", "how many repeats are planned"),
 ];
 
-/// Something cannot be told about a session.
+/// An entry is not possible.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum AboutError {
-    /// No such key.
-    #[error("nothing is called '{key}'; choose from {}", names())]
-    UnknownKey {
-        /// What was given.
-        key: String,
-    },
+    #[error("there is no entry '{key}'; choose from {}", names())]
+    UnknownKey { key: String },
     /// Not `KEY=VALUE`.
     #[error("'{text}' is not KEY=VALUE, as in specimen.thickness_mm=12")]
-    NotAPair {
-        /// What was given.
-        text: String,
-    },
+    NotAPair { text: String },
     /// The value cannot be.
-    #[error("{key} cannot be '{value}'; give {wanted}")]
-    Value {
-        /// The key.
-        key: &'static str,
-        /// What was given.
-        value: String,
-        /// What is possible.
-        wanted: String,
-    },
+    #[error("{key} cannot be '{value}'; give {expected}")]
+    Value { key: &'static str, value: String, expected: String },
     /// A repeat beyond the last.
-    #[error("repeat {repeat} of {repeats} cannot be; correct series.repeat or series.repeats")]
-    Repeat {
-        /// Which repeat.
-        repeat: u64,
-        /// Of how many.
-        repeats: u64,
-    },
+    #[error(
+        "repeat {repeat} of {repeats} is not possible; correct series.repeat or series.repeats"
+    )]
+    Repeat { repeat: u64, repeats: u64 },
 }
 
 fn names() -> String {
@@ -141,8 +122,11 @@ impl Key {
     /// The value of a text, or what is wrong with it.
     pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
         let value = value.trim();
-        let refused =
-            |wanted: String| AboutError::Value { key: self.name, value: value.to_owned(), wanted };
+        let refused = |expected: String| AboutError::Value {
+            key: self.name,
+            value: value.to_owned(),
+            expected,
+        };
         match self.kind {
             Kind::Text if value.is_empty() => Err(refused("some words".into())),
             Kind::Text => Ok(value.into()),
@@ -166,51 +150,45 @@ impl Key {
     }
 }
 
-/// What was told, by key. Keys of later versions are kept as they are read.
+/// Entries by key. Keys of later versions are kept as they are read.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct About {
-    told: BTreeMap<String, Value>,
+    values: BTreeMap<String, Value>,
 }
 
 impl About {
-    /// Whether nothing was told.
     pub fn is_empty(&self) -> bool {
-        self.told.is_empty()
+        self.values.is_empty()
     }
 
-    /// The value of a key, if it was told.
     pub fn get(&self, key: &str) -> Option<&Value> {
-        self.told.get(key)
+        self.values.get(key)
     }
 
-    /// What was told, in the order of [`KEYS`], then what this version does not know. Text without quotes.
+    /// All entries in the order of [`KEYS`], then those that this version does not know. Text without quotes.
     pub fn lines(&self) -> Vec<(&str, String)> {
         let place = |name: &str| KEYS.iter().position(|key| key.name == name);
-        let mut told: Vec<(&str, &Value)> =
-            self.told.iter().map(|(k, v)| (k.as_str(), v)).collect();
-        told.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
+        let mut entries: Vec<(&str, &Value)> =
+            self.values.iter().map(|(k, v)| (k.as_str(), v)).collect();
+        entries.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
         let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        told.into_iter().map(|(name, value)| (name, plain(value))).collect()
+        entries.into_iter().map(|(name, value)| (name, plain(value))).collect()
     }
 }
 
-/// Who and what a session is about.
+/// Operator, specimen and other labels of a session.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Labels {
-    /// Who ran it.
     pub operator: String,
-    /// What was indented.
     pub specimen: String,
-    /// With what.
     pub indenter: String,
-    /// What else is told.
     #[serde(default, skip_serializing_if = "About::is_empty")]
     pub about: About,
 }
 
 impl Labels {
-    /// Tells one thing; a thing told before is replaced.
+    /// Sets one entry; an earlier value is replaced.
     pub fn tell(&mut self, name: &str, value: &str) -> Result<(), AboutError> {
         let key = key(name.trim())?;
         let value = key.parse(value)?;
@@ -220,19 +198,19 @@ impl Labels {
             "specimen" => self.specimen = words(),
             "indenter" => self.indenter = words(),
             name => {
-                self.about.told.insert(name.to_owned(), value);
+                self.about.values.insert(name.to_owned(), value);
             }
         }
         Ok(())
     }
 
-    /// Tells what a `KEY=VALUE` says.
+    /// Sets the entry of a `KEY=VALUE`.
     pub fn tell_pair(&mut self, pair: &str) -> Result<(), AboutError> {
         let (name, value) = pair_of(pair)?;
         self.tell(name, value)
     }
 
-    /// Whether a thing of [`KEYS`] was told.
+    /// Whether an entry of [`KEYS`] has a value.
     pub fn is_told(&self, name: &str) -> bool {
         let is_there = |text: &str| !text.trim().is_empty();
         match name {
@@ -243,7 +221,7 @@ impl Labels {
         }
     }
 
-    /// What only shows once everything is told.
+    /// Refuses entries that contradict each other.
     pub fn check(&self) -> Result<(), AboutError> {
         let count = |name| self.about.get(name).and_then(Value::as_u64);
         match (count("series.repeat"), count("series.repeats")) {
@@ -260,7 +238,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_told_comes_back_in_the_order_of_the_list() {
+    fn entries_come_back_in_the_order_of_the_list() {
         let mut labels = Labels::default();
         for pair in [
             "series.repeat=2",
@@ -289,8 +267,8 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_what_can() {
-        for (pair, told) in [
+    fn impossible_entries_are_refused_with_what_is_possible() {
+        for (pair, expected) in [
             ("specimen.colour=red", "specimen.thickness_mm"),
             ("specimen", "KEY=VALUE"),
             ("specimen.thickness_mm=0", "above 0"),
@@ -303,7 +281,7 @@ mod tests {
         ] {
             let mut labels = Labels::default();
             let refusal = labels.tell_pair(pair).unwrap_err().to_string();
-            assert!(refusal.contains(told), "{pair}: {refusal}");
+            assert!(refusal.contains(expected), "{pair}: {refusal}");
             assert_eq!(labels, Labels::default());
         }
         let mut labels = Labels::default();

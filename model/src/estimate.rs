@@ -5,9 +5,7 @@ use serde::{Deserialize, Serialize};
 /// One parameter of a fitted model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
-    /// Its name.
     pub name: String,
-    /// Its value.
     pub value: f64,
     /// The unit of value, error and interval.
     pub unit: String,
@@ -24,10 +22,9 @@ pub struct Parameter {
     pub systematic_error: Option<f64>,
 }
 
-/// What the record so far says of one parameter.
+/// Whether the record so far determines one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identifiability {
-    /// Its name.
     pub parameter: String,
     /// Whether path and noise so far determine it.
     pub is_identified: bool,
@@ -36,7 +33,7 @@ pub struct Identifiability {
     pub reason: Option<String>,
 }
 
-/// What is known so far.
+/// Parameters estimated during a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LiveEstimate {
     /// The five of the body, then `f0` and `f_offset`. Without a standard error a parameter is not

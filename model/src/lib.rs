@@ -25,3 +25,8 @@ pub mod viscoelastic;
 
 pub use time::Nanos;
 pub use units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
+
+/// For fields that a record leaves out where they say nothing.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

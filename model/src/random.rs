@@ -5,7 +5,6 @@
 pub struct SplitMix(u64);
 
 impl SplitMix {
-    /// From a seed.
     #[must_use]
     pub fn seeded(seed: u64) -> Self {
         Self(seed)

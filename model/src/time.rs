@@ -13,7 +13,6 @@ use std::ops::Add;
 pub struct Nanos(pub u64);
 
 impl Nanos {
-    /// The start of the session.
     pub const ZERO: Self = Self(0);
 
     /// Whole milliseconds as nanoseconds.

@@ -13,15 +13,12 @@ macro_rules! unit {
         pub struct $name(pub f64);
 
         impl $name {
-            /// The unit's symbol.
             pub const UNIT: &'static str = $unit;
             /// The bare number, in the unit of this type.
             #[must_use]
             pub const fn get(self) -> f64 { self.0 }
-            /// Whether the number is neither NaN nor infinite.
             #[must_use]
             pub fn is_finite(self) -> bool { self.0.is_finite() }
-            /// The magnitude.
             #[must_use]
             pub fn abs(self) -> Self { Self(self.0.abs()) }
         }

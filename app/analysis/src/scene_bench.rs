@@ -138,8 +138,7 @@ fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
     let middle = 0.5 * (nodes - 1) as f64;
     let contact = [Contact { x: middle, y: middle, z: -0.5 * middle, side: Side::Push }];
     let field = HeightField::flat(grid, 1.0).map_err(|err| err.to_string())?;
-    let surface = Surface::new(field, method, Recovery::ELASTIC, Cut::NONE);
-    let mut surface = surface.map_err(|err| err.to_string())?;
+    let mut surface = Surface::new(field, method, Recovery::ELASTIC, Cut::NONE);
     let watch = Stopwatch::start();
     let mut moved = 0;
     while watch.seconds() < TIMED_S {

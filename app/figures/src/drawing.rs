@@ -20,14 +20,14 @@ pub struct Svg {
     shapes: Vec<Shape>,
 }
 
-/// What a picture is made of, in px from its upper left corner.
+/// Elements of a picture, in px from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A text, turned a quarter to the left if upright.
     Text { at: [f64; 2], is_upright: bool, ink: Ink, text: String },
     /// A line through points, dashed by so many px if not 0.
     Line { points: Vec<[f64; 2]>, color: Color32, width: f64, dash: f64 },
-    /// What lies within a line.
+    /// The area within a line.
     Band { points: Vec<[f64; 2]>, color: Color32 },
     /// A rectangle by its upper left and its lower right corner.
     Rectangle { corners: [[f64; 2]; 2], color: Color32 },
@@ -35,7 +35,7 @@ pub enum Shape {
     Dot { at: [f64; 2], color: Color32, radius: f64 },
 }
 
-/// Where a text stands relative to its point.
+/// Horizontal position of a text relative to its point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
     Start,
@@ -43,7 +43,6 @@ pub enum Anchor {
     End,
 }
 
-/// How a text looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ink {
     pub color: Color32,
@@ -64,10 +63,9 @@ impl Ink {
 /// A picture that is done.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// Width and height in px.
     pub size: [f64; 2],
     pub ground: Color32,
-    /// What a screen reader says.
+    /// Text for a screen reader.
     pub title: String,
     pub shapes: Vec<Shape>,
 }
@@ -174,16 +172,12 @@ impl Svg {
     }
 
     pub fn text(&mut self, at: [f64; 2], ink: Ink, text: &str) {
-        self.put(at, false, ink, text);
+        self.shapes.push(Shape::Text { at, is_upright: false, ink, text: text.to_owned() });
     }
 
     /// A text turned a quarter to the left, for the names of vertical axes.
     pub fn upright_text(&mut self, at: [f64; 2], ink: Ink, text: &str) {
-        self.put(at, true, ink, text);
-    }
-
-    fn put(&mut self, at: [f64; 2], is_upright: bool, ink: Ink, text: &str) {
-        self.shapes.push(Shape::Text { at, is_upright, ink, text: text.to_owned() });
+        self.shapes.push(Shape::Text { at, is_upright: true, ink, text: text.to_owned() });
     }
 
     pub fn line(&mut self, points: &[[f64; 2]], color: Color32, width: f64) {

@@ -35,7 +35,6 @@ impl Body {
         self.0 += &format!("<h{level}>{}</h{level}>\n", escape(text));
     }
 
-    /// A paragraph.
     pub fn paragraph(&mut self, text: &str) {
         self.0 += &format!("<p>{}</p>\n", escape(text));
     }
@@ -147,7 +146,6 @@ fn style() -> String {
     inks.iter().fold(STYLE.to_owned(), |style, (name, ink)| style.replace(name, &hex(*ink)))
 }
 
-/// The whole page.
 pub fn document(title: &str, body: Body) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

@@ -23,49 +23,37 @@ impl Panel {
     /// A panel for a range of x in which all of these points are seen.
     pub fn around(place: [f64; 4], x: [f64; 2], series: &[&[[f64; 2]]]) -> Self {
         const MARGIN: f64 = 0.05;
-        let values = series.iter().flat_map(|points| points.iter());
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
-            (low.min(point[1]), high.max(point[1]))
-        });
-        let y = if low > high {
-            [0.0, 1.0]
-        } else {
-            // A flat line still needs some height to be drawn in, and one that the numbers beside it can tell.
-            let height = match high - low {
-                spread if spread > (1e-6 * high.abs()).max(1e-12) => spread,
-                _ if high.abs() > 1e-12 => 0.1 * high.abs(),
-                _ => 1.0,
-            };
-            [low - MARGIN * height, high + MARGIN * height]
+        let values = series.iter().flat_map(|points| points.iter().map(|point| point[1]));
+        let y = match range(values) {
+            None => [0.0, 1.0],
+            Some([low, high]) => {
+                // A flat line still needs some height to be drawn in, and one that its numbers can show.
+                let height = match high - low {
+                    spread if spread > (1e-6 * high.abs()).max(1e-12) => spread,
+                    _ if high.abs() > 1e-12 => 0.1 * high.abs(),
+                    _ => 1.0,
+                };
+                [low - MARGIN * height, high + MARGIN * height]
+            }
         };
         Self { place, x, y }
     }
 
     /// A panel for decimal logarithms in which all of these points are seen.
     pub fn around_logarithms(place: [f64; 4], points: &[[f64; 2]]) -> Self {
-        let range = |axis: usize| {
-            let values = points.iter().map(|point| point[axis]);
-            let low = values.clone().fold(f64::INFINITY, f64::min);
-            let high = values.fold(f64::NEG_INFINITY, f64::max);
-            if low > high {
-                return [0.0, 1.0];
-            }
-            // A little room for dots at the edge.
-            [low - 0.25, high + 0.25]
+        // A little room for dots at the edge.
+        let axis = |axis: usize| {
+            let ends = range(points.iter().map(|point| point[axis]));
+            ends.map_or([0.0, 1.0], |[low, high]| [low - 0.25, high + 0.25])
         };
-        Self { place, x: range(0), y: range(1) }
+        Self { place, x: axis(0), y: axis(1) }
     }
 
-    /// Where a point lies in the picture, in px.
+    /// Position of a point in the picture, in px.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [left, top, right, bottom] = self.place;
         let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
         [left + share(x, self.x) * (right - left), bottom - share(y, self.y) * (bottom - top)]
-    }
-
-    pub fn line(&self, svg: &mut Svg, points: &[[f64; 2]], color: Color32, width: f64) {
-        let placed: Vec<[f64; 2]> = points.iter().map(|point| self.at(*point)).collect();
-        svg.line(&placed, color, width);
     }
 
     /// Everything between two x, from top to bottom.
@@ -75,19 +63,12 @@ impl Panel {
         svg.rectangle([left, top], [right, bottom], color);
     }
 
-    /// Grid, numbers and names of the axes.
-    pub fn axes(&self, svg: &mut Svg, names: [&str; 2], look: Look) {
-        let [_, top, _, bottom] = self.place;
-        let marks = [marks(self.x, MARKS_MAX), marks(self.y, (bottom - top) / HEIGHT_OF_MARK)];
-        self.frame(svg, names, look, &marks);
-    }
-
     /// Grid, numbers and name of the time alone.
     pub fn time_axis(&self, svg: &mut Svg, name: &str, look: Look) {
         self.frame(svg, [name, ""], look, &[marks(self.x, MARKS_MAX), Vec::new()]);
     }
 
-    /// The same where the numbers along some of them are decimal logarithms.
+    /// Grid, numbers and names of the axes, the numbers along some of them decimal logarithms.
     pub fn scaled_axes(
         &self,
         svg: &mut Svg,
@@ -96,15 +77,16 @@ impl Panel {
         look: Look,
     ) {
         let [left, top, right, bottom] = self.place;
-        let along = match are_logarithms[0] {
-            true => decades(self.x, (right - left) / WIDTH_OF_DECADE),
-            false => marks(self.x, MARKS_MAX.min((right - left) / WIDTH_OF_DECADE)),
+        let room = [(right - left) / WIDTH_OF_DECADE, (bottom - top) / HEIGHT_OF_MARK];
+        let x_marks = match are_logarithms[0] {
+            true => decades(self.x, room[0]),
+            false => marks(self.x, MARKS_MAX.min(room[0])),
         };
-        let up = match are_logarithms[1] {
-            true => decades(self.y, (bottom - top) / HEIGHT_OF_MARK),
-            false => marks(self.y, (bottom - top) / HEIGHT_OF_MARK),
+        let y_marks = match are_logarithms[1] {
+            true => decades(self.y, room[1]),
+            false => marks(self.y, room[1]),
         };
-        self.frame(svg, names, look, &[along, up]);
+        self.frame(svg, names, look, &[x_marks, y_marks]);
     }
 
     fn frame(
@@ -125,8 +107,8 @@ impl Panel {
         for (mark, text) in y_marks {
             let [_, y] = self.at([0.0, *mark]);
             svg.line(&[[left, y], [right, y]], look.grid, 0.6);
-            let beside = [left - 6.0, y + 0.35 * FONT];
-            svg.text(beside, ink.anchored(Anchor::End), text);
+            let at = [left - 6.0, y + 0.35 * FONT];
+            svg.text(at, ink.anchored(Anchor::End), text);
         }
         svg.line(&[[left, top], [left, bottom], [right, bottom]], look.text, 1.0);
         let middle = ink.anchored(Anchor::Middle);
@@ -134,6 +116,14 @@ impl Panel {
         svg.text(x_place, middle, x_name);
         svg.upright_text([left - 52.0, 0.5 * (top + bottom)], middle, y_name);
     }
+}
+
+/// The lowest and the highest of some numbers; `None` without any.
+pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+        [low.min(value), high.max(value)]
+    });
+    (ends[0] <= ends[1]).then_some(ends)
 }
 
 /// The two inks of axes.

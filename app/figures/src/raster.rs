@@ -13,12 +13,12 @@ use vello_cpu::{Pixmap, RenderContext, Resources};
 
 /// Pixels for a px of the drawing: sharp on paper and on fine screens.
 const SCALE: f64 = 2.0;
-/// How finely a circle is made of curves, in px.
+/// Tolerance of the curves that make a circle, in px.
 const ROUND: f64 = 0.05;
 
 /// The drawing as a PNG file (PNG, ISO/IEC 15948).
 pub fn png(drawing: &Drawing) -> io::Result<Vec<u8>> {
-    let too_large = || io::Error::other("the figure is too large for pixels; draw it as SVG");
+    let too_large = || io::Error::other("the figure is too large for a PNG; draw it as SVG");
     let [width, height] = drawing.size.map(|px| (px * SCALE).ceil());
     if !(width >= 1.0 && height >= 1.0) || width.max(height) > f64::from(u16::MAX) {
         return Err(too_large());

@@ -1,66 +1,39 @@
 //! Thinning for drawing: of all points that share a column of pixels the lowest and the highest
 //! stay, so no peak is lost. What is saved, fitted or exported is never thinned.
 
+use crate::panel::range;
+
 /// At most `2 * columns` of `points`, which come in order of x; points that are not finite are
 /// left out.
 #[must_use]
 pub fn thin(points: impl Iterator<Item = [f64; 2]> + Clone, columns: usize) -> Vec<[f64; 2]> {
     let finite = points.filter(|point| point.iter().all(|number| number.is_finite()));
     let count = finite.clone().count();
-    let ends = finite.clone().fold(None, |ends, [x, _]| {
-        let (low, high) = ends.unwrap_or((x, x));
-        Some((low.min(x), high.max(x)))
-    });
-    let Some((low, high)) = ends.filter(|_| count > 2 * columns && columns > 0) else {
+    let ends = range(finite.clone().map(|[x, _]| x));
+    let Some([low, high]) = ends.filter(|_| count > 2 * columns && columns > 0) else {
         return finite.collect();
     };
     let width = ((high - low) / columns as f64).max(f64::MIN_POSITIVE);
     let mut thinned = Vec::with_capacity(2 * columns);
-    let mut open: Option<Column> = None;
-    for (order, point) in finite.enumerate() {
-        let index = (((point[0] - low) / width) as usize).min(columns - 1);
-        match &mut open {
-            Some(column) if column.index == index => column.take(order, point),
-            _ => {
-                let next = Column { index, least: (order, point), most: (order, point) };
-                if let Some(column) = open.replace(next) {
-                    column.close(&mut thinned);
-                }
+    let mut points = finite.enumerate().peekable();
+    while let Some(first) = points.next() {
+        let column = |point: [f64; 2]| (((point[0] - low) / width) as usize).min(columns - 1);
+        let (mut least, mut most) = (first, first);
+        while let Some(next) = points.next_if(|(_, point)| column(*point) == column(first.1)) {
+            if next.1[1] < least.1[1] {
+                least = next;
+            }
+            if next.1[1] > most.1[1] {
+                most = next;
             }
         }
-    }
-    if let Some(column) = open {
-        column.close(&mut thinned);
+        // Both in the order in which they came, once if they are the same.
+        thinned.push(if least.0 < most.0 { least.1 } else { most.1 });
+        if least.0 != most.0 {
+            thinned.push(if least.0 < most.0 { most.1 } else { least.1 });
+        }
     }
     thinned
-}
-
-/// The lowest and the highest point of a column, each with its place in the order of points.
-struct Column {
-    index: usize,
-    least: (usize, [f64; 2]),
-    most: (usize, [f64; 2]),
-}
-
-impl Column {
-    fn take(&mut self, order: usize, point: [f64; 2]) {
-        if point[1] < self.least.1[1] {
-            self.least = (order, point);
-        }
-        if point[1] > self.most.1[1] {
-            self.most = (order, point);
-        }
-    }
-
-    /// Gives both points in the order in which they came, once if they are the same.
-    fn close(self, thinned: &mut Vec<[f64; 2]>) {
-        let mut pair = [self.least, self.most];
-        pair.sort_by_key(|(order, _)| *order);
-        thinned.push(pair[0].1);
-        if pair[0].0 != pair[1].0 {
-            thinned.push(pair[1].1);
-        }
-    }
 }
 
 #[cfg(test)]

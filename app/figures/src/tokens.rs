@@ -15,7 +15,6 @@ pub struct Tokens {
     pub control_hover: Color32,
     /// Hairlines, frames and grids.
     pub line: Color32,
-    /// Text.
     pub text: Color32,
     /// Labels, units, remarks.
     pub text_quiet: Color32,
@@ -25,15 +24,12 @@ pub struct Tokens {
     pub focus: Color32,
     /// A run under way: strong but grey.
     pub active_fill: Color32,
-    /// Text on `active_fill`.
     pub on_active: Color32,
     /// Something waits for the operator.
     pub notice_fill: Color32,
-    /// Text on `notice_fill`.
     pub on_notice: Color32,
     /// Something is wrong, and the stop control while motion is possible.
     pub alarm_fill: Color32,
-    /// Text on `alarm_fill`.
     pub on_alarm: Color32,
     /// Sentences about what is wrong, on `panel` and `canvas`.
     pub alarm_text: Color32,

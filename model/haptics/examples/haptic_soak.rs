@@ -1,11 +1,12 @@
 //! A hundred million virtual ticks, 28 hours at 1 kHz: `cargo run --release -p palpate-haptics --example haptic_soak [TICKS]`.
 //!
-//! The system goes in and out again and again; in every round it is held beside the same system started afresh. Ends with
+//! The system goes in and out again and again; in every round it is compared with the same system started afresh. Ends with
 //! exit code 1 where anything differs or is no number.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "an example speaks to its user")]
 
 use palpate_haptics::{
-    Flags, Input, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, Snapshot,
+    Flags, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveSettings,
+    MasterSlaveSnapshot, Period,
 };
 use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -20,10 +21,10 @@ fn counts(phase: u64) -> i64 {
     (phase.min(MOVING.saturating_sub(phase)) / 4) as i64
 }
 
-fn tick(system: &mut MasterSlave, phase: u64) -> Snapshot {
+fn tick(system: &mut MasterSlave, phase: u64) -> MasterSlaveSnapshot {
     let counts = counts(phase);
     let cell = if counts > 20 { 1.0 } else { 0.0 };
-    let _ = system.tick(&Input {
+    let _ = system.tick(&MasterSlaveInput {
         counts,
         elapsed: 1,
         cell: Newtons(cell),
@@ -34,7 +35,7 @@ fn tick(system: &mut MasterSlave, phase: u64) -> Snapshot {
 }
 
 /// Force and place at the deepest point of the second round from a fresh start.
-fn fresh(settings: &MasterSlaveSettings) -> Result<Snapshot, MasterSlaveError> {
+fn fresh(settings: &MasterSlaveSettings) -> Result<MasterSlaveSnapshot, MasterSlaveError> {
     let mut system = MasterSlave::new(settings)?;
     let mut deepest = system.snapshot();
     for i in 0..2 * ROUND {
@@ -49,7 +50,7 @@ fn fresh(settings: &MasterSlaveSettings) -> Result<Snapshot, MasterSlaveError> {
 fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
     let settings =
         MasterSlaveSettings::of(LawSettings::of::<3>(ModifiedKelvin::THESIS, Period::MILLISECOND));
-    let wanted = fresh(&settings)?;
+    let expected = fresh(&settings)?;
     let mut system = MasterSlave::new(&settings)?;
     let mut worst = 0.0f64;
     let mut is_right = true;
@@ -58,9 +59,9 @@ fn soak(ticks: u64) -> Result<bool, MasterSlaveError> {
         is_right &= one.force.is_finite() && one.energy.is_finite() && one.bias.is_finite();
         is_right &= !one.flags.has_any(Flags::NO_FORCE | Flags::DEPTH_NAN | Flags::PULSE_RATE);
         if i % ROUND == MOVING / 2 && i > ROUND {
-            let off = (one.model.0 / wanted.model.0 - 1.0).abs();
+            let off = (one.model.0 / expected.model.0 - 1.0).abs();
             worst = worst.max(off);
-            is_right &= one.depth == wanted.depth && one.pulses == wanted.pulses;
+            is_right &= one.depth == expected.depth && one.pulses == expected.pulses;
         }
         if i % 10_000_000 == 0 {
             eprintln!("{i} of {ticks} ticks");

@@ -1,4 +1,4 @@
-//! What a tick of the deformable surface takes: recovery and poke of whatever is displaced, by the three
+//! What a tick of the deformable surface takes: recovery and poke of whatever is displaced, by the two
 //! methods and by a naive chain, in one run.
 //!
 //! `cargo run --release -p palpate-haptics --example surface_speed -- [TICKS [fast]]`; `fast`: the closed form alone
@@ -16,7 +16,7 @@
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Shear, Side, Surface,
+    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Side, Surface,
 };
 use palpate_model::Seconds;
 use palpate_test_support::naive_surface as naive;
@@ -86,14 +86,9 @@ fn line(name: &str, times: &mut [f64], nodes_per_tick: f64) -> f64 {
 
 fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
     let grid = Grid::new(n, n, 0.5).expect("a grid");
-    let shear = match method {
-        // The same limit, but as many as there are nodes: what this method is for.
-        Method::Sorted => Shear::PerNode(vec![SHEAR; grid.nodes()].into()),
-        _ => Shear::Uniform(SHEAR),
-    };
-    let field = HeightField::new(grid, vec![0.0; grid.nodes()], shear).expect("a field");
+    let field = HeightField::flat(grid, SHEAR).expect("a field");
     let recovery = Recovery::new(Seconds(TAU), Seconds(TICK)).expect("a recovery");
-    let mut surface = Surface::new(field, method, recovery, Cut::NONE).expect("a surface");
+    let mut surface = Surface::new(field, method, recovery, Cut::NONE);
     let mut times = Vec::with_capacity(ticks);
     let mut moved = 0;
     // The first tenth is not counted: memory comes to the cache, and the trail of the tool appears.
@@ -101,11 +96,11 @@ fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
         let (node, z) = case.tool(n, tick);
         let contact = [Contact::at(&grid, node, z, Side::Push)];
         let start = Instant::now();
-        let told = black_box(surface.tick(black_box(&contact)));
+        let report = black_box(surface.tick(black_box(&contact)));
         let taken = start.elapsed().as_secs_f64();
         if tick >= ticks / 10 {
             times.push(taken * 1e6);
-            moved += told.moved.moved;
+            moved += report.moved.moved;
         }
     }
     line(method.name(), &mut times, moved as f64 / ticks as f64)

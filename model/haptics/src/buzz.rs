@@ -1,9 +1,9 @@
-//! A limit cycle of the loop, told from a hand: it is fast, wide enough to be felt, and the force feeds it.
+//! A limit cycle of the loop, distinguished from the motion of a hand: it is fast, wide enough to be felt, and the force feeds it.
 
 use super::Period;
 use serde::{Deserialize, Serialize};
 
-/// What counts as a buzz.
+/// Thresholds of a limit cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BuzzSettings {
     /// Slowest buzz in Hz: above what a hand does.
@@ -25,7 +25,7 @@ impl BuzzSettings {
 /// Turns that make a buzz: three whole cycles and the turn before them.
 const TURNS: usize = 7;
 
-/// A swing as it was heard.
+/// A limit cycle as it was detected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Buzz {
     /// Its frequency in Hz.
@@ -54,7 +54,7 @@ pub struct BuzzDetector {
 }
 
 impl BuzzDetector {
-    /// Hears nothing yet, with the device at `at` mm.
+    /// No limit cycle yet, with the device at `at` mm.
     #[must_use]
     pub fn new(settings: &BuzzSettings, period: Period, at: f64) -> Self {
         let cycles = 0.5 * (TURNS - 1) as f64;

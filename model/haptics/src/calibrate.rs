@@ -1,4 +1,4 @@
-//! What force a bias voltage makes at the rack: the source's torque-force calibration.
+//! Force at the rack per bias voltage: the source's torque-force calibration.
 //!
 //! The bias goes up and down in steps while a cell holds the rack; friction, drive and cell make of a straight line a
 //! dead band, a line, and a ceiling, and the way down another line than the way up. Each branch is cut into those three
@@ -13,7 +13,6 @@ use thiserror::Error;
 /// One step of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BiasPoint {
-    /// Bias voltage.
     pub bias: Volts,
     /// Force measured, after it has settled.
     pub force: Newtons,
@@ -34,24 +33,21 @@ pub struct BiasBranch {
     pub ceiling: Option<Newtons>,
 }
 
-/// A calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BiasCalibration {
     /// Force per bias voltage, in N/V.
     pub slope: f64,
     /// Standard error of the slope, in N/V.
     pub slope_error: f64,
-    /// On the way up.
     pub rising: BiasBranch,
     /// On the way down, if it was measured.
     pub falling: Option<BiasBranch>,
     /// Standard deviation of what the lines leave, in N.
     pub residual: f64,
-    /// Points on the lines.
     pub points: usize,
 }
 
-/// No calibration, or no answer from it.
+/// The points make no calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum BiasError {
     /// A point that is no number.
@@ -62,12 +58,9 @@ pub enum BiasError {
     },
     /// Too few points.
     #[error(
-        "{found} points on the straight part of the way up; measure at least {LINE_MIN}, with the bias above the dead band"
+        "only {found} points are on the straight part of the rising branch; measure at least {LINE_MIN}, with the bias above the dead band"
     )]
-    TooFew {
-        /// How many.
-        found: usize,
-    },
+    TooFew { found: usize },
     /// The force does not follow.
     #[error(
         "the force does not rise with the bias voltage ({slope:.3} N/V, standard error {error:.3}); check drive, cell and sign"
@@ -77,18 +70,6 @@ pub enum BiasError {
         slope: f64,
         /// Its standard error.
         error: f64,
-    },
-    /// Beyond what was measured.
-    #[error(
-        "{force:.3} is beyond the calibration, which is straight from {from:.3} to {to:.3}; calibrate to a higher bias, or ask for less"
-    )]
-    Beyond {
-        /// Asked for.
-        force: Newtons,
-        /// Least force of the line.
-        from: Newtons,
-        /// Largest force of the line.
-        to: Newtons,
     },
 }
 
@@ -148,12 +129,12 @@ fn cut(points: &[(f64, f64)]) -> Option<[usize; 2]> {
     // Rounding is no misfit: a part in 1e9 of the whole.
     let floor = 1e-18 * sums.flat(0, n).max(f64::MIN_POSITIVE);
     let score = |from: usize, to: usize| {
-        let left = sums.flat(0, from) + sums.line(from, to) + sums.flat(to, n);
+        let residual = sums.flat(0, from) + sums.line(from, to) + sums.flat(to, n);
         // A cut has a level and a place, and a place is chosen among many: twice what a number costs, as for change
         // points (Zhang & Siegmund, Biometrics 63 (2007) 22-32), and once more for the level's own scatter.
         let cuts = usize::from(from > 0) + usize::from(to < n);
         let numbers = (2 + 4 * cuts) as f64;
-        n as f64 * ((left + floor) / n as f64).ln() + numbers * (n as f64).ln()
+        n as f64 * ((residual + floor) / n as f64).ln() + numbers * (n as f64).ln()
     };
     let all = (0..=n - LINE_MIN).flat_map(|from| (from + LINE_MIN..=n).map(move |to| [from, to]));
     // A flat of one point is that point's error.
@@ -171,8 +152,8 @@ struct Branch {
 
 impl Branch {
     fn of(points: &[BiasPoint], is_rising: bool) -> Option<Self> {
-        let wanted = points.iter().filter(|one| one.is_rising == is_rising);
-        let mut points: Vec<_> = wanted.map(|one| (one.bias.0, one.force.0)).collect();
+        let of_branch = points.iter().filter(|one| one.is_rising == is_rising);
+        let mut points: Vec<_> = of_branch.map(|one| (one.bias.0, one.force.0)).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Sums of squares of centred numbers keep their digits.
         let n = points.len().max(1) as f64;
@@ -193,7 +174,7 @@ impl Branch {
         mean(self.line())
     }
 
-    fn told(&self, slope: f64) -> BiasBranch {
+    fn summary(&self, slope: f64) -> BiasBranch {
         let (u, f) = self.means();
         let [from, to] = self.ends;
         let level = |points: &[(f64, f64)]| (!points.is_empty()).then(|| Newtons(mean(points).1));
@@ -245,32 +226,10 @@ impl BiasCalibration {
         Ok(Self {
             slope,
             slope_error,
-            rising: rising.told(slope),
-            falling: falling.as_ref().map(|branch| branch.told(slope)),
+            rising: rising.summary(slope),
+            falling: falling.as_ref().map(|branch| branch.summary(slope)),
             residual,
             points: count,
         })
-    }
-
-    /// By how much the way down is above the way up, in N: twice the friction.
-    pub fn hysteresis(&self) -> Option<Newtons> {
-        self.falling.map(|one| Newtons(one.offset - self.rising.offset))
-    }
-
-    /// Bias voltage at which force begins on the way up: the end of the dead band.
-    pub fn begins(&self) -> Volts {
-        let at = self.rising.dead.map_or(0.0, |dead| dead.0);
-        Volts((at - self.rising.offset) / self.slope)
-    }
-
-    /// The bias voltage for a force on the way up, between the ends of the line.
-    pub fn bias_for(&self, force: Newtons) -> Result<Volts, BiasError> {
-        let [from, to] =
-            self.rising.line.map(|bias| Newtons(self.rising.offset + self.slope * bias.0));
-        // Written so that NaN is beyond.
-        if !(force >= from && force <= to) {
-            return Err(BiasError::Beyond { force, from, to });
-        }
-        Ok(Volts((force.0 - self.rising.offset) / self.slope))
     }
 }

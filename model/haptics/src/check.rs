@@ -7,26 +7,21 @@ use super::Period;
 use super::calibrate::BiasPoint;
 use super::master_slave::MasterSlaveError;
 use super::rig::{Hand, HandPath};
+use super::setting_error::{SettingError, SettingRange};
 use super::simulation::{Simulation, SimulationSettings};
 use super::torque::{DriveKind, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use thiserror::Error;
 
-/// A check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckSettings {
-    /// The body rendered.
     pub body: ModifiedKelvin,
-    /// The loop's tick.
     pub period: Period,
     /// Speed of the second slider.
     pub speed: MmPerS,
-    /// Its way.
     pub depth: Depth,
-    /// How long it holds.
     pub hold: Seconds,
-    /// The master's drive.
     pub drive: DriveKind,
     /// Share of the motor's friction that is compensated.
     pub friction_share: f64,
@@ -53,22 +48,12 @@ impl CheckSettings {
 
 /// No check.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum CheckError {
+pub enum FeedbackCheckError {
     /// The system it would be of.
     #[error(transparent)]
     System(#[from] MasterSlaveError),
-    /// What the slider would do.
-    #[error("a check with {name} = {value} {unit} is not possible; {should}")]
-    Setting {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// What it may be.
-        should: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
 }
 
 /// Longest check in s: a day.
@@ -90,26 +75,17 @@ impl CheckSettings {
     }
 
     /// How long it takes, if it can be made.
-    fn seconds(&self) -> Result<f64, CheckError> {
-        let above = [
-            ("speed", self.speed.0, "mm/s"),
-            ("depth", self.depth.0, "mm"),
-            ("samples", self.samples_hz, "Hz"),
+    fn seconds(&self) -> Result<f64, FeedbackCheckError> {
+        const CHECK: &str = "a check";
+        let positive = [
+            ("speed", self.speed.0, " mm/s"),
+            ("depth", self.depth.0, " mm"),
+            ("samples", self.samples_hz, " Hz"),
         ];
-        let refusal = |name, value, unit, should| CheckError::Setting { name, value, unit, should };
-        for (name, value, unit) in above {
-            if !(value > 0.0 && value.is_finite()) {
-                let should = "it is a finite number above zero";
-                return Err(refusal(name, value, unit, should));
-            }
-        }
-        if self.hold.0.is_nan() || self.hold.0 < 0.0 {
-            return Err(refusal("hold", self.hold.0, "s", "it is zero or more"));
-        }
+        SettingRange::Positive.check(CHECK, &positive)?;
+        SettingRange::MayBeInfinite.check(CHECK, &[("hold", self.hold.0, " s")])?;
         let seconds = self.ramp().0 + self.hold.0;
-        if seconds > LONGEST_S {
-            return Err(refusal("duration", seconds, "s", "it is at most a day"));
-        }
+        SettingRange::UpTo(LONGEST_S).check(CHECK, &[("duration", seconds, " s")])?;
         Ok(seconds)
     }
 }
@@ -121,11 +97,9 @@ pub struct CheckSample {
     pub t: Seconds,
     /// Depth of the slave.
     pub depth: Depth,
-    /// Force commanded.
     pub commanded: Newtons,
     /// Torque commanded, in N mm.
     pub torque: f64,
-    /// Bias voltage.
     pub bias: Volts,
     /// Force between slider and rack.
     pub measured: Newtons,
@@ -141,7 +115,7 @@ pub fn check(
     settings: &CheckSettings,
     mut seen: impl FnMut(&CheckSample),
     mut progress: impl FnMut(f64),
-) -> Result<(), CheckError> {
+) -> Result<(), FeedbackCheckError> {
     let seconds = settings.seconds()?;
     let path = HandPath::RampHold { from: 0.0, to: settings.depth.0, speed: settings.speed.0 };
     let mut all = SimulationSettings::of(settings.body, settings.period, slider(path));

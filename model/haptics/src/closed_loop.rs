@@ -2,10 +2,10 @@
 //!
 //! Deterministic: the same settings give the same run, bit by bit. Between ticks the device moves in equal parts of a
 //! tick, its force held; commands reach it whole ticks late where a delay is set. The loop itself is whoever calls
-//! [`Plant::sense`] and [`Plant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
+//! [`HapticPlant::sense`] and [`HapticPlant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
 
 use super::rig::{
-    Drive, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
+    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackForces, ThermalState,
 };
 use super::{DELAY_MAX, Period};
 use palpate_model::units::{MmPerS, Newtons};
@@ -13,7 +13,6 @@ use palpate_model::units::{MmPerS, Newtons};
 /// A device and the hand on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantSettings {
-    /// The loop's tick.
     pub period: Period,
     /// Parts of a tick in which the device moves.
     pub parts: u32,
@@ -29,7 +28,6 @@ pub struct PlantSettings {
     pub delay: usize,
     /// The motor on its pinion; `None` for a source of force without faults.
     pub motor: Option<(Motor, Pinion)>,
-    /// The hand.
     pub hand: Hand,
     /// Place at the start, in mm.
     pub x: f64,
@@ -61,41 +59,43 @@ impl PlantSettings {
     }
 }
 
-/// What a loop tells the device.
+/// What a loop commands the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub enum PlantCommand {
     /// So many N against motion into the tissue; a motor takes it as no command.
     Force(Newtons),
     /// The motor's drive, positive against motion into the tissue.
-    Drive(Drive),
+    Drive(DriveInput),
 }
 
-/// What a loop is told.
+/// What a loop reads from the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensed {
+pub struct SensedPosition {
     /// Counts of the encoder; zero for one without steps.
     pub counts: i64,
     /// The place they stand for, in mm.
     pub place: f64,
 }
 
-/// The device with its state.
 #[derive(Clone, Copy, Debug)]
-pub struct Plant {
+pub struct HapticPlant {
     settings: PlantSettings,
-    rack: Rack,
+    /// True motion and energies.
+    pub rack: Rack,
     motor: MotorState,
-    thermal: ThermalState,
-    queue: [Command; DELAY_MAX + 1],
+    /// Temperatures of the motor.
+    pub thermal: ThermalState,
+    queue: [PlantCommand; DELAY_MAX + 1],
     tick: u64,
     /// The tick at which the hand's path began.
     begun: u64,
-    hand_force: f64,
-    motor_force: f64,
+    /// Force of the hand, in N, at the end of the last part of a tick.
+    pub hand_force: f64,
+    /// Force of the motor into the tissue then, in N.
+    pub motor_force: f64,
 }
 
-impl Plant {
-    /// At its start.
+impl HapticPlant {
     #[must_use]
     pub fn new(settings: &PlantSettings) -> Self {
         let mass_kg = settings.mass_kg + settings.hand.mass_kg;
@@ -107,7 +107,7 @@ impl Plant {
             rack,
             motor: MotorState::default(),
             thermal: thermal.thermal.cold(),
-            queue: [Command::Force(settings.held); DELAY_MAX + 1],
+            queue: [PlantCommand::Force(settings.held); DELAY_MAX + 1],
             tick: 0,
             begun: 0,
             hand_force: 0.0,
@@ -128,51 +128,21 @@ impl Plant {
     }
 
     /// What its encoder says.
-    pub fn sense(&self) -> Sensed {
+    pub fn sense(&self) -> SensedPosition {
         let step = self.settings.count_mm;
         if step > 0.0 {
             // A cast beyond the numbers is their end.
             let counts = (self.rack.x / step).floor() as i64;
             let place = counts as f64 * step;
-            Sensed { counts, place }
+            SensedPosition { counts, place }
         } else {
             let place = self.rack.x;
-            Sensed { counts: 0, place }
+            SensedPosition { counts: 0, place }
         }
     }
 
-    /// True place in mm and speed in mm/s.
-    pub fn motion(&self) -> [f64; 2] {
-        [self.rack.x, self.rack.v]
-    }
-
-    /// Force of the hand, then of the motor into the tissue, at the end of the last part of a tick, in N.
-    pub fn forces(&self) -> [f64; 2] {
-        [self.hand_force, self.motor_force]
-    }
-
-    /// Temperatures of the motor.
-    pub fn thermal(&self) -> ThermalState {
-        self.thermal
-    }
-
-    /// Current of the motor in A.
-    pub fn amps(&self) -> f64 {
-        self.motor.amps
-    }
-
-    /// Where the energies went, in N mm.
-    pub fn energies(&self) -> RackEnergies {
-        self.rack.energies
-    }
-
-    /// Energy of its motion, in N mm.
-    pub fn kinetic(&self) -> f64 {
-        self.rack.kinetic()
-    }
-
     /// Moves through one tick. The hand's path begins with the first.
-    pub fn tick(&mut self, command: Command) {
+    pub fn tick(&mut self, command: PlantCommand) {
         let Self { settings, .. } = *self;
         const RING: u64 = DELAY_MAX as u64 + 1;
         let delay = settings.delay.min(DELAY_MAX) as u64;
@@ -180,7 +150,7 @@ impl Plant {
         let due = if self.tick >= delay {
             self.queue[((self.tick - delay) % RING) as usize]
         } else {
-            Command::Force(settings.held)
+            PlantCommand::Force(settings.held)
         };
         let parts = settings.parts.max(1);
         let dt = settings.period.seconds().0 / f64::from(parts);
@@ -190,13 +160,13 @@ impl Plant {
             let path = &settings.hand.path;
             let [early, late] = [path.at(t - 0.5 * dt), path.at(t + 0.5 * dt)];
             let motor = match (settings.motor, due) {
-                (None, Command::Force(force)) => -force.0,
-                (None, Command::Drive(_)) => 0.0,
+                (None, PlantCommand::Force(force)) => -force.0,
+                (None, PlantCommand::Drive(_)) => 0.0,
                 (Some((motor, pinion)), due) => {
                     // Outwards is positive for the drive, inwards for the rack.
                     let drive = match due {
-                        Command::Drive(drive) => drive,
-                        Command::Force(_) => Drive::Current(0.0),
+                        PlantCommand::Drive(drive) => drive,
+                        PlantCommand::Force(_) => DriveInput::Current(0.0),
                     };
                     let omega = -self.rack.v / pinion.radius_mm();
                     self.motor = motor.after(self.motor, drive, omega, dt);

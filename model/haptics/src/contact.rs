@@ -5,7 +5,7 @@ use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Where contact begins and where it ends.
+/// Thresholds at which contact begins and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactSettings {
     /// Force from which on the probe touches.
@@ -18,12 +18,10 @@ pub struct ContactSettings {
 /// No hysteresis.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
-    "contact from {on} on and until below {off} has no hysteresis; let it end at a smaller force than it begins"
+    "contact that begins at {on} and ends below {off} has no hysteresis; end it at a smaller force than it begins"
 )]
-pub struct ContactError {
-    /// Where it would begin.
+pub struct ContactThresholdError {
     pub on: Newtons,
-    /// Where it would end.
     pub off: Newtons,
 }
 
@@ -37,12 +35,12 @@ impl ContactSettings {
     }
 
     /// Itself if contact can end.
-    pub fn checked(self) -> Result<Self, ContactError> {
+    pub fn checked(self) -> Result<Self, ContactThresholdError> {
         let Self { on, off } = self;
         if on.is_finite() && off.is_finite() && off <= on {
             Ok(self)
         } else {
-            Err(ContactError { on, off })
+            Err(ContactThresholdError { on, off })
         }
     }
 }
@@ -52,35 +50,25 @@ impl ContactSettings {
 pub struct ContactDetector {
     settings: ContactSettings,
     is_touching: bool,
-    changes: u64,
 }
 
 impl ContactDetector {
-    /// Not touching.
     #[must_use]
     pub fn new(settings: ContactSettings) -> Self {
-        Self { settings, is_touching: false, changes: 0 }
+        Self { settings, is_touching: false }
     }
 
-    /// Whether it touches.
     pub fn is_touching(&self) -> bool {
         self.is_touching
     }
 
-    /// How often that has changed.
-    pub fn changes(&self) -> u64 {
-        self.changes
-    }
-
     /// Takes the cell's force. What is not a number changes nothing.
     pub fn tick(&mut self, cell: Newtons) -> Flags {
-        let touching = if self.is_touching {
+        self.is_touching = if self.is_touching {
             cell >= self.settings.off || cell.0.is_nan()
         } else {
             cell >= self.settings.on
         };
-        self.changes += u64::from(touching != self.is_touching);
-        self.is_touching = touching;
         Flags::CELL.when(!cell.is_finite())
     }
 }

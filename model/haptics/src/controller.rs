@@ -39,7 +39,6 @@ impl ControllerSettings {
     }
 }
 
-/// What a controller did in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ControllerTick {
     /// The force with the damping.
@@ -48,7 +47,6 @@ pub struct ControllerTick {
     pub damping: f64,
     /// Energy absorbed so far, in N mm; below zero it is owed.
     pub energy: f64,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -64,11 +62,10 @@ pub struct PassivityController {
     observer: PassivityObserver,
     damping_max: f64,
     force_max: f64,
-    kept: f64,
+    credit_decay: f64,
     tick_s: f64,
-    injected: f64,
     hush: u64,
-    hush_left: u64,
+    hush_remaining: u64,
 }
 
 impl PassivityController {
@@ -79,20 +76,14 @@ impl PassivityController {
         let turn = std::f64::consts::FRAC_PI_2 / (2 * settings.delay_ticks + 3) as f64;
         let clamped = inertia(settings.mass_kg) / tick_s * 2.0 * turn.sin();
         Self {
-            observer: PassivityObserver::late(settings.delay_ticks),
+            observer: PassivityObserver::with_delay(settings.delay_ticks),
             damping_max: if settings.is_clamped { clamped.max(0.0) } else { f64::MAX },
             force_max: settings.force_max.0.max(0.0),
-            kept: (-tick_s / settings.leak.0.max(tick_s)).exp(),
+            credit_decay: (-tick_s / settings.leak.0.max(tick_s)).exp(),
             tick_s,
-            injected: 0.0,
             hush: period.ticks_in(settings.hush),
-            hush_left: 0,
+            hush_remaining: 0,
         }
-    }
-
-    /// Energy that damping has taken, in N mm.
-    pub fn injected(&self) -> f64 {
-        self.injected
     }
 
     /// Energy absorbed so far, in N mm.
@@ -101,13 +92,13 @@ impl PassivityController {
     }
 
     /// Whether a buzz was heard not long ago.
-    pub fn is_hushed(&self) -> bool {
-        self.hush_left > 0
+    pub fn is_credit_withheld(&self) -> bool {
+        self.hush_remaining > 0
     }
 
     /// The loop was heard to buzz: for the time of the hush nothing absorbed is a credit.
-    pub fn heard_buzz(&mut self) {
-        self.hush_left = self.hush;
+    pub fn report_buzz(&mut self) {
+        self.hush_remaining = self.hush;
     }
 
     /// The device moved by so many counts of `count_mm` in `elapsed` ticks; `force` is what is to be felt.
@@ -120,12 +111,12 @@ impl PassivityController {
         is_touching: bool,
     ) -> ControllerTick {
         let moved = counts as f64 * count_mm;
-        self.observer.moved(moved);
-        if self.hush_left > 0 {
-            self.hush_left = self.hush_left.saturating_sub(elapsed.max(1));
-            self.observer.keep(0.0);
+        self.observer.record_move(moved);
+        if self.hush_remaining > 0 {
+            self.hush_remaining = self.hush_remaining.saturating_sub(elapsed.max(1));
+            self.observer.scale_credit(0.0);
         } else if !is_touching {
-            self.observer.keep(self.kept);
+            self.observer.scale_credit(self.credit_decay);
         }
         let energy = self.observer.energy();
         let span = self.tick_s * elapsed.max(1) as f64;
@@ -140,15 +131,14 @@ impl PassivityController {
         }
         let added = (damping * speed).clamp(-self.force_max, self.force_max);
         let added = if added.is_finite() { added } else { 0.0 };
-        self.injected += added * speed * self.tick_s;
-        let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
-        let total = wanted + added;
+        let requested = if force.0.is_finite() { force.0 } else { 0.0 };
+        let total = requested + added;
         self.observer.hold(total);
         ControllerTick { force: Newtons(total), damping, energy, flags }
     }
 
     /// The force that reaches the device after all, where a later bound changed it.
-    pub fn rendered(&mut self, force: Newtons) {
+    pub fn set_rendered_force(&mut self, force: Newtons) {
         self.observer.hold_instead(force.0);
     }
 }
@@ -180,7 +170,6 @@ mod tests {
         // Going on at that speed pays it back exactly.
         let tick = one.tick((-2, COUNT), 1, Newtons(0.0), true);
         assert!(tick.energy.abs() < 1e-15 && tick.damping == 0.0);
-        assert!((one.injected() - 4.0 * COUNT).abs() < 1e-12);
     }
 
     #[test]
@@ -224,7 +213,7 @@ mod tests {
             let _ = one.tick((0, COUNT), 1, Newtons(0.0), false);
         }
         assert!((one.energy() - (-1f64).exp()).abs() < 1e-12);
-        one.heard_buzz();
+        one.report_buzz();
         let _ = one.tick((0, COUNT), 1, Newtons(1.0), true);
         assert_eq!(one.energy(), 0.0);
         let _ = one.tick((-1, COUNT), 1, Newtons(0.0), true);

@@ -8,7 +8,7 @@ use std::fmt::Debug;
 /// A scene's loop calls it once a tick: first [`sense`](Self::sense), then [`give`](Self::give). Neither may wait, lock or
 /// allocate; a device on a wire has a thread of its own and hands over its latest values.
 pub trait HapticDevice: Debug + Send {
-    /// What it is. A scene is made for these numbers.
+    /// The device's numbers, for which a scene is made.
     fn settings(&self) -> &DeviceSettings;
 
     /// Where its stylus is, `elapsed` ticks after the last look. That of a device that is gone is at no number, and the scene lets

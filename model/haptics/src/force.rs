@@ -1,12 +1,11 @@
 //! The model as a force law: a depth in, a force out, tick after tick.
 
-use super::{Flags, Period};
-use palpate_model::time::Nanos;
+use super::{Flags, Period, SettingError, SettingRange};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_rheology::families::{POWER_MAX, StepError};
 use palpate_rheology::integrators::{
     Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
-    IntegratorError, Precision, Real, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
+    IntegratorError, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -14,36 +13,22 @@ use thiserror::Error;
 /// Number of elastic terms a law steps; bodies of fewer are [padded](SeriesBody::padded).
 const N: usize = POWER_MAX;
 
-/// What becomes of a force below zero, which the model has where the probe leaves faster than the
-/// tissue follows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Pull {
-    /// Zero: tissue does not stick to the probe.
-    Never,
-    /// As the model has it, for comparisons.
-    AsModel,
-}
-
-/// How a law is stepped and what bounds it.
+/// Integration scheme and bounds of a force law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LawSettings {
     /// The body; a relaxation time of zero is one without memory.
     pub body: SeriesBody<POWER_MAX>,
-    /// How it is stepped.
     pub scheme: Scheme,
-    /// In which numbers.
-    pub precision: Precision,
     /// From tick to tick.
     pub period: Period,
     /// Deepest depth; deeper ones count as this.
     pub depth_max: Depth,
     /// Fastest the depth may move; the law follows faster ones at this speed.
     pub speed_max: MmPerS,
-    /// Largest force.
     pub force_max: Newtons,
-    /// What becomes of a force below zero.
-    pub pull: Pull,
+    /// Whether the force may be below zero, as the model has it where the probe leaves faster than the tissue follows.
+    /// Real tissue does not stick to the probe; this is for comparisons.
+    pub is_pull_allowed: bool,
 }
 
 impl LawSettings {
@@ -54,12 +39,11 @@ impl LawSettings {
         Self {
             body: body.into().padded(),
             scheme: Scheme::Exact,
-            precision: Precision::F64,
             period,
             depth_max: Depth(30.0),
             speed_max: MmPerS(1000.0),
             force_max: Newtons(10.0),
-            pull: Pull::Never,
+            is_pull_allowed: false,
         }
     }
 }
@@ -70,19 +54,8 @@ pub enum LawError {
     /// The body or its step.
     #[error(transparent)]
     Integrator(#[from] IntegratorError),
-    /// A bound that bounds nothing.
-    #[error(
-        "a force law with {name} = {value} {unit} is not possible; {name} is a finite number above zero"
-    )]
-    Bound {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-    },
-    /// The first depth.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     #[error("a force law cannot begin at a depth of {0} mm; give a finite depth")]
     Start(f64),
 }
@@ -96,14 +69,13 @@ pub struct LawTick {
     pub model: Newtons,
     /// The depth taken, after its bounds.
     pub depth: Depth,
-    /// What was special.
     pub flags: Flags,
 }
 
 /// A body at a constant tick, with its state; nothing in a tick allocates, and any input gives a finite
 /// force.
 ///
-/// The force is never below zero unless [`Pull::AsModel`], and zero with the probe above the surface,
+/// The force is never below zero unless [`LawSettings::is_pull_allowed`], and zero with the probe above the surface,
 /// where the model's memory goes on fading.
 #[derive(Clone, Copy, Debug)]
 pub struct ForceLaw {
@@ -111,34 +83,39 @@ pub struct ForceLaw {
     stepper: Stepper,
     depth: f64,
     move_max: f64,
-    ticks: u64,
 }
 
+/// A scheme with its state, in double precision.
 #[derive(Clone, Copy, Debug)]
 enum Stepper {
-    F64(Schemes<f64>),
-    F32(Schemes<f32>),
+    ExplicitEuler(Stepped<f64, N, ExplicitEuler>),
+    ImplicitEuler(Stepped<f64, N, ImplicitEuler>),
+    Trapezoid(Stepped<f64, N, Trapezoid>),
+    ExponentialLeft(Stepped<f64, N, ExponentialLeft>),
+    ExponentialFirstOrder(Stepped<f64, N, ExponentialFirstOrder>),
+    Exact(Exact<f64, N>),
+    RungeKutta(Stepped<f64, N, RungeKutta>),
     /// No relaxation time: the force is the forcing.
     Instant {
-        speed_per_move: f64,
+        body: SeriesBody<N>,
+        dt: f64,
+        depth: f64,
     },
 }
 
-#[derive(Clone, Copy, Debug)]
-enum Schemes<R> {
-    ExplicitEuler(Stepped<R, N, ExplicitEuler>),
-    ImplicitEuler(Stepped<R, N, ImplicitEuler>),
-    Trapezoid(Stepped<R, N, Trapezoid>),
-    ExponentialLeft(Stepped<R, N, ExponentialLeft>),
-    ExponentialFirstOrder(Stepped<R, N, ExponentialFirstOrder>),
-    Exact(Exact<R, N>),
-    RungeKutta(Stepped<R, N, RungeKutta>),
-}
-
-impl<R: Real> Schemes<R> {
-    fn new(scheme: Scheme, body: &SeriesBody<N>, dt: f64, depth: f64) -> Self {
-        let start = Start { depth: R::of(depth), force: None };
-        match scheme {
+impl Stepper {
+    fn new(settings: &LawSettings, depth: f64) -> Result<Self, LawError> {
+        let LawSettings { body, scheme, .. } = settings;
+        let dt = settings.period.seconds().0;
+        // So short a memory is over before any number of ticks can show it.
+        if body.tau_eps >= 0.0 && (dt / body.tau_eps).is_infinite() {
+            let checked = SeriesBody { tau_eps: 1.0, ..*body };
+            checked.checked().map_err(IntegratorError::from)?;
+            return Ok(Self::Instant { body: *body, dt, depth });
+        }
+        scheme.check(body, dt)?;
+        let start = Start { depth, force: None };
+        Ok(match scheme {
             Scheme::ExplicitEuler => Self::ExplicitEuler(Stepped::at_any_step(body, dt, start)),
             Scheme::ImplicitEuler => Self::ImplicitEuler(Stepped::at_any_step(body, dt, start)),
             Scheme::Trapezoid => Self::Trapezoid(Stepped::at_any_step(body, dt, start)),
@@ -148,12 +125,11 @@ impl<R: Real> Schemes<R> {
             }
             Scheme::Exact => Self::Exact(Exact::at_any_step(body, dt, start)),
             Scheme::RungeKutta => Self::RungeKutta(Stepped::at_any_step(body, dt, start)),
-        }
+        })
     }
 
     fn step(&mut self, depth: f64) -> Result<f64, StepError> {
-        let depth = R::of(depth);
-        let force = match self {
+        match self {
             Self::ExplicitEuler(one) => one.step(depth),
             Self::ImplicitEuler(one) => one.step(depth),
             Self::Trapezoid(one) => one.step(depth),
@@ -161,8 +137,16 @@ impl<R: Real> Schemes<R> {
             Self::ExponentialFirstOrder(one) => one.step(depth),
             Self::Exact(one) => one.step(depth),
             Self::RungeKutta(one) => one.step(depth),
-        };
-        force.map(R::to_f64)
+            Self::Instant { body, dt, depth: last } => {
+                let (from, to) = (last.max(0.0), depth.max(0.0));
+                let inner = body.mu.iter().rev().fold(0.0, |sum, mu| sum * to + mu);
+                let force = to * (inner + body.tau_sig * (to - from) * (1.0 / *dt));
+                if force.is_finite() {
+                    *last = depth;
+                }
+                Ok(force)
+            }
+        }
     }
 }
 
@@ -170,56 +154,28 @@ impl ForceLaw {
     /// A body relaxed at `depth`.
     pub fn new(settings: LawSettings, depth: Depth) -> Result<Self, LawError> {
         let bounds = [
-            ("the deepest depth", settings.depth_max.0, "mm"),
-            ("the fastest speed", settings.speed_max.0, "mm/s"),
-            ("the largest force", settings.force_max.0, "N"),
+            ("deepest depth", settings.depth_max.0, " mm"),
+            ("fastest speed", settings.speed_max.0, " mm/s"),
+            ("largest force", settings.force_max.0, " N"),
         ];
-        for (name, value, unit) in bounds {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(LawError::Bound { name, value, unit });
-            }
-        }
+        SettingRange::Positive.check("a force law", &bounds)?;
         if !depth.is_finite() {
             return Err(LawError::Start(depth.0));
         }
         let depth = depth.0.clamp(-settings.depth_max.0, settings.depth_max.0);
         Ok(Self {
-            stepper: stepper(&settings, depth)?,
+            stepper: Stepper::new(&settings, depth)?,
             depth,
             move_max: settings.speed_max.0 * settings.period.seconds().0,
-            ticks: 0,
             settings,
         })
-    }
-
-    /// How it was made.
-    pub fn settings(&self) -> &LawSettings {
-        &self.settings
-    }
-
-    /// Ticks since the start.
-    pub fn ticks(&self) -> u64 {
-        self.ticks
-    }
-
-    /// Time since the start.
-    pub fn time(&self) -> Nanos {
-        self.settings.period.time_of(self.ticks)
     }
 
     /// Moves straight to `depth` within the tick and answers with the force at its end.
     #[must_use]
     pub fn tick(&mut self, depth: Depth) -> LawTick {
-        self.ticks += 1;
         let (to, mut flags) = self.bounded(depth.0);
-        let model = match &mut self.stepper {
-            Stepper::F64(schemes) => schemes.step(to),
-            Stepper::F32(schemes) => schemes.step(to),
-            Stepper::Instant { speed_per_move } => {
-                Ok(instant(&self.settings.body, *speed_per_move, self.depth, to))
-            }
-        };
-        let model = match model {
+        let model = match self.stepper.step(to) {
             Ok(force) if force.is_finite() => {
                 self.depth = to;
                 force
@@ -233,7 +189,7 @@ impl ForceLaw {
         if to <= 0.0 {
             flags |= Flags::ABOVE_SURFACE;
             force = 0.0;
-        } else if force < 0.0 && self.settings.pull == Pull::Never {
+        } else if force < 0.0 && !self.settings.is_pull_allowed {
             flags |= Flags::PULL;
             force = 0.0;
         }
@@ -258,28 +214,4 @@ impl ForceLaw {
         let reached = within.clamp(self.depth - self.move_max, self.depth + self.move_max);
         (reached, range | Flags::JUMP.when(reached != within))
     }
-}
-
-fn stepper(settings: &LawSettings, depth: f64) -> Result<Stepper, LawError> {
-    let LawSettings { body, scheme, .. } = settings;
-    let dt = settings.period.seconds().0;
-    // So short a memory is over before any number of ticks can tell.
-    if body.tau_eps >= 0.0 && (dt / body.tau_eps).is_infinite() {
-        let checked = SeriesBody { tau_eps: 1.0, ..*body };
-        checked.checked().map_err(IntegratorError::from)?;
-        let speed_per_move = 1.0 / dt;
-        return Ok(Stepper::Instant { speed_per_move });
-    }
-    scheme.check(body, dt)?;
-    Ok(match settings.precision {
-        Precision::F64 => Stepper::F64(Schemes::new(*scheme, body, dt, depth)),
-        Precision::F32 => Stepper::F32(Schemes::new(*scheme, body, dt, depth)),
-    })
-}
-
-/// The forcing itself at the end of a move.
-fn instant(body: &SeriesBody<N>, speed_per_move: f64, from: f64, to: f64) -> f64 {
-    let (from, to) = (from.max(0.0), to.max(0.0));
-    let inner = body.mu.iter().rev().fold(0.0, |sum, mu| sum * to + mu);
-    to * (inner + body.tau_sig * (to - from) * speed_per_move)
 }

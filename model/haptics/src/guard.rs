@@ -1,4 +1,4 @@
-//! What keeps the rendered force within bounds, whatever the model asks for.
+//! The guard that keeps the rendered force within bounds, whatever the model asks for.
 
 use super::{Flags, Period};
 use palpate_model::units::{Newtons, Seconds};
@@ -21,13 +21,14 @@ pub struct GuardSettings {
     pub contact_ramp: Seconds,
     /// The drive lets go by itself after so long without a command; `None` for one that holds the last
     /// command for ever.
-    pub lets_go_after: Option<Seconds>,
+    #[serde(rename = "lets_go_after")]
+    pub release_after: Option<Seconds>,
 }
 
 impl Default for GuardSettings {
     /// 10 N is below what the motor may give for long. 0.5 N/ms is three times what the thesis body asks
     /// for at 100 mm/s and 30 mm. A stall of 5 ms is five ticks of 1 kHz. Ramps of a quarter of a second and more leave a
-    /// hand the time to notice; that of contact is short beside a poke.
+    /// hand the time to notice; that of contact is short compared with a poke.
     fn default() -> Self {
         Self {
             force_max: Newtons(10.0),
@@ -36,7 +37,7 @@ impl Default for GuardSettings {
             stall: Seconds(0.005),
             stall_ramp: Seconds(0.25),
             contact_ramp: Seconds(0.02),
-            lets_go_after: None,
+            release_after: None,
         }
     }
 }
@@ -50,7 +51,7 @@ impl GuardSettings {
         stall: Seconds(1e3),
         stall_ramp: Seconds(0.0),
         contact_ramp: Seconds(0.0),
-        lets_go_after: None,
+        release_after: None,
     };
 }
 
@@ -63,7 +64,7 @@ pub struct ForceGuard {
     force_max: f64,
     change_max: f64,
     stall: u64,
-    lets_go_after: Option<u64>,
+    release_after: Option<u64>,
     start: Ramp,
     after_stall: Ramp,
     after_contact: Ramp,
@@ -94,12 +95,9 @@ impl Ramp {
     }
 }
 
-/// What a guard lets through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardTick {
-    /// The force.
     pub force: Newtons,
-    /// What it did.
     pub flags: Flags,
 }
 
@@ -113,7 +111,7 @@ impl ForceGuard {
             force_max: bound(settings.force_max.0),
             change_max: bound(settings.slew_n_per_ms) * period.millis(),
             stall: period.ticks_in(settings.stall),
-            lets_go_after: settings.lets_go_after.map(|span| period.ticks_in(span)),
+            release_after: settings.release_after.map(|span| period.ticks_in(span)),
             start: Ramp::new(period, settings.soft_start, false),
             after_stall: Ramp::new(period, settings.stall_ramp, true),
             after_contact: Ramp::new(period, settings.contact_ramp, false),
@@ -128,7 +126,7 @@ impl ForceGuard {
         Newtons(self.last)
     }
 
-    /// Force is wanted again: it rises as after the start.
+    /// Force is requested again: it rises as after the start.
     pub fn restart(&mut self) {
         self.start.done = 0;
     }
@@ -136,7 +134,7 @@ impl ForceGuard {
     /// Bounds `force`, `elapsed` ticks after the last call: one, unless the loop was away.
     #[must_use]
     pub fn tick(&mut self, force: Newtons, is_touching: bool, elapsed: u64) -> GuardTick {
-        if self.lets_go_after.is_some_and(|ticks| elapsed > ticks) {
+        if self.release_after.is_some_and(|ticks| elapsed > ticks) {
             self.last = 0.0;
         }
         if elapsed > self.stall {
@@ -155,9 +153,9 @@ impl ForceGuard {
             | Flags::CONTACT_RAMP.when(contacts && is_touching)
             | Flags::NO_CONTACT.when(!is_touching)
             | Flags::NO_FORCE.when(force.0.is_nan());
-        let wanted = if is_touching && !force.0.is_nan() { force.0 } else { 0.0 };
-        let bounded = wanted.clamp(-self.force_max, self.force_max);
-        flags |= Flags::FORCE_MAX.when(bounded != wanted);
+        let requested = if is_touching && !force.0.is_nan() { force.0 } else { 0.0 };
+        let bounded = requested.clamp(-self.force_max, self.force_max);
+        flags |= Flags::FORCE_MAX.when(bounded != requested);
         let risen = bounded * start.min(contact);
         // A device that held its force goes on from there: a loop that is late again and again would else never reach it.
         let known = risen.clamp(self.held.min(0.0), self.held.max(0.0));
@@ -253,7 +251,7 @@ mod tests {
     #[test]
     fn a_drive_that_lets_go_is_met_at_zero() {
         let settings = GuardSettings {
-            lets_go_after: Some(Seconds(0.02)),
+            release_after: Some(Seconds(0.02)),
             soft_start: Seconds(0.0),
             ..GuardSettings::default()
         };

@@ -31,24 +31,27 @@ mod observer;
 mod period;
 pub mod rig;
 pub mod scene;
+mod setting_error;
 pub mod simulation;
 pub mod surface;
 mod torque;
 
 pub use buzz::{Buzz, BuzzDetector, BuzzSettings};
 pub use calibrate::{BiasBranch, BiasCalibration, BiasError, BiasPoint};
-pub use contact::{ContactDetector, ContactError, ContactSettings};
+pub use contact::{ContactDetector, ContactSettings, ContactThresholdError};
 pub use controller::{ControllerSettings, ControllerTick, PassivityController};
 pub use device::HapticDevice;
 pub use flags::Flags;
-pub use force::{ForceLaw, LawError, LawSettings, LawTick, Pull};
+pub use force::{ForceLaw, LawError, LawSettings, LawTick};
 pub use guard::{ForceGuard, GuardSettings, GuardTick};
 pub use master_slave::{
-    Input, MasterSlave, MasterSlaveError, MasterSlaveSettings, Output, Snapshot,
+    MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
+    MasterSlaveSnapshot,
 };
 pub use observer::{DELAY_MAX, PassivityObserver};
 pub use period::{Period, PeriodError};
-pub use torque::{Converter, DriveKind, TorqueError, TorqueSettings, TorqueTick};
+pub use setting_error::{SettingError, SettingRange};
+pub use torque::{Converter, DriveKind, TorqueSettings, TorqueTick};
 
 /// Mass in N s^2/mm of so many kg: 1 N = 1 kg m/s^2 = 1000 kg mm/s^2.
 #[must_use]

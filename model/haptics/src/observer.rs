@@ -21,14 +21,14 @@ pub const DELAY_MAX: usize = 32;
 
 impl Default for PassivityObserver {
     fn default() -> Self {
-        Self::late(0)
+        Self::with_delay(0)
     }
 }
 
 impl PassivityObserver {
     /// For forces that come so many ticks late, at most [`DELAY_MAX`].
     #[must_use]
-    pub fn late(delay_ticks: usize) -> Self {
+    pub fn with_delay(delay_ticks: usize) -> Self {
         Self {
             energy: 0.0,
             carry: 0.0,
@@ -43,15 +43,9 @@ impl PassivityObserver {
         self.energy
     }
 
-    /// The device moved by `moved` mm under the force held, and feels `force` N from now on. What is not
-    /// a number counts as zero.
-    pub fn tick(&mut self, moved: f64, force: f64) {
-        self.moved(moved);
-        self.hold(force);
-    }
-
-    /// The first half of a tick: the energy of a move.
-    pub fn moved(&mut self, moved: f64) {
+    /// The first half of a tick: the device moved by `moved` mm under the force held. What is not a number counts as
+    /// zero.
+    pub fn record_move(&mut self, moved: f64) {
         const RING: usize = DELAY_MAX + 1;
         let work = self.forces[(self.tick + RING - self.delay) % RING] * moved;
         if !work.is_finite() {
@@ -76,7 +70,7 @@ impl PassivityObserver {
     }
 
     /// Keeps this share of what was absorbed; what is owed stays.
-    pub fn keep(&mut self, share: f64) {
+    pub fn scale_credit(&mut self, share: f64) {
         if self.energy > 0.0 {
             self.energy *= share;
             self.carry *= share;
@@ -88,6 +82,11 @@ impl PassivityObserver {
 mod tests {
     use super::*;
 
+    fn step(observer: &mut PassivityObserver, moved: f64, force: f64) {
+        observer.record_move(moved);
+        observer.hold(force);
+    }
+
     #[test]
     fn a_held_spring_gives_half_a_stiffness_times_each_move_squared() {
         // In and out in n moves of d: each half gives away k d^2 / 2 a move.
@@ -97,17 +96,17 @@ mod tests {
         for i in 0..2 * n {
             let moved = if i < n { d } else { -d };
             x += moved;
-            observer.tick(moved, k * x);
+            step(&mut observer, moved, k * x);
         }
         assert!((observer.energy() + k * d * d * f64::from(n)).abs() < 1e-12);
     }
 
     #[test]
     fn a_late_force_counts_when_it_comes() {
-        let mut late = PassivityObserver::late(2);
+        let mut late = PassivityObserver::with_delay(2);
         let forces = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
         for force in forces {
-            late.tick(0.5, force);
+            step(&mut late, 0.5, force);
         }
         // The moves of ticks 3, 4, 5 met the forces of 0, 1, 2; those before met none.
         assert_eq!(late.energy(), 0.5 * (1.0 + 2.0 + 3.0));
@@ -116,18 +115,18 @@ mod tests {
     #[test]
     fn many_small_moves_add_up_and_bad_ones_do_not_count() {
         let mut observer = PassivityObserver::default();
-        observer.tick(0.0, 1.0);
-        observer.tick(1e6, 1e-7);
+        step(&mut observer, 0.0, 1.0);
+        step(&mut observer, 1e6, 1e-7);
         for _ in 0..1_000_000 {
-            observer.tick(1e-4, 1e-7);
+            step(&mut observer, 1e-4, 1e-7);
         }
-        // A plain sum would lose every one of them: 1e-11 beside 1e6 is below its last digit.
+        // A plain sum would lose every one of them: 1e-11 added to 1e6 is below its last digit.
         assert!((observer.energy() - 1e6 - 1e-5).abs() < 2e-10);
         let before = observer.energy();
-        observer.tick(f64::NAN, f64::INFINITY);
-        observer.tick(5.0, 1.0);
+        step(&mut observer, f64::NAN, f64::INFINITY);
+        step(&mut observer, 5.0, 1.0);
         assert_eq!(observer.energy(), before);
-        observer.keep(0.5);
+        observer.scale_credit(0.5);
         assert!((observer.energy() - 0.5 * before).abs() < 1e-9);
     }
 }

@@ -48,13 +48,11 @@ impl Period {
         }
     }
 
-    /// In nanoseconds.
     #[must_use]
     pub fn nanos(self) -> u64 {
         self.0
     }
 
-    /// In seconds.
     #[must_use]
     pub fn seconds(self) -> Seconds {
         Seconds(self.0 as f64 * 1e-9)

@@ -1,22 +1,20 @@
 //! The whole system on a simulated device: master, hand, slave and the specimen under it.
 
-use super::closed_loop::{Command, Plant, PlantSettings, Sensed};
-use super::force::{ForceLaw, LawSettings, Pull};
+use super::closed_loop::{HapticPlant, PlantCommand, PlantSettings, SensedPosition};
+use super::force::{ForceLaw, LawSettings};
 use super::master_slave::{
-    Input, MasterSlave, MasterSlaveError, MasterSlaveSettings, Output, Snapshot,
+    MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
+    MasterSlaveSnapshot,
 };
-use super::rig::{Hand, HandPath};
-use super::torque::{DriveKind, TorqueSettings};
+use super::rig::Hand;
+use super::torque::TorqueSettings;
 use super::{GuardSettings, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
-/// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulationSettings {
-    /// The system.
     pub system: MasterSlaveSettings,
-    /// The device and the hand.
     pub plant: PlantSettings,
     /// The specimen that the slave presses.
     pub specimen: ModifiedKelvin,
@@ -37,33 +35,6 @@ impl SimulationSettings {
             ..PlantSettings::bare(period)
         };
         Self { system, plant, specimen: body }
-    }
-
-    /// The thesis body as it buzzes, or not: pressed to 25 mm by a firm grip that wants to 30, on a current drive without
-    /// friction, with an encoder of 15 um, forces two ticks of a millisecond late, and 0.5 N s/m of damping where 3.5 are
-    /// needed. Unguarded, the force is bounded by nothing but the drive and there is no controller. With the source's
-    /// voltage drive, which brings 17.6 N s/m and 0.8 N of friction, it is calm at that depth by itself.
-    #[must_use]
-    pub fn buzz(is_guarded: bool) -> Self {
-        let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
-        // Less damping than a firm grip has when it is asked to calm something.
-        let hand = Hand { damping: 0.002, ..Hand::firm(path) };
-        let mut all = Self::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
-        let (delay, damping) = (2, 0.5e-3);
-        all.plant.friction = [0.0; 2];
-        all.plant.damping = damping;
-        all.plant.delay = delay;
-        all.system.damping = damping;
-        all.system.delay_ticks = delay as f64;
-        all.system.torque = TorqueSettings {
-            drive: DriveKind::Current { amps_per_volt: 1.0 },
-            ..all.system.torque
-        };
-        all.system.torque.motor.friction = 0.0;
-        if let Some((motor, _)) = &mut all.plant.motor {
-            motor.friction = 0.0;
-        }
-        if is_guarded { all } else { all.unguarded() }
     }
 
     /// The same without guard and controller: the force is bounded by nothing but the drive.
@@ -91,12 +62,9 @@ pub struct SimulationTick {
     pub motor: Newtons,
     /// Temperature of the winding in degrees Celsius.
     pub winding_c: f64,
-    /// What the system was told.
-    pub input: Input,
-    /// What it answered.
-    pub output: Output,
-    /// Its state.
-    pub snapshot: Snapshot,
+    pub input: MasterSlaveInput,
+    pub output: MasterSlaveOutput,
+    pub snapshot: MasterSlaveSnapshot,
 }
 
 /// A simulation with its state; the same settings give the same ticks, bit by bit.
@@ -104,14 +72,14 @@ pub struct SimulationTick {
 pub struct Simulation {
     torque: TorqueSettings,
     period: Period,
-    plant: Plant,
+    plant: HapticPlant,
     system: MasterSlave,
     specimen: ForceLaw,
     cell: Newtons,
-    command: Command,
+    command: PlantCommand,
     away: u64,
     tick: u64,
-    last: Output,
+    last: MasterSlaveOutput,
 }
 
 impl Simulation {
@@ -120,7 +88,6 @@ impl Simulation {
         let period = settings.system.law.period;
         let surface = Depth(-settings.system.surface_mm);
         let specimen = LawSettings {
-            pull: Pull::Never,
             force_max: Newtons(1e3),
             speed_max: MmPerS(1e6),
             ..LawSettings::of::<3>(settings.specimen, period)
@@ -130,14 +97,14 @@ impl Simulation {
         Ok(Self {
             torque: settings.system.torque,
             period,
-            plant: Plant::new(&settings.plant),
+            plant: HapticPlant::new(&settings.plant),
             system,
             specimen: ForceLaw::new(specimen, surface)?,
             cell: Newtons(0.0),
-            command: Command::Drive(settings.system.torque.drive(snapshot.bias)),
+            command: PlantCommand::Drive(settings.system.torque.drive(snapshot.bias)),
             away: 0,
             tick: 0,
-            last: Output {
+            last: MasterSlaveOutput {
                 pulses: 0,
                 bias: snapshot.bias,
                 force: Newtons(0.0),
@@ -146,17 +113,15 @@ impl Simulation {
         })
     }
 
-    /// The device.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &HapticPlant {
         &self.plant
     }
 
-    /// The hand goes to another place: see [`Plant::lead`].
+    /// The hand goes to another place: see [`HapticPlant::lead`].
     pub fn lead(&mut self, to: f64, speed: MmPerS) {
         self.plant.lead(to, speed);
     }
 
-    /// The system.
     pub fn system(&self) -> &MasterSlave {
         &self.system
     }
@@ -171,11 +136,12 @@ impl Simulation {
 
     /// One tick with a slave elsewhere, whose cell felt this last, and with force only if it is wanted.
     pub fn tick_with(&mut self, cell: Newtons, is_on: bool) -> SimulationTick {
-        let Sensed { counts, .. } = self.plant.sense();
-        let input = Input { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
+        let SensedPosition { counts, .. } = self.plant.sense();
+        let input =
+            MasterSlaveInput { counts, elapsed: self.away + 1, cell, slave_pulses: None, is_on };
         self.away = 0;
         self.last = self.system.tick(&input);
-        self.command = Command::Drive(self.torque.drive(self.last.bias));
+        self.command = PlantCommand::Drive(self.torque.drive(self.last.bias));
         self.moved(input)
     }
 
@@ -184,7 +150,7 @@ impl Simulation {
         self.away += 1;
         let depth = self.system.snapshot().depth;
         self.cell = self.specimen.tick(depth).force;
-        let input = Input {
+        let input = MasterSlaveInput {
             counts: self.plant.sense().counts,
             elapsed: 0,
             cell: self.cell,
@@ -194,18 +160,17 @@ impl Simulation {
         self.moved(input)
     }
 
-    fn moved(&mut self, input: Input) -> SimulationTick {
+    fn moved(&mut self, input: MasterSlaveInput) -> SimulationTick {
         self.plant.tick(self.command);
         self.tick += 1;
-        let [x, v] = self.plant.motion();
-        let [hand, motor] = self.plant.forces();
+        let HapticPlant { rack, thermal, hand_force, motor_force, .. } = self.plant;
         SimulationTick {
             t: self.period.time_of(self.tick).seconds(),
-            x,
-            v: MmPerS(v),
-            hand: Newtons(hand),
-            motor: Newtons(-motor),
-            winding_c: self.plant.thermal().winding_c,
+            x: rack.x,
+            v: MmPerS(rack.v),
+            hand: Newtons(hand_force),
+            motor: Newtons(-motor_force),
+            winding_c: thermal.winding_c,
             input,
             output: self.last,
             snapshot: self.system.snapshot(),

@@ -1,12 +1,10 @@
-//! From the force to be felt to the bias voltage of the master's motor.
+//! From the force on the hand to the bias voltage of the master's motor.
 
-use super::Flags;
-use super::rig::{Drive, Motor, Pinion};
+use super::rig::{DriveInput, Motor, Pinion};
+use super::{Flags, SettingError, SettingRange};
 use palpate_model::units::{MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-/// How the motor is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DriveKind {
@@ -32,14 +30,11 @@ pub struct Converter {
     pub bits: Option<u8>,
 }
 
-/// What stands between force and bias voltage.
+/// Motor, drive and converter between force and bias voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TorqueSettings {
-    /// The pinion.
     pub pinion: Pinion,
-    /// The motor.
     pub motor: Motor,
-    /// Its drive.
     pub drive: DriveKind,
     /// The converter before the drive.
     pub converter: Converter,
@@ -61,48 +56,20 @@ impl Default for TorqueSettings {
     }
 }
 
-/// No torque can be made so.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("a motor drive with {name} = {value} is not possible; {should}")]
-pub struct TorqueError {
-    /// Which number.
-    pub name: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// What it may be.
-    pub should: &'static str,
-}
-
 impl TorqueSettings {
     /// Itself if it can drive a motor; the motor is checked by [`Motor::checked`].
-    pub fn checked(self) -> Result<Self, TorqueError> {
-        let above = "it is a finite number above zero";
-        let gain = match self.drive {
-            DriveKind::Voltage { gain } => gain,
-            DriveKind::Current { amps_per_volt } => amps_per_volt,
-        };
-        let numbers = [
-            ("radius of the pinion", self.pinion.radius_mm()),
-            ("gain", gain),
-            ("largest bias voltage", self.converter.volts_max),
+    pub fn checked(self) -> Result<Self, SettingError> {
+        const DRIVE: &str = "a motor drive";
+        let (DriveKind::Voltage { gain } | DriveKind::Current { amps_per_volt: gain }) = self.drive;
+        let positive = [
+            ("radius of the pinion", self.pinion.radius_mm(), " mm"),
+            ("gain", gain, ""),
+            ("largest bias voltage", self.converter.volts_max, " V"),
         ];
-        let wrong = numbers.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()));
-        if let Some((name, value)) = wrong {
-            return Err(TorqueError { name, value, should: above });
-        }
-        let bits = self.converter.bits.unwrap_or(12);
-        if !(1..=32).contains(&bits) {
-            let value = f64::from(bits);
-            let should = "it is from 1 to 32";
-            return Err(TorqueError { name: "bits", value, should });
-        }
-        if !(0.0..=1.0).contains(&self.friction_share) {
-            return Err(TorqueError {
-                name: "share of friction",
-                value: self.friction_share,
-                should: "it is from 0 to 1",
-            });
-        }
+        SettingRange::Positive.check(DRIVE, &positive)?;
+        let bits = self.converter.bits.map_or(1.0, f64::from);
+        SettingRange::PositiveUpTo(32.0).check(DRIVE, &[("bits", bits, "")])?;
+        SettingRange::UpTo(1.0).check(DRIVE, &[("share of friction", self.friction_share, "")])?;
         Ok(self)
     }
 
@@ -115,11 +82,11 @@ impl TorqueSettings {
         }
     }
 
-    /// What the drive is told by a bias voltage.
-    pub fn drive(&self, bias: Volts) -> Drive {
+    /// The input of the drive at a bias voltage.
+    pub fn drive(&self, bias: Volts) -> DriveInput {
         match self.drive {
-            DriveKind::Voltage { gain } => Drive::Voltage(gain * bias.0),
-            DriveKind::Current { amps_per_volt } => Drive::Current(amps_per_volt * bias.0),
+            DriveKind::Voltage { gain } => DriveInput::Voltage(gain * bias.0),
+            DriveKind::Current { amps_per_volt } => DriveInput::Current(amps_per_volt * bias.0),
         }
     }
 
@@ -127,8 +94,8 @@ impl TorqueSettings {
     pub fn amps_at_rest(&self, bias: Volts) -> f64 {
         let most = self.motor.volts_max / self.motor.resistance;
         let amps = match self.drive(bias) {
-            Drive::Voltage(volts) => volts / self.motor.resistance,
-            Drive::Current(amps) => amps,
+            DriveInput::Voltage(volts) => volts / self.motor.resistance,
+            DriveInput::Current(amps) => amps,
         };
         amps.clamp(-most, most)
     }
@@ -148,7 +115,7 @@ impl TorqueSettings {
 
     /// The command for a force against motion into the tissue, with the device moving at `speed`.
     pub fn tick(&self, force: Newtons, speed: MmPerS) -> TorqueTick {
-        let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
+        let requested = if force.0.is_finite() { force.0 } else { 0.0 };
         let help = if speed.0 > 0.0 {
             self.friction_share
         } else if speed.0 < 0.0 {
@@ -157,9 +124,9 @@ impl TorqueSettings {
             0.0
         };
         // Friction is against the motion; what helps it is less force against it.
-        let felt = wanted - help * self.friction().0;
-        let torque = felt * self.pinion.radius_mm();
-        let volts = felt * self.volts_per_newton();
+        let effective = requested - help * self.friction().0;
+        let torque = effective * self.pinion.radius_mm();
+        let volts = effective * self.volts_per_newton();
         let most = self.converter.volts_max;
         let within = volts.clamp(-most, most);
         let bias = match self.converter.bits {
@@ -182,7 +149,6 @@ pub struct TorqueTick {
     pub torque: f64,
     /// Bias voltage; positive against motion into the tissue.
     pub bias: Volts,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -206,7 +172,7 @@ mod tests {
         let current =
             TorqueSettings { drive: DriveKind::Current { amps_per_volt: 1.0 }, ..voltage };
         assert_eq!(current.damping(), 0.0);
-        assert_eq!(current.drive(Volts(2.0)), Drive::Current(2.0));
+        assert_eq!(current.drive(Volts(2.0)), DriveInput::Current(2.0));
     }
 
     #[test]

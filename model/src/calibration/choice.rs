@@ -1,15 +1,14 @@
-//! Which kind of curve foretells a weight it has not seen.
+//! Which kind of curve predicts a weight that it was not fitted to.
 //!
 //! Each weight between the ends is left out in turn, with all its repeats in both directions; the curve through
 //! the others reads its force (leave-one-out cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111-147). The
 //! first and the last weight are left out as well, but there the curve is only continued straight: that
-//! error is told apart and does not count.
+//! error is reported separately and does not count.
 
 use super::curve::Curve;
-use super::document::Point;
+use super::document::CalibrationPoint;
 use super::kind::CurveKind;
-use super::quality::{Zeroed, rms};
-use crate::units::Newtons;
+use super::quality::{TaredCurve, rms};
 use serde::Serialize;
 
 /// Straight segments are tried up to this many; the thesis drew "a few".
@@ -20,9 +19,7 @@ const DEGREES: std::ops::RangeInclusive<usize> = 1..=super::curve::DEGREE_MAX;
 /// One kind of curve and what it misses.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Candidate {
-    /// The curve.
     pub curve: CurveKind,
-    /// In words.
     pub name: String,
     /// Root mean square error in N of the forces read for weights left out between the ends.
     pub left_out_rms_n: Option<f64>,
@@ -38,15 +35,33 @@ pub struct Candidate {
     pub refused: Option<String>,
 }
 
-/// How one kind finds its curve for some points.
 enum Recipe {
     Fixed(CurveKind),
     Segments(usize),
 }
 
 impl Recipe {
+    fn of(kind: &CurveKind) -> Self {
+        match kind {
+            CurveKind::Segments { through_g } => Self::Segments(through_g.len().saturating_sub(1)),
+            _ => Self::Fixed(kind.clone()),
+        }
+    }
+
+    /// The curve without one of the points, and the other points.
+    fn curve_without(
+        &self,
+        points: &[CalibrationPoint],
+        index: usize,
+    ) -> Option<(Curve, Vec<CalibrationPoint>)> {
+        let mut others = points.to_vec();
+        others.remove(index);
+        let curve = self.kind(&others)?.through(&others).ok()?;
+        Some((curve, others))
+    }
+
     /// The kind as this recipe makes it of these points.
-    fn kind(&self, points: &[Point]) -> Option<CurveKind> {
+    fn kind(&self, points: &[CalibrationPoint]) -> Option<CurveKind> {
         match self {
             Self::Fixed(kind) => Some(kind.clone()),
             // With a weight less there may be a segment less.
@@ -61,7 +76,7 @@ impl Recipe {
 ///
 /// With fewer than four weights nothing can be compared, and the monotone curve stands alone.
 #[must_use]
-pub fn candidates(points: &[Point]) -> Vec<Candidate> {
+pub fn candidates(points: &[CalibrationPoint]) -> Vec<Candidate> {
     let mut recipes = vec![Recipe::Fixed(CurveKind::Monotone)];
     if points.len() >= 4 {
         let all = points.len() - 1;
@@ -82,21 +97,17 @@ pub fn candidates(points: &[Point]) -> Vec<Candidate> {
     candidates
 }
 
-/// What a given kind misses at these points.
+/// Errors of a given kind of curve at these points.
 #[must_use]
-pub fn judge_kind(kind: &CurveKind, points: &[Point]) -> Option<Candidate> {
-    let recipe = match kind {
-        CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
-        _ => Recipe::Fixed(kind.clone()),
-    };
-    judge_as(kind.clone(), &recipe, points)
+pub fn judge_kind(kind: &CurveKind, points: &[CalibrationPoint]) -> Option<Candidate> {
+    judge_as(kind.clone(), &Recipe::of(kind), points)
 }
 
-fn judge(recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+fn judge(recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
     judge_as(recipe.kind(points)?, recipe, points)
 }
 
-fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
     let mut candidate = Candidate {
         name: kind.to_string(),
         curve: kind,
@@ -114,7 +125,7 @@ fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candid
             return Some(candidate);
         }
     };
-    let zeroed = Zeroed::of(&curve, points);
+    let zeroed = TaredCurve::of(&curve, points);
     for point in points {
         candidate.residuals_n.push(zeroed.force(point.volts).0 - point.newtons.0);
         candidate.residuals_v.push(zeroed.signal(point.newtons).0 - point.volts.0);
@@ -138,27 +149,24 @@ fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candid
 
 /// Errors in N of every reading with its weight left out, with the index of the weight. The zero of the
 /// empty cell is known in any case, as it is from the tare.
-fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, String> {
+fn left_out(recipe: &Recipe, points: &[CalibrationPoint]) -> Result<Vec<(usize, f64)>, String> {
     let mut errors = Vec::new();
     if points.len() < 3 {
         return Ok(errors);
     }
     for (i, out) in points.iter().enumerate() {
-        let mut others = points.to_vec();
-        others.remove(i);
         let is_end = i == 0 || i == points.len() - 1;
-        let curve = recipe.kind(&others).map(|kind| kind.through(&others));
-        let curve: Curve = match curve {
-            Some(Ok(curve)) => curve,
-            _ if is_end => continue,
-            _ => {
+        let (curve, others) = match recipe.curve_without(points, i) {
+            Some(found) => found,
+            None if is_end => continue,
+            None => {
                 return Err(format!(
-                    "it does not rise everywhere when {} g is left out",
+                    "the curve does not rise everywhere when {} g is left out",
                     out.mass_g
                 ));
             }
         };
-        let zeroed = Zeroed::of(&curve, &others);
+        let zeroed = TaredCurve::of(&curve, &others);
         let error = |volts| zeroed.force(volts).0 - out.newtons.0;
         errors.extend(out.readings.iter().map(|reading| (i, error(reading.volts))));
     }
@@ -167,20 +175,15 @@ fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, Stri
 
 /// Errors in V at each weight with it left out, the mean of its readings; `None` at the ends and where the
 /// others make no curve.
-pub(super) fn left_out_volts(kind: &CurveKind, points: &[Point]) -> Vec<Option<f64>> {
-    let recipe = match kind {
-        CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
-        _ => Recipe::Fixed(kind.clone()),
-    };
+pub(super) fn left_out_volts(kind: &CurveKind, points: &[CalibrationPoint]) -> Vec<Option<f64>> {
+    let recipe = Recipe::of(kind);
     let error = |i: usize| {
         if i == 0 || i + 1 == points.len() || points.len() < 3 {
             return None;
         }
-        let mut others = points.to_vec();
-        let out = others.remove(i);
-        let curve = recipe.kind(&others)?.through(&others).ok()?;
-        let signal = Zeroed::of(&curve, &others).signal(Newtons(out.newtons.0));
-        Some(signal.0 - out.volts.0)
+        let (curve, others) = recipe.curve_without(points, i)?;
+        let signal = TaredCurve::of(&curve, &others).signal(points[i].newtons);
+        Some(signal.0 - points[i].volts.0)
     };
     (0..points.len()).map(error).collect()
 }

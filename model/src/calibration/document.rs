@@ -1,10 +1,11 @@
-//! The document a calibration is kept as: what lay on the cell, what it read, and what else a reader of a
+//! The document of a calibration: what lay on the load cell, what it read, and what else a reader of a
 //! force must know. It is never edited, only superseded.
 
 use super::curve::Curve;
 use super::error::CalibrationError;
 use super::kind::CurveKind;
 use super::weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};
+use crate::is_default;
 use crate::units::{Newtons, Volts};
 use serde::{Deserialize, Serialize};
 
@@ -18,17 +19,15 @@ const SAME_MASS: f64 = 1e-6;
 /// A weight with a name, so that it is known to lie on the cell in several steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedWeight {
-    /// What is engraved on it.
+    /// As engraved on it.
     pub name: String,
-    /// Its mass in g.
     pub mass_g: f64,
-    /// Half-width in g of the range in which the mass surely lies; `None` where nobody states it.
+    /// Half-width in g of the range in which the mass surely lies; `None` where it is not stated.
     #[serde(default)]
     pub tolerance_g: Option<f64>,
 }
 
 crate::named! {
-    /// Which way the load went.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Direction {
@@ -42,7 +41,6 @@ crate::named! {
 /// One way up or down.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// Which way.
     pub direction: Direction,
     /// Which repeat, counted from 1.
     pub repeat: u32,
@@ -58,7 +56,6 @@ pub struct SeriesStep {
     /// Names of the weights that lay on it; empty where only the sum is known.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<String>,
-    /// Mean signal.
     pub volts: Volts,
     /// Standard deviation of one sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,10 +74,9 @@ pub struct SeriesStep {
 /// A load-cell calibration as it is kept.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// What people call it.
     pub name: String,
     /// Version of the form; 0 where there is none, in sessions recorded before there was one.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub format: u32,
     /// When it was taken, RFC 3339; `None` where that is not known.
     #[serde(default)]
@@ -88,22 +84,18 @@ pub struct Calibration {
     /// The points in order of increasing mass, where only those are known. With `series` it is empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<WeightStep>,
-    /// Who measured it on what, or the document it is copied from.
+    /// Operator and set-up, or the document that it is copied from.
     #[serde(default)]
     pub source: String,
-    /// The rig whose cell it is.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub rig: String,
-    /// The cell's serial number.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub cell: String,
     /// Excitation of the bridge.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excitation: Option<Volts>,
-    /// Who took it.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub operator: String,
-    /// The weights.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub weights: Vec<NamedWeight>,
     /// Every way up and down, in the order taken.
@@ -119,7 +111,7 @@ pub struct Calibration {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolution: Option<Volts>,
     /// The curve through the points; the monotone one where nothing is said.
-    #[serde(default, skip_serializing_if = "CurveKind::is_default")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub curve: CurveKind,
     /// Days for which it is valid, [`VALID_DAYS`] where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -129,16 +121,10 @@ pub struct Calibration {
     pub supersedes: Option<String>,
 }
 
-fn is_zero(format: &u32) -> bool {
-    *format == 0
-}
-
 /// One reading with the series it belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
-    /// Which way the load went.
+pub struct CalibrationReading {
     pub direction: Direction,
-    /// Mean signal.
     pub volts: Volts,
     /// Standard deviation of the mean that the noise of its samples explains, where that is known.
     pub noise_of_mean: Option<Volts>,
@@ -146,21 +132,19 @@ pub struct Reading {
 
 /// All readings under one mass.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
-    /// The mass in g.
+pub struct CalibrationPoint {
     pub mass_g: f64,
     /// Its weight.
     pub newtons: Newtons,
     /// Mean of the means of both directions: a direction read more often counts no more.
     pub volts: Volts,
-    /// Every reading.
-    pub readings: Vec<Reading>,
+    pub readings: Vec<CalibrationReading>,
 }
 
-impl Point {
+impl CalibrationPoint {
     /// Mean signal of one direction, if it was taken.
     pub fn mean(&self, direction: Direction) -> Option<Volts> {
-        let volts = |reading: &&Reading| reading.direction == direction;
+        let volts = |reading: &&CalibrationReading| reading.direction == direction;
         let own: Vec<f64> = self.readings.iter().filter(volts).map(|r| r.volts.0).collect();
         (!own.is_empty()).then(|| Volts(own.iter().sum::<f64>() / own.len() as f64))
     }
@@ -170,7 +154,7 @@ impl Point {
         Some(self.mean(Direction::Loading)? - self.mean(Direction::Unloading)?)
     }
 
-    fn averaged(mass_g: f64, readings: Vec<Reading>) -> Self {
+    fn averaged(mass_g: f64, readings: Vec<CalibrationReading>) -> Self {
         let mut point =
             Self { mass_g, newtons: newtons_of(mass_g), volts: Volts(f64::NAN), readings };
         let means = [Direction::Loading, Direction::Unloading].map(|way| point.mean(way));
@@ -241,7 +225,7 @@ impl Calibration {
     }
 
     /// All readings by mass, in order of increasing mass; at least two masses, all numbers finite.
-    pub fn points(&self) -> Result<Vec<Point>, CalibrationError> {
+    pub fn points(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
         if self.format > CALIBRATION_FORMAT {
             return Err(CalibrationError::NewerFormat { format: self.format });
         }
@@ -254,8 +238,7 @@ impl Calibration {
         }
     }
 
-    /// Numbers beside the readings must be numbers, and those that say how far something may be off not
-    /// negative.
+    /// Numbers other than the readings must be finite, and uncertainties not negative.
     fn check_facts(&self) -> Result<(), CalibrationError> {
         let signed = [
             ("zero before", self.zero_before),
@@ -280,8 +263,8 @@ impl Calibration {
         wrong.map_or(Ok(()), Err)
     }
 
-    fn points_of_steps(&self) -> Result<Vec<Point>, CalibrationError> {
-        let mut points: Vec<Point> = Vec::with_capacity(self.steps.len());
+    fn points_of_steps(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
+        let mut points: Vec<CalibrationPoint> = Vec::with_capacity(self.steps.len());
         for (index, here) in self.steps.iter().enumerate() {
             check_numbers(index + 1, here.mass_g, here.volts)?;
             if let Some(before) = points.last().filter(|last| here.mass_g <= last.mass_g) {
@@ -291,21 +274,24 @@ impl Calibration {
                     before_g: before.mass_g,
                 });
             }
-            let reading =
-                Reading { direction: Direction::Loading, volts: here.volts, noise_of_mean: None };
-            points.push(Point::averaged(here.mass_g, vec![reading]));
+            let reading = CalibrationReading {
+                direction: Direction::Loading,
+                volts: here.volts,
+                noise_of_mean: None,
+            };
+            points.push(CalibrationPoint::averaged(here.mass_g, vec![reading]));
         }
         Ok(points)
     }
 
-    fn points_of_series(&self) -> Result<Vec<Point>, CalibrationError> {
-        let mut readings: Vec<(f64, Reading)> = Vec::new();
+    fn points_of_series(&self) -> Result<Vec<CalibrationPoint>, CalibrationError> {
+        let mut readings: Vec<(f64, CalibrationReading)> = Vec::new();
         for (series, step) in self.series_steps() {
             let number = readings.len() + 1;
             check_numbers(number, step.mass_g, step.volts)?;
             self.check_weights(number, step)?;
             let noise = step.noise.zip(step.samples.filter(|samples| *samples > 0));
-            let reading = Reading {
+            let reading = CalibrationReading {
                 direction: series.direction,
                 volts: step.volts,
                 noise_of_mean: noise.map(|(noise, n)| Volts(noise.0 / (n as f64).sqrt())),
@@ -314,16 +300,18 @@ impl Calibration {
         }
         readings.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         let groups = readings.chunk_by(|(a, _), (b, _)| b - a <= SAME_MASS);
-        let point = |group: &[(f64, Reading)]| {
-            Point::averaged(group[0].0, group.iter().map(|(_, reading)| *reading).collect())
+        let point = |group: &[(f64, CalibrationReading)]| {
+            CalibrationPoint::averaged(
+                group[0].0,
+                group.iter().map(|(_, reading)| *reading).collect(),
+            )
         };
         Ok(groups.map(point).collect())
     }
 
     /// Every step of every series, in the order taken.
     pub fn series_steps(&self) -> impl Iterator<Item = (&Series, &SeriesStep)> {
-        let steps = |series| Series::steps_of(series);
-        self.series.iter().flat_map(steps)
+        self.series.iter().flat_map(|series| series.steps.iter().map(move |step| (series, step)))
     }
 
     /// Weights named in a step must be known and have its mass.
@@ -365,7 +353,7 @@ impl Calibration {
         Ok(self)
     }
 
-    /// The kind of curve that foretells weights left out best.
+    /// The kind of curve that predicts weights left out best.
     pub fn best_curve(&self) -> Result<CurveKind, CalibrationError> {
         let found = super::candidates(&self.points()?);
         let best = found.into_iter().find(|one| one.refused.is_none());
@@ -398,12 +386,6 @@ impl Calibration {
 
 /// The last digit printed in the thesis's table.
 const THESIS_RESOLUTION: Volts = Volts(0.01);
-
-impl Series {
-    fn steps_of(&self) -> impl Iterator<Item = (&Self, &SeriesStep)> {
-        self.steps.iter().map(move |step| (self, step))
-    }
-}
 
 fn check_numbers(step: usize, mass_g: f64, volts: Volts) -> Result<(), CalibrationError> {
     if mass_g.is_finite() && volts.is_finite() && mass_g >= 0.0 {

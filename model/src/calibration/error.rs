@@ -9,10 +9,7 @@ pub enum CalibrationError {
     #[error(
         "the calibration has {count} weight step(s); take at least two, the first without a weight"
     )]
-    TooFewSteps {
-        /// Steps given.
-        count: usize,
-    },
+    TooFewSteps { count: usize },
     /// NaN, infinite, or a negative mass.
     #[error(
         "weight step {step} has mass {mass_g} g and signal {volts} V; both must be finite and the mass not negative, take this step again"
@@ -20,29 +17,20 @@ pub enum CalibrationError {
     NotANumber {
         /// Step, counted from 1.
         step: usize,
-        /// Its mass in g.
         mass_g: f64,
-        /// Its signal in V.
         volts: f64,
     },
-    /// A number beside the readings that cannot be.
+    /// A number other than a reading.
     #[error(
-        "the {what} of the calibration is {value}, which cannot be; correct it or leave it out"
+        "the {what} of the calibration is {value}, which is not possible; correct it or leave it out"
     )]
-    Fact {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// Masses out of order.
+    Fact { what: &'static str, value: f64 },
     #[error(
         "weight step {step} has {mass_g} g after {before_g} g; masses must increase from step to step, remove or reorder it"
     )]
     MassNotIncreasing {
         /// Step, counted from 1.
         step: usize,
-        /// Its mass in g.
         mass_g: f64,
         /// The mass of the step before in g.
         before_g: f64,
@@ -54,7 +42,6 @@ pub enum CalibrationError {
     VoltsNotIncreasing {
         /// Step, counted from 1 in order of mass.
         step: usize,
-        /// Its signal in V.
         volts: f64,
         /// The signal of the step before in V.
         before_volts: f64,
@@ -64,7 +51,6 @@ pub enum CalibrationError {
         "under {mass_g} g the cell reads {volts} V in {way}, less than the {before_volts} V under {before_g} g; the signal must rise with every weight, check the wiring and take the weights again"
     )]
     SignalFalls {
-        /// The mass in g.
         mass_g: f64,
         /// Mean signal there in V.
         volts: f64,
@@ -77,17 +63,14 @@ pub enum CalibrationError {
     },
     /// Next to no rise between two weights.
     #[error(
-        "between two weights the signal rises by less than a millionth of its own uncertainty, so no force can be told there; leave one of them out or take the steps again"
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave one of them out or take the steps again"
     )]
     TooFlat,
     /// Written by a later version.
     #[error(
-        "the calibration has form {format}, newer than this program knows; read it with the version that wrote it"
+        "the calibration has format {format}, which is newer than this program reads; read it with the version that wrote it"
     )]
-    NewerFormat {
-        /// Its form.
-        format: u32,
-    },
+    NewerFormat { format: u32 },
     /// A step names a weight that the document does not list.
     #[error(
         "weight step {step} has the weight \"{name}\" on it, which is not in the list of weights; add it there"
@@ -95,7 +78,6 @@ pub enum CalibrationError {
     UnknownWeight {
         /// Step, counted from 1.
         step: usize,
-        /// The name.
         name: String,
     },
     /// The mass of a step is not that of its weights.
@@ -105,31 +87,23 @@ pub enum CalibrationError {
     WeightsDisagree {
         /// Step, counted from 1.
         step: usize,
-        /// Its mass in g.
         mass_g: f64,
         /// The sum of its weights in g.
         sum_g: f64,
     },
     /// A tolerance that is none.
     #[error("a tolerance of {tolerance_g} g is not possible; give 0 or more")]
-    Tolerance {
-        /// The tolerance in g.
-        tolerance_g: f64,
-    },
+    Tolerance { tolerance_g: f64 },
     /// Straight segments through masses that were not taken.
     #[error(
         "straight segments through {} do not go from the first to the last weight through weights that were taken; give masses of the table in order", grams(.through_g)
     )]
-    NoSuchBreak {
-        /// The masses in g.
-        through_g: Vec<f64>,
-    },
+    NoSuchBreak { through_g: Vec<f64> },
     /// A polynomial that turns back or that the points do not determine.
     #[error(
         "a polynomial of degree {degree} through {points} weights does not rise everywhere between them; choose another degree, or the monotone curve"
     )]
     NotRising {
-        /// Its degree.
         degree: usize,
         /// Masses taken.
         points: usize,

@@ -1,12 +1,11 @@
-//! Which curve goes through the points.
+//! Kinds of calibration curves.
 
 use super::curve::Curve;
-use super::document::Point;
+use super::document::CalibrationPoint;
 use super::error::CalibrationError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A kind of curve.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum CurveKind {
@@ -39,12 +38,8 @@ impl fmt::Display for CurveKind {
 }
 
 impl CurveKind {
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::Monotone
-    }
-
     /// Whether the curve goes through every one of these points.
-    pub fn meets_all(&self, points: &[Point]) -> bool {
+    pub fn meets_all(&self, points: &[CalibrationPoint]) -> bool {
         match self {
             Self::Monotone => true,
             Self::Segments { through_g } => through_g.len() == points.len(),
@@ -53,8 +48,8 @@ impl CurveKind {
     }
 
     /// The curve of this kind for points in order of increasing mass.
-    pub fn through(&self, points: &[Point]) -> Result<Curve, CalibrationError> {
-        let pairs = |points: &mut dyn Iterator<Item = &Point>| -> Vec<(f64, f64)> {
+    pub fn through(&self, points: &[CalibrationPoint]) -> Result<Curve, CalibrationError> {
+        let pairs = |points: &mut dyn Iterator<Item = &CalibrationPoint>| -> Vec<(f64, f64)> {
             points.map(|point| (point.newtons.0, point.volts.0)).collect()
         };
         match self {
@@ -78,7 +73,7 @@ impl CurveKind {
     /// squared voltages; dynamic programming (Bellman, Commun. ACM 4 (1961) 284). `None` for more segments
     /// than there are intervals.
     #[must_use]
-    pub fn best_segments(points: &[Point], count: usize) -> Option<Self> {
+    pub fn best_segments(points: &[CalibrationPoint], count: usize) -> Option<Self> {
         let last = points.len().checked_sub(1)?;
         if count == 0 || count > last {
             return None;
@@ -112,20 +107,21 @@ impl CurveKind {
 
 /// Squared distance in V of the points between two from the line through them; infinite where the line
 /// does not rise.
-fn miss(points: &[Point], i: usize, j: usize) -> f64 {
+fn miss(points: &[CalibrationPoint], i: usize, j: usize) -> f64 {
     let (a, b) = (&points[i], &points[j]);
     let slope = (b.volts.0 - a.volts.0) / (b.newtons.0 - a.newtons.0);
     if i == j || slope <= 0.0 {
         return f64::INFINITY;
     }
-    let line = |point: &Point| a.volts.0 + slope * (point.newtons.0 - a.newtons.0);
+    let line = |point: &CalibrationPoint| a.volts.0 + slope * (point.newtons.0 - a.newtons.0);
     let between = points[i + 1..j].iter();
     between.map(|point| (point.volts.0 - line(point)).powi(2)).sum()
 }
 
 /// Which points have these masses: in order, from the first to the last.
-fn break_indices(points: &[Point], through_g: &[f64]) -> Option<Vec<usize>> {
-    let near = |point: &Point, mass: f64| (point.mass_g - mass).abs() <= 1e-6 * (1.0 + mass);
+fn break_indices(points: &[CalibrationPoint], through_g: &[f64]) -> Option<Vec<usize>> {
+    let near =
+        |point: &CalibrationPoint, mass: f64| (point.mass_g - mass).abs() <= 1e-6 * (1.0 + mass);
     let place = |&mass: &f64| points.iter().position(|point| near(point, mass));
     let breaks: Vec<usize> = through_g.iter().map(place).collect::<Option<_>>()?;
     let is_whole = breaks.first() == Some(&0) && breaks.last() == Some(&(points.len() - 1));
@@ -134,7 +130,7 @@ fn break_indices(points: &[Point], through_g: &[f64]) -> Option<Vec<usize>> {
 
 /// The signal must rise from each point to the next.
 fn check_rise<'a>(
-    points: impl Iterator<Item = (usize, &'a Point)>,
+    points: impl Iterator<Item = (usize, &'a CalibrationPoint)>,
 ) -> Result<(), CalibrationError> {
     let mut before: Option<f64> = None;
     for (index, point) in points {

@@ -20,13 +20,13 @@ mod weight_steps;
 pub use choice::{Candidate, candidates, judge_kind};
 pub use curve::{Curve, DEGREE_MAX};
 pub use document::{
-    CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, Point, Reading, Series, SeriesStep,
-    VALID_DAYS,
+    CALIBRATION_FORMAT, Calibration, CalibrationPoint, CalibrationReading, Direction, NamedWeight,
+    Series, SeriesStep, VALID_DAYS,
 };
 pub use error::CalibrationError;
 pub use kind::CurveKind;
 pub use quality::{FlatStretch, Hysteresis, PointQuality, Quality};
-pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady, Unsettled};
+pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady};
 pub use uncertainty::{ForceUncertainty, Term};
-pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckError, CheckResult, KnownWeight};
+pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckResult, KnownWeight, WeightCheckError};
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

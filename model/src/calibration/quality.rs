@@ -1,8 +1,8 @@
-//! What a calibration is like: hysteresis, repeatability, zero shift, sensitivity, and where it is flat.
+//! Quality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
 
 use super::CalibrationError;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, Point};
+use super::document::{Calibration, CalibrationPoint, Direction};
 use super::uncertainty::ForceUncertainty;
 use crate::units::{Newtons, Volts};
 use serde::Serialize;
@@ -12,14 +12,14 @@ const FLAT_SHARE: f64 = 0.25;
 
 /// A curve read after taring, as every force of a run is: the signal is shifted so that the empty cell
 /// reads 0 N. A curve by least squares misses the empty cell's signal; taring takes that out.
-pub(super) struct Zeroed<'a> {
+pub(super) struct TaredCurve<'a> {
     curve: &'a Curve,
     shift: f64,
 }
 
-impl<'a> Zeroed<'a> {
+impl<'a> TaredCurve<'a> {
     /// Tared on the empty cell if it is among the points, else not at all.
-    pub fn of(curve: &'a Curve, points: &[Point]) -> Self {
+    pub fn of(curve: &'a Curve, points: &[CalibrationPoint]) -> Self {
         let empty = points.first().filter(|point| point.newtons.0 == 0.0);
         let shift =
             empty.map_or(0.0, |point| point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0);
@@ -38,7 +38,6 @@ impl<'a> Zeroed<'a> {
 /// One weight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PointQuality {
-    /// Mass in g.
     pub mass_g: f64,
     /// Its weight in N.
     pub force_n: f64,
@@ -94,10 +93,9 @@ pub struct Hysteresis {
     pub rms_n: f64,
 }
 
-/// What a calibration is like.
+/// Figures of merit of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quality {
-    /// Every weight.
     pub points: Vec<PointQuality>,
     /// Loading against unloading, where both were taken.
     pub hysteresis: Option<Hysteresis>,
@@ -107,21 +105,19 @@ pub struct Quality {
     pub zero_shift_v: Option<f64>,
     /// The same in N, at the sensitivity of the empty cell.
     pub zero_shift_n: Option<f64>,
-    /// Flat stretches.
     pub flat: Vec<FlatStretch>,
     /// Forces beyond this in N are extrapolated.
     pub force_max_n: f64,
-    /// What a reader must know, one sentence each.
+    /// Findings for a reader, one sentence each.
     pub findings: Vec<String>,
 }
 
 impl Calibration {
-    /// What this calibration is like.
     pub fn quality(&self) -> Result<Quality, CalibrationError> {
         let points = self.points()?;
         let curve = self.curve.through(&points)?;
         let uncertainty = ForceUncertainty::of(self)?;
-        let zeroed = Zeroed::of(&curve, &points);
+        let zeroed = TaredCurve::of(&curve, &points);
         let sigma = |newtons: f64| uncertainty.sigma(Newtons(newtons)).map(|sigma| sigma.0);
         let qualities: Vec<PointQuality> = points
             .iter()
@@ -174,7 +170,7 @@ fn hysteresis(points: &[PointQuality]) -> Option<Hysteresis> {
 }
 
 /// Standard deviation of one reading from repeats under the same weight in the same direction, pooled.
-pub(super) fn repeatability(points: &[Point]) -> Option<Volts> {
+pub(super) fn repeatability(points: &[CalibrationPoint]) -> Option<Volts> {
     let (mut square, mut freedom) = (0.0, 0);
     for point in points {
         for direction in [Direction::Loading, Direction::Unloading] {
@@ -196,9 +192,13 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (square / f64::from(count)).sqrt())
 }
 
-/// The flat stretch, as it shows to somebody who lays weight after weight: it begins where the next weight
+/// The flat stretch, as it appears while weight after weight is laid on: it begins where the next weight
 /// hardly moves the signal and goes on as long as the signal, seen from there, lags behind.
-fn flat(points: &[Point], curve: &Curve, uncertainty: &ForceUncertainty) -> Option<FlatStretch> {
+fn flat(
+    points: &[CalibrationPoint],
+    curve: &Curve,
+    uncertainty: &ForceUncertainty,
+) -> Option<FlatStretch> {
     let chord = |i: usize, j: usize| {
         (points[j].volts.0 - points[i].volts.0) / (points[j].newtons.0 - points[i].newtons.0)
     };

@@ -57,7 +57,7 @@ impl SettleRule {
     }
 }
 
-/// What a signal was like over one window.
+/// Mean, noise and slope of a signal over one window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steady {
     /// Mean of the window.
@@ -72,7 +72,6 @@ pub struct Steady {
     pub waited: Seconds,
 }
 
-/// What is known after a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settle {
     /// Not yet at rest.
@@ -80,10 +79,10 @@ pub enum Settle {
     /// At rest. It stays so whatever follows.
     Settled(Steady),
     /// Never at rest within the time allowed. It stays so whatever follows.
-    TimedOut(Unsettled),
+    TimedOut(SettlingNow),
 }
 
-/// How far a signal has come to rest, for an indicator.
+/// How far a signal has come to rest. Prints as a sentence that says why it is not yet at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettlingNow {
     /// Time waited so far.
@@ -100,26 +99,13 @@ pub struct SettlingNow {
     pub noise_max: Volts,
 }
 
-/// A signal that did not settle in time; prints as one sentence.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unsettled {
-    /// The last window, if one was ever full.
-    pub last: Option<Steady>,
-    /// The slope in V/s that would still have counted as rest.
-    pub slope_max_v_per_s: f64,
-    /// The scatter that would still have counted as rest.
-    pub noise_max: Volts,
-    /// Time waited.
-    pub waited: Seconds,
-}
-
-impl fmt::Display for Unsettled {
+impl fmt::Display for SettlingNow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let waited = self.waited.0;
         match self.last {
             None => write!(
                 f,
-                "the signal was not read without a gap within {waited:.0} s; check the load cell and its wiring"
+                "the signal has no complete window without gaps within {waited:.0} s; check the load cell and its wiring"
             ),
             Some(last) if last.noise.0 > self.noise_max.0 => write!(
                 f,
@@ -180,7 +166,7 @@ impl Settling {
         }
     }
 
-    /// Takes the next sample, so many ticks after the one before. A signal that is no number begins the window anew.
+    /// Takes the next sample, so many ticks after the one before. A signal that is not a number restarts the window.
     pub fn push(&mut self, ticks: u64, signal: Volts) -> Settle {
         if self.verdict != Settle::Waiting {
             return self.verdict;
@@ -204,17 +190,11 @@ impl Settling {
             }
         }
         if self.verdict == Settle::Waiting && self.waited().0 >= self.rule.timeout.0 {
-            self.verdict = Settle::TimedOut(Unsettled {
-                last: self.last.map(|(steady, _)| steady),
-                slope_max_v_per_s: self.last.map_or(0.0, |(_, slope_max)| slope_max),
-                noise_max: self.rule.noise_max,
-                waited: self.waited(),
-            });
+            self.verdict = Settle::TimedOut(self.now());
         }
         self.verdict
     }
 
-    /// How far it has come.
     pub fn now(&self) -> SettlingNow {
         SettlingNow {
             waited: self.waited(),
@@ -356,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_begins_anew_and_the_verdict_stays() {
+    fn a_gap_restarts_the_window_and_the_verdict_stays() {
         let mut settling = Settling::new(RULE);
         for i in 0..1999 {
             let volts = if i == 1500 { f64::NAN } else { 1.28 };
@@ -377,6 +357,6 @@ mod tests {
         let Some(Settle::TimedOut(blind)) = verdict else {
             panic!("{verdict:?}");
         };
-        assert!(blind.to_string().contains("without a gap"), "{blind}");
+        assert!(blind.to_string().contains("without gaps"), "{blind}");
     }
 }

@@ -201,7 +201,7 @@ fn weights_must_be_known_and_add_up() {
 }
 
 #[test]
-fn segments_go_where_they_are_told_or_nearest() {
+fn segments_go_through_the_given_or_the_nearest_weights() {
     let points = Calibration::thesis().points().unwrap();
     let through = |masses: &[f64]| CurveKind::Segments { through_g: masses.to_vec() };
     let curve = through(&[0.0, 340.0, 640.0, 1040.0]).through(&points).unwrap();
@@ -222,7 +222,8 @@ fn segments_go_where_they_are_told_or_nearest() {
     // Against every choice of three breaks between the ends.
     let sum = |kind: &CurveKind| -> f64 {
         let curve = kind.through(&points).unwrap();
-        let miss = |point: &Point| curve.volts_from_newtons(point.newtons).0 - point.volts.0;
+        let miss =
+            |point: &CalibrationPoint| curve.volts_from_newtons(point.newtons).0 - point.volts.0;
         points.iter().map(|point| miss(point).powi(2)).sum()
     };
     let mut least = f64::INFINITY;
@@ -401,8 +402,8 @@ fn a_known_weight_passes_within_one_percent() {
 fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     let thesis = Calibration::thesis();
     for mass_g in [200.0, 500.0] {
-        let told = thesis.check_refusal(mass_g).unwrap().unwrap();
-        assert!(told.contains(&format!("{mass_g} g")) && told.contains("950 g"), "{told}");
+        let refusal = thesis.check_refusal(mass_g).unwrap().unwrap();
+        assert!(refusal.contains(&format!("{mass_g} g")) && refusal.contains("950 g"), "{refusal}");
     }
     for mass_g in [800.0, 950.0] {
         assert_eq!(thesis.check_refusal(mass_g), Ok(None));
@@ -413,6 +414,6 @@ fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     let mut coarse = thesis;
     coarse.resolution = Some(Volts(0.2));
     // No weight would do.
-    let told = coarse.check_refusal(800.0).unwrap().unwrap();
-    assert!(told.contains("800 g") && !told.contains("950 g"), "{told}");
+    let refusal = coarse.check_refusal(800.0).unwrap().unwrap();
+    assert!(refusal.contains("800 g") && !refusal.contains("950 g"), "{refusal}");
 }

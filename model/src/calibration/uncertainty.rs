@@ -8,7 +8,7 @@
 use super::CalibrationError;
 use super::choice::left_out_volts;
 use super::curve::Curve;
-use super::document::{Calibration, Direction, Point};
+use super::document::{Calibration, CalibrationPoint, Direction};
 use super::quality::{repeatability, rms};
 use crate::units::{Newtons, Volts};
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ const GAP_SHARE: f64 = 0.25;
 const HALVINGS: u32 = 20;
 
 crate::named! {
-    /// Where an error comes from.
+    /// Source of an error.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum Term {
@@ -63,9 +63,8 @@ pub struct ForceUncertainty {
 }
 
 impl ForceUncertainty {
-    /// That of a calibration's forces.
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
-        let maker = Maker::of(calibration)?;
+        let maker = ComponentBuilder::of(calibration)?;
         let mut not_stated = Vec::new();
         let mut components = Vec::new();
         for term in Term::ALL {
@@ -116,7 +115,7 @@ impl ForceUncertainty {
         &self.not_stated
     }
 
-    /// Whether a force lies beyond the weights, where the true uncertainty is larger than what is told.
+    /// Whether a force lies beyond the weights, where the true uncertainty is larger than [`Self::sigma`].
     pub fn is_extrapolated(&self, force: Newtons) -> bool {
         !(self.range.0.0..=self.range.1.0).contains(&force.0)
     }
@@ -146,15 +145,14 @@ impl ForceUncertainty {
     }
 }
 
-/// What is needed to make the components.
-struct Maker<'a> {
+struct ComponentBuilder<'a> {
     calibration: &'a Calibration,
-    points: Vec<Point>,
+    points: Vec<CalibrationPoint>,
     curve: Curve,
     nodes: Vec<f64>,
 }
 
-impl<'a> Maker<'a> {
+impl<'a> ComponentBuilder<'a> {
     fn of(calibration: &'a Calibration) -> Result<Self, CalibrationError> {
         let points = calibration.points()?;
         let curve = calibration.curve.through(&points)?;
@@ -240,7 +238,7 @@ impl<'a> Maker<'a> {
         (!components.is_empty()).then_some(components)
     }
 
-    fn share(&self, name: &str, point: &Point) -> f64 {
+    fn share(&self, name: &str, point: &CalibrationPoint) -> f64 {
         let steps = self.calibration.series_steps().map(|(_, step)| step);
         let own: Vec<_> = steps.filter(|step| (step.mass_g - point.mass_g).abs() <= 1e-6).collect();
         let with = own.iter().filter(|step| step.weights.iter().any(|one| one == name));
@@ -251,7 +249,7 @@ impl<'a> Maker<'a> {
     /// from the noise of the samples.
     fn reading_sigmas(&self) -> Option<Vec<f64>> {
         if let Some(one) = repeatability(&self.points) {
-            let sigma = |point: &Point| mean_sigma(point, |_| Some(one));
+            let sigma = |point: &CalibrationPoint| mean_sigma(point, |_| Some(one));
             return self.points.iter().map(sigma).collect();
         }
         self.sampled()
@@ -259,7 +257,7 @@ impl<'a> Maker<'a> {
 
     /// The same from the noise of the samples alone.
     fn sampled(&self) -> Option<Vec<f64>> {
-        let sigma = |point: &Point| mean_sigma(point, |reading| reading.noise_of_mean);
+        let sigma = |point: &CalibrationPoint| mean_sigma(point, |reading| reading.noise_of_mean);
         self.points.iter().map(sigma).collect()
     }
 
@@ -279,7 +277,7 @@ impl<'a> Maker<'a> {
     }
 
     /// The curve through points that were moved.
-    fn moved(&self, change: impl Fn(usize, &mut Point)) -> Option<Curve> {
+    fn moved(&self, change: impl Fn(usize, &mut CalibrationPoint)) -> Option<Curve> {
         let mut points = self.points.clone();
         points.iter_mut().enumerate().for_each(|(i, point)| change(i, point));
         let is_ordered = points.windows(2).all(|pair| pair[0].newtons.0 < pair[1].newtons.0);
@@ -322,54 +320,48 @@ impl<'a> Maker<'a> {
         }
         let last = self.points.len() - 1;
         let newtons = |i: usize| self.points[i].newtons.0;
-        let mut components = Vec::new();
+        let component = |shift: &dyn Fn(f64) -> f64| Component {
+            term: Term::Interpolation,
+            shifts: self.nodes.iter().map(|force| shift(*force)).collect(),
+        };
+        let sensitivity = |force: f64| self.curve.sensitivity_at(Newtons(force));
         if self.calibration.curve.meets_all(&self.points) {
-            for i in 0..last {
+            let arch = |i: usize| {
                 let near = left_out[i..=i + 1].iter().flatten().copied();
                 let sigma = GAP_SHARE * rms(near).unwrap_or(0.0);
                 let (from, to) = (newtons(i), newtons(i + 1));
-                let arch = |&force: &f64| {
+                component(&|force| {
                     let s = (force - from) / (to - from);
                     if !(0.0..=1.0).contains(&s) {
                         return 0.0;
                     }
-                    let error =
-                        4.0 * s * (1.0 - s) * sigma / self.curve.sensitivity_at(Newtons(force));
+                    let error = 4.0 * s * (1.0 - s) * sigma / sensitivity(force);
                     error.min(force - from).min(to - force)
-                };
-                components.push(Component {
-                    term: Term::Interpolation,
-                    shifts: self.nodes.iter().map(arch).collect(),
-                });
-            }
-        } else {
-            let sigma = rms(left_out.iter().flatten().copied()).unwrap_or(0.0);
-            for i in 0..=last {
-                if newtons(i) == 0.0 {
-                    // The tare puts this one right.
-                    continue;
-                }
-                let hat = |&force: &f64| {
-                    let side = if force < newtons(i) { i.checked_sub(1) } else { Some(i + 1) };
-                    let next = side.filter(|next| *next <= last).map(newtons);
-                    let height = match next {
-                        Some(next) => (1.0 - (force - newtons(i)) / (next - newtons(i))).max(0.0),
-                        None => 1.0,
-                    };
-                    height * sigma / self.curve.sensitivity_at(Newtons(force))
-                };
-                components.push(Component {
-                    term: Term::Interpolation,
-                    shifts: self.nodes.iter().map(hat).collect(),
-                });
-            }
+                })
+            };
+            return Some((0..last).map(arch).collect());
         }
-        Some(components)
+        let sigma = rms(left_out.iter().flatten().copied()).unwrap_or(0.0);
+        let hat = |i: usize| {
+            component(&|force| {
+                let side = if force < newtons(i) { i.checked_sub(1) } else { Some(i + 1) };
+                let next = side.filter(|next| *next <= last).map(newtons);
+                let height = next.map_or(1.0, |next| {
+                    (1.0 - (force - newtons(i)) / (next - newtons(i))).max(0.0)
+                });
+                height * sigma / sensitivity(force)
+            })
+        };
+        // The tare corrects the point without a weight.
+        Some((0..=last).filter(|i| newtons(*i) != 0.0).map(hat).collect())
     }
 }
 
 /// Standard deviation in V of the mean of directions' means; `None` if a reading's own is not known.
-fn mean_sigma(point: &Point, sigma: impl Fn(&super::Reading) -> Option<Volts>) -> Option<f64> {
+fn mean_sigma(
+    point: &CalibrationPoint,
+    sigma: impl Fn(&super::CalibrationReading) -> Option<Volts>,
+) -> Option<f64> {
     let mut square = 0.0;
     let mut ways = 0;
     for direction in [Direction::Loading, Direction::Unloading] {

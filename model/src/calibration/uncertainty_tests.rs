@@ -108,11 +108,11 @@ fn each_term_is_what_draws_of_it_scatter() {
         drawn
     };
     let close = |term: Term, force: f64, drawn: f64| {
-        let told = uncertainty.term_sigma(term, Newtons(force)).unwrap().0;
+        let stated = uncertainty.term_sigma(term, Newtons(force)).unwrap().0;
         // 4000 draws know a standard deviation to 1.1 %; three times that, and the curve's bend.
         assert!(
-            (told / drawn - 1.0).abs() < 0.045,
-            "{term:?} at {force} N: {told} against {drawn}"
+            (stated / drawn - 1.0).abs() < 0.045,
+            "{term:?} at {force} N: {stated} against {drawn}"
         );
     };
     for force in [0.4, 1.3, 2.45, 3.9, 4.8] {
@@ -147,10 +147,10 @@ fn the_digits_of_the_thesis_are_what_draws_of_them_scatter() {
         drawn
     };
     for force in [0.7, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 11.0] {
-        let told = uncertainty.term_sigma(Term::Resolution, Newtons(force)).unwrap().0;
+        let stated = uncertainty.term_sigma(Term::Resolution, Newtons(force)).unwrap().0;
         let drawn = 10.0 * scatter(&thesis, force, draw);
         // The curve bends within a whole digit where it is flat, so the two part a little.
-        assert!((told / drawn - 1.0).abs() < 0.2, "{force} N: {told} against {drawn}");
+        assert!((stated / drawn - 1.0).abs() < 0.2, "{force} N: {stated} against {drawn}");
     }
     let sigma = |force: f64| uncertainty.sigma(Newtons(force)).unwrap().0;
     // The flat stretch is an order of magnitude worse than where the cell moves.

@@ -14,10 +14,9 @@ const EXCITATION_SHARE: f64 = 1e-3;
 /// Largest error of a known weight in percent. ASTM E4 asks testing machines for 1 % of the force.
 pub const CHECK_LIMIT_PERCENT: f64 = 1.0;
 
-/// What a calibration would be used on.
+/// The rig and cell that a calibration is used with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bench<'a> {
-    /// Name of the rig.
     pub rig: &'a str,
     /// Serial number of its cell, where it is known.
     pub cell: Option<&'a str>,
@@ -30,11 +29,9 @@ pub struct Bench<'a> {
 /// One known weight on the cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownWeight {
-    /// Its mass in g.
     pub mass_g: f64,
     /// Its tolerance in g, where it is stated.
     pub tolerance_g: Option<f64>,
-    /// The signal with the weight.
     pub volts: Volts,
     /// The signal of the empty cell just before.
     pub tare: Volts,
@@ -42,7 +39,7 @@ pub struct KnownWeight {
     pub limit_percent: Option<f64>,
 }
 
-/// What came of a check.
+/// Result of a check with a known weight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckResult {
     /// Whether the error is within the limit.
@@ -63,31 +60,24 @@ pub struct CheckResult {
     pub uncertainty_n: Option<f64>,
     /// One sentence for the operator.
     pub sentence: String,
-    /// What weakens the answer, one sentence each.
+    /// Reasons to doubt the result, one sentence each.
     pub doubts: Vec<String>,
 }
 
 /// A check could not be judged.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum CheckError {
+pub enum WeightCheckError {
     /// The calibration is none.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// A number that cannot be.
     #[error("the {what} of the check is {value}; {advice}")]
-    Number {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// What to give.
-        advice: &'static str,
-    },
+    Number { what: &'static str, value: f64, advice: &'static str },
 }
 
 impl KnownWeight {
     /// Its limit in percent, if its numbers can be.
-    fn checked_limit(&self) -> Result<f64, CheckError> {
+    fn checked_limit(&self) -> Result<f64, WeightCheckError> {
         let limit_percent = self.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         for (what, value, is_right, advice) in [
@@ -103,7 +93,7 @@ impl KnownWeight {
             ("tare", self.tare.0, self.tare.is_finite(), "read the empty cell again"),
         ] {
             if !is_right {
-                return Err(CheckError::Number { what, value, advice });
+                return Err(WeightCheckError::Number { what, value, advice });
             }
         }
         Ok(limit_percent)
@@ -115,45 +105,40 @@ impl Calibration {
     /// against it.
     pub fn doubts(&self, bench: &Bench<'_>) -> Vec<String> {
         let mut doubts = Vec::new();
+        let mut doubt = |text: String| {
+            doubts.push(format!("the calibration \"{}\" {text}", self.name));
+        };
         let valid = i64::from(self.valid_days());
         match bench.age_days {
-            None => doubts.push(format!(
-                "the calibration \"{}\" does not say when it was taken, so nobody knows whether it still holds; check it with one known weight",
-                self.name
-            )),
-            Some(age) if age < 0 => doubts.push(format!(
-                "the calibration \"{}\" is dated {} days ahead; check the clock of this computer",
-                self.name, -age
-            )),
-            Some(age) if age > valid => doubts.push(format!(
-                "the calibration \"{}\" is {age} days old and was valid for {valid}; take a new one",
-                self.name
-            )),
-            Some(age) if age > valid - WARNING_DAYS => doubts.push(format!(
-                "the calibration \"{}\" is valid for {} more day(s); plan a new one",
-                self.name,
-                valid - age
-            )),
+            None => doubt("does not say when it was taken, so its age is not known; check it with one known weight".into()),
+            Some(age) if age < 0 => {
+                doubt(format!("is dated {} days ahead; check the clock of this computer", -age));
+            }
+            Some(age) if age > valid => {
+                doubt(format!("is {age} days old and was valid for {valid}; take a new one"));
+            }
+            Some(age) if age > valid - WARNING_DAYS => {
+                doubt(format!("is valid for {} more day(s); plan a new one", valid - age));
+            }
             Some(_) => {}
         }
         if !self.rig.is_empty() && self.rig != bench.rig {
-            doubts.push(format!(
-                "the calibration \"{}\" was taken on rig {}, and this is rig {}; take one on this rig",
-                self.name, self.rig, bench.rig
+            doubt(format!(
+                "was taken on rig {}, and this is rig {}; take one on this rig",
+                self.rig, bench.rig
             ));
         }
         if let Some(cell) = bench.cell.filter(|cell| !self.cell.is_empty() && *cell != self.cell) {
-            doubts.push(format!(
-                "the calibration \"{}\" is of cell {}, and cell {cell} is mounted; take one of this cell",
-                self.name, self.cell
+            doubt(format!(
+                "is of cell {}, and cell {cell} is mounted; take one of this cell",
+                self.cell
             ));
         }
         if let (Some(then), Some(now)) = (self.excitation, bench.excitation)
             && (then.0 - now.0).abs() > EXCITATION_SHARE * then.0.abs()
         {
-            doubts.push(format!(
-                "the calibration \"{}\" was taken at an excitation of {then}, and it is {now} now; set it back or take a new calibration",
-                self.name
+            doubt(format!(
+                "was taken at an excitation of {then}, and it is {now} now; set it back or take a new calibration"
             ));
         }
         doubts
@@ -168,7 +153,8 @@ impl Calibration {
         let digit = self.reading_resolution().unwrap_or(Volts(0.0)).0;
         let allowed = spread.max(digit);
         for direction in [Direction::Loading, Direction::Unloading] {
-            let mean = |point: &super::Point| Some((point.mass_g, point.mean(direction)?.0));
+            let mean =
+                |point: &super::CalibrationPoint| Some((point.mass_g, point.mean(direction)?.0));
             let taken: Vec<(f64, f64)> = points.iter().filter_map(mean).collect();
             let fall = taken.windows(2).find(|pair| pair[0].1 - pair[1].1 > allowed);
             if let Some(&[(before_g, before_volts), (mass_g, volts)]) = fall {
@@ -185,7 +171,7 @@ impl Calibration {
     }
 
     /// Why a check with a weight of that mass in g would tell nothing: the calibration itself knows the force
-    /// less well than [`CHECK_LIMIT_PERCENT`]. `None` where it can be told, or where no uncertainty is stated.
+    /// less well than [`CHECK_LIMIT_PERCENT`]. `None` where the check is possible, or where no uncertainty is stated.
     pub fn check_refusal(&self, mass_g: f64) -> Result<Option<String>, CalibrationError> {
         let uncertainty = ForceUncertainty::of(self)?;
         let limit = |mass_g: f64| CHECK_LIMIT_PERCENT / 100.0 * newtons_of(mass_g).0;
@@ -205,19 +191,19 @@ impl Calibration {
             .min_by(|a, b| share(a).total_cmp(&share(b)));
         let advice = best.map_or_else(
             || {
-                "no weight up to the heaviest can be told by it, so take a new calibration"
+                "no weight up to the heaviest can be checked with it, so take a new calibration"
                     .to_owned()
             },
             |best| format!("take a weight where the cell is more sensitive, such as {best} g"),
         );
         Ok(Some(format!(
-            "the calibration knows the force of {mass_g} g to {own:.3} N only (one standard uncertainty), worse than the limit of {:.3} N, so a check with it tells nothing; {advice}",
+            "the calibration knows the force of {mass_g} g to {own:.3} N only (one standard uncertainty), worse than the limit of {:.3} N, so a check with it says nothing; {advice}",
             limit(mass_g)
         )))
     }
 
     /// Whether a known weight reads what it weighs.
-    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, CheckError> {
+    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, WeightCheckError> {
         let limit_percent = weight.checked_limit()?;
         let curve = self.curve()?;
         let uncertainty = ForceUncertainty::of(self)?;

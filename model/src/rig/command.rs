@@ -1,4 +1,4 @@
-//! What a rig can be told. Only the runner sends these, and only because the engine asked.
+//! Commands to a rig. Only the runner sends these, and only because the engine asked.
 
 use crate::units::{MmPerS, MmPerS2, Position};
 use serde::{Deserialize, Serialize};
@@ -56,21 +56,21 @@ impl RigCommand {
         matches!(self, Self::MoveTo(_) | Self::Oscillate(_))
     }
 
-    /// Whether a controller that acknowledges `set` does what this command asked. It counts speed and acceleration
+    /// Whether a controller that acknowledges `set` does what this command asks. It counts speed and acceleration
     /// in quanta of its own, so 0.9 mm/s may come back as thirty times 0.03 mm/s, which is not the same float.
     pub fn is_answered_by(&self, set: &Self) -> bool {
         // Far below any quantum of speed, far above the rounding of a product.
-        let is_near = |asked: f64, set: f64| (asked - set).abs() <= 1e-9 * asked.abs();
+        let is_near = |requested: f64, set: f64| (requested - set).abs() <= 1e-9 * requested.abs();
         match (self, set) {
-            (Self::MoveTo(asked), Self::MoveTo(set)) => {
-                asked.target_pulses == set.target_pulses
-                    && is_near(asked.speed.0, set.speed.0)
-                    && is_near(asked.acceleration.0, set.acceleration.0)
+            (Self::MoveTo(requested), Self::MoveTo(set)) => {
+                requested.target_pulses == set.target_pulses
+                    && is_near(requested.speed.0, set.speed.0)
+                    && is_near(requested.acceleration.0, set.acceleration.0)
             }
-            (Self::Oscillate(asked), Self::Oscillate(set)) => {
+            (Self::Oscillate(requested), Self::Oscillate(set)) => {
                 let acceleration = set.acceleration;
-                *set == Oscillation { acceleration, ..*asked }
-                    && is_near(asked.acceleration.0, acceleration.0)
+                *set == Oscillation { acceleration, ..*requested }
+                    && is_near(requested.acceleration.0, acceleration.0)
             }
             _ => self == set,
         }

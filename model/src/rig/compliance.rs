@@ -1,4 +1,4 @@
-//! How far a rig gives way under force, from a run against something stiff, and what that does to depth.
+//! Machine compliance of a rig, from a run against something stiff, and the correction of depth by it.
 
 use crate::units::{Depth, Newtons, Position};
 use thiserror::Error;
@@ -10,8 +10,8 @@ pub struct StiffSample {
     pub position: Position,
     /// Force above tare.
     pub force: Newtons,
-    /// Its standard uncertainty beside that of the others: only ratios matter. Where a load cell hardly answers,
-    /// forces are worth little.
+    /// Its standard uncertainty relative to that of the others: only ratios matter. Where a load cell is
+    /// insensitive, forces have little weight.
     pub sigma: Newtons,
 }
 
@@ -22,7 +22,7 @@ pub struct Compliance {
     pub mm_per_newton: f64,
     /// Its standard error.
     pub std_error: f64,
-    /// Where the straight line has no force: the stiff surface, from home.
+    /// Position from home at which the straight line has no force: the stiff surface.
     pub surface: Position,
     /// Its standard error in mm.
     pub surface_std_error_mm: f64,
@@ -40,14 +40,13 @@ pub enum ComplianceError {
         "only {samples} samples are above the seating force of {seating:.2}; at least {SAMPLES_MIN} are needed, so press further or more slowly"
     )]
     TooShort {
-        /// How many there are.
         samples: usize,
         /// The seating force.
         seating: Newtons,
     },
     /// The force does not rise with position.
     #[error(
-        "the force does not rise with position, so nothing stiff was touched; check what stands before the probe"
+        "the force does not rise with position, so the probe did not touch anything stiff; check what is in front of the probe"
     )]
     NotRising,
     /// Not a straight line.
@@ -57,7 +56,6 @@ pub enum ComplianceError {
     Curved {
         /// Greatest deviation of a parabola from the line as a share of the force range, in percent.
         bend: f64,
-        /// What is allowed, in percent.
         limit: f64,
     },
 }
@@ -86,7 +84,7 @@ pub fn fit_compliance(
     samples: &[StiffSample],
     seating: Newtons,
 ) -> Result<Compliance, ComplianceError> {
-    let known: Vec<Weighed> = samples.iter().filter_map(Weighed::of).collect();
+    let known: Vec<WeightedSample> = samples.iter().filter_map(WeightedSample::of).collect();
     let by_force = known.iter().filter(|one| one.force >= seating.0);
     let mut line = Line::through(by_force.copied().collect(), seating)?;
     for _ in 0..ROUNDS_MAX {
@@ -105,13 +103,13 @@ pub fn fit_compliance(
 
 /// A sample as the line takes it, in mm and N.
 #[derive(Clone, Copy)]
-struct Weighed {
+struct WeightedSample {
     position: f64,
     force: f64,
     weight: f64,
 }
 
-impl Weighed {
+impl WeightedSample {
     fn of(sample: &StiffSample) -> Option<Self> {
         let weight = sample.sigma.0.powi(-2);
         let is_known = sample.position.is_finite() && sample.force.is_finite();
@@ -137,25 +135,25 @@ struct Line {
 }
 
 impl Line {
-    fn through(used: Vec<Weighed>, seating: Newtons) -> Result<Self, ComplianceError> {
+    fn through(used: Vec<WeightedSample>, seating: Newtons) -> Result<Self, ComplianceError> {
         let (samples, count) = (used.len(), used.len() as f64);
         if samples < SAMPLES_MIN {
             return Err(ComplianceError::TooShort { samples, seating });
         }
         let weights: f64 = used.iter().map(|one| one.weight).sum();
-        let mean = |of: &dyn Fn(&Weighed) -> f64| {
+        let mean = |of: &dyn Fn(&WeightedSample) -> f64| {
             used.iter().map(|one| one.weight * of(one)).sum::<f64>() / weights
         };
         let (middle, force_mean) = (mean(&|s| s.position), mean(&|s| s.force));
         let half = used.iter().fold(0.0f64, |max, s| max.max((s.position - middle).abs()));
         // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
-        let u = |s: &Weighed| (s.position - middle) / half;
+        let u = |s: &WeightedSample| (s.position - middle) / half;
         let (square, cube) = (mean(&|s| u(s).powi(2)), mean(&|s| u(s).powi(3)));
-        let parabola = |s: &Weighed| u(s).powi(2) - cube / square * u(s) - square;
+        let parabola = |s: &WeightedSample| u(s).powi(2) - cube / square * u(s) - square;
         let slope = mean(&|s| u(s) * s.force) / square;
         let parabola_square = mean(&|s| parabola(s).powi(2));
         let bend = mean(&|s| parabola(s) * s.force) / parabola_square;
-        let residual = |s: &Weighed| s.force - force_mean - slope * u(s);
+        let residual = |s: &WeightedSample| s.force - force_mean - slope * u(s);
         let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
         let slope_error = (variance / count / square).sqrt();
         // Three standard errors: a slope that could be noise is none.
@@ -202,7 +200,7 @@ impl Line {
     }
 }
 
-/// A depth with what a rig's compliance takes from it. It stands beside the raw depth, never in its place.
+/// A depth with what a rig's compliance takes from it. It never replaces the raw depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CorrectedDepth {
     /// `depth - compliance * force`.
@@ -212,7 +210,7 @@ pub struct CorrectedDepth {
 }
 
 impl Compliance {
-    /// How deep the probe really is where the axis is at a raw depth under a force.
+    /// Depth of the probe itself where the axis is at a raw depth under a force.
     ///
     /// Contact is found at forces far below those of a measurement, and the rig gives way by as little there.
     pub fn correct(&self, raw: Depth, force: Newtons, force_sigma: Newtons) -> CorrectedDepth {

@@ -1,4 +1,4 @@
-//! The document a rig's compliance is kept as: what was found, from which run, and over which forces. It is
+//! The document of a rig's compliance: the value, from which run, and over which forces. It is
 //! never edited, only superseded.
 
 use super::compliance::{Compliance, ComplianceError, StiffSample, fit_compliance};
@@ -8,16 +8,14 @@ use serde::{Deserialize, Serialize};
 /// Version of the document's form.
 pub const COMPLIANCE_FORMAT: u32 = 1;
 
-/// A rig's compliance as it is kept.
+/// A rig's compliance with its origin.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RigCompliance {
-    /// Version of the form.
     pub format: u32,
     /// The rig that gives way.
     pub rig: String,
     /// When the surface was pressed, RFC 3339.
     pub taken_at: String,
-    /// Who pressed it.
     #[serde(default)]
     pub operator: String,
     /// The session it was found in.
@@ -50,10 +48,10 @@ pub struct RigCompliance {
     pub supersedes: Option<String>,
 }
 
-/// What one press alone tells.
+/// Compliance from one press alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PressCompliance {
-    /// Which one, from 1.
+    /// Number of the press, from 1.
     pub press: u32,
     /// Way of the axis per force, in mm/N.
     pub mm_per_n: f64,
@@ -64,8 +62,8 @@ pub struct PressCompliance {
 }
 
 impl RigCompliance {
-    /// What presses onto a stiff surface tell together, `(number, samples on the way in)` each. What a rig,
-    /// a session and a date are, the caller knows.
+    /// Compliance from presses onto a stiff surface, `(number, samples on the way in)` each. The caller adds rig,
+    /// session and date.
     ///
     /// One line goes through all presses, and one through each: noise is not all that makes them differ. A
     /// surface that settles and a slide with play do too, and that shows only between presses.
@@ -118,7 +116,7 @@ impl RigCompliance {
     pub fn check(&self) -> Result<(), String> {
         if self.format > COMPLIANCE_FORMAT {
             return Err(format!(
-                "a compliance of form {} is newer than this palpate, which reads up to {COMPLIANCE_FORMAT}; update palpate",
+                "a machine compliance of format {} is newer than this palpate, which reads up to {COMPLIANCE_FORMAT}; update palpate",
                 self.format
             ));
         }
@@ -127,7 +125,7 @@ impl RigCompliance {
             && is_possible(self.std_error_mm_per_n, 0.0))
         {
             return Err(format!(
-                "a compliance of {} ± {} mm/N is not possible; measure it anew",
+                "a machine compliance of {} ± {} mm/N is not possible; measure it again",
                 self.mm_per_n, self.std_error_mm_per_n
             ));
         }

@@ -30,7 +30,6 @@ impl Course {
         }
     }
 
-    /// Where it ends.
     pub fn end(&self) -> Position {
         self.position(self.duration())
     }

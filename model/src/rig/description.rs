@@ -1,17 +1,16 @@
-//! What a rig is: the facts it reports about itself when it is connected.
+//! The description that a rig reports about itself when it is connected.
 
 use super::command::Oscillation;
 use super::oscillation::Sine;
 use super::sensor::RigSensors;
+use crate::is_default;
 use crate::units::{MmPerS, MmPerS2, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 
 /// The converter between the load cell and the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AdcDescription {
-    /// Lowest count.
     pub counts_min: i32,
-    /// Highest count.
     pub counts_max: i32,
     /// Volts of one count.
     pub volts_per_count: f64,
@@ -44,10 +43,10 @@ pub struct RigDescription {
     pub noise_expected: Volts,
     /// By how long reported pulses may be behind or before the commanded path: filters of the drive, and the time from
     /// a command to the sample behind it. Zero on a simulated rig.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub pulse_lag: Seconds,
-    /// How long before it was sent a value of the load cell was felt, by a filter of its own. Zero where it has none.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    /// How long before it was sent a value of the load cell was measured, because of a filter of its own. Zero where it has none.
+    #[serde(default, skip_serializing_if = "is_default")]
     pub cell_delay: Seconds,
     /// On average a sample comes in so many ticks of the controller. One on a rig that reports every tick; more on one that
     /// is asked for its samples over a link, or whose load cell is slower than its clock.
@@ -56,14 +55,9 @@ pub struct RigDescription {
     /// How far the probe may go while no sample comes; from 0.02 to 0.5 mm.
     #[serde(default = "usual_unseen", skip_serializing_if = "is_usual_unseen")]
     pub unseen_max: Position,
-    /// What it tells beside load cell and axis.
-    #[serde(default, skip_serializing_if = "has_no_sensors")]
+    /// What it reports apart from load cell and axis.
+    #[serde(default, skip_serializing_if = "is_default")]
     pub sensors: RigSensors,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
-fn has_no_sensors(sensors: &RigSensors) -> bool {
-    *sensors == RigSensors::default()
 }
 
 const fn usual_unseen() -> Position {
@@ -80,10 +74,6 @@ const fn one() -> f64 {
 
 fn is_one(count: &f64) -> bool {
     *count == one()
-}
-
-fn is_zero(span: &Seconds) -> bool {
-    span.0 == 0.0
 }
 
 impl RigDescription {
@@ -136,7 +126,7 @@ impl RigDescription {
         }
         if speed.0 < quantum * (1.0 - 1e-9) || speed.0 > self.speed_max.0 * (1.0 + 1e-9) {
             return Err(format!(
-                "a speed of {speed} is outside what rig {} makes; choose from {} to {}",
+                "a speed of {speed} is outside the range of rig {}; choose from {} to {}",
                 self.name, self.speed_quantum, self.speed_max
             ));
         }

@@ -1,4 +1,4 @@
-//! What a person does at the rig between motions, as far as a simulated rig must know of it.
+//! Actions of a person at the rig between motions, for a simulated rig.
 
 use crate::calibration::STANDARD_GRAVITY;
 use crate::units::Newtons;
@@ -18,7 +18,6 @@ pub enum HandAction {
         /// Which: equal numbers are equal specimens, and 0 is the one a rig begins with.
         specimen: u64,
     },
-    /// The specimen is taken out.
     Unmount,
 }
 

@@ -35,7 +35,7 @@ impl Limits {
 
     /// Longest tolerated age of the newest sample at a speed: the time in which the probe moves
     /// as far as it may `unseen`, kept between 20 ms (two scheduler slices of a desktop host) and 250 ms. A rig whose samples come `apart`,
-    /// as those of a slow load cell, has that time beside the 20 ms: its newest sample is as old by itself.
+    /// as those of a slow load cell, has that time in addition to the 20 ms: its newest sample is as old by itself.
     #[must_use]
     pub fn sample_age_max(speed: MmPerS, unseen: Position, apart: Seconds) -> Seconds {
         let span = if speed.0.abs() > 0.0 { unseen.0 / speed.0.abs() } else { f64::INFINITY };

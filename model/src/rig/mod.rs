@@ -1,4 +1,4 @@
-//! The words every crate shares about a rig: what it is, what it is told, what it reports.
+//! The vocabulary of a rig that every crate shares: description, commands, readings.
 
 pub mod command;
 pub mod compliance;

@@ -19,9 +19,7 @@ use thiserror::Error;
     "commanded path at {expected_pulses:.2} pulses but the controller reports {reported_pulses}; steps were lost or the axis was moved by hand, home it again"
 )]
 pub struct PathError {
-    /// Where the commanded course is, in pulses.
     pub expected_pulses: f64,
-    /// What the controller reported.
     pub reported_pulses: i64,
 }
 
@@ -33,7 +31,7 @@ enum Motion {
 
 /// A motion that was sent and has not begun.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Pending {
+enum PendingMotion {
     Move(MoveTo),
     Sine(Oscillation),
 }
@@ -48,7 +46,7 @@ pub struct PathTracker {
     velocity: MmPerS,
     /// Speed at which the motion under way was cut short: what its place is uncertain by then stays so to the end.
     speed_at_stop: MmPerS,
-    pending: Option<Pending>,
+    pending: Option<PendingMotion>,
     /// A stop was accepted behind the motion that has not begun.
     is_pending_stopped: bool,
     motion: Motion,
@@ -73,15 +71,15 @@ impl PathTracker {
 
     /// A move was sent; it starts when the axis reports motion.
     pub fn on_move(&mut self, command: MoveTo) {
-        self.await_motion(Pending::Move(command));
+        self.await_motion(PendingMotion::Move(command));
     }
 
     /// An oscillation was sent; it starts when the axis reports motion.
     pub fn on_oscillate(&mut self, command: Oscillation) {
-        self.await_motion(Pending::Sine(command));
+        self.await_motion(PendingMotion::Sine(command));
     }
 
-    fn await_motion(&mut self, motion: Pending) {
+    fn await_motion(&mut self, motion: PendingMotion) {
         self.pending = Some(motion);
         self.is_pending_stopped = false;
     }
@@ -166,14 +164,14 @@ impl PathTracker {
         Ok(position)
     }
 
-    fn course_from(&self, from: Position, pending: Pending) -> Course {
+    fn course_from(&self, from: Position, pending: PendingMotion) -> Course {
         match pending {
-            Pending::Move(command) => {
+            PendingMotion::Move(command) => {
                 let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
                 let (speed, acceleration) = (command.speed, command.acceleration);
                 Course::Move(Profile::to_rest(from, target, speed, acceleration))
             }
-            Pending::Sine(command) => {
+            PendingMotion::Sine(command) => {
                 Course::Sine(Sine::new(from, &command, self.mm_per_pulse, self.tick))
             }
         }

@@ -72,7 +72,6 @@ impl Profile {
         Seconds(self.accel_secs + self.cruise_secs + self.decel_secs)
     }
 
-    /// Where the move ends.
     pub fn end(&self) -> Position {
         self.position(self.duration())
     }

@@ -51,7 +51,7 @@ pub struct Reading {
     pub pulses: i64,
     /// State of the axis.
     pub status: AxisStatus,
-    /// How old it was when it reached the host, as far as the link tells.
+    /// Age of the sample when it reached the host, if the link reports it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub age: Option<Age>,
 }
@@ -61,6 +61,6 @@ pub struct Reading {
 pub struct Age {
     /// The best estimate.
     pub by: Nanos,
-    /// How far it may be wrong either way.
+    /// Largest error of the estimate either way.
     pub within: Nanos,
 }

@@ -1,4 +1,4 @@
-//! What a rig says beside load cell and axis: digital inputs and the temperature of the bath that the specimen lies in.
+//! What a rig reports apart from load cell and axis: digital inputs and the temperature of the bath that the specimen lies in.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,14 +13,10 @@ pub enum SensorReading {
     DigitalInput {
         /// Its number, from 1 to [`DIGITAL_INPUTS_MAX`].
         number: u8,
-        /// Its level.
         is_high: bool,
     },
     /// The specimen's bath.
-    Bath {
-        /// Its temperature in °C.
-        celsius: f64,
-    },
+    Bath { celsius: f64 },
 }
 
 impl SensorReading {
@@ -41,7 +37,7 @@ impl SensorReading {
 pub struct RigSensors {
     /// Digital inputs, numbered from 1.
     pub digital_inputs: u8,
-    /// Whether it tells the temperature of a bath.
+    /// Whether it reports the temperature of a bath.
     pub has_bath: bool,
 }
 

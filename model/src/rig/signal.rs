@@ -1,4 +1,4 @@
-//! What a reader must know of the signal: how it was sampled, and what may stand in it that was never there.
+//! Sampling of the signal, and aliases that may appear in it.
 
 use super::description::RigDescription;
 use serde::{Deserialize, Serialize};
@@ -10,12 +10,12 @@ const HARMONICS: u32 = 40;
 /// An alias below this frequency in Hz looks like tissue or drift: a ramp or a relaxation of 100 ms and longer.
 const SLOW_HZ: f64 = 10.0;
 
-/// How the load cell's signal was taken.
+/// Sampling of the load cell's signal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SignalFacts {
     /// Samples per second of true time.
     pub sample_rate_hz: f64,
-    /// What is before the converter to keep higher frequencies out, in words.
+    /// Anti-aliasing filter before the converter, in words.
     pub filter: String,
     /// Lowest and highest signal the converter can tell, in V; `None` without a converter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -23,12 +23,12 @@ pub struct SignalFacts {
     /// One count of the converter in V.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resolution_v: Option<f64>,
-    /// What can appear at a frequency that it does not have.
+    /// Possible aliases, in words.
     pub aliasing: String,
 }
 
 impl RigDescription {
-    /// How this rig takes its signal: one sample a controller tick.
+    /// This rig takes one sample a controller tick.
     pub fn signal(&self) -> SignalFacts {
         let rate = 1.0 / self.tick().0;
         let filter = if self.settings.is_empty() {

@@ -1,4 +1,4 @@
-//! How thick a specimen is, from where the probe meets it and where it meets the base behind it.
+//! Thickness of a specimen, from the positions of its surface and of the base behind it.
 
 use crate::units::Position;
 use thiserror::Error;
@@ -29,9 +29,7 @@ pub struct Thickness {
     "the base at {base:.3} is not behind the tissue at {tissue:.3}; touch both again without homing in between"
 )]
 pub struct ThicknessError {
-    /// Where the base was met.
     pub base: Position,
-    /// Where the tissue was met.
     pub tissue: Position,
 }
 

@@ -1,4 +1,4 @@
-//! Where the tissue begins, from a slow pass at constant speed.
+//! The contact point, from a slow pass at constant speed.
 //!
 //! Past contact at `x_c` the depth grows as `d = x - x_c = v u`, and a Kelvin body answers
 //! `F = c + a_1 d psi_1(u / tau) + a_2 d^2 psi_2(u / tau)`: the closed form of the force model's
@@ -35,15 +35,12 @@ pub struct ContactEstimate {
 
 /// No contact position follows from the pass.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum ContactError {
+pub enum ContactFitError {
     /// Too little data.
     #[error(
         "the slow pass has only {points} points; at least {POINTS_MIN} are needed, so approach more slowly"
     )]
-    TooShort {
-        /// How many there are.
-        points: usize,
-    },
+    TooShort { points: usize },
     /// Not a pass forward at one speed.
     #[error("the slow pass did not move forward at one speed, so contact cannot be located in it")]
     NotOneSpeed,
@@ -64,30 +61,44 @@ const CONTACT_COUNT: usize = 60;
 type Rows = Triangle<6>;
 
 /// Estimates the contact position from a slow pass at constant speed.
-pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactError> {
+pub fn fit_contact(points: &[ContactPoint]) -> Result<ContactEstimate, ContactFitError> {
     if points.len() < POINTS_MIN {
-        return Err(ContactError::TooShort { points: points.len() });
+        return Err(ContactFitError::TooShort { points: points.len() });
     }
     let pass = Pass::new(points)?;
-    let (mut at, mut cost) = pass.scan().ok_or(ContactError::NoOnset)?;
-    // Gauss-Newton with step halving; it settles in a few steps from a scanned start.
-    for _ in 0..30 {
-        let Some(step) = pass.step(at) else { break };
-        let better = (0..12).find_map(|halving| {
-            let next = at.moved(step, 0.5f64.powi(halving));
-            let next_cost = pass.cost(next)?;
-            (next_cost < cost).then_some((next, next_cost))
-        });
-        let Some((next, next_cost)) = better else {
-            break;
-        };
-        let is_settled = (cost - next_cost) <= 1e-10 * cost;
+    let start = pass.scan().ok_or(ContactFitError::NoOnset)?;
+    let line = |at: Trial| {
+        let (step, pass) = (pass.step(at)?, &pass);
+        Some(move |share| {
+            let next = at.moved(step, share);
+            Some((next, pass.cost(next)?))
+        })
+    };
+    // It settles in a few steps from a scanned start.
+    let (at, _) = descend(start, 30, |cost| 1e-10 * cost, line);
+    pass.estimate(at).ok_or(ContactFitError::NoOnset)
+}
+
+/// Gauss-Newton with step halving. `line` gives the trials along the step at a trial, by the share of the step that
+/// is taken, each with its cost; a step that gains no more than `gain_min` of the cost is the last.
+pub(super) fn descend<T: Copy, L: Fn(f64) -> Option<(T, f64)>>(
+    (mut at, mut cost): (T, f64),
+    steps_max: usize,
+    gain_min: impl Fn(f64) -> f64,
+    line: impl Fn(T) -> Option<L>,
+) -> (T, f64) {
+    for _ in 0..steps_max {
+        let Some(trial) = line(at) else { break };
+        let better = (0..12)
+            .find_map(|halving| trial(0.5f64.powi(halving)).filter(|(_, next)| *next < cost));
+        let Some((next, next_cost)) = better else { break };
+        let is_settled = cost - next_cost <= gain_min(cost);
         (at, cost) = (next, next_cost);
         if is_settled {
             break;
         }
     }
-    pass.estimate(at).ok_or(ContactError::NoOnset)
+    (at, cost)
 }
 
 /// A trial contact position and relaxation time.
@@ -115,7 +126,7 @@ struct Pass<'a> {
 }
 
 impl<'a> Pass<'a> {
-    fn new(points: &'a [ContactPoint]) -> Result<Self, ContactError> {
+    fn new(points: &'a [ContactPoint]) -> Result<Self, ContactFitError> {
         let (begin, end) = (points[0], points[points.len() - 1]);
         let speed = (end.position.0 - begin.position.0) / (end.t.0 - begin.t.0);
         let is_straight = points.iter().all(|point| {
@@ -124,7 +135,7 @@ impl<'a> Pass<'a> {
             (point.position.0 - expected).abs() < 1e-3 && point.force.is_finite()
         });
         if !(is_straight && speed > 0.0) {
-            return Err(ContactError::NotOneSpeed);
+            return Err(ContactFitError::NotOneSpeed);
         }
         Ok(Self { points, speed, first: begin.position.0, last: end.position.0 })
     }
@@ -321,7 +332,7 @@ mod tests {
                 force: Newtons(0.006 * noise.normal()),
             })
             .collect();
-        assert_eq!(fit_contact(&flat), Err(ContactError::NoOnset));
-        assert!(matches!(fit_contact(&flat[..10]), Err(ContactError::TooShort { points: 10 })));
+        assert_eq!(fit_contact(&flat), Err(ContactFitError::NoOnset));
+        assert!(matches!(fit_contact(&flat[..10]), Err(ContactFitError::TooShort { points: 10 })));
     }
 }

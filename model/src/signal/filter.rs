@@ -34,7 +34,7 @@ impl MovingMean {
         self.next += 1;
         if self.next == self.length {
             self.next = 0;
-            // Once a round the sum is formed anew, so rounding does not add up over hours.
+            // Once a round the sum is formed from the values, so rounding does not add up over hours.
             self.sum = self.ring.iter().sum();
         }
         self.sum / self.ring.len() as f64

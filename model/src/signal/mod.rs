@@ -9,7 +9,7 @@ mod trace;
 pub mod track;
 mod work;
 
-pub use contact::{ContactError, ContactEstimate, ContactPoint, fit_contact};
+pub use contact::{ContactEstimate, ContactFitError, ContactPoint, fit_contact};
 pub use filter::MovingMean;
 pub use touch::{TouchEstimate, TouchPoint, fit_touch};
 pub use trace::{LiveTrace, TracePoint};

@@ -13,7 +13,7 @@
 
 /// The furthest that a sample left out is from the line drawn, in pixels.
 pub const ERROR_PIXELS: f64 = 0.5;
-/// What of it goes to making straight.
+/// Part of it for straightening.
 const STRAIGHT: f64 = 0.146;
 /// Side of a cell in pixels. Its diagonal is what is left of the error: (0.5 - 0.146) / sqrt(2).
 const CELL: f64 = 0.25;
@@ -26,7 +26,6 @@ pub struct Reducer {
     covered: Vec<u64>,
     /// Points of the stretch being drawn; empty while the pen is up.
     stretch: Vec<[f64; 2]>,
-    /// The newest sample.
     before: Option<[f64; 2]>,
     /// Whether the newest sample stands alone so far.
     is_alone: bool,
@@ -36,7 +35,7 @@ pub struct Reducer {
     points: [usize; 2],
 }
 
-/// How much of every pixel is crossed.
+/// Coverage of every pixel by the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Coverage {
     /// Pixels across and up.
@@ -234,7 +233,7 @@ impl Reducer {
     }
 }
 
-/// Visits every cell that a line crosses, until told to stop (Amanatides & Woo, Eurographics 1987, 3-10).
+/// Visits every cell that a line crosses, until `visit` returns false (Amanatides & Woo, Eurographics 1987, 3-10).
 fn walk([from, to]: [[f64; 2]; 2], mut visit: impl FnMut([usize; 2]) -> bool) {
     let cell_of = |place: f64| (place / CELL) as i64;
     let mut cell = from.map(cell_of);
@@ -252,8 +251,8 @@ fn walk([from, to]: [[f64; 2]; 2], mut visit: impl FnMut([usize; 2]) -> bool) {
     let between = way.map(|way| if way == 0.0 { f64::INFINITY } else { CELL / way.abs() });
     // As many steps as there are edges: rounding cannot make it go on.
     let steps = (last[0] - cell[0]).abs() + (last[1] - cell[1]).abs();
-    for left in (0..=steps).rev() {
-        if !visit(cell.map(|one| one.max(0) as usize)) || left == 0 {
+    for remaining in (0..=steps).rev() {
+        if !visit(cell.map(|one| one.max(0) as usize)) || remaining == 0 {
             return;
         }
         let is_there = [cell[0] == last[0], cell[1] == last[1]];

@@ -23,9 +23,8 @@ const NONE: u32 = PLACE;
 /// Most samples in one pyramid.
 pub const SAMPLES_MAX: usize = NONE as usize;
 
-/// What is drawn next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mark {
+pub enum PyramidMark {
     /// A sample: its place and its value.
     Point(usize, f32),
     /// Samples that are no numbers: the line breaks.
@@ -41,7 +40,7 @@ struct Bucket {
 
 /// A sample within a fold, and how many gaps came before it.
 #[derive(Clone, Copy)]
-struct Place {
+struct FoldSample {
     index: u32,
     value: f32,
     gaps: u32,
@@ -50,8 +49,8 @@ struct Place {
 /// Finds the lowest and the highest of what passes by, the first of equal ones.
 #[derive(Default)]
 struct Fold {
-    low: Option<Place>,
-    high: Option<Place>,
+    low: Option<FoldSample>,
+    high: Option<FoldSample>,
     gaps: u32,
 }
 
@@ -61,7 +60,7 @@ impl Fold {
     }
 
     fn take(&mut self, index: u32, value: f32) {
-        let place = Place { index, value, gaps: self.gaps };
+        let place = FoldSample { index, value, gaps: self.gaps };
         if self.low.is_none_or(|low| value < low.value) {
             self.low = Some(place);
         }
@@ -71,7 +70,7 @@ impl Fold {
     }
 
     /// The two in order of time, the second none where both are one.
-    fn pair(&self) -> Option<(Place, Option<Place>)> {
+    fn pair(&self) -> Option<(FoldSample, Option<FoldSample>)> {
         let (low, high) = (self.low?, self.high?);
         Some(match low.index.cmp(&high.index) {
             std::cmp::Ordering::Less => (low, Some(high)),
@@ -94,23 +93,23 @@ impl Fold {
         }
     }
 
-    fn draw(&self, draw: &mut impl FnMut(Mark)) {
+    fn draw(&self, draw: &mut impl FnMut(PyramidMark)) {
         let Some((first, second)) = self.pair() else {
             if self.gaps > 0 {
-                draw(Mark::Gap);
+                draw(PyramidMark::Gap);
             }
             return;
         };
         let mut gaps = 0;
         for place in [Some(first), second].into_iter().flatten() {
             if place.gaps > gaps {
-                draw(Mark::Gap);
+                draw(PyramidMark::Gap);
             }
             gaps = place.gaps;
-            draw(Mark::Point(place.index as usize, place.value));
+            draw(PyramidMark::Point(place.index as usize, place.value));
         }
         if self.gaps > gaps {
-            draw(Mark::Gap);
+            draw(PyramidMark::Gap);
         }
     }
 }
@@ -129,12 +128,10 @@ impl Pyramid {
         Self { values: Vec::with_capacity(samples), levels: Vec::new() }
     }
 
-    /// How many samples there are.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -233,7 +230,7 @@ impl Pyramid {
     /// Draws the samples of a range: of every `column` samples, a power of two, the lowest and the highest in
     /// order of time. Columns begin at multiples of `column`, whatever the range, so that a picture that is
     /// moved does not flicker; those that the range touches are drawn whole. A column of one draws every sample.
-    pub fn draw(&self, from: usize, to: usize, column: usize, mut draw: impl FnMut(Mark)) {
+    pub fn draw(&self, from: usize, to: usize, column: usize, mut draw: impl FnMut(PyramidMark)) {
         let column = column.max(1).next_power_of_two();
         let to = to.min(self.values.len());
         if from >= to {
@@ -241,7 +238,11 @@ impl Pyramid {
         }
         if column == 1 {
             for (value, index) in self.values[from..to].iter().zip(from..) {
-                draw(if value.is_finite() { Mark::Point(index, *value) } else { Mark::Gap });
+                draw(if value.is_finite() {
+                    PyramidMark::Point(index, *value)
+                } else {
+                    PyramidMark::Gap
+                });
             }
             return;
         }
@@ -267,7 +268,7 @@ impl Pyramid {
             }
             at += column;
         }
-        let found = |place: Place| (place.index as usize, place.value);
+        let found = |place: FoldSample| (place.index as usize, place.value);
         Some([found(fold.low?), found(fold.high?)])
     }
 }

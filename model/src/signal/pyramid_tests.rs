@@ -31,7 +31,7 @@ fn pyramid(random: &mut SplitMix, values: &[f32]) -> Pyramid {
     pyramid
 }
 
-fn drawn(pyramid: &Pyramid, from: usize, to: usize, column: usize) -> Vec<Mark> {
+fn drawn(pyramid: &Pyramid, from: usize, to: usize, column: usize) -> Vec<PyramidMark> {
     let mut marks = Vec::new();
     pyramid.draw(from, to, column, |mark| marks.push(mark));
     marks
@@ -52,8 +52,8 @@ fn every_column_has_the_extremes_of_its_samples_and_every_gap_breaks_it() {
         let points: Vec<(usize, f32)> = marks
             .iter()
             .filter_map(|mark| match *mark {
-                Mark::Point(index, value) => Some((index, value)),
-                Mark::Gap => None,
+                PyramidMark::Point(index, value) => Some((index, value)),
+                PyramidMark::Gap => None,
             })
             .collect();
         assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0));
@@ -77,8 +77,8 @@ fn every_column_has_the_extremes_of_its_samples_and_every_gap_breaks_it() {
         let mut has_gap = false;
         for mark in &marks {
             match *mark {
-                Mark::Gap => has_gap = true,
-                Mark::Point(index, _) => {
+                PyramidMark::Gap => has_gap = true,
+                PyramidMark::Point(index, _) => {
                     if let Some(before) = before {
                         let is_broken = raw[before..index].iter().any(|one| !one.is_finite());
                         assert_eq!(has_gap, is_broken, "{before}..{index} by {column}");
@@ -117,7 +117,7 @@ fn nothing_one_sample_and_ranges_beyond_the_end_are_drawn() {
     assert_eq!(pyramid.extremes(0, 10), None);
     pyramid.extend([3.0]);
     for column in [1, 2, 16, 4096] {
-        assert_eq!(drawn(&pyramid, 0, 1, column), [Mark::Point(0, 3.0)]);
+        assert_eq!(drawn(&pyramid, 0, 1, column), [PyramidMark::Point(0, 3.0)]);
         assert!(drawn(&pyramid, 5, 9, column).is_empty());
     }
     let nothing = {
@@ -125,7 +125,7 @@ fn nothing_one_sample_and_ranges_beyond_the_end_are_drawn() {
         pyramid.extend([f32::NAN; 100]);
         pyramid
     };
-    assert!(drawn(&nothing, 0, 100, 64).iter().all(|mark| *mark == Mark::Gap));
+    assert!(drawn(&nothing, 0, 100, 64).iter().all(|mark| *mark == PyramidMark::Gap));
     assert_eq!(nothing.extremes(0, 100), None);
 }
 

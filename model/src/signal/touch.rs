@@ -1,4 +1,4 @@
-//! Where the tissue begins, from everything that was felt while it was touched twice: a fast press, the
+//! Where the tissue begins, from all forces while it was touched twice: a fast press, the
 //! relaxation after it, and a slow pass.
 //!
 //! One pass at one speed cannot tell a late onset from a slow one: at speed `v` a body with relaxation
@@ -10,10 +10,10 @@
 //!
 //! The viscous force of that body grows with depth times speed, and tissue whose viscous force grows with the
 //! speed alone, such as a standard linear solid, resists at once. Taken for the other kind, it seems to have begun
-//! a millimetre earlier. So where the residuals remember, a body with both viscous forces is tried as well, and
+//! a millimetre earlier. So where the residuals are autocorrelated, a body with both viscous forces is tried as well, and
 //! preferred if it leaves less than chance would explain.
 
-use super::contact::{ContactError, ContactEstimate};
+use super::contact::{ContactEstimate, ContactFitError, descend};
 use crate::linalg::Triangle;
 use crate::units::{Depth, Newtons, Position, Seconds};
 use crate::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -43,7 +43,7 @@ const CONTACT_COUNT: u32 = 60;
 const SCAN_POINTS: usize = 300;
 /// Refinements settle within a handful of steps.
 const STEPS_MAX: usize = 40;
-/// Points in a block whose mean shows whether residuals remember: 0.2 s of the engine's points.
+/// Points in a block whose mean shows whether residuals are autocorrelated: 0.2 s of the engine's points.
 const BLOCK: usize = 10;
 
 /// Filtered powers of depth, filtered depth times speed, and filtered speed.
@@ -52,14 +52,13 @@ const BODY: usize = 5;
 const SPACE: usize = 2 + BODY + 3 + 1;
 type Row = [f64; SPACE];
 
-/// Variances of one force by which a further coefficient must lower the sum of squares, were there no memory: chance
+/// Variances of one force by which a further coefficient must lower the sum of squares, were residuals white: chance
 /// does so once in 16 000.
 const GAIN_MIN: f64 = 16.0;
 
-/// Standard errors by which two touches must be apart to be two: rarer by chance than one in three hundred.
-const APART_SIGMAS: f64 = 3.0;
+/// Standard errors by which the positions of two touches must differ to be two: rarer by chance than one in three hundred.
+const SEPARATION_SIGMAS: f64 = 3.0;
 
-/// What a search says of the contact position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchEstimate {
     /// The contact position. Half of the distance between the touches is part of its standard error if it is
@@ -73,27 +72,28 @@ pub struct TouchEstimate {
 
 /// Estimates the contact position from a whole search. The path must begin out of contact and go on without
 /// gaps; times rise. What follows the last point without force is the second touch.
-pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
+pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactFitError> {
     let mut search = Search::new(points.to_vec())?;
     let mut starts = search.coarse().scan();
-    let mut found = search.best(&starts).ok_or(ContactError::NoOnset)?;
-    if found.memory > 1.0 {
+    let mut found = search.best(&starts).ok_or(ContactFitError::NoOnset)?;
+    if found.variance_inflation > 1.0 {
         search.has_speed_term = true;
         let others = search.coarse().scan();
         match search.best(&others) {
             Some(mut other)
-                if found.cost - other.cost > GAIN_MIN * other.variance * other.memory =>
+                if found.cost - other.cost
+                    > GAIN_MIN * other.variance * other.variance_inflation =>
             {
                 // Half of what the bodies disagree by, if one describes the tissue hardly better than the other;
                 // nothing if it does far better.
                 let way = other.trial.contact - found.trial.contact;
-                other.by_choice_mm = 0.5 * way.abs() * (other.cost / found.cost);
+                other.model_error_mm = 0.5 * way.abs() * (other.cost / found.cost);
                 (starts, found) = (others, other);
             }
             _ => search.has_speed_term = false,
         }
     }
-    search.estimate(&found, &starts).ok_or(ContactError::NoOnset)
+    search.estimate(&found, &starts).ok_or(ContactFitError::NoOnset)
 }
 
 /// A trial contact position in mm, the logarithm of a relaxation time in s, and how much deeper in mm the second
@@ -102,25 +102,24 @@ pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
 struct Trial {
     contact: f64,
     log_tau: f64,
-    apart: f64,
+    separation: f64,
 }
 
 /// The bottom of the deepest valley.
-struct Bottom {
+struct ValleyBottom {
     trial: Trial,
-    /// Sum of squares of the residuals, its share of one force, and what [`Search::memory`] says.
+    /// Sum of squares of the residuals, its share of one force, and what [`Search::variance_inflation`].
     cost: f64,
     variance: f64,
-    memory: f64,
-    /// Error of the contact position for not knowing which body is right.
-    by_choice_mm: f64,
+    variance_inflation: f64,
+    model_error_mm: f64,
 }
 
 struct Search {
     /// The body's viscous force grows with the speed alone, too.
     has_speed_term: bool,
     /// The second touch may meet the tissue elsewhere than the first.
-    may_be_apart: bool,
+    has_separation: bool,
     /// The last point before the second touch, if there is one.
     between: Option<usize>,
     points: Vec<TouchPoint>,
@@ -130,10 +129,10 @@ struct Search {
 }
 
 impl Search {
-    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactError> {
+    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactFitError> {
         let forces = points.iter().filter(|point| point.force.is_some()).count();
         if forces < FORCES_MIN {
-            return Err(ContactError::TooShort { points: forces });
+            return Err(ContactFitError::TooShort { points: forces });
         }
         let is_forward = points.windows(2).all(|pair| pair[1].t.0 > pair[0].t.0);
         let is_finite = points.iter().all(|point| {
@@ -144,11 +143,11 @@ impl Search {
         points.iter().for_each(|point| deep = deep.max(point.position.0));
         let (begin, end) = (points[0], points[points.len() - 1]);
         if !(is_forward && is_finite && deep > begin.position.0) {
-            return Err(ContactError::NotOneSpeed);
+            return Err(ContactFitError::NotOneSpeed);
         }
         Ok(Self {
             has_speed_term: false,
-            may_be_apart: false,
+            has_separation: false,
             between: points.iter().rposition(|point| point.force.is_none()),
             shallow: begin.position.0,
             deep,
@@ -164,10 +163,10 @@ impl Search {
 
     /// Parameters that are not: contact, ln tau and perhaps the distance.
     fn outer(&self) -> usize {
-        if self.may_be_apart { 3 } else { 2 }
+        if self.has_separation { 3 } else { 2 }
     }
 
-    fn best(&self, starts: &[Trial]) -> Option<Bottom> {
+    fn best(&self, starts: &[Trial]) -> Option<ValleyBottom> {
         let coarse = self.coarse();
         // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
         // relaxation time has its own valley, and the deepest shows only at its bottom.
@@ -180,12 +179,12 @@ impl Search {
         let (linear, cost) = self.solve(trial)?;
         let forces = self.points.iter().filter(|point| point.force.is_some());
         let variance = cost / (forces.count() - self.linear() - self.outer()) as f64;
-        Some(Bottom {
+        Some(ValleyBottom {
             trial,
             cost,
             variance,
-            memory: self.memory(trial, &linear, variance),
-            by_choice_mm: 0.0,
+            variance_inflation: self.variance_inflation(trial, &linear, variance),
+            model_error_mm: 0.0,
         })
     }
 
@@ -216,8 +215,8 @@ impl Search {
         let body = ModifiedKelvin { tau_eps: trial.log_tau.exp(), mu: [0.0; 3], tau_sig: 0.0 };
         let depth = |index: usize, point: &TouchPoint| {
             let is_second = self.between.is_some_and(|between| index > between);
-            let apart = if is_second { trial.apart } else { 0.0 };
-            Depth(point.position.0 - trial.contact - apart)
+            let separation = if is_second { trial.separation } else { 0.0 };
+            Depth(point.position.0 - trial.contact - separation)
         };
         let reach = self.deep - trial.contact;
         // Columns of like size: powers of the share of the deepest depth.
@@ -272,7 +271,7 @@ impl Search {
             let trials = (1..CONTACT_COUNT).filter_map(|i| {
                 let share = f64::from(i) / f64::from(CONTACT_COUNT);
                 let contact = self.shallow + share * (self.deep - self.shallow);
-                let trial = Trial { contact, log_tau, apart: 0.0 };
+                let trial = Trial { contact, log_tau, separation: 0.0 };
                 Some((trial, self.solve(trial)?.1))
             });
             let best = trials.min_by(|one, other| one.1.total_cmp(&other.1))?;
@@ -284,43 +283,30 @@ impl Search {
     }
 
     /// Gauss-Newton with step halving from a trial to the bottom of its valley.
-    fn refined(&self, mut trial: Trial) -> Trial {
-        let Some((_, mut cost)) = self.solve(trial) else {
+    fn refined(&self, trial: Trial) -> Trial {
+        let Some((_, cost)) = self.solve(trial) else {
             return trial;
         };
         let [low, high] = TAU_RANGE.map(f64::ln);
-        for _ in 0..STEPS_MAX {
-            let Some(step) = self.linearised(trial).and_then(|rows| {
-                let mut triangle = Triangle::default();
-                rows.into_iter().for_each(|(_, row)| triangle.push(row));
-                triangle.solve(self.linear() + self.outer())
-            }) else {
-                break;
-            };
-            let better = (0..12).find_map(|halving| {
-                let share = 0.5f64.powi(halving);
+        let line = |trial: Trial| {
+            let mut triangle = Triangle::default();
+            self.linearised(trial)?.into_iter().for_each(|(_, row)| triangle.push(row));
+            let step = triangle.solve(self.linear() + self.outer())?;
+            Some(move |share: f64| {
                 let next = Trial {
                     contact: trial.contact + share * step[self.linear()],
                     // A factor of e at a time keeps the step where the linearisation holds.
                     log_tau: (trial.log_tau + share * step[self.linear() + 1].clamp(-1.0, 1.0))
                         .clamp(low, high),
-                    apart: trial.apart + share * step[self.linear() + 2],
+                    separation: trial.separation + share * step[self.linear() + 2],
                 };
-                let (_, next_cost) = self.solve(next)?;
-                (next_cost < cost).then_some((next, next_cost))
-            });
-            let Some((next, next_cost)) = better else {
-                break;
-            };
-            // A step that gains less than a hundredth of one degree of freedom moves the answer by less
-            // than a tenth of its standard error.
-            let is_settled = cost - next_cost <= 1e-2 * cost / self.points.len() as f64;
-            (trial, cost) = (next, next_cost);
-            if is_settled {
-                break;
-            }
-        }
-        trial
+                Some((next, self.solve(next)?.1))
+            })
+        };
+        // A step that gains less than a hundredth of one degree of freedom moves the answer by less
+        // than a tenth of its standard error.
+        let gain_min = |cost: f64| 1e-2 * cost / self.points.len() as f64;
+        descend((trial, cost), STEPS_MAX, gain_min, line).0
     }
 
     /// All columns at a trial, with the derivatives of the fitted force by contact and ln tau, and the index of
@@ -340,22 +326,22 @@ impl Search {
             });
             forces
         };
-        let by = |contact: f64, log_tau: f64, apart: f64| {
+        let by = |contact: f64, log_tau: f64, separation: f64| {
             let shifted = |sign: f64| {
                 response(Trial {
                     contact: trial.contact + sign * contact,
                     log_tau: trial.log_tau + sign * log_tau,
-                    apart: trial.apart + sign * apart,
+                    separation: trial.separation + sign * separation,
                 })
             };
-            let step = 2.0 * (contact + log_tau + apart);
+            let step = 2.0 * (contact + log_tau + separation);
             let pairs = shifted(1.0).into_iter().zip(shifted(-1.0));
             pairs.map(move |(up, down)| (up - down) / step)
         };
         let mut by_all = [
             Some(by(dx, 0.0, 0.0)),
             Some(by(0.0, dl, 0.0)),
-            self.may_be_apart.then(|| by(0.0, 0.0, dx)),
+            self.has_separation.then(|| by(0.0, 0.0, dx)),
         ];
         let mut rows = Vec::with_capacity(self.points.len());
         self.follow(trial, |index, point, force, columns| {
@@ -368,10 +354,11 @@ impl Search {
         Some(rows)
     }
 
-    fn estimate(&self, bottom: &Bottom, starts: &[Trial]) -> Option<TouchEstimate> {
+    fn estimate(&self, bottom: &ValleyBottom, starts: &[Trial]) -> Option<TouchEstimate> {
         let by_noise = self.std_error(bottom, 0)?;
-        let apart_mm = self.apart(starts);
-        let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0).hypot(bottom.by_choice_mm);
+        let apart_mm = self.separation(starts);
+        let std_error_mm =
+            by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0).hypot(bottom.model_error_mm);
         // Against offset and drift alone the fit must gain what noise cannot: chi-square with six degrees,
         // for which 100 has a chance of 1e-18 a trial.
         let gain = (self.cost_without_contact()? - bottom.cost) / bottom.variance;
@@ -384,28 +371,28 @@ impl Search {
     }
 
     /// How much deeper the second touch met the tissue, if that is more than noise: everything is
-    /// found anew with the distance free.
-    fn apart(&self, starts: &[Trial]) -> Option<f64> {
+    /// fitted again with the distance free.
+    fn separation(&self, starts: &[Trial]) -> Option<f64> {
         self.between?;
-        let free = Self { may_be_apart: true, points: self.points.clone(), ..*self };
+        let free = Self { has_separation: true, points: self.points.clone(), ..*self };
         let moved = free.best(starts)?;
         let error = free.std_error(&moved, 2)?;
-        (moved.trial.apart.abs() > APART_SIGMAS * error).then_some(moved.trial.apart)
+        (moved.trial.separation.abs() > SEPARATION_SIGMAS * error).then_some(moved.trial.separation)
     }
 
     /// Of the contact (0), ln tau (1) or the distance (2).
-    fn std_error(&self, bottom: &Bottom, which: usize) -> Option<f64> {
+    fn std_error(&self, bottom: &ValleyBottom, which: usize) -> Option<f64> {
         let mut triangle = Triangle::default();
         let rows = self.linearised(bottom.trial)?;
         rows.iter().for_each(|(_, row)| triangle.push(*row));
         let (linear, all) = (self.linear(), self.linear() + self.outer());
         let unit = triangle.inverse_diagonal(linear + which, all)?;
-        Some((bottom.variance * bottom.memory * unit).sqrt())
+        Some((bottom.variance * bottom.variance_inflation * unit).sqrt())
     }
 
     /// How much more the means of blocks of residuals scatter than those of white noise could, else 1: by so
     /// much the variance of a slow parameter is larger than white noise would make it.
-    fn memory(&self, trial: Trial, linear: &Row, variance: f64) -> f64 {
+    fn variance_inflation(&self, trial: Trial, linear: &Row, variance: f64) -> f64 {
         let (mut blocks, mut squares) = (0.0, 0.0);
         let (mut sum, mut length, mut last) = (0.0, 0, None);
         self.follow(trial, |index, point, force, columns| {

@@ -10,7 +10,6 @@ pub struct TracePoint {
     pub t: f64,
     /// Depth in mm.
     pub depth: f64,
-    /// Force in N.
     pub force: f64,
 }
 
@@ -59,7 +58,6 @@ impl LiveTrace {
         Self { capacity: capacity.max(2), per_bucket: 1, buckets: Vec::new(), open: None }
     }
 
-    /// Takes a sample.
     pub fn push(&mut self, t: Seconds, depth: Depth, force: Newtons) {
         let point = Bucket::of(TracePoint { t: t.0, depth: depth.0, force: force.0 });
         let (bucket, count) = match self.open.take() {

@@ -4,7 +4,7 @@
 //! Memory: 8 bytes a sample for its time, and for each quantity 4 bytes for its value as an f32, which has the
 //! digits of a 24-bit converter, and 0.67 bytes for its [`Pyramid`].
 
-use super::pyramid::{Mark, Pyramid, column_for};
+use super::pyramid::{Pyramid, PyramidMark, column_for};
 use std::sync::Arc;
 
 /// Samples in a segment: as many as the log has in its largest block.
@@ -51,10 +51,8 @@ impl Segment {
     }
 }
 
-/// What was drawn of a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drawn {
-    /// Points handed out.
     pub points: usize,
     /// The most samples that share a lowest and a highest one; 1 where every sample is drawn.
     pub samples_per_column: usize,
@@ -62,8 +60,7 @@ pub struct Drawn {
 
 /// A place on a track.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// Number of the sample.
+pub struct TrackPosition {
     pub index: usize,
     /// Its time in s.
     pub t: f64,
@@ -91,12 +88,10 @@ impl Track {
         self.segments.push(segment);
     }
 
-    /// How many samples there are.
     pub fn len(&self) -> usize {
         self.samples
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.samples == 0
     }
@@ -125,16 +120,21 @@ impl Track {
     }
 
     /// The last sample not after a time; the first one before all.
-    pub fn place(&self, t: f64) -> Option<Place> {
+    pub fn place(&self, t: f64) -> Option<TrackPosition> {
         let after = self.segments.partition_point(|one| one.times[0] <= t);
         let segment = after.saturating_sub(1);
         let times = &self.segments.get(segment)?.times;
         let within = times.partition_point(|one| *one <= t).saturating_sub(1);
-        Some(Place { index: self.before[segment] + within, t: times[within], segment, within })
+        Some(TrackPosition {
+            index: self.before[segment] + within,
+            t: times[within],
+            segment,
+            within,
+        })
     }
 
     /// A quantity at a place; `None` in a gap.
-    pub fn value(&self, quantity: usize, place: Place) -> Option<f64> {
+    pub fn value(&self, quantity: usize, place: TrackPosition) -> Option<f64> {
         let values = self.segments.get(place.segment)?.values(quantity);
         let value = f64::from(*values.get(place.within)?);
         value.is_finite().then_some(value)
@@ -206,8 +206,8 @@ impl Track {
                 pen.point(0, times[0], values[0]);
             }
             column.draw(start, end, size, |mark| match mark {
-                Mark::Point(index, value) => pen.point(before + index, times[index], value),
-                Mark::Gap => pen.gap(),
+                PyramidMark::Point(index, value) => pen.point(before + index, times[index], value),
+                PyramidMark::Gap => pen.gap(),
             });
             if next.is_none() && end == count && values[count - 1].is_finite() {
                 pen.point(before + count - 1, times[count - 1], values[count - 1]);
@@ -246,7 +246,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix;
 
-    /// Segments of any length at a rate that changes, with gaps; the raw samples beside them.
+    /// Segments of any length at a rate that changes, with gaps; with the raw samples.
     fn track(random: &mut SplitMix, segments: usize) -> (Track, Vec<(f64, f32)>) {
         let (mut track, mut raw, mut t) = (Track::default(), Vec::new(), 0.0);
         for _ in 0..segments {

@@ -15,10 +15,8 @@ use super::ModifiedKelvin;
 
 /// A band of depth in mm; the end is infinite where the band never ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Band {
-    /// Where it begins.
+pub struct InadmissibleBand {
     pub from: f64,
-    /// Where it ends.
     pub to: f64,
 }
 
@@ -27,21 +25,21 @@ const SHALLOW_MM: f64 = 5e-4;
 
 /// Depths at which the elastic force falls with depth.
 #[must_use]
-pub fn unstable(body: &ModifiedKelvin) -> Vec<Band> {
+pub fn unstable(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
     let [mu1, mu2, mu3] = body.mu;
     negative([mu1, 2.0 * mu2, 3.0 * mu3])
 }
 
 /// Depths around which a small slow cycle returns energy.
 #[must_use]
-pub fn active_cycles(body: &ModifiedKelvin) -> Vec<Band> {
+pub fn active_cycles(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
     let ([mu1, mu2, mu3], tau) = (body.mu, body.tau_eps);
     negative([-tau * mu1, body.tau_sig - 2.0 * tau * mu2, -3.0 * tau * mu3])
 }
 
 /// Depths to which a step from the surface does not relax and a slow poke returns energy.
 #[must_use]
-pub fn active_pokes(body: &ModifiedKelvin) -> Vec<Band> {
+pub fn active_pokes(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
     let ([mu1, mu2, mu3], tau) = (body.mu, body.tau_eps);
     negative([-tau * mu1, 0.5 * body.tau_sig - tau * mu2, -tau * mu3])
 }
@@ -70,7 +68,7 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
         .collect()
 }
 
-fn words(band: &Band, deepest: f64) -> Option<String> {
+fn words(band: &InadmissibleBand, deepest: f64) -> Option<String> {
     if band.from >= deepest || band.to < SHALLOW_MM {
         return None;
     }
@@ -83,7 +81,7 @@ fn words(band: &Band, deepest: f64) -> Option<String> {
 }
 
 /// Where `c0 + c1 x + c2 x^2` is negative for `x > 0`.
-fn negative([c0, c1, c2]: [f64; 3]) -> Vec<Band> {
+fn negative([c0, c1, c2]: [f64; 3]) -> Vec<InadmissibleBand> {
     let mut ends = vec![0.0];
     ends.extend(roots([c0, c1, c2]).into_iter().filter(|&root| root > 0.0));
     ends.push(f64::INFINITY);
@@ -94,7 +92,7 @@ fn negative([c0, c1, c2]: [f64; 3]) -> Vec<Band> {
                 if pair[1].is_finite() { 0.5 * (pair[0] + pair[1]) } else { 2.0 * pair[0] + 1.0 };
             value(middle) < 0.0
         })
-        .map(|pair| Band { from: pair[0], to: pair[1] })
+        .map(|pair| InadmissibleBand { from: pair[0], to: pair[1] })
         .collect()
 }
 

@@ -22,7 +22,6 @@ pub const NEGLIGIBLE: f64 = 1e-200;
 /// lose yet).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Compensated {
-    /// The sum.
     pub value: f64,
     carry: f64,
 }

@@ -27,9 +27,7 @@ pub struct ModifiedKelvin {
     "the tissue body has {name} = {value}; the relaxation time must be positive and every coefficient finite"
 )]
 pub struct BodyError {
-    /// Which parameter.
     pub name: &'static str,
-    /// Its value.
     pub value: f64,
 }
 
@@ -59,7 +57,7 @@ impl ModifiedKelvin {
     }
 }
 
-/// What the body remembers: its filtered powers of depth and where the probe is.
+/// State of the body: its filtered powers of depth and the position of the probe.
 ///
 /// Depth moves straight between steps and the response to that path is exact, whatever the step
 /// length. Depth below zero is out of contact and counts as zero; a step that crosses the surface

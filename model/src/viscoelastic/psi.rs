@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn agrees_with_fifty_digits() {
         let rows = reference();
-        // Every 0.02 in 0.5..8 for each j, besides the decades.
+        // Every 0.02 in 0.5..8 for each j, and the decades.
         let dense =
             |j| rows.iter().filter(|row| row.0 == j && (0.5..8.01).contains(&row.1)).count();
         assert!((0..=5).all(|j| dense(j) >= 376));

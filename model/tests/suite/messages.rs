@@ -15,7 +15,7 @@ fn what_prevents_a_calibration_is_worded() {
         Wrong::VoltsNotIncreasing { step: 4, volts: 1.1, before_volts: 1.2 } => ["step 4", "1.1 V", "1.2 V", "wiring"],
         Wrong::SignalFalls { mass_g: 100.0, volts: 1.1, before_g: 0.0, before_volts: 1.2, way: "loading" } => ["100 g", "1.1 V", "0 g", "1.2 V", "loading", "wiring"],
         Wrong::TooFlat => ["two weights"],
-        Wrong::NewerFormat { format: 9 } => ["form 9"],
+        Wrong::NewerFormat { format: 9 } => ["format 9"],
         Wrong::UnknownWeight { step: 5, name: "A".into() } => ["step 5", "\"A\""],
         Wrong::WeightsDisagree { step: 6, mass_g: 100.0, sum_g: 50.0 } => ["step 6", "100 g", "50 g"],
         Wrong::Tolerance { tolerance_g: -1.0 } => ["-1 g"],

@@ -90,7 +90,7 @@ fn bodies_of_every_kind_are_met_where_they_are() {
 }
 
 #[test]
-fn a_surface_that_moved_between_the_touches_is_told() {
+fn a_surface_that_moved_between_the_touches_is_reported() {
     for (name, body) in [("linear", LINEAR), ("thesis", THESIS), ("quasi-linear", QUASI_LINEAR)] {
         for apart in [-0.3, 0.2] {
             let found = found(&body, apart, 1).apart_mm.unwrap_or(0.0);

@@ -128,7 +128,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
         ("0,75", "write a point, not a comma"),
         ("3 mm", "\"3 mm\" is a length"),
         ("0.7501", "cannot make 0.7501 mm/s"),
-        ("900", "outside what rig sim makes"),
+        ("900", "outside the range of rig sim"),
         ("", "a number is missing"),
     ] {
         flow.type_into("speed", text);

@@ -465,7 +465,7 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
         ("rabbit, specimen 1", "rabbit, specimen 2")
     );
     for (key, value, words) in
-        [("series.repeat", "2", "series"), ("specimen.colour", "red", "nothing is called")]
+        [("series.repeat", "2", "series"), ("specimen.colour", "red", "there is no entry")]
     {
         let refusal = whole.tell(key, value).unwrap_err();
         assert!(refusal.contains(words), "{refusal}");

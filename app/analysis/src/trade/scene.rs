@@ -67,8 +67,7 @@ fn job<'a>(scene: &PokeScene, nodes: usize, cut: Cut) -> Result<Job<'a>, String>
     let field = scene.field(nodes).map_err(|err| err.to_string())?;
     let tau = Seconds(ModifiedKelvin::THESIS.tau_eps);
     let recovery = Recovery::new(tau, Seconds(TICK)).map_err(|err| err.to_string())?;
-    let surface = Surface::new(field, Method::Envelope, recovery, cut);
-    let mut surface = surface.map_err(|err| err.to_string())?;
+    let mut surface = Surface::new(field, Method::Envelope, recovery, cut);
     let contact = [Contact {
         x: 0.5 * scene.extent,
         y: 0.5 * scene.extent,

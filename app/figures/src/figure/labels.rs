@@ -1,21 +1,21 @@
-//! Where names stand beside points, so that none covers another.
+//! Positions of names next to points, so that none covers another.
 
 use crate::drawing::FONT;
 
 /// Height of a line of names at the right, in px.
 const LINE: f64 = FONT + 2.0;
-/// Width of a name beside a point, and half the width of the point, in px.
+/// Width of a name next to a point, and half the width of the point, in px.
 const LABEL: f64 = 78.0;
 const SIZE: f64 = 5.0;
 
 /// Heights for names at the right edge, as near to the ends of their lines as leaves all of them readable.
-pub(super) fn pushed_apart(wanted: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..wanted.len()).collect();
-    order.sort_by(|a, b| wanted[*a].total_cmp(&wanted[*b]));
-    let mut places = vec![0.0; wanted.len()];
+pub(super) fn spread_heights(target: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..target.len()).collect();
+    order.sort_by(|a, b| target[*a].total_cmp(&target[*b]));
+    let mut places = vec![0.0; target.len()];
     let mut free = top;
     for &index in &order {
-        places[index] = wanted[index].max(free);
+        places[index] = target[index].max(free);
         free = places[index] + LINE;
     }
     let mut free = bottom;
@@ -26,8 +26,8 @@ pub(super) fn pushed_apart(wanted: &[f64], [top, bottom]: [f64; 2]) -> Vec<f64> 
     places
 }
 
-/// Where a point's name stands: beside it, or else as little above or below as leaves other points and names uncovered.
-pub(super) fn beside(
+/// Position of a point's name: next to it, or else as little above or below as leaves other points and names uncovered.
+pub(super) fn label_position(
     [x, y]: [f64; 2],
     [top, bottom]: [f64; 2],
     points: &[[f64; 2]],
@@ -41,10 +41,10 @@ pub(super) fn beside(
             && !labels.iter().any(|label| covers(label, -LABEL, LABEL))
             && !points.iter().any(|point| covers(&[point[0], point[1] + 0.35 * FONT], -SIZE, LABEL))
     };
-    let beside = |lines: f64| [x + 12.0, y + 0.35 * FONT + lines * FONT];
+    let candidate = |lines: f64| [x + 12.0, y + 0.35 * FONT + lines * FONT];
     // Each line farther is tried above and below; a dozen points never need more.
     let lines = (0..24).map(|i| f64::from(i / 2 + i % 2) * if i % 2 == 0 { 1.0 } else { -1.0 });
-    lines.map(beside).find(is_free).unwrap_or(beside(0.0))
+    lines.map(candidate).find(is_free).unwrap_or(candidate(0.0))
 }
 
 #[cfg(test)]
@@ -52,8 +52,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_at_one_height_are_pushed_apart_and_stay_within() {
-        let places = pushed_apart(&[95.0, 95.0, 10.0, 95.0], [0.0, 100.0]);
+    fn names_at_one_height_are_spread_heights_and_stay_within() {
+        let places = spread_heights(&[95.0, 95.0, 10.0, 95.0], [0.0, 100.0]);
         assert_eq!(places[2], 10.0);
         let mut close = [places[0], places[1], places[3]];
         close.sort_by(f64::total_cmp);
@@ -68,7 +68,7 @@ mod tests {
         let mut labels: Vec<[f64; 2]> = Vec::new();
         let marks = [[400.0, 200.0], [400.0, 202.0], [400.0, 204.0]];
         for mark in marks {
-            labels.push(beside(mark, [64.0, 490.0], &marks, &labels));
+            labels.push(label_position(mark, [64.0, 490.0], &marks, &labels));
         }
         for (index, one) in labels.iter().enumerate() {
             for other in &labels[index + 1..] {
@@ -76,7 +76,7 @@ mod tests {
             }
         }
         let other = [[420.0, 300.0], [430.0, 300.0]];
-        let [_, y] = beside(other[0], [64.0, 490.0], &other, &[]);
+        let [_, y] = label_position(other[0], [64.0, 490.0], &other, &[]);
         // To rounding: it is moved by just so much.
         assert!((y - 300.0 - 0.35 * FONT).abs() >= FONT - 1e-9, "{y}");
     }

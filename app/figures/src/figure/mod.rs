@@ -12,30 +12,28 @@ use ecolor::Color32;
 /// An ink by its use; each theme has its own colour for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
-    /// What was measured.
+    /// Measured points.
     Series,
-    /// What was fitted, and limits.
+    /// Fitted curves, and limits.
     Limit,
-    /// What stands out.
+    /// Emphasised text.
     Text,
-    /// What stands back.
+    /// Secondary text.
     Quiet,
     /// Hairlines.
     Line,
-    /// What waits for somebody.
+    /// What needs attention.
     Notice,
-    /// What is wrong.
     Alarm,
     /// Strong but grey.
     Active,
-    /// One of several that belong beside each other, by its place among them.
+    /// One of several that are compared, by its place among them.
     Session(usize),
     /// From what was measured to what was fitted, in 255 parts.
     Between(u8),
 }
 
 impl Ink {
-    /// In a theme.
     #[must_use]
     pub fn of(self, tokens: &Tokens) -> Color32 {
         match self {
@@ -55,7 +53,6 @@ impl Ink {
     }
 }
 
-/// How numbers lie along an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// Evenly.
@@ -69,7 +66,7 @@ pub enum Scale {
 const LEAST: f64 = 1e-18;
 
 impl Scale {
-    /// Where a number lies.
+    /// Position of a number on an axis of this scale.
     #[must_use]
     pub fn place(self, value: f64) -> f64 {
         match self {
@@ -82,9 +79,7 @@ impl Scale {
 /// One axis of a plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Axis {
-    /// Its name with the unit.
     pub name: String,
-    /// How numbers lie along it.
     pub scale: Scale,
     /// Lowest and highest number drawn; without it, all points are.
     pub range: Option<[f64; 2]>,
@@ -121,51 +116,41 @@ impl Axis {
 /// Length of dashes in px where nothing else is said.
 const DASH: f64 = 5.0;
 
-/// How points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A line of this width in px.
     Line {
-        /// Width in px.
         width: f64,
         /// Length of its dashes in px, 0 for a whole line.
         dash: f64,
     },
     /// A dot at each point, filled or hollow.
-    Dots {
-        /// Radius in px.
-        radius: f64,
-        /// Whether it is filled.
-        is_filled: bool,
-    },
+    Dots { radius: f64, is_filled: bool },
 }
 
-/// What is written at points.
+/// Text at points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Labels {
     /// Nothing; the legend has the name.
     #[default]
     None,
-    /// The name, beside the last point.
+    /// The name, next to the last point.
     AtEnd,
-    /// At each point: a short name beside it, and what is told of it on demand.
+    /// At each point: a short name next to it, and a longer text on demand.
     Each(Vec<[String; 2]>),
 }
 
 /// Points that belong together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// What they are; empty for what needs no name.
+    /// Empty where no name is needed.
     pub name: String,
-    /// Their ink.
     pub ink: Ink,
-    /// How strong it is, 0 to 1.
+    /// From 0 to 1.
     pub opacity: f64,
-    /// How they are drawn.
     pub shape: Shape,
     /// In order along the line.
     pub points: Vec<[f64; 2]>,
-    /// What is written at them.
     pub labels: Labels,
 }
 
@@ -209,10 +194,9 @@ impl Series {
     }
 }
 
-/// What lies between two lines over the same abscissas.
+/// The area between two lines over the same abscissas.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
-    /// What it is.
     pub name: String,
     /// Its ink, drawn thinly.
     pub ink: Ink,
@@ -223,7 +207,6 @@ pub struct Band {
 /// A shaded stretch of the abscissa.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
-    /// What it is.
     pub name: String,
     /// From and to.
     pub ends: [f64; 2],
@@ -234,22 +217,16 @@ pub struct Stretch {
 /// A value that is marked across the whole plot, along either axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// What it is; empty for a zero.
+    /// Empty for a zero line.
     pub name: String,
-    /// The value.
     pub at: f64,
-    /// Its ink.
     pub ink: Ink,
-    /// Whether it is dashed.
     pub is_dashed: bool,
 }
 
-/// One plot.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
-    /// What it shows.
     pub title: String,
-    /// Its axes.
     pub x: Axis,
     /// The upright one.
     pub y: Axis,
@@ -257,7 +234,6 @@ pub struct Plot {
     pub stretches: Vec<Stretch>,
     /// Bands, behind the lines.
     pub bands: Vec<Band>,
-    /// Marked values.
     pub levels: Vec<Level>,
     /// Marked places of the abscissa.
     pub moments: Vec<Level>,
@@ -293,13 +269,13 @@ impl Plot {
         Self { series: series.into_iter().collect(), ..self }
     }
 
-    /// Where a point lies on its axes.
+    /// Position of a point on both axes.
     #[must_use]
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.x.scale.place(x), self.y.scale.place(y)]
     }
 
-    /// Names and inks of what has no name beside it: series, then stretches, each name once.
+    /// Names and inks of what has no name next to it: series, then stretches, each name once.
     pub fn legend(&self) -> Vec<(&str, Ink)> {
         let series = self.series.iter();
         let series = series.filter(|one| one.labels == Labels::None);

@@ -1,8 +1,9 @@
 //! A plot drawn into a rectangle of a picture for a file.
 
-use super::labels::{beside, pushed_apart};
+use super::labels::{label_position, spread_heights};
 use super::{Ink, Labels, Plot, Scale, Series, Shape, Stretch};
 use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
+use crate::panel::range;
 use crate::tokens::LIGHT;
 
 /// Letters are about so wide, in px.
@@ -58,12 +59,8 @@ impl Plot {
             (Some(range), scale) => range.map(|x| scale.place(x)),
             (None, Scale::Logarithmic) => Panel::around_logarithms(place, &placed).x,
             (None, Scale::Linear) => {
-                let ends = |start: f64, of: fn(f64, f64) -> f64| {
-                    placed.iter().map(|point| point[0]).fold(start, of)
-                };
-                let (low, high) =
-                    (ends(f64::INFINITY, f64::min), ends(f64::NEG_INFINITY, f64::max));
-                if low < high { [low, high] } else { [0.0, 1.0] }
+                let ends = range(placed.iter().map(|point| point[0]));
+                ends.filter(|[low, high]| low < high).unwrap_or([0.0, 1.0])
             }
         };
         let levels = self.levels.iter().map(|level| level.at);
@@ -157,7 +154,7 @@ impl Plot {
             })
             .collect();
         let heights: Vec<f64> = ends.iter().map(|(_, [_, y])| *y).collect();
-        for ((name, end), y) in ends.iter().zip(pushed_apart(&heights, [top, bottom])) {
+        for ((name, end), y) in ends.iter().zip(spread_heights(&heights, [top, bottom])) {
             svg.line(&[*end, [right + 14.0, y]], LIGHT.line, 0.6);
             let at = [right + 18.0, y + 0.35 * FONT];
             svg.text(at, text.anchored(Anchor::Start), name);
@@ -170,7 +167,7 @@ impl Plot {
                 continue;
             };
             for (place, [name, _]) in self.placed(panel, &one.points).into_iter().zip(names) {
-                let at = beside(place, [top, bottom], &points, &labels);
+                let at = label_position(place, [top, bottom], &points, &labels);
                 labels.push(at);
                 svg.text(at, text, name);
             }

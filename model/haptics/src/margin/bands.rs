@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 /// From a depth to a deeper one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DepthBand {
-    /// Where it begins.
     pub from: Depth,
     /// Where it ends, or the end of the stroke.
     pub to: Depth,

@@ -5,9 +5,9 @@
 //! (Colgate & Schenkel, Journal of Robotic Systems 14 (1997) 37-47). A delay of `d` ticks is a factor `e^{-j th d}`.
 //!
 //! Without delay and for any one-step scheme the right side is a ratio of two straight lines in `cos th`, so that its
-//! largest value is at one of the two ends, [`Sampled::slow`] and [`Sampled::fast`]. The tests check that against this.
+//! largest value is at one of the two ends, [`SampledStep::slow`] and [`SampledStep::fast`]. The tests check that against this.
 
-use super::linear::Sampled;
+use super::linear::SampledStep;
 use std::f64::consts::PI;
 
 /// Frequencies looked at, evenly in the logarithm of `th` and again evenly in `th`.
@@ -17,7 +17,7 @@ const SMALLEST: f64 = 1e-7;
 
 /// The right side of the criterion at `th` in `(0, pi]`, in N s/mm.
 #[must_use]
-pub fn needed_at(sampled: &Sampled, delay_ticks: f64, th: f64) -> f64 {
+pub fn damping_needed_at(sampled: &SampledStep, delay_ticks: f64, th: f64) -> f64 {
     // q = e^{-j th} = 1 - u, with u = 2 sin^2(th/2) + j sin th: small numbers without cancellation.
     let (half_sin, half_cos) = (0.5 * th).sin_cos();
     let u = [2.0 * half_sin * half_sin, 2.0 * half_sin * half_cos];
@@ -37,11 +37,11 @@ pub fn needed_at(sampled: &Sampled, delay_ticks: f64, th: f64) -> f64 {
 
 /// The largest value of the right side over all frequencies, in N s/mm, and the `th` it is at.
 #[must_use]
-pub fn needed(sampled: &Sampled, delay_ticks: f64) -> (f64, f64) {
+pub fn damping_needed(sampled: &SampledStep, delay_ticks: f64) -> (f64, f64) {
     let at_rest = sampled.both / sampled.share;
     let mut best = (sampled.slow() + at_rest * delay_ticks * sampled.tick, 0.0);
     let mut look = |th: f64| {
-        let value = needed_at(sampled, delay_ticks, th);
+        let value = damping_needed_at(sampled, delay_ticks, th);
         if value > best.0 {
             best = (value, th);
         }
@@ -59,7 +59,7 @@ pub fn needed(sampled: &Sampled, delay_ticks: f64) -> (f64, f64) {
         const SECTION: f64 = 0.618_033_988_749_894_9;
         for _ in 0..80 {
             let (a, b) = (high - SECTION * (high - low), low + SECTION * (high - low));
-            let [at_a, at_b] = [a, b].map(|th| needed_at(sampled, delay_ticks, th));
+            let [at_a, at_b] = [a, b].map(|th| damping_needed_at(sampled, delay_ticks, th));
             if at_a > at_b {
                 high = b
             } else {

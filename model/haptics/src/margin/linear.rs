@@ -25,12 +25,6 @@ impl Linear {
         Self { stiffness: slope, damping: body.tau_sig * x, tau: body.tau_eps }
     }
 
-    /// A spring without memory.
-    #[must_use]
-    pub fn spring(stiffness: f64) -> Self {
-        Self { stiffness, damping: 0.0, tau: 0.0 }
-    }
-
     /// Damping in N s/mm that the lag alone takes, at any tick: `k0 tau - c0`.
     pub fn lag(&self) -> f64 {
         self.stiffness * self.tau - self.damping
@@ -39,7 +33,7 @@ impl Linear {
 
 /// `F(+) = keep F + now x(+) + before x`: a step of length `tick` as a transfer function.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampled {
+pub struct SampledStep {
     /// Tick in s.
     pub tick: f64,
     /// Share of the force that goes: `1 - keep`.
@@ -52,7 +46,7 @@ pub struct Sampled {
     pub both: f64,
 }
 
-impl Sampled {
+impl SampledStep {
     /// Of a body by a scheme, its speed the difference of two depths, as the integrators take it.
     #[must_use]
     pub fn of(linear: &Linear, scheme: Scheme, tick: f64) -> Self {

@@ -1,8 +1,8 @@
-//! How much damping a device must have to render a body calmly, known before play and watched during it.
+//! The stability margin: damping that a device needs to render a body, before use and in every tick.
 //!
 //! With `k0 = g'(x0)`, `c0 = tau_sig x0`, `k_inf = c0 / tau_eps`, tick `T` and a delay of `d` ticks, the body about depth
 //! `x0`, stepped exactly, needs `b >= max(k0 (T/2 + d T + tau_eps) - c0, k_inf (T/2 + d T))` (from the criterion in
-//! [`criterion`], which the tests hold beside it). The first term has a part without `T`, `k0 tau_eps - c0`: where it is
+//! [`criterion`], which the tests compare with it). The first term has a part without `T`, `k0 tau_eps - c0`: where it is
 //! above zero the lag of the body itself returns energy, and no faster loop mends that.
 //!
 //! An encoder of step `D` lets a wall of stiffness `K` return `K D^2 / 2` unseen with every count, and Coulomb friction
@@ -14,7 +14,7 @@ pub mod criterion;
 mod linear;
 
 pub use bands::{DepthBand, active_cycles, active_pokes};
-pub use linear::{Linear, Sampled};
+pub use linear::{Linear, SampledStep};
 
 use super::Period;
 use palpate_model::units::{Depth, MmPerS, Newtons};
@@ -22,16 +22,15 @@ use palpate_rheology::families::POWER_MAX;
 use palpate_rheology::integrators::{Scheme, SeriesBody};
 use serde::{Deserialize, Serialize};
 
-/// What a device brings to the loop.
+/// Properties of a device that the stability margin depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Device {
     /// Its own damping in N s/mm; a voltage drive adds its motor's.
     pub damping: f64,
-    /// Its Coulomb friction.
     pub friction: Newtons,
     /// Step of its encoder at the handle, in mm.
     pub count_mm: f64,
-    /// Ticks from a count to the force made of it, beside the half tick that holding costs.
+    /// Ticks from a count to the force made of it, in addition to the half tick that holding costs.
     pub delay_ticks: f64,
 }
 
@@ -41,21 +40,18 @@ const DEPTHS: u32 = 1000;
 /// Everything the margin depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Watch {
-    /// The body rendered.
     pub body: SeriesBody<POWER_MAX>,
-    /// How it is stepped.
     pub scheme: Scheme,
-    /// The loop's tick.
     pub period: Period,
-    /// The device.
     pub device: Device,
 }
 
-/// What asks for the most damping.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Why damping is needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cause {
     /// The body's own lag: it needs this much at any tick.
+    #[default]
     Lag,
     /// Tick and delay, in slow motion.
     Tick,
@@ -64,9 +60,8 @@ pub enum Cause {
 }
 
 /// The margin at one depth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Margin {
-    /// Where.
     pub depth: Depth,
     /// Damping needed there in N s/mm; zero or less where the body brings its own.
     pub needed: f64,
@@ -76,7 +71,6 @@ pub struct Margin {
     pub cause: Cause,
     /// Friction needed against a buzz of a count or so.
     pub friction_needed: Newtons,
-    /// Friction there is.
     pub friction: Newtons,
 }
 
@@ -102,7 +96,7 @@ impl Watch {
     pub fn at(&self, depth: Depth, speed: MmPerS) -> Margin {
         let tick = self.period.seconds().0;
         let linear = Linear::of(&self.body, depth);
-        let sampled = Sampled::of(&linear, self.scheme, tick);
+        let sampled = SampledStep::of(&linear, self.scheme, tick);
         let delay = self.device.delay_ticks.max(0.0);
         let moving = self.moving(speed);
         let slow = sampled.slow() + linear.stiffness * delay * tick + moving;
@@ -133,13 +127,13 @@ impl Watch {
             return self.at(depth, speed);
         }
         let linear = Linear::of(&self.body, depth);
-        let sampled = Sampled::of(&linear, self.scheme, self.period.seconds().0);
-        let (needed, _) = criterion::needed(&sampled, self.device.delay_ticks.max(0.0));
+        let sampled = SampledStep::of(&linear, self.scheme, self.period.seconds().0);
+        let (needed, _) = criterion::damping_needed(&sampled, self.device.delay_ticks.max(0.0));
         Margin { needed: needed + self.moving(speed), ..self.at(depth, speed) }
     }
 
     /// Damping that tick and delay ask for where the probe moves in, in N s/mm: the viscous term `tau_sig x x'` then
-    /// has a stiffness of `tau_sig v` beside its damping. It counts for the tick alone; over a relaxation time the
+    /// has a stiffness of `tau_sig v` in addition to its damping. It counts for the tick alone; over a relaxation time the
     /// probe is elsewhere, and the term is the rate of `tau_sig x^2 / 2`, which no loop lives on.
     fn moving(&self, speed: MmPerS) -> f64 {
         let inwards = speed.0.max(0.0) * self.body.tau_sig.max(0.0);
@@ -153,7 +147,7 @@ impl Watch {
         (0..=DEPTHS).map(move |i| self.exactly_at(at(i), speed))
     }
 
-    /// What can be said before play of a stroke to `deepest`, entered at up to `speed`.
+    /// The margin over a stroke to `deepest`, entered at up to `speed`, before the device is used.
     pub fn before_play(&self, deepest: Depth, speed: MmPerS) -> Verdict {
         let all = || self.over(deepest, speed).chain(self.over(deepest, MmPerS(0.0)));
         let worst = |more: fn(&Margin, &Margin) -> bool| {
@@ -177,9 +171,9 @@ impl Watch {
 /// The margin before play.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Where the most damping is needed.
+    /// The margin where most damping is needed.
     pub worst: Margin,
-    /// Where the most friction is needed.
+    /// The margin where most friction is needed.
     pub loudest: Margin,
     /// Depths at which the device has less damping than needed.
     pub bands: Vec<DepthBand>,

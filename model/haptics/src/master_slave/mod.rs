@@ -16,11 +16,11 @@ use crate::torque::TorqueSettings;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 pub use settings::{MasterSlaveError, MasterSlaveSettings};
-pub use snapshot::Snapshot;
+pub use snapshot::MasterSlaveSnapshot;
 
-/// What comes in with a tick; the same inputs give the same outputs, bit by bit.
+/// Input of a tick; the same inputs give the same outputs, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Input {
+pub struct MasterSlaveInput {
     /// Counts of the master's encoder.
     pub counts: i64,
     /// Ticks since the last input: one, unless the loop was away.
@@ -29,20 +29,19 @@ pub struct Input {
     pub cell: Newtons,
     /// Pulses at which the slave is, from its start; `None` if it is taken to be where it was sent.
     pub slave_pulses: Option<i64>,
-    /// Whether force is wanted at all.
+    /// Whether force is requested at all.
     pub is_on: bool,
 }
 
-/// What goes out.
+/// Output of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Output {
+pub struct MasterSlaveOutput {
     /// Pulses for the slave in this tick.
     pub pulses: i64,
     /// Bias voltage of the master's motor, positive against motion into the tissue.
     pub bias: Volts,
     /// The force it stands for.
     pub force: Newtons,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -67,7 +66,7 @@ pub struct MasterSlave {
     direction: i64,
     still: u64,
     thermal: ThermalState,
-    snapshot: Snapshot,
+    snapshot: MasterSlaveSnapshot,
 }
 
 /// Ticks of a stall that the model is led through one by one; after longer ones its memory is as old as it was.
@@ -76,8 +75,8 @@ const CAUGHT_UP: u64 = 64;
 /// A count in 0.1 s is 0.15 mm/s with the source's encoder, a fifth of its slowest check.
 const HEADING_S: f64 = 0.1;
 
-/// What the controller sees of a tick.
-struct Touch {
+/// Input of the passivity controller.
+struct ControllerInput {
     is_touching: bool,
     is_on: bool,
     has_buzz: bool,
@@ -96,7 +95,7 @@ impl MasterSlave {
         let mm_per_pulse = settings.slave.mm_per_pulse;
         let ratio = GearRatio::one_to_one(pinion, &settings.encoder, mm_per_pulse)?;
         let count_mm = settings.count_mm();
-        let heard = settings.buzz.unwrap_or(BuzzSettings::of(count_mm));
+        let buzz_settings = settings.buzz.unwrap_or(BuzzSettings::of(count_mm));
         let depth = Depth(0.0 - settings.surface_mm);
         let watch = settings.watch();
         let delay_ticks = settings.delay_ticks.round() as usize;
@@ -107,8 +106,8 @@ impl MasterSlave {
             law: ForceLaw::new(settings.law, depth)?,
             guard: ForceGuard::new(&settings.guard, period),
             controller: controller.map(|one| PassivityController::new(&one, period)),
-            observer: PassivityObserver::late(delay_ticks),
-            buzz: BuzzDetector::new(&heard, period, 0.0),
+            observer: PassivityObserver::with_delay(delay_ticks),
+            buzz: BuzzDetector::new(&buzz_settings, period, 0.0),
             contact: ContactDetector::new(settings.contact),
             counter: EncoderCounter::new(&settings.encoder, period),
             gear: Gear::new(ratio, &settings.slave, period),
@@ -122,13 +121,13 @@ impl MasterSlave {
             direction: 0,
             still: 0,
             thermal,
-            snapshot: Snapshot::at_start(&watch, depth, thermal.winding_c),
+            snapshot: MasterSlaveSnapshot::at_start(&watch, depth, thermal.winding_c),
         })
     }
 
     /// Everything after the last tick.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot { checksum: self.snapshot.sum(), ..self.snapshot }
+    pub fn snapshot(&self) -> MasterSlaveSnapshot {
+        MasterSlaveSnapshot { checksum: self.snapshot.sum(), ..self.snapshot }
     }
 
     /// Which way the master goes, for what helps against friction: slow motion has many ticks without a count, so that a
@@ -158,20 +157,20 @@ impl MasterSlave {
         (law, flags)
     }
 
-    /// What of the model's force is asked for: a winding too hot gets no more than it may have for ever, until it
+    /// The model's force, bounded where the winding is too hot: it gets no more than it may have for ever, until it
     /// has cooled.
-    fn asked(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
+    fn bounded_force(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
         let lasting = if is_hot {
             self.torque.motor.continuous / self.torque.pinion.radius_mm()
         } else {
             f64::MAX
         };
-        let asked = if is_on { model.0 } else { 0.0 };
-        Newtons(asked.clamp(-lasting, lasting))
+        let requested = if is_on { model.0 } else { 0.0 };
+        Newtons(requested.clamp(-lasting, lasting))
     }
 
-    /// What the passivity controller makes of the guarded force.
-    fn damp(&mut self, guarded: Newtons, touch: &Touch) -> ControllerTick {
+    /// The guarded force with the damping of the passivity controller.
+    fn damp(&mut self, guarded: Newtons, touch: &ControllerInput) -> ControllerTick {
         let mut damped =
             ControllerTick { force: guarded, damping: 0.0, energy: 0.0, flags: Flags::NONE };
         let Some(controller) = &mut self.controller else {
@@ -179,8 +178,8 @@ impl MasterSlave {
         };
         // While what made it buzz lasts, so does the caution.
         let is_close = touch.is_touching && !self.snapshot.margin.is_enough();
-        if touch.has_buzz || (controller.is_hushed() && is_close) {
-            controller.heard_buzz();
+        if touch.has_buzz || (controller.is_credit_withheld() && is_close) {
+            controller.report_buzz();
         }
         let moved = (touch.moved, self.count_mm);
         let one = controller.tick(moved, touch.elapsed, guarded, touch.is_touching);
@@ -190,13 +189,13 @@ impl MasterSlave {
                 ..one
             };
         }
-        controller.rendered(damped.force);
+        controller.set_rendered_force(damped.force);
         damped
     }
 
     /// Takes one input and gives one output.
     #[must_use]
-    pub fn tick(&mut self, input: &Input) -> Output {
+    pub fn tick(&mut self, input: &MasterSlaveInput) -> MasterSlaveOutput {
         let elapsed = input.elapsed.max(1);
         let before = self.snapshot;
         let span = self.watch.period.seconds().0 * elapsed as f64;
@@ -205,27 +204,32 @@ impl MasterSlave {
         let (moved, mut flags) = self.counter.tick(input.counts, elapsed);
         let gear = self.gear.tick(input.counts);
         let slave = input.slave_pulses.unwrap_or(gear.made) as f64 * self.mm_per_pulse;
-        let wanted = Depth(slave - self.surface_mm);
+        let target = Depth(slave - self.surface_mm);
         flags |= gear.flags | self.contact.tick(input.cell);
         let is_touching = self.contact.is_touching();
-        let (law, law_flags) = self.lead(before.depth, wanted, elapsed);
+        let (law, law_flags) = self.lead(before.depth, target, elapsed);
         flags |= law_flags;
         let is_hot = self.thermal.winding_c > self.torque.motor.thermal.winding_max_c;
-        let asked = self.asked(law.force, input.is_on, is_hot);
+        let requested = self.bounded_force(law.force, input.is_on, is_hot);
         flags |= Flags::OFF.when(!input.is_on) | Flags::HOT.when(is_hot);
         if input.is_on && before.flags.has(Flags::OFF) {
             self.guard.restart();
         }
-        let guarded = self.guard.tick(asked, is_touching, elapsed);
+        let guarded = self.guard.tick(requested, is_touching, elapsed);
         flags |= guarded.flags;
         // What the loop makes of it.
         let master_mm = input.counts.saturating_sub(origin) as f64 * self.count_mm;
-        self.observer.moved(moved as f64 * self.count_mm);
+        self.observer.record_move(moved as f64 * self.count_mm);
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(master_mm, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
-        let touch =
-            Touch { is_touching, is_on: input.is_on, has_buzz: buzz.is_some(), moved, elapsed };
+        let touch = ControllerInput {
+            is_touching,
+            is_on: input.is_on,
+            has_buzz: buzz.is_some(),
+            moved,
+            elapsed,
+        };
         let damped = self.damp(guarded.force, &touch);
         let force = damped.force.0;
         flags |= damped.flags;
@@ -239,7 +243,7 @@ impl MasterSlave {
         let margin = self.watch.at(law.depth, MmPerS(0.0));
         flags |= torque.flags | Flags::MARGIN.when(is_touching && !margin.is_enough());
         let tick = before.tick.saturating_add(elapsed);
-        self.snapshot = Snapshot {
+        self.snapshot = MasterSlaveSnapshot {
             tick,
             time: self.watch.period.time_of(tick),
             counts: input.counts,
@@ -264,6 +268,6 @@ impl MasterSlave {
             flags,
             checksum: 0,
         };
-        Output { pulses: gear.pulses, bias: torque.bias, force: Newtons(force), flags }
+        MasterSlaveOutput { pulses: gear.pulses, bias: torque.bias, force: Newtons(force), flags }
     }
 }

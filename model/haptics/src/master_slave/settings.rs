@@ -1,14 +1,15 @@
-//! What a master-slave system is made of, and what makes none.
+//! Settings of a master-slave system.
 
 use crate::buzz::BuzzSettings;
-use crate::contact::{ContactError, ContactSettings};
+use crate::contact::{ContactSettings, ContactThresholdError};
 use crate::controller::ControllerSettings;
 use crate::force::{LawError, LawSettings};
 use crate::guard::GuardSettings;
 use crate::margin::{Device, Watch};
 use crate::observer::DELAY_MAX;
-use crate::rig::{Encoder, EncoderError, GearError, MotorError, SlaveDrive};
-use crate::torque::{TorqueError, TorqueSettings};
+use crate::rig::{Encoder, GearError, SlaveDrive};
+use crate::setting_error::{SettingError, SettingRange};
+use crate::torque::TorqueSettings;
 use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -16,9 +17,7 @@ use thiserror::Error;
 /// Everything a master-slave system is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MasterSlaveSettings {
-    /// The force law and the tick.
     pub law: LawSettings,
-    /// Bounds of the force.
     pub guard: GuardSettings,
     /// The passivity controller; `None` for none. Its delay is that of the system.
     pub controller: Option<ControllerSettings>,
@@ -26,9 +25,7 @@ pub struct MasterSlaveSettings {
     pub buzz: Option<BuzzSettings>,
     /// Thresholds of contact.
     pub contact: ContactSettings,
-    /// The master's encoder.
     pub encoder: Encoder,
-    /// The slave's drive.
     pub slave: SlaveDrive,
     /// The master's motor and what drives it.
     pub torque: TorqueSettings,
@@ -75,15 +72,10 @@ impl MasterSlaveSettings {
         self.encoder.checked()?;
         self.torque.motor.checked()?;
         self.torque.checked()?;
-        let device = [
-            ("damping", self.damping, "N s/mm", f64::MAX),
-            ("delay", self.delay_ticks, "ticks", DELAY_MAX as f64),
-        ];
-        for (name, value, unit, most) in device {
-            if !(0.0..=most).contains(&value) {
-                return Err(MasterSlaveError::Device { name, value, unit, most });
-            }
-        }
+        let damping = [("damping", self.damping, " N s/mm")];
+        SettingRange::NotNegative.check("a master", &damping)?;
+        let delay = [("delay", self.delay_ticks, " ticks")];
+        SettingRange::UpTo(DELAY_MAX as f64).check("a master", &delay)?;
         if !self.surface_mm.is_finite() {
             return Err(MasterSlaveError::Surface(self.surface_mm));
         }
@@ -109,37 +101,15 @@ impl MasterSlaveSettings {
 /// Settings that make no system.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MasterSlaveError {
-    /// The law.
     #[error(transparent)]
     Law(#[from] LawError),
-    /// The thresholds.
     #[error(transparent)]
-    Contact(#[from] ContactError),
-    /// The encoder.
-    #[error(transparent)]
-    Encoder(#[from] EncoderError),
-    /// The gear.
+    Contact(#[from] ContactThresholdError),
     #[error(transparent)]
     Gear(#[from] GearError),
-    /// The motor.
+    /// A number of encoder, motor, drive or master.
     #[error(transparent)]
-    Motor(#[from] MotorError),
-    /// Its drive.
-    #[error(transparent)]
-    Torque(#[from] TorqueError),
-    /// The device's own numbers.
-    #[error("a master with {name} = {value} {unit} is not possible; it is from 0 to {most} {unit}")]
-    Device {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// The largest there is.
-        most: f64,
-    },
-    /// The surface.
+    Setting(#[from] SettingError),
     #[error("the surface cannot be {0} mm from where the slave starts; give a finite distance")]
     Surface(f64),
 }

@@ -8,17 +8,14 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::Serialize;
 
 /// The state of everything after a tick, as screens and records take it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Snapshot {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MasterSlaveSnapshot {
     /// Ticks since the start, those away included.
     pub tick: u64,
-    /// The time of that.
     pub time: Nanos,
-    /// The master's encoder.
     pub counts: i64,
     /// Way of the master from its start, in mm.
     pub master_mm: f64,
-    /// Speed of the master.
     pub master_speed: MmPerS,
     /// Pulses sent to the slave since the start.
     pub pulses: i64,
@@ -26,11 +23,8 @@ pub struct Snapshot {
     pub behind: i64,
     /// Depth of the slave.
     pub depth: Depth,
-    /// Speed of the slave.
     pub speed: MmPerS,
-    /// Force on the cell.
     pub cell: Newtons,
-    /// Whether it touches.
     pub is_touching: bool,
     /// Force of the model.
     pub model: Newtons,
@@ -44,48 +38,22 @@ pub struct Snapshot {
     pub energy: f64,
     /// Torque commanded, in N mm.
     pub torque: f64,
-    /// Bias voltage.
     pub bias: Volts,
     /// Temperature of the motor's winding as its commands let expect, in degrees Celsius.
     pub winding_c: f64,
     /// A buzz, if there is one.
     pub buzz: Option<Buzz>,
-    /// The margin at this depth.
     pub margin: Margin,
-    /// What was special.
     pub flags: Flags,
-    /// Of all before, so that a torn copy is told.
+    /// Checksum of all fields above, so that a torn copy is detected.
     pub checksum: u64,
 }
 
-impl Snapshot {
+impl MasterSlaveSnapshot {
     /// Before the first tick.
     pub(super) fn at_start(watch: &Watch, depth: Depth, winding_c: f64) -> Self {
-        Self {
-            tick: 0,
-            time: Nanos::ZERO,
-            counts: 0,
-            master_mm: 0.0,
-            master_speed: MmPerS(0.0),
-            pulses: 0,
-            behind: 0,
-            depth,
-            speed: MmPerS(0.0),
-            cell: Newtons(0.0),
-            is_touching: false,
-            model: Newtons(0.0),
-            guarded: Newtons(0.0),
-            force: Newtons(0.0),
-            damping: 0.0,
-            energy: 0.0,
-            torque: 0.0,
-            bias: Volts(0.0),
-            winding_c,
-            buzz: None,
-            margin: watch.at(depth, MmPerS(0.0)),
-            flags: Flags::NONE,
-            checksum: 0,
-        }
+        let margin = watch.at(depth, MmPerS(0.0));
+        Self { depth, winding_c, margin, ..Self::default() }
     }
 
     /// FNV-1a over the bits of every field but the checksum.

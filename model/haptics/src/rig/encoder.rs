@@ -1,75 +1,44 @@
 //! The master's encoder: lines, edges and how fast they can be counted.
 
 use super::rack::Pinion;
-use crate::{Flags, Period};
+use crate::{Flags, Period, SettingError, SettingRange};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-/// Edges counted per line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Quadrature {
-    /// One.
-    X1,
-    /// Two.
-    X2,
-    /// All four.
-    X4,
-}
-
-impl Quadrature {
-    fn edges(self) -> u32 {
-        match self {
-            Self::X1 => 1,
-            Self::X2 => 2,
-            Self::X4 => 4,
-        }
-    }
-}
 
 /// An incremental encoder of two channels on the motor's shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Encoder {
     /// Lines per revolution.
     pub lines: u32,
-    /// Edges counted per line.
-    pub quadrature: Quadrature,
+    /// Edges counted per line: 1, 2 or, in full quadrature, 4.
+    pub edges_per_line: u32,
     /// Fastest lines per second that its channels follow.
     pub lines_per_s_max: f64,
-}
-
-/// No encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error(
-    "an encoder of {lines} lines and {rate} lines/s at most is not possible; give 1 line or more and a rate above zero"
-)]
-pub struct EncoderError {
-    /// Lines per revolution.
-    pub lines: u32,
-    /// Fastest lines per second.
-    pub rate: f64,
 }
 
 impl Default for Encoder {
     /// The source's catalogue: up to 1024 lines, times four, up to 100 kHz.
     fn default() -> Self {
-        Self { lines: 1024, quadrature: Quadrature::X4, lines_per_s_max: 100e3 }
+        Self { lines: 1024, edges_per_line: 4, lines_per_s_max: 100e3 }
     }
 }
 
 impl Encoder {
     /// Itself if it can count.
-    pub fn checked(self) -> Result<Self, EncoderError> {
-        if self.lines > 0 && self.lines_per_s_max > 0.0 && self.lines_per_s_max.is_finite() {
-            Ok(self)
-        } else {
-            Err(EncoderError { lines: self.lines, rate: self.lines_per_s_max })
-        }
+    pub fn checked(self) -> Result<Self, SettingError> {
+        const ENCODER: &str = "an encoder";
+        let positive = [
+            ("lines", f64::from(self.lines), ""),
+            ("largest rate", self.lines_per_s_max, " lines/s"),
+        ];
+        SettingRange::Positive.check(ENCODER, &positive)?;
+        let edges = [("edges per line", f64::from(self.edges_per_line), "")];
+        SettingRange::PositiveUpTo(4.0).check(ENCODER, &edges)?;
+        Ok(self)
     }
 
     /// Counts per revolution, the source's `N_R`.
     pub fn counts_per_rev(&self) -> f64 {
-        f64::from(self.lines) * f64::from(self.quadrature.edges())
+        f64::from(self.lines) * f64::from(self.edges_per_line)
     }
 
     /// Way of the rack per count, in mm.
@@ -79,7 +48,7 @@ impl Encoder {
 
     /// Fastest counts per second.
     pub fn counts_per_s_max(&self) -> f64 {
-        self.lines_per_s_max * f64::from(self.quadrature.edges())
+        self.lines_per_s_max * f64::from(self.edges_per_line)
     }
 }
 
@@ -114,14 +83,14 @@ mod tests {
     #[test]
     fn a_count_of_the_source_is_61_um_or_15() {
         let pinion = Pinion::default();
-        let one = Encoder { quadrature: Quadrature::X1, ..Encoder::default() };
+        let one = Encoder { edges_per_line: 1, ..Encoder::default() };
         assert!((one.count_mm(&pinion) - 0.061_359_2).abs() < 1e-7);
         assert!((Encoder::default().count_mm(&pinion) - 0.015_339_8).abs() < 1e-7);
         assert!(Encoder { lines: 0, ..one }.checked().is_err());
     }
 
     #[test]
-    fn faster_than_its_channels_is_told() {
+    fn faster_than_its_channels_is_reported() {
         // 100 kHz of lines are 400 counts a millisecond.
         let mut counter = EncoderCounter::new(&Encoder::default(), Period::MILLISECOND);
         assert_eq!(counter.tick(1_000_000, 1), (0, Flags::NONE));

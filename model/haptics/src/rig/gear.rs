@@ -59,7 +59,7 @@ impl GearRatio {
     }
 }
 
-/// How the slave's drive takes pulses.
+/// Pulse length and rate of the slave's drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SlaveDrive {
     /// Way of a pulse in mm.
@@ -85,7 +85,6 @@ pub struct GearTick {
     pub made: i64,
     /// Pulses that are due and wait for the drive.
     pub behind: i64,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -116,14 +115,14 @@ impl Gear {
     pub fn tick(&mut self, counts: i64) -> GearTick {
         let origin = *self.origin.get_or_insert(counts);
         let due = self.ratio.pulses(counts.saturating_sub(origin));
-        let wanted = due.saturating_sub(self.made);
-        let pulses = wanted.clamp(-self.per_tick_max, self.per_tick_max);
+        let target = due.saturating_sub(self.made);
+        let pulses = target.clamp(-self.per_tick_max, self.per_tick_max);
         self.made += pulses;
         GearTick {
             pulses,
             made: self.made,
-            behind: wanted - pulses,
-            flags: Flags::PULSE_RATE.when(pulses != wanted),
+            behind: target - pulses,
+            flags: Flags::PULSE_RATE.when(pulses != target),
         }
     }
 }
@@ -131,15 +130,14 @@ impl Gear {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Quadrature;
 
     #[test]
     fn the_ratio_is_the_source_s() {
         // G1: pi 20 / (0.015 N_R).
-        for (quadrature, wanted) in [(Quadrature::X1, 4.0906), (Quadrature::X4, 1.02265)] {
-            let encoder = Encoder { quadrature, ..Encoder::default() };
+        for (edges_per_line, target) in [(1, 4.0906), (4, 1.02265)] {
+            let encoder = Encoder { edges_per_line, ..Encoder::default() };
             let ratio = GearRatio::one_to_one(&Pinion::default(), &encoder, 0.015).unwrap();
-            assert!((ratio.pulses_per_count() - wanted).abs() < 5e-5);
+            assert!((ratio.pulses_per_count() - target).abs() < 5e-5);
             let exact = std::f64::consts::PI * 20.0 / (0.015 * encoder.counts_per_rev());
             assert!((ratio.pulses_per_count() - exact).abs() < 1e-14);
         }

@@ -13,7 +13,6 @@ pub struct Hand {
     pub stiffness: f64,
     /// Damper to the intended path, in N s/mm.
     pub damping: f64,
-    /// Where it wants to be.
     pub path: HandPath,
 }
 

@@ -8,9 +8,9 @@ mod motor;
 mod rack;
 mod thermal;
 
-pub use encoder::{Encoder, EncoderCounter, EncoderError, Quadrature};
+pub use encoder::{Encoder, EncoderCounter};
 pub use gear::{Gear, GearError, GearRatio, GearTick, SlaveDrive};
 pub use hand::{Hand, HandPath};
-pub use motor::{Drive, Motor, MotorError, MotorOrigin, MotorState};
+pub use motor::{DriveInput, Motor, MotorState};
 pub use rack::{Pinion, Rack, RackEnergies, RackForces};
 pub use thermal::{Thermal, ThermalState};

@@ -1,30 +1,15 @@
 //! A direct-current motor with its drive.
 
 use super::thermal::Thermal;
+use crate::{SettingError, SettingRange};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-palpate_model::named! {
-    /// Where a motor's numbers come from.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-    #[serde(rename_all = "kebab-case")]
-    pub enum MotorOrigin {
-        /// A catalogue or the user's own.
-        Given = "as given",
-        /// The source's 12 V winding, scaled to twice the voltage: twice the turns of half the section.
-        ScaledFrom12V =
-            "Faulhaber 3863H024C, scaled from the catalogue of the 12 V winding, to 5 %; its inertia is assumed",
-    }
-}
-
-/// What a motor is. Torque is in N mm, which is mN m.
+/// Motor constants. Torque is in N mm, which is mN m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motor {
-    /// Where the numbers come from.
-    pub origin: MotorOrigin,
-    /// Of the winding, in ohm.
+    /// Resistance of the winding in ohm.
     pub resistance: f64,
-    /// Of the winding, in H.
+    /// Inductance of the winding in H.
     pub inductance: f64,
     /// Torque per current, in N mm/A; a thousandth of it is the voltage per speed in V s/rad.
     pub torque_constant: f64,
@@ -36,20 +21,7 @@ pub struct Motor {
     pub continuous: f64,
     /// Largest voltage of its drive, in V.
     pub volts_max: f64,
-    /// Its heat.
     pub thermal: Thermal,
-}
-
-/// No motor.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error(
-    "a motor with {name} = {value} is not possible; it is a finite number, and above zero but for friction and inductance"
-)]
-pub struct MotorError {
-    /// Which number.
-    pub name: &'static str,
-    /// Its value.
-    pub value: f64,
 }
 
 impl Motor {
@@ -57,7 +29,6 @@ impl Motor {
     /// mN m, 110 mN m): constants double, resistance becomes four times as large. Inductance and inertia are in
     /// neither; 130 uH and 110 g cm^2 are of the size of the successor's 180 uH and 120 g cm^2.
     pub const SOURCE: Self = Self {
-        origin: MotorOrigin::ScaledFrom12V,
         resistance: 0.64,
         inductance: 130e-6,
         torque_constant: 33.6,
@@ -69,26 +40,25 @@ impl Motor {
     };
 
     /// Itself if its numbers are a motor's.
-    pub fn checked(self) -> Result<Self, MotorError> {
-        let above = [
-            ("resistance", self.resistance),
-            ("torque constant", self.torque_constant),
-            ("inertia", self.inertia_kg_mm2),
-            ("continuous torque", self.continuous),
-            ("largest voltage", self.volts_max),
-            ("thermal resistance of the winding", self.thermal.winding_case),
-            ("thermal resistance of the case", self.thermal.case_air),
-            ("time constant of the winding", self.thermal.winding_s),
-            ("time constant of the case", self.thermal.case_s),
-            ("heat that its winding stands", self.thermal.winding_max_c - self.thermal.air_c),
+    pub fn checked(self) -> Result<Self, SettingError> {
+        const MOTOR: &str = "a motor";
+        let thermal = &self.thermal;
+        let positive = [
+            ("resistance", self.resistance, " ohm"),
+            ("torque constant", self.torque_constant, " N mm/A"),
+            ("inertia", self.inertia_kg_mm2, " kg mm²"),
+            ("continuous torque", self.continuous, " N mm"),
+            ("largest voltage", self.volts_max, " V"),
+            ("thermal resistance of the winding", thermal.winding_case, " K/W"),
+            ("thermal resistance of the case", thermal.case_air, " K/W"),
+            ("time constant of the winding", thermal.winding_s, " s"),
+            ("time constant of the case", thermal.case_s, " s"),
+            ("largest temperature rise", thermal.winding_max_c - thermal.air_c, " K"),
         ];
-        let least = [("inductance", self.inductance), ("friction", self.friction)];
-        let bad = |value: f64| !(value.is_finite() && value >= 0.0);
-        let wrong = above.into_iter().find(|(_, v)| bad(*v) || *v == 0.0);
-        match wrong.or(least.into_iter().find(|(_, v)| bad(*v))) {
-            Some((name, value)) => Err(MotorError { name, value }),
-            None => Ok(self),
-        }
+        SettingRange::Positive.check(MOTOR, &positive)?;
+        let rest = [("inductance", self.inductance, " H"), ("friction", self.friction, " N mm")];
+        SettingRange::NotNegative.check(MOTOR, &rest)?;
+        Ok(self)
     }
 
     /// Voltage per speed in V s/rad.
@@ -107,12 +77,12 @@ impl Motor {
     }
 
     /// The current after `dt` s, the speed held over it: exact for the winding's own time constant.
-    pub fn after(&self, state: MotorState, drive: Drive, omega: f64, dt: f64) -> MotorState {
+    pub fn after(&self, state: MotorState, drive: DriveInput, omega: f64, dt: f64) -> MotorState {
         let emf = self.back_emf() * omega;
         let limit = |volts: f64| volts.clamp(-self.volts_max, self.volts_max);
         let settled = |volts: f64| (volts - emf) / self.resistance;
         let (amps, is_saturated) = match drive {
-            Drive::Voltage(volts) => {
+            DriveInput::Voltage(volts) => {
                 let within = limit(volts);
                 let to = settled(within);
                 let share = if self.inductance > 0.0 {
@@ -122,8 +92,8 @@ impl Motor {
                 };
                 (state.amps + (to - state.amps) * share, within != volts)
             }
-            // The inner loop of a current drive is fast beside a tick; what it cannot do is go beyond its voltage.
-            Drive::Current(amps) => {
+            // The inner loop of a current drive is fast compared with a tick, but it is limited to its voltage.
+            DriveInput::Current(amps) => {
                 let within = amps.clamp(settled(-self.volts_max), settled(self.volts_max));
                 (within, within != amps)
             }
@@ -132,9 +102,9 @@ impl Motor {
     }
 }
 
-/// What a drive is told.
+/// The input of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
+pub enum DriveInput {
     /// Volts on the winding.
     Voltage(f64),
     /// Amperes through it.
@@ -146,7 +116,7 @@ pub enum Drive {
 pub struct MotorState {
     /// Current in A.
     pub amps: f64,
-    /// Whether the drive could not do what it was told.
+    /// Whether the drive is at its limit.
     pub is_saturated: bool,
 }
 
@@ -166,21 +136,20 @@ mod tests {
         let amps = motor.continuous / motor.torque_constant;
         let hot = motor.thermal.settled(amps * amps * motor.resistance).winding_c;
         assert!((60.0..125.0).contains(&hot), "{hot}");
-        assert!(motor.origin.name().contains("scaled"));
     }
 
     #[test]
     fn voltage_lags_by_the_winding_and_current_does_not() {
         let motor = Motor::SOURCE;
         let dt = motor.inductance / motor.resistance;
-        let one = motor.after(MotorState::default(), Drive::Voltage(2.0), 0.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Voltage(2.0), 0.0, dt);
         assert!((one.amps - 2.0 / 0.64 * (1.0 - (-1f64).exp())).abs() < 1e-12);
-        let one = motor.after(MotorState::default(), Drive::Current(3.0), 10.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Current(3.0), 10.0, dt);
         assert_eq!((one.amps, one.is_saturated), (3.0, false));
         // 24 V less the speed's own voltage is all there is.
-        let one = motor.after(MotorState::default(), Drive::Current(100.0), 100.0, dt);
+        let one = motor.after(MotorState::default(), DriveInput::Current(100.0), 100.0, dt);
         assert!(one.is_saturated && (one.amps - (24.0 - 3.36) / 0.64).abs() < 1e-12);
-        let one = motor.after(MotorState::default(), Drive::Voltage(-30.0), 0.0, 1.0);
+        let one = motor.after(MotorState::default(), DriveInput::Voltage(-30.0), 0.0, 1.0);
         assert!(one.is_saturated && (one.amps + 37.5).abs() < 1e-12);
     }
 }

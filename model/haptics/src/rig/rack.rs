@@ -4,10 +4,8 @@ use super::hand::Hand;
 use crate::inertia;
 use serde::{Deserialize, Serialize};
 
-/// The pinion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pinion {
-    /// Teeth.
     pub teeth: u32,
     /// Module in mm: pitch diameter per tooth.
     pub module_mm: f64,
@@ -49,14 +47,13 @@ pub struct Rack {
     pub x: f64,
     /// Speed in mm/s.
     pub v: f64,
-    /// Where its energies went.
     pub energies: RackEnergies,
 }
 
-/// What acts on the rack over a step beside its own damping and friction.
+/// What acts on the rack over a step, apart from its own damping and friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RackForces {
-    /// Of the motor, in N, positive into the tissue.
+    /// Force of the motor in N, positive into the tissue.
     pub motor: f64,
     /// Intended place of the hand in the middle of the step, in mm, and its speed in mm/s.
     pub hand: [f64; 2],
@@ -65,13 +62,13 @@ pub struct RackForces {
 /// Energies in N mm since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RackEnergies {
-    /// That the motor put in.
+    /// Put in by the motor.
     pub motor: f64,
-    /// That the hand put in, through its spring and damper.
+    /// Put in by the hand, through its spring and damper.
     pub hand: f64,
-    /// That the device's damping took.
+    /// Taken by the device's damping.
     pub damping: f64,
-    /// That its friction took.
+    /// Taken by its friction.
     pub friction: f64,
 }
 
@@ -118,12 +115,6 @@ impl Rack {
         self.energies.friction += friction * moved;
         pull
     }
-
-    /// What is missing in the balance of energies, in N mm, from a start at rest: rounding alone.
-    pub fn residual(&self) -> f64 {
-        let RackEnergies { motor, hand, damping, friction } = self.energies;
-        motor + hand - damping - friction - self.kinetic()
-    }
 }
 
 #[cfg(test)]
@@ -145,7 +136,9 @@ mod tests {
         assert!((rack.x - 3.0).abs() < 1e-3, "{rack:?}");
         // Of the 2.25 N mm in the spring all is there.
         assert!((0.25 * rack.x * rack.x + rack.kinetic() - 2.25).abs() < 1e-11);
-        assert!(rack.residual().abs() < 1e-11, "{:e}", rack.residual());
+        let RackEnergies { motor, hand, damping, friction } = rack.energies;
+        let residual = motor + hand - damping - friction - rack.kinetic();
+        assert!(residual.abs() < 1e-11, "{residual:e}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! How hot the winding gets: winding and case as two bodies, each passing its heat on.
+//! Temperature of the winding: winding and case as two bodies in series.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,18 +32,10 @@ impl Thermal {
     };
 }
 
-impl Default for Thermal {
-    fn default() -> Self {
-        Self::SUCCESSOR
-    }
-}
-
 /// Temperatures in degrees Celsius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThermalState {
-    /// Of the winding.
     pub winding_c: f64,
-    /// Of the case.
     pub case_c: f64,
 }
 
@@ -53,7 +45,7 @@ impl Thermal {
         ThermalState { winding_c: self.air_c, case_c: self.air_c }
     }
 
-    /// Where `watts` for ever would lead.
+    /// Temperatures after `watts` for ever.
     pub fn settled(&self, watts: f64) -> ThermalState {
         let case_c = self.air_c + watts * self.case_air;
         ThermalState { winding_c: case_c + watts * self.winding_case, case_c }
@@ -80,7 +72,7 @@ mod tests {
 
     #[test]
     fn it_settles_where_resistances_say_and_on_their_time() {
-        let thermal = Thermal::default();
+        let thermal = Thermal::SUCCESSOR;
         let watts = 7.0;
         let mut state = thermal.cold();
         for _ in 0..50 {

@@ -4,16 +4,16 @@
 //! energies add up exactly). Turns carry no torque, as on the Omni: they are where the hand has them, in steps of
 //! the sensor.
 
-use super::{LED_MAX, SceneError, SceneSettings};
-use crate::Period;
-use crate::rig::{Hand, HandPath, Rack, RackEnergies, RackForces};
+use super::{LED_MAX, SceneSettings};
+use crate::rig::{Hand, HandPath, Rack, RackForces};
+use crate::{Period, SettingError, SettingRange};
 use serde::{Deserialize, Serialize};
 
 /// Parts of a tick in which the device moves: a quarter of a millisecond, a 30th of the period in which a firm hand's spring
 /// swings the lightest device.
 const PARTS: u32 = 4;
 
-/// Where a hand wants the stylus.
+/// Pose of the stylus that a hand intends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hand6 {
     /// x, y and z in mm. The surface at rest is z = 0, tissue is below; x and y begin at the mesh's first node.
@@ -88,61 +88,50 @@ impl Default for DeviceSettings {
 
 impl DeviceSettings {
     /// The settings themselves if there can be such a device.
-    pub fn checked(self) -> Result<Self, SceneError> {
+    pub fn checked(self) -> Result<Self, SettingError> {
+        const DEVICE: &str = "a device";
+        const MOST: f64 = 1e6;
         let [wide, deep, high] = self.workspace_mm;
-        let above_zero = [
-            ("mass_kg", self.mass_kg),
-            ("step_mm", self.step_mm),
-            ("turn_step_rad", self.turn_step_rad),
-            ("force_max_n", self.force_max_n),
-            ("force_continuous_n", self.force_continuous_n),
-            ("stiffness_max_n_per_mm", self.stiffness_max_n_per_mm),
-            ("workspace_mm", wide),
-            ("workspace_mm", deep),
-            ("workspace_mm", high),
-            ("hand_speed_max_mm_per_s", self.hand_speed_max_mm_per_s),
+        let positive = [
+            ("mass_kg", self.mass_kg, ""),
+            ("step_mm", self.step_mm, ""),
+            ("turn_step_rad", self.turn_step_rad, ""),
+            ("force_max_n", self.force_max_n, ""),
+            ("force_continuous_n", self.force_continuous_n, ""),
+            ("stiffness_max_n_per_mm", self.stiffness_max_n_per_mm, ""),
+            ("workspace_mm", wide, ""),
+            ("workspace_mm", deep, ""),
+            ("workspace_mm", high, ""),
+            ("hand_speed_max_mm_per_s", self.hand_speed_max_mm_per_s, ""),
         ];
+        SettingRange::PositiveUpTo(MOST).check(DEVICE, &positive)?;
         let or_zero = [
-            ("damping_n_s_per_mm", self.damping_n_s_per_mm),
-            ("friction_n", self.friction_n),
-            ("hand_mass_kg", self.hand_mass_kg),
-            ("hand_stiffness_n_per_mm", self.hand_stiffness_n_per_mm),
-            ("hand_damping_n_s_per_mm", self.hand_damping_n_s_per_mm),
+            ("damping_n_s_per_mm", self.damping_n_s_per_mm, ""),
+            ("friction_n", self.friction_n, ""),
+            ("hand_mass_kg", self.hand_mass_kg, ""),
+            ("hand_stiffness_n_per_mm", self.hand_stiffness_n_per_mm, ""),
+            ("hand_damping_n_s_per_mm", self.hand_damping_n_s_per_mm, ""),
         ];
-        let most = 1e6;
-        for (name, value) in above_zero {
-            if !(value > 0.0 && value <= most) {
-                return Err(SceneError::Device {
-                    name,
-                    value,
-                    wanted: "above 0 and up to 1000000",
-                });
-            }
-        }
-        for (name, value) in or_zero {
-            if !(value >= 0.0 && value <= most) {
-                return Err(SceneError::Device { name, value, wanted: "from 0 to 1000000" });
-            }
-        }
+        SettingRange::UpTo(MOST).check(DEVICE, &or_zero)?;
         Ok(self)
     }
 
-    /// `force` as far as the device can give it, the same way, and whether it is less than asked for.
+    /// `force` as far as the device can give it, the same way, and whether it is less than requested.
     #[must_use]
-    pub fn given(&self, force: [f64; 3]) -> ([f64; 3], bool) {
-        let asked = length(force);
-        if asked <= self.force_max_n {
+    pub fn limit_force(&self, force: [f64; 3]) -> ([f64; 3], bool) {
+        let requested = length(force);
+        if requested <= self.force_max_n {
             return (force, false);
         }
-        if !asked.is_finite() {
+        if !requested.is_finite() {
             return ([0.0; 3], true);
         }
-        let share = self.force_max_n / asked;
+        let share = self.force_max_n / requested;
         (force.map(|part| share * part), true)
     }
 }
 
-/// What a device senses.
+/// Pose of the stylus as the device senses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Place of the stylus in mm.
@@ -151,14 +140,13 @@ pub struct Pose {
     pub turn: [f64; 3],
 }
 
-/// The device with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct SimulatedDevice {
     settings: DeviceSettings,
     middle: [f64; 3],
     tick_s: f64,
     axes: [Rack; 3],
-    /// Where the hand wants it, after the bounds of speed and workspace.
+    /// Position that the hand intends, within the bounds of speed and workspace.
     aim: [f64; 3],
     turn: [f64; 3],
 }
@@ -170,7 +158,7 @@ impl SimulatedDevice {
         period: Period,
         middle: [f64; 3],
         at: [f64; 3],
-    ) -> Result<Self, SceneError> {
+    ) -> Result<Self, SettingError> {
         let settings = settings.checked()?;
         let mass_kg = settings.mass_kg + settings.hand_mass_kg;
         let axis = |x| Rack::new(mass_kg, settings.damping_n_s_per_mm, [settings.friction_n; 2], x);
@@ -185,17 +173,16 @@ impl SimulatedDevice {
     }
 
     /// The device of a scene, over the middle of its tissue.
-    pub fn of(settings: &SceneSettings) -> Result<Self, SceneError> {
+    pub fn of(settings: &SceneSettings) -> Result<Self, SettingError> {
         let (middle, start) = (settings.middle(), settings.start());
         Self::new(settings.device, settings.period, middle, start)
     }
 
-    /// What it is.
     pub fn settings(&self) -> &DeviceSettings {
         &self.settings
     }
 
-    /// What it senses, in whole steps of its sensors.
+    /// The sensed pose, in whole steps of the sensors.
     pub fn pose(&self) -> Pose {
         let stepped = |value: f64, step: f64| (value / step).round() * step;
         Pose {
@@ -204,33 +191,16 @@ impl SimulatedDevice {
         }
     }
 
-    /// True places in mm and speeds in mm/s.
-    pub fn motion(&self) -> [[f64; 3]; 2] {
-        [self.axes.map(|axis| axis.x), self.axes.map(|axis| axis.v)]
-    }
-
-    /// Where its energies went so far, in N mm, of all axes together.
-    pub fn energies(&self) -> RackEnergies {
-        let mut sum = RackEnergies::default();
-        for axis in &self.axes {
-            sum.motor += axis.energies.motor;
-            sum.hand += axis.energies.hand;
-            sum.damping += axis.energies.damping;
-            sum.friction += axis.energies.friction;
-        }
-        sum
-    }
-
-    /// Energy of its motion in N mm.
-    pub fn kinetic(&self) -> f64 {
-        self.axes.iter().map(Rack::kinetic).sum()
+    /// True motion and energies along x, y and z.
+    pub fn axes(&self) -> &[Rack; 3] {
+        &self.axes
     }
 
     /// Moves through `ticks` ticks, a thousand at most, with `force` (N) held on the stylus, led by a hand. A hand at no number
     /// stays where it was.
     pub fn follow(&mut self, hand: Hand6, force: [f64; 3], ticks: u64) {
-        let (force, _) = self.settings.given(force);
-        let wanted = if hand.is_finite() {
+        let (force, _) = self.settings.limit_force(force);
+        let target = if hand.is_finite() {
             self.turn = hand.turn;
             [0, 1, 2].map(|axis| {
                 let reach = 0.5 * self.settings.workspace_mm[axis];
@@ -240,12 +210,12 @@ impl SimulatedDevice {
             self.aim
         };
         for _ in 0..ticks.min(LED_MAX) {
-            self.tick(wanted, force);
+            self.tick(target, force);
         }
     }
 
-    fn tick(&mut self, wanted: [f64; 3], force: [f64; 3]) {
-        let way = [0, 1, 2].map(|axis| wanted[axis] - self.aim[axis]);
+    fn tick(&mut self, target: [f64; 3], force: [f64; 3]) {
+        let way = [0, 1, 2].map(|axis| target[axis] - self.aim[axis]);
         let share =
             (self.settings.hand_speed_max_mm_per_s * self.tick_s / length(way).max(1e-12)).min(1.0);
         let speed = way.map(|part| part * share / self.tick_s);

@@ -7,19 +7,19 @@
 //! hands.
 
 mod device;
-mod led;
+mod hand_led;
+mod no_force_reason;
 mod path;
 mod settings;
-mod why;
 
 pub use device::{DeviceSettings, Hand6, Pose, SimulatedDevice};
-pub use led::LedScene;
+pub use hand_led::LedScene;
+pub use no_force_reason::WhyNoForce;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
-pub use why::WhyNoForce;
 
 use crate::surface::{
-    Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, Touch, TouchState,
+    Contact, HeightField, Proxy, ProxyTouch, Recovery, Rect, Side, Surface, TouchState, dot,
 };
 use crate::{
     BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
@@ -31,12 +31,11 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 /// Ticks of a stall that device and law are led through; after longer ones they stand where they were.
 const LED_MAX: u64 = 1000;
 
-/// What a tick did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SceneTick {
     /// Ticks since the start.
     pub tick: u64,
-    /// Sensed place of the stylus in mm.
+    /// SensedPosition place of the stylus in mm.
     pub device: [f64; 3],
     /// Its sensed yaw, pitch and roll in rad.
     pub turn: [f64; 3],
@@ -46,13 +45,12 @@ pub struct SceneTick {
     pub normal: [f64; 3],
     /// Depth of the stylus below the contact point along the normal in mm; zero without contact.
     pub depth: f64,
-    /// How fast the stylus goes in along the normal, in mm/s.
+    /// Speed of the stylus into the tissue along the normal, in mm/s.
     pub speed: f64,
     /// Force on the hand in N.
     pub force: [f64; 3],
-    /// Whether the device gives less than it was asked for.
+    /// Whether the device gives less than requested.
     pub is_saturated: bool,
-    /// What takes force away.
     pub why: WhyNoForce,
     /// Damping added by the passivity controller in N s/mm.
     pub injected_damping: f64,
@@ -64,7 +62,6 @@ pub struct SceneTick {
     pub moved: usize,
     /// Hash of one row of the surface, of the next row in every tick: a look at all of it in as many ticks as it has rows.
     pub row_hash: u64,
-    /// What was special.
     pub flags: Flags,
 }
 
@@ -86,7 +83,7 @@ pub struct Scene {
     controller: Option<PassivityController>,
     observer: PassivityObserver,
     buzz: BuzzDetector,
-    /// How far the stylus is below the surface at rest; above it less than zero.
+    /// Depth of the stylus below the surface at rest in mm; negative above it.
     below: f64,
     last: SceneTick,
     dirty: Rect,
@@ -99,18 +96,18 @@ impl Scene {
         let period = settings.period;
         let pose = SimulatedDevice::of(&settings)?.pose();
         let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
-        let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
+        let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut);
         let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
-        let heard = BuzzSettings::of(settings.device.step_mm);
+        let buzz_settings = BuzzSettings::of(settings.device.step_mm);
         Ok(Self {
             surface,
-            proxy: Proxy::new(settings.friction, f64::INFINITY)?,
+            proxy: Proxy::new(settings.friction)?,
             law: ForceLaw::new(law, Depth(below))?,
             guard: ForceGuard::new(&settings.guard, period),
             controller: settings.controller.map(|one| PassivityController::new(&one, period)),
             observer: PassivityObserver::default(),
-            buzz: BuzzDetector::new(&heard, period, below),
+            buzz: BuzzDetector::new(&buzz_settings, period, below),
             below,
             last: SceneTick {
                 device: pose.at,
@@ -125,12 +122,10 @@ impl Scene {
         })
     }
 
-    /// What it is made of.
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
-    /// The surface.
     pub fn field(&self) -> &HeightField {
         self.surface.field()
     }
@@ -140,7 +135,6 @@ impl Scene {
         self.dirty
     }
 
-    /// The last tick.
     pub fn last(&self) -> SceneTick {
         self.last
     }
@@ -170,16 +164,16 @@ impl Scene {
                 let rest = self.field().at_rest().at(x, y);
                 rest.map_or(before, |(height, _)| height - z).min(0.0)
             }
-            // Nothing is below it beside the mesh, and nothing is known of it without a place.
+            // Outside the mesh nothing is below the stylus.
             TouchState::Outside => before.min(0.0),
             TouchState::NotANumber => before,
         };
-        let (wanted, mut flags) = self.led(before, elapsed);
-        let guarded = self.guard.tick(wanted, is_contact, elapsed);
+        let (target, mut flags) = self.advance_law(before, elapsed);
+        let guarded = self.guard.tick(target, is_contact, elapsed);
         flags |= guarded.flags;
         // What the loop makes of it, along the normal.
         let counts = ((self.below - before) / self.settings.device.step_mm).round() as i64;
-        self.observer.moved(self.below - before);
+        self.observer.record_move(self.below - before);
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(self.below, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
@@ -187,7 +181,7 @@ impl Scene {
         let mut injected_damping = 0.0;
         if let Some(controller) = &mut self.controller {
             if buzz.is_some() {
-                controller.heard_buzz();
+                controller.report_buzz();
             }
             let step = self.settings.device.step_mm;
             let one = controller.tick((counts, step), elapsed, along, is_contact);
@@ -195,13 +189,13 @@ impl Scene {
             injected_damping = one.damping;
             flags |= one.flags;
         }
-        let asked = self.felt(&touch, along);
-        let (force, is_saturated) = self.settings.device.given(asked);
-        let given = Newtons(dot(force, touch.normal));
+        let requested = self.force_on_hand(&touch, along);
+        let (force, is_saturated) = self.settings.device.limit_force(requested);
+        let rendered = Newtons(dot(force, touch.normal));
         if let Some(controller) = &mut self.controller {
-            controller.rendered(given);
+            controller.set_rendered_force(rendered);
         }
-        self.observer.hold(given.0);
+        self.observer.hold(rendered.0);
         self.press(&touch);
         let is_saturated = is_saturated || flags.has(Flags::FORCE_MAX);
         let device = &self.settings.device;
@@ -229,7 +223,7 @@ impl Scene {
     }
 
     /// The law's force, after it was led straight through what was missed.
-    fn led(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
+    fn advance_law(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
         let steps = elapsed.min(LED_MAX);
         let way = (self.below - before) / steps as f64;
         let mut flags = Flags::NONE;
@@ -245,7 +239,7 @@ impl Scene {
 
     /// The force on the hand where `along` is what there is along the normal: friction goes with what the model gives, and damping
     /// has none.
-    fn felt(&self, touch: &Touch, along: Newtons) -> [f64; 3] {
+    fn force_on_hand(&self, touch: &ProxyTouch, along: Newtons) -> [f64; 3] {
         let push = along.0.max(0.0);
         let with_friction = touch.force(push);
         let pull = along.0 - if touch.is_contact() { push } else { 0.0 };
@@ -253,14 +247,14 @@ impl Scene {
     }
 
     /// The surface follows the stylus from the contact point down.
-    fn press(&mut self, touch: &Touch) {
+    fn press(&mut self, touch: &ProxyTouch) {
         let [x, y, z] = touch.point;
         let contact = Contact { x, y, z: z - touch.depth, side: Side::Push };
         let contacts = [contact];
         let contacts = if touch.is_contact() { &contacts[..] } else { &[] };
-        let told = self.surface.tick(contacts);
-        self.dirty = told.dirty;
-        self.moved = told.moved.moved;
+        let report = self.surface.tick(contacts);
+        self.dirty = report.dirty;
+        self.moved = report.moved.moved;
     }
 
     fn row_hash(&self, tick: u64) -> u64 {
@@ -275,8 +269,4 @@ fn hash(heights: &[f64]) -> u64 {
     let mix =
         |hash: u64, z: &f64| (hash ^ z.to_bits()).wrapping_mul(0x0100_0000_01b3).rotate_left(23);
     heights.iter().fold(0xcbf2_9ce4_8422_2325, mix)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
 palpate_model::named! {
-    /// What a hand does, from the scene's start and back to it.
+    /// A path of the hand, from the scene's start and back to it.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum ScenePath {
         /// Down to 8 mm and up again, once.
@@ -24,13 +24,13 @@ palpate_model::named! {
 const WAY_S: f64 = 0.5;
 
 impl ScenePath {
-    /// How long it takes in s.
+    /// Duration in s.
     #[must_use]
     pub fn seconds(self) -> f64 {
         2.0 * WAY_S + self.contact_s()
     }
 
-    /// How long it is at the surface or below, in s.
+    /// Time at the surface or below it, in s.
     fn contact_s(self) -> f64 {
         match self {
             Self::Poke | Self::Taps => 2.0,
@@ -39,19 +39,19 @@ impl ScenePath {
         }
     }
 
-    /// Where the hand wants the stylus at `t_s` s; before and after at the scene's start.
+    /// Intended pose at `t_s` s; before and after, the scene's start.
     #[must_use]
     pub fn at(self, t_s: f64, settings: &SceneSettings) -> Hand6 {
         let [x, y, high] = settings.start();
         let whole = self.contact_s();
         let t = t_s - WAY_S;
-        let gone = t.clamp(0.0, whole);
-        let share = gone / whole;
+        let passed = t.clamp(0.0, whole);
+        let share = passed / whole;
         // Down from the start and up to it without a jerk.
         let away = if t < 0.0 { -t } else { t - whole }.clamp(0.0, WAY_S) / WAY_S;
         let above = high * eased(away);
         // In and out again in a quarter of a second.
-        let edge = (gone.min(whole - gone) / 0.25).min(1.0);
+        let edge = (passed.min(whole - passed) / 0.25).min(1.0);
         let (depth, aside, lean) = match self {
             Self::Poke => (8.0 * (PI * share).sin().powi(2), 0.0, 0.0),
             Self::Press => (5.0 * eased(edge), 0.0, 0.0),

@@ -1,9 +1,8 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, RecoveryError};
-use crate::surface::{ProxyError, Shear};
-use crate::{ControllerSettings, GuardSettings, LawError, Period};
+use crate::surface::{Cut, Grid, HeightField, MeshError, Method};
+use crate::{ControllerSettings, GuardSettings, LawError, Period, SettingError};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::Scheme;
@@ -27,15 +26,12 @@ pub struct SceneSettings {
     pub recovery_s: f64,
     /// Friction coefficient between stylus and tissue.
     pub friction: f64,
-    /// The device.
     pub device: DeviceSettings,
     /// From tick to tick.
     pub period: Period,
-    /// How the force law is stepped.
     pub scheme: Scheme,
-    /// How the surface is found.
     pub method: Method,
-    /// How far a contact's effect on the surface is followed.
+    /// Bounds of a contact's influence on the surface.
     pub cut: Cut,
     /// Bounds of the force along the normal; those of the device come after.
     pub guard: GuardSettings,
@@ -79,7 +75,7 @@ impl SceneSettings {
         [0.5 * self.side_mm, 0.5 * self.side_mm, 0.0]
     }
 
-    /// Where the stylus is at the start, in mm.
+    /// Position of the stylus at the start, in mm.
     pub fn start(&self) -> [f64; 3] {
         let [x, y, _] = self.middle();
         [x, y, START_HEIGHT_MM]
@@ -109,37 +105,18 @@ impl SceneSettings {
         // A spacing that is none is refused with the grid.
         let spacing = self.side_mm / self.nodes.saturating_sub(1) as f64;
         let grid = Grid::new(self.nodes, self.nodes, spacing)?;
-        let shear = Shear::Uniform(self.max_shear_mm);
-        Ok(HeightField::new(grid, vec![0.0; grid.nodes()], shear)?)
+        Ok(HeightField::flat(grid, self.max_shear_mm)?)
     }
 }
 
 /// A scene that cannot be.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SceneError {
-    /// Its mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// Its force law.
     #[error(transparent)]
     Law(#[from] LawError),
-    /// Its contact point.
+    /// A number of its device, its friction or its recovery.
     #[error(transparent)]
-    Proxy(#[from] ProxyError),
-    /// Its way back to rest.
-    #[error(transparent)]
-    Recovery(#[from] RecoveryError),
-    /// How its surface is found.
-    #[error(transparent)]
-    Method(#[from] MethodError),
-    /// Its device.
-    #[error("a device with {name} = {value} is not possible; {name} is {wanted}")]
-    Device {
-        /// Which number.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        wanted: &'static str,
-    },
+    Setting(#[from] SettingError),
 }

@@ -5,10 +5,10 @@
 //!
 //! A moved node offers each of its neighbours a move. A neighbour that is further away in height than
 //! MaxShear moves just enough, once in a pass. The order matters: the first move that reaches a node must
-//! be the largest, and with one limit for all that is the one over the fewest links. Where limits
-//! differ it is not, and [`sorted`](super::sorted) is needed.
+//! be the largest, and with one limit for all that is the one over the fewest links.
 
-use super::contact::{Cut, Moved, Poke, Side};
+use super::contact::{Cut, MoveCounts, Poke, Side};
+use super::envelope::height;
 use super::grid::{Grid, Node, Rect};
 use super::mesh::HeightField;
 
@@ -24,7 +24,7 @@ pub(super) struct Chain {
     rows: [u16; 2],
 }
 
-/// Which nodes moved in this pass.
+/// Marks of the nodes that moved in this pass.
 #[derive(Clone, Debug)]
 pub(super) struct Stamps {
     of: Box<[u32]>,
@@ -40,7 +40,7 @@ impl Stamps {
     pub(super) fn begin(&mut self) {
         self.pass = self.pass.wrapping_add(1);
         if self.pass == 0 {
-            // After 4 thousand million passes the numbers begin anew.
+            // After 4 thousand million passes the numbers repeat.
             self.of.fill(0);
             self.pass = 1;
         }
@@ -64,24 +64,8 @@ impl Stamps {
 
 /// How far a height is beyond what is allowed of it, in mm; above zero: it has to move.
 #[inline(always)]
-pub(super) fn beyond<const PULL: bool>(z: f64, allowed: f64) -> f64 {
+pub(super) fn excess<const PULL: bool>(z: f64, allowed: f64) -> f64 {
     if PULL { allowed - z } else { z - allowed }
-}
-
-/// The furthest that a neighbour of a node at `z` may be.
-#[inline(always)]
-pub(super) fn allowed<const PULL: bool>(z: f64, limit: f64) -> f64 {
-    if PULL { z - limit } else { z + limit }
-}
-
-/// What a pass tells where nothing is to move: the contact does not reach its node, or the node is pinned.
-#[inline(always)]
-pub(super) fn unmoved<const PULL: bool>(field: &HeightField, poke: Poke) -> Option<Moved> {
-    let node = field.grid.index(poke.node);
-    if beyond::<PULL>(field.now[node], poke.z) <= 0.0 {
-        return Some(Moved::default());
-    }
-    field.is_pinned(poke.node).then(|| Moved { held: 1, ..Moved::default() })
 }
 
 impl Chain {
@@ -102,7 +86,7 @@ impl Chain {
         shear: f64,
         cut: Cut,
         poke: Poke,
-    ) -> Moved {
+    ) -> MoveCounts {
         self.stamps.begin();
         self.moved = 0;
         match poke.side {
@@ -117,12 +101,12 @@ impl Chain {
         shear: f64,
         cut: Cut,
         poke: Poke,
-    ) -> Moved {
-        if let Some(told) = unmoved::<PULL>(field, poke) {
-            return told;
-        }
-        let mut told = Moved::default();
+    ) -> MoveCounts {
         let seed = field.grid.index(poke.node);
+        if excess::<PULL>(field.now[seed], poke.z) <= 0.0 {
+            return MoveCounts::default();
+        }
+        let mut counts = MoveCounts::default();
         self.rows = [poke.node.row, poke.node.row + 1];
         self.put(field, poke.node, seed, poke.z);
         let [last_column, last_row] = [field.grid.columns() - 1, field.grid.rows() - 1];
@@ -135,18 +119,15 @@ impl Chain {
                 continue;
             }
             let index = field.grid.index(Node { column, row });
-            let allowed = allowed::<PULL>(field.now[index], shear);
+            let allowed = height::<PULL>(field.now[index], 1.0, shear);
             let mut offer = |column, row, index| {
-                told.visited += 1;
+                counts.visited += 1;
                 // Nodes that moved are mostly where they may be: looking at the height first saves
                 // looking at the mark.
-                if beyond::<PULL>(field.now[index], allowed) > cut.threshold()
+                if excess::<PULL>(field.now[index], allowed) > cut.threshold()
                     && !self.stamps.has(index)
                 {
-                    let node = Node { column, row };
-                    if !field.is_pinned(node) {
-                        self.put(field, node, index, allowed);
-                    }
+                    self.put(field, Node { column, row }, index, allowed);
                 }
             };
             if column > 0 {
@@ -162,9 +143,12 @@ impl Chain {
                 offer(column, row + 1, index + columns);
             }
         }
-        finish::<PULL>(field, poke.z, self.rows);
-        told.moved = self.moved;
-        told
+        let rows = self.rows.map(u32::from);
+        field.displaced.widen(Rect { rows, ..field.grid.whole() });
+        field.displaced.tighten();
+        extend_bounds::<PULL>(field, poke.z);
+        counts.moved = self.moved;
+        counts
     }
 
     #[inline(always)]
@@ -184,16 +168,8 @@ impl Chain {
     }
 }
 
-/// Notes in which rows a pass moved something, and how far nodes may now be.
-pub(super) fn finish<const PULL: bool>(field: &mut HeightField, z: f64, rows: [u16; 2]) {
-    let whole = field.grid.whole();
-    field.displaced.widen(Rect { rows: rows.map(u32::from), ..whole });
-    field.displaced.tighten();
-    reaches::<PULL>(field, z);
-}
-
 /// Notes how far nodes may now be.
-pub(super) fn reaches<const PULL: bool>(field: &mut HeightField, z: f64) {
+pub(super) fn extend_bounds<const PULL: bool>(field: &mut HeightField, z: f64) {
     let [lowest, highest] = &mut field.bounds;
     if PULL {
         *highest = highest.max(z);

@@ -1,10 +1,9 @@
-//! What touches a surface, and how far its effect is followed.
+//! Contacts with a surface, and bounds of their influence.
 
 use super::grid::{Grid, Node};
 use super::mesh::HIGHEST_MM;
-use thiserror::Error;
+use crate::{SettingError, SettingRange};
 
-/// Which way a contact moves the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The surface is never above it: down where it is.
@@ -20,13 +19,11 @@ pub struct Contact {
     pub x: f64,
     /// Along rows, in mm.
     pub y: f64,
-    /// Height in mm.
     pub z: f64,
-    /// Which way.
     pub side: Side,
 }
 
-/// What of a displacement is left out.
+/// Bounds of a contact's influence, for speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut {
     /// Most steps along the axes from a contact to a node it moves.
@@ -35,20 +32,14 @@ pub struct Cut {
     threshold: f64,
 }
 
-/// A cut that cannot be.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("a movement threshold of {0} mm is not possible; it is a finite length, zero or more")]
-pub struct CutError(pub f64);
-
 impl Cut {
     /// Nothing is left out.
     pub const NONE: Self = Self { range: u32::MAX, threshold: 0.0 };
 
     /// No further than `range` steps (`None`: however far), nor where less than `threshold` mm.
-    pub fn new(range: Option<u32>, threshold: f64) -> Result<Self, CutError> {
-        if !(threshold >= 0.0 && threshold.is_finite()) {
-            return Err(CutError(threshold));
-        }
+    pub fn new(range: Option<u32>, threshold: f64) -> Result<Self, SettingError> {
+        let settings = [("movement threshold", threshold, " mm")];
+        SettingRange::NotNegative.check("a cut", &settings)?;
         Ok(Self { range: range.unwrap_or(u32::MAX), threshold })
     }
 
@@ -97,21 +88,17 @@ impl Contact {
     }
 }
 
-/// What a pass did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Moved {
+pub struct MoveCounts {
     /// Nodes moved by contacts, counted once for each contact.
     pub moved: usize,
     /// Nodes or links looked at for it.
     pub visited: usize,
-    /// Contacts that would have moved a pinned node, and so moved nothing.
-    pub held: usize,
 }
 
-impl Moved {
+impl MoveCounts {
     pub(super) fn add(&mut self, other: Self) {
         self.moved += other.moved;
         self.visited += other.visited;
-        self.held += other.held;
     }
 }

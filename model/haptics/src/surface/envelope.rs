@@ -10,11 +10,11 @@
 //! A minimum needs no order, no marks and no queue: rows are worked through from one end to the other,
 //! recovery and all contacts in one go over memory, no further than a contact can reach.
 
-use super::chain::{beyond, reaches};
-use super::contact::{Cut, Moved, Poke, Side};
+use super::chain::{excess, extend_bounds};
+use super::contact::{Cut, MoveCounts, Poke, Side};
 use super::grid::{Grid, Node, Rect};
-use super::mesh::{HeightField, Pins};
-use super::recover::{Recovery, trimmed};
+use super::mesh::HeightField;
+use super::recover::{Recovery, trim_span};
 use palpate_rheology::vectors::wide;
 
 /// Contacts that are worked through together.
@@ -34,7 +34,7 @@ struct Cone {
 
 const NO_CONE: Cone = Cone { poke: Poke::NOWHERE, reach: 0 };
 
-/// What is made once.
+/// Tables that are made once.
 #[derive(Clone, Debug)]
 pub(super) struct Envelope {
     shear: f64,
@@ -58,30 +58,29 @@ pub(super) fn tick(
     recovery: Recovery,
     cut: Cut,
     pokes: &[Poke],
-) -> Moved {
-    let mut told = Moved::default();
+) -> MoveCounts {
+    let mut counts = MoveCounts::default();
     let mut cones = [NO_CONE; TOGETHER];
     let mut count = 0;
     let mut touched = Rect::EMPTY;
     for &poke in pokes {
-        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count], &mut told) {
+        if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count]) {
             cones[count] = cone;
             count += 1;
             touched = touched.union(cone.rect(&field.grid));
             match poke.side {
-                Side::Push => reaches::<false>(field, poke.z),
-                Side::Pull => reaches::<true>(field, poke.z),
+                Side::Push => extend_bounds::<false>(field, poke.z),
+                Side::Pull => extend_bounds::<true>(field, poke.z),
             }
         }
     }
     let cones = &cones[..count];
     if cones.is_empty() {
         recovery.step_field(field);
-        return told;
+        return counts;
     }
     field.displaced.widen(touched);
-    let border = usize::from(field.pins == Pins::Border);
-    let [columns, rows] = [field.grid.columns(), field.grid.rows()];
+    let columns = field.grid.columns();
     let touched = field.displaced.active_rows();
     wide(
         #[inline(always)]
@@ -90,22 +89,16 @@ pub(super) fn tick(
                 let first = row * columns;
                 let now = &mut field.now[first..first + columns];
                 let rest = &field.rest[row * field.rest_stride..][..columns];
-                let span = field.displaced.row(row);
-                let span = if row < border || row >= rows - border {
-                    recovery.step_row(&mut now[span[0]..span[1]], &rest[span[0]..span[1]]);
-                    span
-                } else {
-                    let mut work = Row { now, rest, row, ends: [border, columns - border], span };
-                    work.press_all(cones, shape, recovery, cut, &mut told);
-                    work.span
-                };
-                field.displaced.set(row, trimmed(now, rest, span));
+                let mut work = Row { now, rest, row, span: field.displaced.row(row) };
+                work.press_all(cones, shape, recovery, cut, &mut counts);
+                let span = work.span;
+                field.displaced.set(row, trim_span(now, rest, span));
             }
         },
     );
     field.displaced.tighten();
     field.forget_bounds();
-    told
+    counts
 }
 
 /// The cone of a contact, if it moves anything.
@@ -116,7 +109,6 @@ fn cone(
     cut: Cut,
     poke: Poke,
     before: &[Cone],
-    told: &mut Moved,
 ) -> Option<Cone> {
     let index = field.grid.index(poke.node);
     // The touched node as it will be when this contact's turn comes.
@@ -130,14 +122,10 @@ fn cone(
         };
     }
     let (above, furthest) = match poke.side {
-        Side::Push => (beyond::<false>(z, poke.z), field.bounds[1] - poke.z),
-        Side::Pull => (beyond::<true>(z, poke.z), poke.z - field.bounds[0]),
+        Side::Push => (excess::<false>(z, poke.z), field.bounds[1] - poke.z),
+        Side::Pull => (excess::<true>(z, poke.z), poke.z - field.bounds[0]),
     };
     if above <= 0.0 {
-        return None;
-    }
-    if field.is_pinned(poke.node) {
-        told.held += 1;
         return None;
     }
     // Steps beyond which even the furthest height is allowed; one more for the rounding of the
@@ -166,7 +154,7 @@ impl Cone {
         } else {
             (height::<PULL>(self.poke.z, f64::from(steps), shear), cut.threshold())
         };
-        let moves = beyond::<PULL>(z, allowed) > threshold;
+        let moves = excess::<PULL>(z, allowed) > threshold;
         (if moves { allowed } else { z }, moves)
     }
 
@@ -183,8 +171,6 @@ struct Row<'a> {
     now: &'a mut [f64],
     rest: &'a [f64],
     row: usize,
-    /// Columns that may move: from, and to before which.
-    ends: [usize; 2],
     /// Columns that may be displaced.
     span: [usize; 2],
 }
@@ -198,7 +184,7 @@ impl Row<'_> {
         shape: &Envelope,
         recovery: Recovery,
         cut: Cut,
-        told: &mut Moved,
+        counts: &mut MoveCounts,
     ) {
         let mut recovery = Some(recovery);
         for cone in cones {
@@ -207,9 +193,8 @@ impl Row<'_> {
             };
             let column = usize::from(cone.poke.node.column);
             let reach = cone.reach - away;
-            let [start, end] = self.ends;
-            let mut reached =
-                [column.saturating_sub(reach).max(start), (column + reach + 1).min(end)];
+            let end = self.now.len();
+            let mut reached = [column.saturating_sub(reach), (column + reach + 1).min(end)];
             // Nodes beyond the reach are where a cone allows them, so that it may be laid over them as
             // well; but not beyond a range.
             let is_free = cone.reach < cut.range() as usize;
@@ -217,7 +202,7 @@ impl Row<'_> {
                 reached = join(self.span, reached);
                 let over = (reached[1] - reached[0]).next_multiple_of(LANES);
                 reached[1] = (reached[0] + over).min(end);
-                reached[0] = reached[1].saturating_sub(over).max(start);
+                reached[0] = reached[1].saturating_sub(over);
             }
             let step = match recovery.take() {
                 Some(recovery) if is_free => recovery,
@@ -231,8 +216,8 @@ impl Row<'_> {
                 Side::Pull => self.press::<true>(cone, away, reached, shape, step, cut),
             };
             self.span = join(self.span, reached);
-            told.moved += moved;
-            told.visited += reached[1] - reached[0];
+            counts.moved += moved;
+            counts.visited += reached[1] - reached[0];
         }
         self.recover(recovery);
     }
@@ -267,14 +252,14 @@ impl Row<'_> {
         for ((now, &rest), steps) in now.iter_mut().zip(rest).zip(steps) {
             let free = recovery.step(*now, rest);
             let allowed = height::<PULL>(z, far + steps, shear);
-            let moves = beyond::<PULL>(free, allowed) > threshold;
+            let moves = excess::<PULL>(free, allowed) > threshold;
             *now = if moves { allowed } else { free };
             moved += usize::from(moves);
         }
         if away == 0 {
             // The touched node itself: no threshold, and no product of nothing and an infinite limit.
-            let counted = beyond::<PULL>(touched, height::<PULL>(z, 0.0, shear)) > threshold;
-            let moves = beyond::<PULL>(touched, z) > 0.0;
+            let counted = excess::<PULL>(touched, height::<PULL>(z, 0.0, shear)) > threshold;
+            let moves = excess::<PULL>(touched, z) > 0.0;
             self.now[column] = if moves { z } else { touched };
             moved = moved + usize::from(moves) - usize::from(counted);
         }
@@ -284,7 +269,7 @@ impl Row<'_> {
 
 /// The furthest that a node so many steps from a contact may be.
 #[inline(always)]
-fn height<const PULL: bool>(z: f64, steps: f64, shear: f64) -> f64 {
+pub(super) fn height<const PULL: bool>(z: f64, steps: f64, shear: f64) -> f64 {
     let slope = shear * steps;
     if PULL { z - slope } else { z + slope }
 }

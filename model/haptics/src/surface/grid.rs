@@ -56,7 +56,6 @@ impl Grid {
         self.spacing
     }
 
-    /// How many nodes.
     pub fn nodes(&self) -> usize {
         self.columns() * self.rows()
     }
@@ -66,13 +65,13 @@ impl Grid {
         [self.columns - 1, self.rows - 1].map(|cells| f64::from(cells) * self.spacing)
     }
 
-    /// Where a node's numbers are: row by row.
+    /// Index of a node's numbers: row by row.
     #[inline(always)]
     pub fn index(&self, node: Node) -> usize {
         usize::from(node.row) * usize::from(self.columns) + usize::from(node.column)
     }
 
-    /// Where a node is, in mm.
+    /// Position of a node in mm.
     pub fn place(&self, node: Node) -> [f64; 2] {
         [node.column, node.row].map(|step| f64::from(step) * self.spacing)
     }
@@ -87,22 +86,8 @@ impl Grid {
         Some(Node { column: step(x, self.columns)?, row: step(y, self.rows)? })
     }
 
-    /// All nodes.
     pub fn whole(&self) -> Rect {
         Rect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
-    }
-
-    /// The neighbours along the axes, those that there are.
-    #[inline(always)]
-    pub(super) fn neighbours(&self, node: Node) -> [Option<Node>; 4] {
-        let Node { column, row } = node;
-        let at = |column, row| Node { column, row };
-        [
-            (column > 0).then(|| at(column - 1, row)),
-            (column + 1 < self.columns).then(|| at(column + 1, row)),
-            (row > 0).then(|| at(column, row - 1)),
-            (row + 1 < self.rows).then(|| at(column, row + 1)),
-        ]
     }
 }
 
@@ -120,12 +105,10 @@ impl Node {
 pub struct Rect {
     /// Columns.
     pub columns: [u32; 2],
-    /// Rows.
     pub rows: [u32; 2],
 }
 
 impl Rect {
-    /// No node.
     pub const EMPTY: Self = Self { columns: [0; 2], rows: [0; 2] };
 
     /// Whether there is no node in it.
@@ -149,13 +132,11 @@ impl Rect {
         }
     }
 
-    /// How many nodes.
     pub fn nodes(&self) -> usize {
         let count = |[from, to]: [u32; 2]| to.saturating_sub(from) as usize;
         count(self.columns) * count(self.rows)
     }
 
-    /// Its rows.
     pub(super) fn row_range(&self) -> Range<usize> {
         self.rows[0] as usize..self.rows[1] as usize
     }

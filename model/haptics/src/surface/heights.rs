@@ -21,11 +21,10 @@ impl<'a> Heights<'a> {
     }
 
     /// Of a grid that they were made for.
-    pub(super) fn made_for(grid: Grid, of: &'a [f64]) -> Self {
+    pub(super) fn for_grid(grid: Grid, of: &'a [f64]) -> Self {
         Self { grid, of }
     }
 
-    /// The grid.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
@@ -45,20 +44,6 @@ impl<'a> Heights<'a> {
         let along_x = ((b - a) + v * ((d - c) - (b - a))) / spacing;
         let along_y = (far - near) / spacing;
         Some((near + v * (far - near), unit([-along_x, -along_y, 1.0])))
-    }
-
-    /// Unit normal at a place in mm, interpolated between those of the nodes around it: no edge shows
-    /// where cells meet. The true one is [`Heights::at`].
-    pub fn shaded(&self, x: f64, y: f64) -> Option<[f64; 3]> {
-        let (Node { column, row }, [u, v]) = self.cell(x, y)?;
-        let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)]
-            .map(|(right, down)| self.normal(Node { column: column + right, row: row + down }));
-        let mix = |axis: usize| {
-            let near = a[axis] + u * (b[axis] - a[axis]);
-            let far = c[axis] + u * (d[axis] - c[axis]);
-            near + v * (far - near)
-        };
-        Some(unit([mix(0), mix(1), mix(2)]))
     }
 
     /// Unit normal of a node: the normalised sum of the unit normals of the faces around it, at the

@@ -20,22 +20,13 @@ pub enum MeshError {
     Spacing(f64),
     /// Not a number for each node.
     #[error("there are {given} {what} for {nodes} nodes; give one for each, row by row")]
-    Count {
-        /// Of what.
-        what: &'static str,
-        /// How many there are.
-        given: usize,
-        /// How many there should be.
-        nodes: usize,
-    },
+    Count { what: &'static str, given: usize, nodes: usize },
     /// No height.
     #[error(
         "the rest height of column {column}, row {row} is {height} mm; heights are within 1000000 mm of zero"
     )]
     Height {
-        /// Column.
         column: usize,
-        /// Row.
         row: usize,
         /// Its height in mm.
         height: f64,
@@ -48,13 +39,10 @@ pub enum MeshError {
         "at rest, column {column}, row {row} is {rise} mm from its neighbour in height, and MaxShear there is {limit} mm; make the rest surface smoother or MaxShear larger"
     )]
     Steep {
-        /// Column.
         column: usize,
-        /// Row.
         row: usize,
         /// Difference of heights in mm.
         rise: f64,
-        /// What is allowed.
         limit: f64,
     },
 }

@@ -5,13 +5,11 @@
 //! constant. [`Surface::tick`] does both; it allocates nothing, locks nothing, and gives the same bits
 //! for the same contacts.
 //!
-//! Three ways give the shape. [`Method::Chain`] is ChainMail as published; [`Method::Envelope`] is its
-//! closed form, many times faster; both need one MaxShear for all. [`Method::Sorted`] takes a MaxShear
-//! for each node.
+//! Two methods give the same shape: [`Method::Chain`] is ChainMail as published, [`Method::Envelope`] its
+//! closed form, many times faster.
 
 mod chain;
 mod contact;
-mod curves;
 mod envelope;
 mod grid;
 mod heights;
@@ -20,76 +18,41 @@ mod mesh_error;
 mod plan;
 mod proxy;
 mod recover;
-mod sorted;
-mod trade;
+mod scene_curves;
+mod shape_error;
 
-pub use contact::{Contact, Cut, CutError, Moved, Side};
-pub use curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
+pub use contact::{Contact, Cut, MoveCounts, Side};
 pub use grid::{Grid, MOST_NODES, Node, Rect};
 pub use heights::Heights;
-pub use mesh::{HIGHEST_MM, HeightField, INERT, Pins, Shear};
+pub use mesh::{HIGHEST_MM, HeightField, INERT};
 pub use mesh_error::MeshError;
-pub use plan::{Dropped, Needs, NoPlan, ScenePlan, plan, slower};
-pub use proxy::{Proxy, ProxyError, Touch, TouchState};
-pub use recover::{Recovery, RecoveryError, SETTLED_MM};
-pub use trade::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
+pub use plan::{Needs, NoPlan, OmittedPart, ScenePlan, plan, slower};
+pub use proxy::{Proxy, ProxyTouch, TouchState};
+pub use recover::{Recovery, SETTLED_MM};
+pub use scene_curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
+pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 
 use chain::Chain;
 use contact::Poke;
 use envelope::Envelope;
-use sorted::Sorted;
-use thiserror::Error;
+pub(crate) use proxy::dot;
 
 palpate_model::named! {
-    /// How the shape is found.
+    /// Algorithm that computes the shape.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Method {
         /// The closed form: the fast one.
         Envelope = "closed form",
         /// First moved first processed.
         Chain = "first moved first",
-        /// Largest violation first.
-        Sorted = "largest violation first",
     }
-}
-
-impl Method {
-    /// The fastest that is right for a field.
-    #[must_use]
-    pub fn fastest(field: &HeightField) -> Self {
-        match (field.shear(), field.pins()) {
-            (Shear::PerNode(_), _) => Self::Sorted,
-            (Shear::Uniform(_), Pins::Nodes(_)) => Self::Chain,
-            (Shear::Uniform(_), _) => Self::Envelope,
-        }
-    }
-}
-
-/// A method that would be wrong on a field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum MethodError {
-    /// Limits differ.
-    #[error(
-        "'{}' needs one MaxShear for all, and this mesh has one for each node; use '{}'",
-        .0.name(),
-        Method::Sorted.name()
-    )]
-    Shear(Method),
-    /// Ways around pinned nodes have no closed form.
-    #[error(
-        "'{}' does not go around single pinned nodes; pin the border only or use '{}'",
-        Method::Envelope.name(),
-        Method::Chain.name()
-    )]
-    Pins,
 }
 
 /// A method with its storage.
 #[derive(Clone, Debug)]
 enum Solver {
     Envelope(Envelope),
-    Chain { shear: f64, chain: Chain },
-    Sorted(Sorted),
+    Chain(Chain),
 }
 
 /// A height field, how it is moved and how it returns.
@@ -101,11 +64,10 @@ pub struct Surface {
     cut: Cut,
 }
 
-/// What a tick did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tick {
+pub struct SurfaceTick {
     /// Work and effect of the contacts.
-    pub moved: Moved,
+    pub moved: MoveCounts,
     /// Every node that may be at another height than before.
     pub dirty: Rect,
     /// Contacts outside the mesh or with a number that is none: they had no effect.
@@ -116,28 +78,15 @@ pub struct Tick {
 
 impl Surface {
     /// With everything a tick needs allocated.
-    pub fn new(
-        field: HeightField,
-        method: Method,
-        recovery: Recovery,
-        cut: Cut,
-    ) -> Result<Self, MethodError> {
-        let uniform = match field.shear() {
-            Shear::Uniform(shear) => Ok(*shear),
-            Shear::PerNode(_) => Err(MethodError::Shear(method)),
-        };
+    #[must_use]
+    pub fn new(field: HeightField, method: Method, recovery: Recovery, cut: Cut) -> Self {
         let solver = match method {
-            Method::Envelope if matches!(field.pins(), Pins::Nodes(_)) => {
-                return Err(MethodError::Pins);
-            }
-            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), uniform?)),
-            Method::Chain => Solver::Chain { shear: uniform?, chain: Chain::new(field.grid()) },
-            Method::Sorted => Solver::Sorted(Sorted::new(field.grid())),
+            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), field.shear())),
+            Method::Chain => Solver::Chain(Chain::new(field.grid())),
         };
-        Ok(Self { field, solver, recovery, cut })
+        Self { field, solver, recovery, cut }
     }
 
-    /// The field.
     pub fn field(&self) -> &HeightField {
         &self.field
     }
@@ -147,14 +96,10 @@ impl Surface {
         self.field.heights()
     }
 
-    /// Forgets every displacement.
-    pub fn reset(&mut self) {
-        self.field.reset();
-    }
-
     /// One tick of recovery, then the contacts one after the other.
-    pub fn tick(&mut self, contacts: &[Contact]) -> Tick {
-        let mut told = Tick { dirty: self.field.displaced.bounds(), ..Tick::default() };
+    pub fn tick(&mut self, contacts: &[Contact]) -> SurfaceTick {
+        let mut report =
+            SurfaceTick { dirty: self.field.displaced.bounds(), ..SurfaceTick::default() };
         let mut recovery = self.recovery;
         let mut rest = contacts;
         loop {
@@ -166,36 +111,34 @@ impl Surface {
                     Some((poke, clamped)) => {
                         pokes[count] = poke;
                         count += 1;
-                        told.clamped += usize::from(clamped);
+                        report.clamped += usize::from(clamped);
                     }
-                    None => told.ignored += 1,
+                    None => report.ignored += 1,
                 }
             }
-            told.moved.add(self.solve(recovery, &pokes[..count]));
-            told.dirty = told.dirty.union(self.field.displaced.bounds());
+            report.moved.add(self.solve(recovery, &pokes[..count]));
+            report.dirty = report.dirty.union(self.field.displaced.bounds());
             recovery = Recovery::NONE;
             rest = others;
             if rest.is_empty() {
-                return told;
+                return report;
             }
         }
     }
 
-    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> Moved {
+    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> MoveCounts {
         let Self { field, solver, cut, .. } = self;
-        if let Solver::Envelope(shape) = solver {
-            return envelope::tick(field, shape, recovery, *cut, pokes);
+        match solver {
+            Solver::Envelope(shape) => envelope::tick(field, shape, recovery, *cut, pokes),
+            Solver::Chain(chain) => {
+                recovery.step_field(field);
+                let mut moved = MoveCounts::default();
+                for &poke in pokes {
+                    moved.add(chain.poke(field, field.shear(), *cut, poke));
+                }
+                moved
+            }
         }
-        recovery.step_field(field);
-        let mut moved = Moved::default();
-        for &poke in pokes {
-            moved.add(match solver {
-                Solver::Chain { shear, chain } => chain.poke(field, *shear, *cut, poke),
-                Solver::Sorted(sorted) => sorted.poke(field, *cut, poke),
-                Solver::Envelope(_) => Moved::default(),
-            });
-        }
-        moved
     }
 }
 

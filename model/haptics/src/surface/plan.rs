@@ -5,13 +5,14 @@
 //! A mesh costs its time multiplied by the share that the cut leaves; times add. So the cheapest pair for
 //! the shape and the cheapest pair for the force are the cheapest of all.
 
-use super::curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
 use super::mesh::INERT;
+use super::scene_curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
 use palpate_model::units::Newtons;
 use palpate_rheology::tolerance::Tolerance;
 use serde::Serialize;
+use std::cmp::Ordering;
 
-/// What a scene tolerates.
+/// Tolerances and time budget of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needs {
     /// Error of force, such as so many percent of what a hand notices
@@ -25,9 +26,9 @@ pub struct Needs {
     pub budget_us: f64,
 }
 
-/// What a plan leaves out, beside the most exact that was measured.
+/// What a plan leaves out, compared with the most exact that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Dropped {
+pub struct OmittedPart {
     /// What, in words.
     pub what: String,
     /// The error of that part with it left out.
@@ -41,13 +42,9 @@ pub struct Dropped {
 /// One of each.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenePlan {
-    /// The mesh.
     pub mesh: MeshPoint,
-    /// The cut.
     pub cut: CutPoint,
-    /// Integrator and step.
     pub step: StepPoint,
-    /// The family.
     pub family: FamilyPoint,
     /// Most that the shape is off, in mm.
     pub shape_error_mm: f64,
@@ -55,8 +52,7 @@ pub struct ScenePlan {
     pub force_error_n: f64,
     /// Expected time of a tick in microseconds.
     pub cost_us: f64,
-    /// What was left out.
-    pub dropped: Vec<Dropped>,
+    pub dropped: Vec<OmittedPart>,
     /// Parts without effect, and why.
     pub inert: [(&'static str, &'static str); 2],
 }
@@ -66,7 +62,7 @@ pub struct ScenePlan {
 pub struct NoPlan {
     /// Why, in a sentence.
     pub why: String,
-    /// What keeps to the budget and is beyond the tolerances by the least factor.
+    /// The plan within the budget that exceeds the tolerances by the least factor.
     pub nearest: Option<Box<ScenePlan>>,
 }
 
@@ -83,18 +79,18 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
     ] {
         if !(value > 0.0 && value.is_finite()) {
             return Err(refuse(format!(
-                "a {what} of {value} is not possible; it is a finite number above zero"
+                "a {what} of {value} is not possible; it must be a finite number above zero"
             )));
         }
     }
     curves.checked().map_err(refuse)?;
-    let shapes = curves.shapes(slower);
-    let forces = curves.forces(slower);
+    let shapes = curves.shape_pairs(slower);
+    let forces = curves.force_pairs(slower);
     let shape = cheapest(&shapes, needs.shape_mm);
     let force = cheapest(&forces, force_n);
     let why = match (shape, force) {
         (Some(shape), Some(force)) if shape.cost + force.cost <= needs.budget_us => {
-            return Ok(curves.planned(shape, force, slower));
+            return Ok(curves.assemble_plan(shape, force, slower));
         }
         (Some(shape), Some(force)) => format!(
             "the cheapest that holds {} mm and {force_n:.3} N takes {:.1} us a tick, and the budget is {} us",
@@ -105,15 +101,15 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
         (None, _) => format!(
             "nothing measured holds a shape to {} mm; the most exact is off by {} mm",
             needs.shape_mm,
-            least(&shapes)
+            least_error(&shapes)
         ),
         (_, None) => format!(
             "nothing measured holds a force to {force_n:.3} N; the most exact is off by {:.3} N",
-            least(&forces)
+            least_error(&forces)
         ),
     };
     let nearest = nearest([&shapes, &forces], [needs.shape_mm, force_n], needs.budget_us)
-        .map(|[shape, force]| curves.planned(shape, force, slower));
+        .map(|[shape, force]| curves.assemble_plan(shape, force, slower));
     let advice = match &nearest {
         Some(plan) => format!(
             "; within the budget, {} nodes a side and the family {} are off by {:.3} mm and {:.3} N",
@@ -135,13 +131,14 @@ pub fn slower(plan: &ScenePlan, slower: f64, measured_us: f64) -> f64 {
 /// The cheapest within a tolerance; of equal ones the most exact.
 fn cheapest(pairs: &[Pair], tolerance: f64) -> Option<Pair> {
     let within = pairs.iter().filter(|pair| pair.error <= tolerance);
-    within.copied().min_by(|a, b| {
-        let by_cost = a.cost.total_cmp(&b.cost);
-        by_cost.then(a.error.total_cmp(&b.error))
-    })
+    within.copied().min_by(by_cost)
 }
 
-fn least(pairs: &[Pair]) -> f64 {
+fn by_cost(a: &Pair, b: &Pair) -> Ordering {
+    a.cost.total_cmp(&b.cost).then(a.error.total_cmp(&b.error))
+}
+
+fn least_error(pairs: &[Pair]) -> f64 {
     let errors = pairs.iter().map(|pair| pair.error);
     errors.fold(f64::INFINITY, f64::min)
 }
@@ -149,7 +146,7 @@ fn least(pairs: &[Pair]) -> f64 {
 /// The two within a budget together whose errors are beyond their tolerances by the least factor; of
 /// equal ones the cheapest.
 fn nearest(pairs: [&[Pair]; 2], tolerances: [f64; 2], budget: f64) -> Option<[Pair; 2]> {
-    let [shapes, forces] = pairs.map(front);
+    let [shapes, forces] = pairs.map(pareto_front);
     let mut best: Option<([f64; 2], [Pair; 2])> = None;
     for shape in &shapes {
         for force in &forces {
@@ -165,12 +162,9 @@ fn nearest(pairs: [&[Pair]; 2], tolerances: [f64; 2], budget: f64) -> Option<[Pa
 }
 
 /// Those than which nothing is both cheaper and more exact, the cheapest first.
-fn front(pairs: &[Pair]) -> Vec<Pair> {
+fn pareto_front(pairs: &[Pair]) -> Vec<Pair> {
     let mut sorted = pairs.to_vec();
-    sorted.sort_by(|a, b| {
-        let by_cost = a.cost.total_cmp(&b.cost);
-        by_cost.then(a.error.total_cmp(&b.error))
-    });
+    sorted.sort_by(by_cost);
     let mut least = f64::INFINITY;
     sorted.retain(|pair| {
         let is_better = pair.error < least;
@@ -181,7 +175,7 @@ fn front(pairs: &[Pair]) -> Vec<Pair> {
 }
 
 impl SceneCurves {
-    fn planned(&self, shape: Pair, force: Pair, slower: f64) -> ScenePlan {
+    fn assemble_plan(&self, shape: Pair, force: Pair, slower: f64) -> ScenePlan {
         let (mesh, cut) = (&self.meshes[shape.indices[0]], &self.cuts[shape.indices[1]]);
         let step = &self.steps[force.indices[0]];
         let family = &self.families[force.indices[1]];
@@ -201,53 +195,41 @@ impl SceneCurves {
     }
 
     /// Part by part, what the most exact measured would be instead.
-    fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<Dropped> {
+    fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<OmittedPart> {
         let ScenePlan { mesh, cut, step, family, .. } = plan;
         let finest = most_exact(&self.meshes, |point| (point.error_mm, point.cost_us));
         let widest = most_exact(&self.cuts, |point| (point.error_mm, point.cost_share));
         let shortest = most_exact(&self.steps, |point| (point.error_n, point.cost_us));
         let fullest = most_exact(&self.families, |point| (point.error_n, point.cost_us));
-        let mut dropped = Vec::new();
-        let mut drop = |what: String, error: [f64; 2], unit, saved_us: f64| {
-            // What is as exact as the most exact leaves nothing out.
-            if error[0] > error[1] {
-                dropped.push(Dropped { what, error: error[0], unit, saved_us: slower * saved_us });
-            }
+        let words = |step: &StepPoint| format!("{} at {} s", step.scheme.name(), step.step_s);
+        let of_mesh = finest.map(|finest| {
+            let what = format!("a mesh of {} nodes a side; {} are used", finest.nodes, mesh.nodes);
+            let saved_us = (finest.cost_us - mesh.cost_us) * cut.cost_share;
+            (what, [mesh.error_mm, finest.error_mm], "mm", saved_us)
+        });
+        let of_cut = widest.map(|widest| {
+            let what = format!("influence beyond {}", cut.words());
+            let saved_us = (widest.cost_share - cut.cost_share) * mesh.cost_us;
+            (what, [cut.error_mm, widest.error_mm], "mm", saved_us)
+        });
+        let of_step = shortest.map(|shortest| {
+            let what = format!("{}; {} is used", words(shortest), words(step));
+            (what, [step.error_n, shortest.error_n], "N", shortest.cost_us - step.cost_us)
+        });
+        let of_family = fullest.map(|fullest| {
+            let what = format!("the family {}; {} is used", fullest.family, family.family);
+            (what, [family.error_n, fullest.error_n], "N", fullest.cost_us - family.cost_us)
+        });
+        // What is as exact as the most exact leaves nothing out.
+        let parts = [of_mesh, of_cut, of_step, of_family].into_iter().flatten();
+        let parts = parts.filter(|(_, [error, least], ..)| error > least);
+        let part = |(what, [error, _], unit, saved_us): (String, [f64; 2], _, f64)| OmittedPart {
+            what,
+            error,
+            unit,
+            saved_us: slower * saved_us,
         };
-        if let Some(finest) = finest {
-            drop(
-                format!("a mesh of {} nodes a side; {} are used", finest.nodes, mesh.nodes),
-                [mesh.error_mm, finest.error_mm],
-                "mm",
-                (finest.cost_us - mesh.cost_us) * cut.cost_share,
-            );
-        }
-        if let Some(widest) = widest {
-            drop(
-                format!("influence beyond {}", cut.words()),
-                [cut.error_mm, widest.error_mm],
-                "mm",
-                (widest.cost_share - cut.cost_share) * mesh.cost_us,
-            );
-        }
-        if let Some(shortest) = shortest {
-            let words = |step: &StepPoint| format!("{} at {} s", step.scheme.name(), step.step_s);
-            drop(
-                format!("{}; {} is used", words(shortest), words(step)),
-                [step.error_n, shortest.error_n],
-                "N",
-                shortest.cost_us - step.cost_us,
-            );
-        }
-        if let Some(fullest) = fullest {
-            drop(
-                format!("the family {}; {} is used", fullest.family, family.family),
-                [family.error_n, fullest.error_n],
-                "N",
-                fullest.cost_us - family.cost_us,
-            );
-        }
-        dropped
+        parts.map(part).collect()
     }
 }
 

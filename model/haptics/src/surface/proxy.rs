@@ -11,7 +11,7 @@
 //! normal turns with a sliding point, and depth with it.
 
 use super::heights::Heights;
-use thiserror::Error;
+use crate::{SettingError, SettingRange};
 
 /// Projections in a tick: as many as there are constraints on a point in space.
 const ROUNDS: usize = 3;
@@ -26,24 +26,10 @@ const MOST_FRICTION: f64 = 10.0;
 #[derive(Clone, Debug)]
 pub struct Proxy {
     friction: f64,
-    most_step: f64,
     /// Where the contact point is along x and y, while it touches.
     at: Option<[f64; 2]>,
     /// Where the device was, if it was somewhere.
     last: Option<[f64; 3]>,
-}
-
-/// A contact point that cannot be.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum ProxyError {
-    /// No friction coefficient.
-    #[error("a friction coefficient of {0} is not possible; it is from 0 to 10")]
-    Friction(f64),
-    /// No length.
-    #[error(
-        "a contact point that moves by at most {0} mm in a tick is not possible; it is a length above zero, and may be infinite"
-    )]
-    Step(f64),
 }
 
 /// Whether there is a contact, and why not.
@@ -55,15 +41,15 @@ pub enum TouchState {
     Sticks,
     /// The contact point slides.
     Slides,
-    /// The device is beside the mesh.
+    /// The device is outside the mesh.
     Outside,
     /// The device's place is no number: nothing changed.
     NotANumber,
 }
 
-/// What a device at a place touches.
+/// Contact of a device with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct ProxyTouch {
     /// Whether, and why not.
     pub state: TouchState,
     /// The contact point in mm; without contact where the device is.
@@ -72,13 +58,11 @@ pub struct Touch {
     pub depth: f64,
     /// True unit normal of the surface at the contact point.
     pub normal: [f64; 3],
-    /// Smooth unit normal there, for a force without edges; signs and depths take the true one.
-    pub shaded: [f64; 3],
     /// The way from the device to the contact point without its part along the normal, in mm.
     pub aside: [f64; 3],
 }
 
-impl Touch {
+impl ProxyTouch {
     /// Whether the device touches.
     pub fn is_contact(&self) -> bool {
         matches!(self.state, TouchState::Sticks | TouchState::Slides)
@@ -94,36 +78,23 @@ impl Touch {
     }
 
     fn without(state: TouchState, point: [f64; 3]) -> Self {
-        Self {
-            state,
-            point,
-            depth: 0.0,
-            normal: [0.0, 0.0, 1.0],
-            shaded: [0.0, 0.0, 1.0],
-            aside: [0.0; 3],
-        }
+        Self { state, point, depth: 0.0, normal: [0.0, 0.0, 1.0], aside: [0.0; 3] }
     }
 }
 
 impl Proxy {
-    /// With a friction coefficient, and a length in mm by which the contact point moves along x and y in
-    /// a tick at most. A contact that begins anew, because its point lost the device behind a ridge, is
-    /// not held to that.
-    pub fn new(friction: f64, most_step: f64) -> Result<Self, ProxyError> {
-        if !(0.0..=MOST_FRICTION).contains(&friction) {
-            return Err(ProxyError::Friction(friction));
-        }
-        if most_step.is_nan() || most_step <= 0.0 {
-            return Err(ProxyError::Step(most_step));
-        }
-        Ok(Self { friction, most_step, at: None, last: None })
+    /// With a friction coefficient.
+    pub fn new(friction: f64) -> Result<Self, SettingError> {
+        let settings = [("friction coefficient", friction, "")];
+        SettingRange::UpTo(MOST_FRICTION).check("a contact point", &settings)?;
+        Ok(Self { friction, at: None, last: None })
     }
 
     /// One tick: the device is at `device` (mm).
-    pub fn follow(&mut self, surface: Heights, device: [f64; 3]) -> Touch {
+    pub fn follow(&mut self, surface: Heights, device: [f64; 3]) -> ProxyTouch {
         if !device.iter().all(|part| part.is_finite()) {
             let at = self.last.unwrap_or_default();
-            return Touch::without(TouchState::NotANumber, at);
+            return ProxyTouch::without(TouchState::NotANumber, at);
         }
         let [x, y, z] = device;
         let below = surface.at(x, y).map(|(height, _)| z < height);
@@ -135,36 +106,30 @@ impl Proxy {
         };
         if let Some(state) = state {
             self.at = None;
-            return Touch::without(state, device);
+            return ProxyTouch::without(state, device);
         }
-        let (from, entered) = match self.at {
-            Some(at) => (at, false),
-            None => (entry(surface, last, device), true),
-        };
-        let (at, slides) = self.moved(surface, from, device, entered);
+        let from = self.at.unwrap_or_else(|| entry(surface, last, device));
+        let (at, slides) = self.moved(surface, from, device);
         self.at = Some(at);
         touch(surface, at, device, slides).unwrap_or_else(|| {
             // Below the surface and yet not under the plane of the contact point, as behind a ridge:
-            // the contact begins anew above the device.
+            // the contact starts again above the device.
             self.at = Some([x, y]);
-            touch(surface, [x, y], device, true).unwrap_or(Touch::without(TouchState::Free, device))
+            touch(surface, [x, y], device, true)
+                .unwrap_or(ProxyTouch::without(TouchState::Free, device))
         })
     }
 
     /// Where the contact point goes from `from`, and whether it slides.
-    fn moved(
-        &self,
-        surface: Heights,
-        from: [f64; 2],
-        device: [f64; 3],
-        entered: bool,
-    ) -> ([f64; 2], bool) {
+    fn moved(&self, surface: Heights, from: [f64; 2], device: [f64; 3]) -> ([f64; 2], bool) {
         let goal = goal(surface, from, device);
-        let (Some((start, _)), Some((end, normal))) = (on(surface, from), on(surface, goal)) else {
+        let (Some((start, _)), Some((end, normal))) =
+            (surface_point(surface, from), surface_point(surface, goal))
+        else {
             return (from, false);
         };
-        let depth = dot(minus(end, device), normal).max(0.0);
-        let way = minus(start, end);
+        let depth = dot(difference(end, device), normal).max(0.0);
+        let way = difference(start, end);
         let length = dot(way, way).sqrt();
         // The contact point stays while it is within the cone of friction around the goal.
         let held = self.friction * depth;
@@ -172,14 +137,7 @@ impl Proxy {
             return (from, false);
         }
         let share = held / length;
-        let mut to = [0, 1].map(|axis| goal[axis] + share * (from[axis] - goal[axis]));
-        let step = (to[0] - from[0]).hypot(to[1] - from[1]);
-        // The first point of a contact is where it is; only later ones are moved to.
-        if step > self.most_step && !entered {
-            let share = self.most_step / step;
-            to = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
-        }
-        (to, true)
+        ([0, 1].map(|axis| goal[axis] + share * (from[axis] - goal[axis])), true)
     }
 }
 
@@ -189,7 +147,7 @@ fn entry(surface: Heights, last: Option<[f64; 3]>, device: [f64; 3]) -> [f64; 2]
     let Some(last) = last else {
         return straight;
     };
-    let way = minus(device, last);
+    let way = difference(device, last);
     let along = |share: f64| [0, 1, 2].map(|axis| last[axis] + share * way[axis]);
     let is_below = |share: f64| {
         let [x, y, z] = along(share);
@@ -214,10 +172,10 @@ fn goal(surface: Heights, from: [f64; 2], device: [f64; 3]) -> [f64; 2] {
     let [wide, high] = surface.grid().extent();
     let mut at = from;
     for _ in 0..ROUNDS {
-        let Some((point, normal)) = on(surface, at) else {
+        let Some((point, normal)) = surface_point(surface, at) else {
             return at;
         };
-        let depth = dot(minus(point, device), normal);
+        let depth = dot(difference(point, device), normal);
         let next = [
             (device[0] + depth * normal[0]).clamp(0.0, wide),
             (device[1] + depth * normal[1]).clamp(0.0, high),
@@ -232,29 +190,28 @@ fn goal(surface: Heights, from: [f64; 2], device: [f64; 3]) -> [f64; 2] {
 }
 
 /// The contact at a place, if the device is under its plane.
-fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Option<Touch> {
-    let (point, normal) = on(surface, at)?;
-    let way = minus(point, device);
+fn touch(surface: Heights, at: [f64; 2], device: [f64; 3], slides: bool) -> Option<ProxyTouch> {
+    let (point, normal) = surface_point(surface, at)?;
+    let way = difference(point, device);
     let depth = dot(way, normal);
-    (depth > 0.0).then(|| Touch {
+    (depth > 0.0).then(|| ProxyTouch {
         state: if slides { TouchState::Slides } else { TouchState::Sticks },
         point,
         depth,
         normal,
-        shaded: surface.shaded(at[0], at[1]).unwrap_or(normal),
         aside: [0, 1, 2].map(|axis| way[axis] - depth * normal[axis]),
     })
 }
 
-fn on(surface: Heights, [x, y]: [f64; 2]) -> Option<([f64; 3], [f64; 3])> {
+fn surface_point(surface: Heights, [x, y]: [f64; 2]) -> Option<([f64; 3], [f64; 3])> {
     let (z, normal) = surface.at(x, y)?;
     Some(([x, y, z], normal))
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| a[axis] - b[axis])
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -9,15 +9,15 @@
 //! the second the lower or upper envelope of two fields that are.
 
 use super::mesh::HeightField;
+use crate::{SettingError, SettingRange};
 use palpate_model::units::Seconds;
 use palpate_rheology::vectors::wide;
-use thiserror::Error;
 
 /// How far beyond rest a recovering node aims, in mm: a nanometre, a ten-thousandth of what any
 /// display or motor of this size resolves.
 pub const SETTLED_MM: f64 = 1e-6;
 
-/// How displaced nodes return before each tick's pokes.
+/// Exponential return of displaced nodes, before the contacts of each tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recovery {
     /// Share of the way to rest in a tick.
@@ -26,31 +26,18 @@ pub struct Recovery {
     creep: f64,
 }
 
-/// A recovery that cannot be.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error(
-    "a recovery with a time constant of {tau} s at ticks of {tick} s is not possible; the tick is a finite time above zero, the time constant zero or more (infinite: never)"
-)]
-pub struct RecoveryError {
-    /// Time constant in s.
-    pub tau: f64,
-    /// Tick in s.
-    pub tick: f64,
-}
-
 impl Recovery {
     /// At rest again at once: every tick starts from the rest surface, so that the shape depends on
     /// this tick's contacts alone.
     pub const ELASTIC: Self = Self { share: 1.0, creep: SETTLED_MM };
-    /// Never.
     pub const NONE: Self = Self { share: 0.0, creep: 0.0 };
 
     /// With a time constant, such as the `tau_eps` of the force model, at a constant tick.
-    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, RecoveryError> {
+    pub fn new(tau: Seconds, tick: Seconds) -> Result<Self, SettingError> {
+        const RECOVERY: &str = "a recovery";
         let (tau, tick) = (tau.0, tick.0);
-        if !(tick > 0.0 && tick.is_finite() && tau >= 0.0) {
-            return Err(RecoveryError { tau, tick });
-        }
+        SettingRange::Positive.check(RECOVERY, &[("tick", tick, " s")])?;
+        SettingRange::MayBeInfinite.check(RECOVERY, &[("time constant", tau, " s")])?;
         // tau = 0 gives exp(-inf) = 0: elastic.
         let share = -(-tick / tau).exp_m1();
         Ok(Self { share, creep: share * SETTLED_MM })
@@ -94,7 +81,7 @@ impl Recovery {
                         let now = &mut field.now[first..first + columns];
                         let rest = &field.rest[row * field.rest_stride..][..columns];
                         self.step_row(&mut now[from..to], &rest[from..to]);
-                        field.displaced.set(row, trimmed(now, rest, [from, to]));
+                        field.displaced.set(row, trim_span(now, rest, [from, to]));
                     }
                 }
             },
@@ -106,7 +93,7 @@ impl Recovery {
 
 /// The part of a span outside of which a row is at rest.
 #[inline(always)]
-pub(super) fn trimmed(now: &[f64], rest: &[f64], [mut from, mut to]: [usize; 2]) -> [usize; 2] {
+pub(super) fn trim_span(now: &[f64], rest: &[f64], [mut from, mut to]: [usize; 2]) -> [usize; 2] {
     while from < to && now[from] == rest[from] {
         from += 1;
     }

@@ -2,15 +2,13 @@
 
 use palpate_haptics::Flags;
 use palpate_haptics::Period;
-use palpate_haptics::rig::{
-    Encoder, EncoderCounter, Gear, GearRatio, Pinion, Quadrature, SlaveDrive,
-};
+use palpate_haptics::rig::{Encoder, EncoderCounter, Gear, GearRatio, Pinion, SlaveDrive};
 use palpate_model::random::SplitMix;
 
 const TICKS: u32 = 10_000_000;
 
-fn encoder(quadrature: Quadrature) -> Encoder {
-    Encoder { quadrature, ..Encoder::default() }
+fn encoder(edges_per_line: u32) -> Encoder {
+    Encoder { edges_per_line, ..Encoder::default() }
 }
 
 fn ratio(encoder: &Encoder) -> GearRatio {
@@ -41,13 +39,13 @@ fn walk(count_mm: f64, ticks: u32, mut pulses: impl FnMut(i64, i64) -> i64) -> (
 /// G2: never farther than half a pulse, and home is home.
 #[test]
 fn the_slave_is_never_half_a_pulse_away_and_never_drifts() {
-    for quadrature in [Quadrature::X1, Quadrature::X4] {
-        let encoder = encoder(quadrature);
+    for edges in [1, 4] {
+        let encoder = encoder(edges);
         let mut gear = Gear::new(ratio(&encoder), &SlaveDrive::default(), Period::MILLISECOND);
         gear.tick(0);
         let count_mm = encoder.count_mm(&Pinion::default());
         let (worst, home) = walk(count_mm, TICKS, |counts, _| gear.tick(counts).pulses);
-        println!("{quadrature:?}: at most {:.4} um away in {TICKS} ticks", 1e3 * worst);
+        println!("{edges} edges a line: at most {:.4} um away in {TICKS} ticks", 1e3 * worst);
         // Half a pulse, and the rounding of positions of up to a few metres to a double.
         assert!(worst <= 0.0075 + 1e-11 && worst > 0.0074 && home == 0.0, "{worst} {home}");
     }
@@ -56,21 +54,21 @@ fn the_slave_is_never_half_a_pulse_away_and_never_drifts() {
 /// The mutant: rounding each tick's pulses drifts away.
 #[test]
 fn rounding_every_tick_drifts() {
-    for quadrature in [Quadrature::X1, Quadrature::X4] {
-        let encoder = encoder(quadrature);
+    for edges in [1, 4] {
+        let encoder = encoder(edges);
         let per_count = ratio(&encoder).pulses_per_count();
         let count_mm = encoder.count_mm(&Pinion::default());
         let (worst, _) =
             walk(count_mm, 100_000, |_, moved| (moved as f64 * per_count).round() as i64);
-        println!("{quadrature:?}: rounded tick by tick, {worst:.3} mm away");
+        println!("{edges} edges a line: rounded tick by tick, {worst:.3} mm away");
         assert!(worst > 0.0075 * 10.0, "{worst}");
     }
 }
 
 /// G3: turning round at every count loses nothing; faster than the drive, pulses wait and it is said.
 #[test]
-fn reversals_lose_nothing_and_the_drive_s_limit_is_told() {
-    let encoder = encoder(Quadrature::X4);
+fn reversals_lose_nothing_and_the_drive_s_limit_is_reported() {
+    let encoder = encoder(4);
     let drive = SlaveDrive { pulses_per_s_max: 10e3, ..SlaveDrive::default() };
     let ratio = ratio(&encoder);
     let mut gear = Gear::new(ratio, &drive, Period::MILLISECOND);
@@ -97,7 +95,7 @@ fn reversals_lose_nothing_and_the_drive_s_limit_is_told() {
         ticks += 1;
     }
     assert_eq!((gear.tick(counts).made, ticks), (ratio.pulses(2000), (late - 1) / 10));
-    // The encoder has a limit of its own: 100 kHz of lines are 6.1 m/s, which no hand reaches, told all the same.
+    // The encoder has a limit of its own: 100 kHz of lines are 6.1 m/s, which no hand reaches; it is reported all the same.
     let mut counter = EncoderCounter::new(&encoder, Period::MILLISECOND);
     counter.tick(0, 1);
     assert_eq!(counter.tick(401, 1).1, Flags::COUNT_RATE);

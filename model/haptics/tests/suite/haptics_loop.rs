@@ -1,7 +1,7 @@
 //! Device, hand and loop together: rows L1 to L7, L10 and L11. Figures are printed; run with `--nocapture` to read them.
 
 use crate::renderer::{Rendered, Renderer, RunTick, run};
-use palpate_haptics::closed_loop::{Command, Plant, PlantSettings};
+use palpate_haptics::closed_loop::{HapticPlant, PlantCommand, PlantSettings};
 use palpate_haptics::margin::{Device, Watch};
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::{
@@ -21,10 +21,10 @@ fn period(us: u64) -> Period {
 }
 
 /// L7 in every run: the energies of all ports and losses add up, and no loss is a gain.
-fn balanced(plant: &Plant, started_with: f64) {
-    let all = plant.energies();
+fn balanced(plant: &HapticPlant, started_with: f64) {
+    let all = plant.rack.energies;
     let put_in = all.motor + all.hand + started_with;
-    let gone = all.damping + all.friction + plant.kinetic();
+    let gone = all.damping + all.friction + plant.rack.kinetic();
     let size = all.motor.abs() + all.hand.abs() + all.damping + gone.abs() + started_with;
     assert!((put_in - gone).abs() <= 1e-11 * size, "residual {:e} of {size:e} N mm", put_in - gone);
     assert!(all.damping >= 0.0 && all.friction >= -1e-9 * size, "{all:?}");
@@ -36,8 +36,8 @@ fn play(
     mut renderer: Renderer,
     seconds: f64,
     seen: impl FnMut(&RunTick) -> bool,
-) -> Plant {
-    let mut plant = Plant::new(settings);
+) -> HapticPlant {
+    let mut plant = HapticPlant::new(settings);
     let ticks = (seconds / settings.period.seconds().0).round() as u64;
     run(&mut plant, &mut renderer, ticks, seen);
     let mass = inertia(settings.mass_kg + settings.hand.mass_kg);
@@ -193,12 +193,12 @@ fn without_damping_friction_holds_up_to_an_amplitude() {
             let middle = 0.5 * (low + high);
             if grows(middle) { high = middle } else { low = middle }
         }
-        let wanted = 8.0 * friction / (std::f64::consts::PI * stiffness * 1e-3);
+        let expected = 8.0 * friction / (std::f64::consts::PI * stiffness * 1e-3);
         println!(
-            "L4: {stiffness} N/mm grows from {low:.1} mm/s on, {wanted:.1} by the balance of energies"
+            "L4: {stiffness} N/mm grows from {low:.1} mm/s on, {expected:.1} by the balance of energies"
         );
         // The balance is of a sine; the first quarter of the swing has lost some speed already.
-        assert!((low / wanted - 1.0).abs() < 0.15, "{stiffness}: {low} {wanted}");
+        assert!((low / expected - 1.0).abs() < 0.15, "{stiffness}: {low} {expected}");
     }
 }
 
@@ -229,10 +229,7 @@ fn swing_about(
         held: Newtons(held),
         ..PlantSettings::bare(period)
     };
-    let law = LawSettings {
-        pull: palpate_haptics::Pull::AsModel,
-        ..LawSettings::of::<3>(THESIS, period)
-    };
+    let law = LawSettings { is_pull_allowed: true, ..LawSettings::of::<3>(THESIS, period) };
     let law = ForceLaw::new(law, Depth(depth)).expect("a law");
     let renderer = Renderer::new(Rendered::Law(law), &settings, None, None);
     let (mut early, mut late, mut least, mut taken, mut before) =
@@ -281,7 +278,7 @@ fn the_margin_s_damping_is_enough_and_a_part_of_it_is_not() {
         for (mass, stiffness) in [(0.05, 0.2), (0.2, 0.8), (0.05, 3.0), (2.0, 0.05), (5.0, 0.01)] {
             let (growth, least, start) = swing_about(depth, mass, stiffness, needed, delay);
             assert!(growth < 1.0, "{depth} mm, hand {mass} kg {stiffness} N/mm: {growth}");
-            // Swings of 1 mm/s are small beside most depths, not quite beside 0.3 mm.
+            // Swings of 1 mm/s are small compared with most depths, not quite with 0.3 mm.
             assert!(
                 least > -0.02 * start,
                 "{depth} mm, {mass} kg {stiffness} N/mm: {least:e} of {start:e}"
@@ -410,7 +407,7 @@ fn after_a_stall_the_force_ramps() {
         for lets_go in [false, true] {
             let guard = GuardSettings {
                 soft_start: Seconds(0.0),
-                lets_go_after: lets_go.then_some(Seconds(0.005)),
+                release_after: lets_go.then_some(Seconds(0.005)),
                 ..GuardSettings::default()
             };
             let path = HandPath::RampHold { from: 0.0, to: 20.0, speed: 30.0 };
@@ -423,19 +420,19 @@ fn after_a_stall_the_force_ramps() {
             let wall = Rendered::Wall { stiffness: 0.3 };
             let mut renderer =
                 Renderer::new(wall, &settings, Some(&guard), Some(&ControllerSettings::of(0.11)));
-            let mut plant = Plant::new(&settings);
+            let mut plant = HapticPlant::new(&settings);
             let (mut last, mut worst, mut full) = (0.0f64, 0.0f64, 0.0f64);
             let mut tick = 0;
             while tick < 1500 {
                 let one = renderer.tick(plant.sense(), 1);
                 worst = worst.max((one.force.0 - last).abs());
                 last = one.force.0;
-                plant.tick(Command::Force(one.force));
+                plant.tick(PlantCommand::Force(one.force));
                 tick += 1;
                 if tick == 200 {
                     for _ in 0..stall_ms {
                         let held = if lets_go { Newtons(0.0) } else { one.force };
-                        plant.tick(Command::Force(held));
+                        plant.tick(PlantCommand::Force(held));
                     }
                     last = if lets_go { 0.0 } else { last };
                     let x = plant.sense().place;
@@ -448,7 +445,7 @@ fn after_a_stall_the_force_ramps() {
                     );
                     worst = worst.max((back.force.0 - last).abs());
                     last = back.force.0;
-                    plant.tick(Command::Force(back.force));
+                    plant.tick(PlantCommand::Force(back.force));
                     tick += stall_ms + 1;
                 }
                 full = full.max(one.force.0);

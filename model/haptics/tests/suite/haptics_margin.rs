@@ -1,8 +1,8 @@
-//! The margin: closed forms beside the criterion at every frequency, bands of the thesis body, sentences.
+//! The margin: closed forms against the criterion at every frequency, bands of the thesis body, sentences.
 
 use palpate_haptics::Period;
 use palpate_haptics::margin::{
-    Cause, Device, Linear, Sampled, Watch, active_cycles, active_pokes, criterion,
+    Cause, Device, Linear, SampledStep, Watch, active_cycles, active_pokes, criterion,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::{ModifiedKelvin, admissibility};
@@ -12,7 +12,7 @@ use palpate_rheology::integrators::{Scheme, SeriesBody};
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 
 /// The right side of the criterion as its paper writes it, in plain complex numbers.
-fn as_written(sampled: &Sampled, delay: f64, th: f64) -> f64 {
+fn as_written(sampled: &SampledStep, delay: f64, th: f64) -> f64 {
     type C = (f64, f64);
     let times = |a: C, b: C| (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0);
     let over = |a: C, b: C| {
@@ -32,16 +32,16 @@ fn as_written(sampled: &Sampled, delay: f64, th: f64) -> f64 {
 /// A spring with a damper by differences needs `K T / 2 + B`, and a delay of `d` ticks `K (T/2 + d T)`.
 #[test]
 fn known_walls() {
-    let spring = Linear::spring(2.0);
-    let wall = Sampled::of(&spring, Scheme::Exact, 1e-3);
-    for (delay, wanted) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
-        let (needed, _) = criterion::needed(&wall, delay);
-        assert!((needed / wanted - 1.0).abs() < 1e-9, "{delay}: {needed}");
+    let spring = Linear { stiffness: 2.0, damping: 0.0, tau: 0.0 };
+    let wall = SampledStep::of(&spring, Scheme::Exact, 1e-3);
+    for (delay, expected) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
+        let (needed, _) = criterion::damping_needed(&wall, delay);
+        assert!((needed / expected - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
     let damped = Linear { damping: 3e-3, ..spring };
-    let wall = Sampled::of(&damped, Scheme::Exact, 1e-3);
-    let (needed, th) = criterion::needed(&wall, 0.0);
+    let wall = SampledStep::of(&damped, Scheme::Exact, 1e-3);
+    let (needed, th) = criterion::damping_needed(&wall, 0.0);
     assert!((needed / 4e-3 - 1.0).abs() < 1e-12 && (th - std::f64::consts::PI).abs() < 1e-6);
 }
 
@@ -61,14 +61,14 @@ fn two_ends_are_the_whole_criterion_without_delay() {
             if scheme.stability_limit().is_some_and(|limit| tick / linear.tau >= limit) {
                 continue;
             }
-            let sampled = Sampled::of(&linear, scheme, tick);
+            let sampled = SampledStep::of(&linear, scheme, tick);
             let ends = sampled.slow().max(sampled.fast());
-            let (needed, _) = criterion::needed(&sampled, 0.0);
+            let (needed, _) = criterion::damping_needed(&sampled, 0.0);
             let size = linear.stiffness * (tick + linear.tau) + linear.damping;
             assert!((needed - ends).abs() < 1e-8 * size, "{scheme:?} {linear:?}: {needed} {ends}");
             for th in [0.01, 0.3, 1.0, 2.0, 3.0] {
                 for delay in [0.0, 1.0, 3.5] {
-                    let ours = criterion::needed_at(&sampled, delay, th);
+                    let ours = criterion::damping_needed_at(&sampled, delay, th);
                     let paper = as_written(&sampled, delay, th);
                     assert!((ours - paper).abs() < 1e-9 * size, "{scheme:?} {th}: {ours} {paper}");
                 }
@@ -77,7 +77,7 @@ fn two_ends_are_the_whole_criterion_without_delay() {
     }
 }
 
-/// The exact step needs `max(k0 T/2 + k0 tau - c0, k_inf T/2)` for ticks short beside `tau`; the left-edge exponential
+/// The exact step needs `max(k0 T/2 + k0 tau - c0, k_inf T/2)` for ticks much shorter than `tau`; the left-edge exponential
 /// half a tick of `k0` more, and less at the fast end.
 #[test]
 fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
@@ -86,19 +86,19 @@ fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
     {
         let linear = Linear { stiffness: k0, damping: c0, tau };
         let k_inf: f64 = c0 / tau;
-        let exact = Sampled::of(&linear, Scheme::Exact, tick);
+        let exact = SampledStep::of(&linear, Scheme::Exact, tick);
         let slow = k0 * tick / 2.0 + k0 * tau - c0;
         assert!((exact.slow() - slow).abs() < 1e-12 * (slow.abs() + c0));
         // At the fast end k_inf T/2 is the limit of short ticks; the next term is (T/tau)^2 / 12 of k_inf and k0.
         let h = tick / tau;
         let miss = (exact.fast() - 0.5 * k_inf * tick).abs();
         assert!(miss < 0.5 * tick * (k_inf + k0) * h, "{miss:e}");
-        let left = Sampled::of(&linear, Scheme::ExponentialLeft, tick);
-        let kept = (-h).exp();
-        let wanted = 1.5 * k0 * tick + k0 * tick * kept / (1.0 - kept) - c0;
-        assert!((left.slow() - wanted).abs() < 1e-12 * (wanted.abs() + c0));
-        let wanted = 0.5 * tick * (1.0 - kept) / (1.0 + kept) * (2.0 * c0 / tick - k0);
-        assert!((left.fast() - wanted).abs() < 1e-12 * (wanted.abs() + c0));
+        let left = SampledStep::of(&linear, Scheme::ExponentialLeft, tick);
+        let decay = (-h).exp();
+        let expected = 1.5 * k0 * tick + k0 * tick * decay / (1.0 - decay) - c0;
+        assert!((left.slow() - expected).abs() < 1e-12 * (expected.abs() + c0));
+        let expected = 0.5 * tick * (1.0 - decay) / (1.0 + decay) * (2.0 * c0 / tick - k0);
+        assert!((left.fast() - expected).abs() < 1e-12 * (expected.abs() + c0));
         // In slow motion it needs more: that is the mutant's price.
         assert!(left.slow() > exact.slow() + 0.49 * k0 * tick);
     }
@@ -136,8 +136,8 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
         let size = quick.needed.abs().max(1e-6);
         assert!(whole.needed <= quick.needed + 1e-3 * size, "{watch:?} {quick:?} {whole:?}");
         if watch.device.delay_ticks == 0.0 {
-            let (needed, _) = criterion::needed(
-                &Sampled::of(
+            let (needed, _) = criterion::damping_needed(
+                &SampledStep::of(
                     &Linear::of(&watch.body, depth),
                     watch.scheme,
                     watch.period.seconds().0,
@@ -214,11 +214,11 @@ fn a_verdict_says_it_in_words() {
     assert_eq!(verdict.worst.cause, Cause::Lag);
     assert!((verdict.worst.needed * 1e3 - 54.58).abs() < 0.05, "{:?}", verdict.worst);
     assert!(!verdict.is_calm() && (verdict.ratio().expect("a need") - 0.322).abs() < 1e-3);
-    let said = verdict.sentences();
-    println!("{said:#?}");
-    assert!(said[0].contains("0.32"));
+    let sentences = verdict.sentences();
+    println!("{sentences:#?}");
+    assert!(sentences[0].contains("0.32"));
     for fact in ["below 0.", "0.810 N", "0.712 mm", "1.430 mm"] {
-        assert!(said[1..].iter().any(|one| one.contains(fact)), "{fact}");
+        assert!(sentences[1..].iter().any(|one| one.contains(fact)), "{fact}");
     }
     // Enough of everything.
     let calm = Device { damping: 0.06, ..device };

@@ -1,7 +1,7 @@
 //! The words of what a mesh and a force law refuse.
 
-use palpate_haptics::LawError;
 use palpate_haptics::surface::MeshError;
+use palpate_haptics::{LawError, SettingError, SettingRange};
 use palpate_test_support::assert_messages;
 
 #[test]
@@ -19,7 +19,19 @@ fn what_a_mesh_refuses_is_worded() {
 #[test]
 fn what_a_force_law_refuses_is_worded() {
     assert_messages! {
-        LawError::Bound { name: "largest force", value: -1.0, unit: "N" } => ["largest force", "-1 N"],
         LawError::Start(f64::NAN) => ["NaN mm"],
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_worded() {
+    let refused =
+        |name, value, unit, range| SettingError { subject: "a motor", name, value, unit, range };
+    assert_messages! {
+        refused("resistance", 0.0, " ohm", SettingRange::Positive) => ["a motor", "resistance = 0 ohm", "above zero"],
+        refused("bits", 33.0, "", SettingRange::PositiveUpTo(32.0)) => ["bits = 33", "up to 32"],
+        refused("share", 2.0, "", SettingRange::UpTo(1.0)) => ["share = 2", "from 0 to 1"],
+        refused("friction", -1.0, " N", SettingRange::NotNegative) => ["friction = -1 N", "zero or more"],
+        refused("hold", f64::NAN, " s", SettingRange::MayBeInfinite) => ["hold = NaN s", "infinite"],
     }
 }

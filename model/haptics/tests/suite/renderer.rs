@@ -1,6 +1,6 @@
 //! A loop of a spring or a law on a simulated device, with or without guard and controller.
 
-use palpate_haptics::closed_loop::{Command, Plant, PlantSettings, Sensed};
+use palpate_haptics::closed_loop::{HapticPlant, PlantCommand, PlantSettings, SensedPosition};
 use palpate_haptics::{
     BuzzDetector, BuzzSettings, ControllerSettings, Flags, ForceGuard, ForceLaw, GuardSettings,
     PassivityController, PassivityObserver, Period,
@@ -35,7 +35,7 @@ pub struct Renderer {
     buzz: BuzzDetector,
     count_mm: f64,
     period: Period,
-    last: Option<Sensed>,
+    last: Option<SensedPosition>,
 }
 
 /// What a renderer did in a tick.
@@ -62,13 +62,13 @@ impl Renderer {
     ) -> Self {
         let period = plant.period;
         let count_mm = if plant.count_mm > 0.0 { plant.count_mm } else { STEPLESS_MM };
-        let heard = BuzzSettings::of(plant.count_mm.max(0.001));
+        let buzz_settings = BuzzSettings::of(plant.count_mm.max(0.001));
         Self {
             rendered,
             guard: guard.map(|one| ForceGuard::new(one, period)),
             controller: controller.map(|one| PassivityController::new(one, period)),
-            observer: PassivityObserver::late(plant.delay),
-            buzz: BuzzDetector::new(&heard, period, plant.x),
+            observer: PassivityObserver::with_delay(plant.delay),
+            buzz: BuzzDetector::new(&buzz_settings, period, plant.x),
             count_mm,
             period,
             last: None,
@@ -76,7 +76,7 @@ impl Renderer {
     }
 
     /// One tick, `elapsed` ticks after the last.
-    pub fn tick(&mut self, sensed: Sensed, elapsed: u64) -> RendererTick {
+    pub fn tick(&mut self, sensed: SensedPosition, elapsed: u64) -> RendererTick {
         let x = sensed.place;
         let moved = x - self.last.unwrap_or(sensed).place;
         self.last = Some(sensed);
@@ -98,12 +98,12 @@ impl Renderer {
             force = one.force;
             flags |= one.flags;
         }
-        self.observer.moved(moved);
+        self.observer.record_move(moved);
         let buzz = self.buzz.tick(x, elapsed, self.observer.energy());
         flags |= Flags::BUZZ.when(buzz.is_some());
         if let Some(controller) = &mut self.controller {
             if buzz.is_some() {
-                controller.heard_buzz();
+                controller.report_buzz();
             }
             let counts = (moved / self.count_mm).round() as i64;
             let one = controller.tick((counts, self.count_mm), elapsed, force, is_touching);
@@ -132,20 +132,19 @@ pub struct RunTick {
 
 /// Runs a loop from its start for so many ticks and shows each to `seen`, which ends it by returning false.
 pub fn run(
-    plant: &mut Plant,
+    plant: &mut HapticPlant,
     renderer: &mut Renderer,
     ticks: u64,
     mut seen: impl FnMut(&RunTick) -> bool,
 ) {
     for tick in 1..=ticks {
         let rendered = renderer.tick(plant.sense(), 1);
-        plant.tick(Command::Force(rendered.force));
-        let [x, v] = plant.motion();
+        plant.tick(PlantCommand::Force(rendered.force));
         let one = RunTick {
             t: renderer.period.time_of(tick).seconds(),
-            x,
-            v,
-            absorbed: -plant.energies().motor,
+            x: plant.rack.x,
+            v: plant.rack.v,
+            absorbed: -plant.rack.energies.motor,
             rendered,
         };
         if !seen(&one) {

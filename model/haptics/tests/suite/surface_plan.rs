@@ -44,8 +44,9 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
         let itself = scene.mesh_error_against(101, 101).unwrap();
         assert!(itself.linf_mm < 1e-12);
     }
-    assert!(scene(|_, _| 0.0).mesh_error(1).is_err());
-    assert!(scene(|x, _| x).mesh_error(51).unwrap_err().to_string().contains("MaxShear"));
+    assert!(scene(|_, _| 0.0).mesh_error_against(1, 101).is_err());
+    let steep = scene(|x, _| x).mesh_error_against(51, 101).unwrap_err();
+    assert!(steep.to_string().contains("MaxShear"));
 }
 
 #[test]
@@ -239,7 +240,7 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     assert_eq!(dropped.len(), 2);
     assert!(dropped[1].0.contains("0.0005 s") && dropped[1].1 == 1e-3);
     assert_eq!(first.inert.map(|(name, _)| name), ["MinDist", "MaxDist"]);
-    // It took longer than it may: with that, nothing holds 0.12 mm, and what is nearest is told.
+    // It took longer than it may: with that, nothing holds 0.12 mm, and the refusal names the nearest.
     let again = slower(&first, 1.0, 130.0);
     let none = plan(&needs, &curves, again).unwrap_err();
     assert!(none.why.contains("130.0 us") && none.why.contains("100 us"), "{}", none.why);

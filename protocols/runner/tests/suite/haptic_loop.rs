@@ -5,7 +5,7 @@ use palpate_haptics::Period;
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Shear, Side, Surface,
+    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Side, Surface,
 };
 use palpate_model::Seconds;
 use palpate_model::units::MmPerS;
@@ -97,13 +97,9 @@ fn a_tick_waits_for_nobody() {
 /// together.
 fn poked(method: Method) -> impl FnMut(usize) {
     let grid = Grid::new(41, 41, 0.5).expect("a grid");
-    let shear = match method {
-        Method::Sorted => Shear::PerNode(vec![0.05; grid.nodes()].into()),
-        _ => Shear::Uniform(0.05),
-    };
-    let field = HeightField::new(grid, vec![0.0; grid.nodes()], shear).expect("a field");
+    let field = HeightField::flat(grid, 0.05).expect("a field");
     let recovery = Recovery::new(Seconds(0.05), Seconds(1e-3)).expect("a recovery");
-    let mut surface = Surface::new(field, method, recovery, Cut::NONE).expect("a surface");
+    let mut surface = Surface::new(field, method, recovery, Cut::NONE);
     move |tick| {
         let contacts: [Contact; 20] = std::array::from_fn(|tool| {
             let [column, row] = [7 * tick + 11 * tool, tick / 3 + 31 * tool].map(|at| at % 41);

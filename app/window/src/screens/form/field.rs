@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(read(&unload, "").unwrap(), "none");
         let speeds = of("validation-series", "speeds");
         for (field, text, words) in [
-            (&speeds, "0.75, 900", "outside what rig sim makes"),
+            (&speeds, "0.75, 900", "outside the range of rig sim"),
             (&rest, "", "a number is missing"),
             (&rest, "soon", "\"soon\" is not a time"),
             (&rest, "0,5", "write a point, not a comma"),

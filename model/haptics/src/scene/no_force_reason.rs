@@ -1,4 +1,4 @@
-//! Why a hand feels nothing, or less than the model says.
+//! Why the force is zero, or less than the model says.
 
 use super::device::DeviceSettings;
 use crate::Flags;
@@ -6,7 +6,7 @@ use crate::surface::TouchState;
 use serde::Serialize;
 
 palpate_model::named! {
-    /// What takes force away in a tick; the first that applies.
+    /// Why the force is zero or reduced; the first reason that applies.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum WhyNoForce {
@@ -15,10 +15,10 @@ palpate_model::named! {
         /// The stylus is above the surface.
         #[default]
         NoContact = "the stylus is above the surface",
-        /// The stylus is beside the mesh.
-        Outside = "the stylus is beside the tissue",
+        /// The stylus is outside the mesh.
+        Outside = "the stylus is outside the tissue",
         /// The place is no number.
-        NotANumber = "the device reports no place",
+        NotANumber = "the device reports no position",
         /// The model has no force.
         NoModel = "the model has no force for this move",
         /// The tissue follows more slowly than the stylus leaves.

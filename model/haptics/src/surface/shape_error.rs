@@ -5,7 +5,7 @@
 use super::contact::{Contact, Cut, Side};
 use super::envelope::{self, Envelope};
 use super::grid::Grid;
-use super::mesh::{HeightField, Shear};
+use super::mesh::HeightField;
 use super::mesh_error::MeshError;
 use super::recover::Recovery;
 use palpate_rheology::integrators::{IntegratorError, Scheme, SeriesBody};
@@ -33,7 +33,7 @@ pub struct PokeScene {
     pub places: Vec<[f64; 2]>,
 }
 
-/// How far a shape is from another.
+/// Difference of two shapes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShapeError {
     /// Root of the mean square over the area and all pokes, in mm.
@@ -43,13 +43,7 @@ pub struct ShapeError {
 }
 
 impl PokeScene {
-    /// The shape on a mesh of `nodes` a side against that on [`REFERENCE_NODES`], between nodes
-    /// interpolated.
-    pub fn mesh_error(&self, nodes: usize) -> Result<ShapeError, MeshError> {
-        self.mesh_error_against(nodes, REFERENCE_NODES)
-    }
-
-    /// The same against another mesh.
+    /// The shape on a mesh of `nodes` a side against that on a mesh of `reference` nodes, between nodes interpolated.
     pub fn mesh_error_against(
         &self,
         nodes: usize,
@@ -70,7 +64,7 @@ impl PokeScene {
         let places = (0..grid.nodes())
             .map(|index| [index % nodes, index / nodes].map(|steps| steps as f64 * grid.spacing()));
         let rest = places.map(|[x, y]| (self.rest)(x, y)).collect();
-        HeightField::new(grid, rest, Shear::Uniform(self.slope * grid.spacing()))
+        HeightField::new(grid, rest, self.slope * grid.spacing())
     }
 
     fn compare(
@@ -85,7 +79,7 @@ impl PokeScene {
         for &place in &self.places {
             self.poke(&mut field, cut, place);
             self.poke(&mut truth, truth_cut, place);
-            let shape = field.as_it_is();
+            let shape = field.current();
             for (index, truth) in truth.now.iter().enumerate() {
                 let steps = [index % truth_nodes, index / truth_nodes];
                 // The last node of one mesh may be a rounding beyond that of the other.
@@ -104,9 +98,8 @@ impl PokeScene {
     /// One poke of the surface at rest.
     fn poke(&self, field: &mut HeightField, cut: Cut, [x, y]: [f64; 2]) {
         let contact = Contact { x, y, z: (self.rest)(x, y) - self.depth, side: Side::Push };
-        let shear = self.slope * field.grid.spacing();
         let pokes = contact.poke(&field.grid).map(|(poke, _)| poke);
-        let shape = Envelope::new(&field.grid, shear);
+        let shape = Envelope::new(&field.grid, field.shear());
         envelope::tick(field, &shape, Recovery::ELASTIC, cut, pokes.as_slice());
     }
 }

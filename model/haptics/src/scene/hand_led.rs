@@ -5,9 +5,7 @@ use super::{Hand6, Scene, SceneError, SceneSettings, SceneTick, SimulatedDevice}
 /// A scene with the simulated device that a hand leads; the same hands give the same bits.
 #[derive(Clone, Debug)]
 pub struct LedScene {
-    /// The scene.
     pub scene: Scene,
-    /// The device.
     pub device: SimulatedDevice,
 }
 

@@ -1,9 +1,8 @@
-//! What was measured of a scene: points of error and cost.
+//! Measured error and cost of a scene's parts.
 
 use palpate_rheology::integrators::Scheme;
 use serde::{Deserialize, Serialize};
 
-/// A measured mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshPoint {
     /// Nodes along a side.
@@ -14,7 +13,6 @@ pub struct MeshPoint {
     pub cost_us: f64,
 }
 
-/// A measured cut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutPoint {
     /// Most steps from a contact; null for none.
@@ -23,14 +21,12 @@ pub struct CutPoint {
     pub threshold_mm: f64,
     /// Error of shape in mm.
     pub error_mm: f64,
-    /// What is left of a mesh's time, as a share.
+    /// Share of a mesh's time that remains with this cut.
     pub cost_share: f64,
 }
 
-/// A measured integrator at a step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepPoint {
-    /// Which.
     pub scheme: Scheme,
     /// Step in s.
     pub step_s: f64,
@@ -40,27 +36,21 @@ pub struct StepPoint {
     pub cost_us: f64,
 }
 
-/// A measured family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FamilyPoint {
-    /// Its key.
     pub family: String,
     /// Error of its fit in N.
     pub error_n: f64,
-    /// What it adds to a tick in microseconds.
+    /// Added time of a tick in microseconds.
     pub cost_us: f64,
 }
 
-/// Everything measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneCurves {
-    /// Meshes.
     pub meshes: Vec<MeshPoint>,
     /// Cuts, the absence of one among them.
     pub cuts: Vec<CutPoint>,
-    /// Integrators and steps.
     pub steps: Vec<StepPoint>,
-    /// Families.
     pub families: Vec<FamilyPoint>,
 }
 
@@ -100,38 +90,30 @@ impl SceneCurves {
     }
 
     /// Every mesh with every cut.
-    pub(super) fn shapes(&self, slower: f64) -> Vec<Pair> {
-        let mut pairs = Vec::new();
-        for (i, mesh) in self.meshes.iter().enumerate() {
-            for (j, cut) in self.cuts.iter().enumerate() {
-                pairs.push(Pair {
-                    indices: [i, j],
-                    error: mesh.error_mm + cut.error_mm,
-                    cost: slower * (mesh.cost_us * cut.cost_share),
-                });
-            }
-        }
-        pairs
+    pub(super) fn shape_pairs(&self, slower: f64) -> Vec<Pair> {
+        pairs(&self.meshes, &self.cuts, |mesh, cut| {
+            (mesh.error_mm + cut.error_mm, slower * (mesh.cost_us * cut.cost_share))
+        })
     }
 
     /// Every step with every family.
-    pub(super) fn forces(&self, slower: f64) -> Vec<Pair> {
-        let mut pairs = Vec::new();
-        for (i, step) in self.steps.iter().enumerate() {
-            for (j, family) in self.families.iter().enumerate() {
-                pairs.push(Pair {
-                    indices: [i, j],
-                    error: step.error_n + family.error_n,
-                    cost: slower * (step.cost_us + family.cost_us),
-                });
-            }
-        }
-        pairs
+    pub(super) fn force_pairs(&self, slower: f64) -> Vec<Pair> {
+        pairs(&self.steps, &self.families, |step, family| {
+            (step.error_n + family.error_n, slower * (step.cost_us + family.cost_us))
+        })
     }
 }
 
+fn pairs<A, B>(first: &[A], second: &[B], sum: impl Fn(&A, &B) -> (f64, f64)) -> Vec<Pair> {
+    let indices = (0..first.len()).flat_map(|i| (0..second.len()).map(move |j| [i, j]));
+    let pair = |indices: [usize; 2]| {
+        let (error, cost) = sum(&first[indices[0]], &second[indices[1]]);
+        Pair { indices, error, cost }
+    };
+    indices.map(pair).collect()
+}
+
 impl CutPoint {
-    /// Where it cuts, in words.
     pub fn words(&self) -> String {
         match (self.range, self.threshold_mm > 0.0) {
             (Some(range), true) => {
