@@ -14,7 +14,6 @@ pub const THRESHOLD_SHARE: f64 = 0.1;
 /// A tolerated error of force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// So many newtons.
     Newtons(Newtons),
     /// So many percent of the peak force.
     PercentOfPeak(f64),
@@ -28,7 +27,6 @@ pub enum Tolerance {
     "'{text}' is not a tolerance of force; write newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd), above zero"
 )]
 pub struct BadTolerance {
-    /// What was given.
     pub text: String,
 }
 

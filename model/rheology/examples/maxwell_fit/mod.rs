@@ -41,7 +41,6 @@ pub struct MaxwellFit {
     pub k_std_error: f64,
     /// Sum of squared residuals, in the squared unit of the stress.
     pub residual_sum: f64,
-    /// Samples used.
     pub samples: usize,
 }
 

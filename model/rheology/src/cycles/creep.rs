@@ -9,11 +9,9 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 pub struct Creep {
     /// From the first to the last sample.
     pub duration: Seconds,
-    /// Mean force.
     pub force: Newtons,
     /// Standard deviation of the force about it: how well it was held, noise included.
     pub force_sd: Newtons,
-    /// Depth at the start.
     pub depth_start: Depth,
     /// Depth at the end: a line through the last tenth of the hold, read at its end. Its error has a part that no
     /// number of samples averages away where the step of the axis is known.

@@ -1,7 +1,7 @@
 //! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
 
 use super::information::{BODY, PARAMETER_NAMES};
-use crate::fit::{CONDITION_MAX, heaviest};
+use crate::fit::{CONDITION_MAX, dominant_entries};
 use palpate_model::linalg::Triangle;
 
 /// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
@@ -28,7 +28,7 @@ pub fn inverse(
     let inverse = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
     let (condition, blind) = largest_singular(&inverse);
     if condition.is_nan() || condition > CONDITION_MAX {
-        return Err(named(&blind));
+        return Err(combination_words(&blind));
     }
     Ok(std::array::from_fn(|i| inverse[i].map(|value| value / lengths[i])))
 }
@@ -52,9 +52,9 @@ fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
     (value, vector)
 }
 
-fn named(blind: &[f64; BODY]) -> String {
+fn combination_words(blind: &[f64; BODY]) -> String {
     let names: Vec<&str> =
-        heaviest(blind).into_iter().map(|place| PARAMETER_NAMES[place]).collect();
+        dominant_entries(blind).into_iter().map(|place| PARAMETER_NAMES[place]).collect();
     match names.as_slice() {
         [one, other] => format!("{one} from {other}"),
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),

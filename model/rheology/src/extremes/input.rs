@@ -1,8 +1,8 @@
-//! What is no number, and time that stands still or runs backwards.
+//! Inputs that are not numbers, and times that do not increase.
 
-use super::fits::{DEFAULT_FIT, fitted};
-use super::judge::{Answer, Expected, PathCase, Row, judge};
-use super::members::member;
+use super::fits::{DEFAULT_FIT, fit_answer};
+use super::judge::{ExpectedAnswer, PathCase, Row, SubjectAnswer, judge};
+use super::members::make_member;
 use super::records::ramp_hold;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
@@ -11,7 +11,6 @@ use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "input";
 
 pub(super) fn parts(_extent: Extent, key: &str) -> Vec<Part> {
@@ -22,7 +21,7 @@ pub(super) fn parts(_extent: Extent, key: &str) -> Vec<Part> {
 }
 
 fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
-    let usual = || member(&**family, 1.0, 20.0, 2.0);
+    let usual = || make_member(&**family, 1.0, 20.0, 2.0);
     let mut rows = Vec::new();
     for (case, start, step) in [
         ("NaN depth at the start", f64::NAN, (0.1, 1.0)),
@@ -40,7 +39,7 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
             start,
             steps: vec![(0.1, 0.5), step, (0.1, 1.0)],
         };
-        rows.push(path.put_to(&FamilyBody(usual())));
+        rows.push(path.run_on(&FamilyBody(usual())));
     }
     rows.push(after_bad_steps(&**family));
     let plain = |case: &str| PathCase {
@@ -54,12 +53,12 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
     {
         let mut model = usual();
         model.linear[0] = value;
-        rows.push(plain(&format!("{name} coefficient")).put_to(&FamilyBody(model)));
+        rows.push(plain(&format!("{name} coefficient")).run_on(&FamilyBody(model)));
         for index in 0..usual().outer.len() {
             let mut model = usual();
             model.outer[index] = value;
             let name = format!("{name} relaxation time or other outer parameter");
-            rows.push(plain(&name).put_to(&FamilyBody(model)));
+            rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }
     for index in 0..usual().outer.len() {
@@ -67,13 +66,13 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
             let mut model = usual();
             model.outer[index] = value;
             let name = format!("relaxation time or other outer parameter of {value}");
-            rows.push(plain(&name).put_to(&FamilyBody(model)));
+            rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }
-    rows.extend(bad_records(|samples| fitted(Arc::clone(family), samples, None)).map(
+    rows.extend(bad_records(|samples| fit_answer(Arc::clone(family), samples, None)).map(
         |(case, answer)| {
             let subject = format!("fit of {}", family.key());
-            judge([GROUP, case], &subject, Expected::Refusal, 0.0, answer)
+            judge([GROUP, case], &subject, ExpectedAnswer::Refusal, 0.0, answer)
         },
     ));
     rows
@@ -81,13 +80,13 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
 
 /// A body that refused steps goes on as if they had not been asked for.
 fn after_bad_steps(family: &dyn Family) -> Row {
-    struct Refusing(FamilyBody);
-    impl super::judge::Subject for Refusing {
+    struct BodyAfterRefusals(FamilyBody);
+    impl super::judge::ExtremesSubject for BodyAfterRefusals {
         fn name(&self) -> String {
             self.0.name()
         }
 
-        fn terms(&self) -> Result<Vec<crate::families::Relaxation>, String> {
+        fn terms(&self) -> Result<Vec<crate::families::RelaxationTerm>, String> {
             self.0.terms()
         }
 
@@ -113,13 +112,13 @@ fn after_bad_steps(family: &dyn Family) -> Row {
         start: 0.0,
         steps: vec![(0.1, 1.0), (0.5, 9.0), (0.2, 9.0), (0.1, 4.0)],
     };
-    path.put_to(&Refusing(FamilyBody(member(family, 1.0, 20.0, 2.0))))
+    path.run_on(&BodyAfterRefusals(FamilyBody(make_member(family, 1.0, 20.0, 2.0))))
 }
 
 /// A good record with one sample spoilt, and what a fit makes of it.
 fn bad_records(
-    fit: impl Fn(&[FitSample]) -> Answer,
-) -> impl Iterator<Item = (&'static str, Answer)> {
+    fit: impl Fn(&[FitSample]) -> SubjectAnswer,
+) -> impl Iterator<Item = (&'static str, SubjectAnswer)> {
     type Spoil = fn(&mut Vec<FitSample>);
     let spoilt: [(&str, Spoil); 14] = [
         ("a NaN time", |all| all[7].t = Seconds(f64::NAN)),
@@ -154,11 +153,13 @@ fn bad_records(
     })
 }
 
-/// The same records put to the fit of the thesis body.
+/// The same records for the fit of the thesis body.
 pub(super) fn thesis_parts() -> Vec<Part> {
     vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
-        let rows = bad_records(|samples| fitted(Arc::new(PowerSeries::THESIS), samples, None));
-        rows.map(|(case, answer)| judge([GROUP, case], DEFAULT_FIT, Expected::Refusal, 0.0, answer))
-            .collect()
+        let rows = bad_records(|samples| fit_answer(Arc::new(PowerSeries::THESIS), samples, None));
+        rows.map(|(case, answer)| {
+            judge([GROUP, case], DEFAULT_FIT, ExpectedAnswer::Refusal, 0.0, answer)
+        })
+        .collect()
     })]
 }

@@ -11,7 +11,6 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 const GROUP: &str = "integrators, relaxation time and step";
 /// Name of the group of all else.
 const OTHER: &str = "integrators, depth and force";
-/// Samples of a ramp.
 const SAMPLES: u32 = 20;
 
 pub(super) fn parts(extent: Extent) -> Vec<Part> {
@@ -31,7 +30,7 @@ pub(super) fn parts(extent: Extent) -> Vec<Part> {
                     let subject = subject(10f64.powi(*tau), 1.0);
                     for step in &steps {
                         let case = format!("tau 1e{tau} s, step 1e{step} s");
-                        rows.push(poke(GROUP, case, 20.0, 10f64.powi(*step)).put_to(&subject));
+                        rows.push(poke(GROUP, case, 20.0, 10f64.powi(*step)).run_on(&subject));
                     }
                     progress((index + 1) as f64 / taus.len() as f64);
                 }
@@ -72,7 +71,7 @@ fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<Row> {
     let mut rows = Vec::new();
     let mut put = |case: &str, path: PathCase, body: SchemeBody| {
         let case = case.to_owned();
-        rows.push(PathCase { case, ..path }.put_to(&body));
+        rows.push(PathCase { case, ..path }.run_on(&body));
     };
     let path = |depth: f64, dt: f64| poke(OTHER, String::new(), depth, dt);
     for (case, depth) in [

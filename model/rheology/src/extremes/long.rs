@@ -1,15 +1,14 @@
 //! Long records at a constant step, streamed: 1e8 samples, 24 h at 1 kHz.
 
-use super::judge::{Answer, Expected, Row, judged};
-use super::members::member;
+use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge_named};
+use super::members::make_member;
 use super::{Extent, Part};
-use crate::families::{Relaxation, StepError, by_key};
+use crate::families::{RelaxationTerm, StepError, by_key};
 use crate::integrators::{Exact, Integrator, Scheme, SeriesBody, Start};
 use crate::reference::Reference;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "long records";
 /// Depth moves by a power of two, so that no sample is rounded and the path is as straight as it says.
 const MOVE: f64 = 1.0 / 65_536.0;
@@ -36,7 +35,7 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
         let Ok(family) = by_key(&key) else {
             return Vec::new();
         };
-        let model = member(&*family, 2.0, 20.0, 2.0);
+        let model = make_member(&*family, 2.0, 20.0, 2.0);
         let has_many = model.terms().is_ok_and(|terms| terms.len() > MANY);
         let cases: &[Case] = match extent {
             Extent::Quick if has_many => &[SHORTEST],
@@ -77,19 +76,19 @@ fn rows(
     cases: &[Case],
     subject: &str,
     progress: &mut dyn FnMut(f64),
-    answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<Answer, String>,
+    answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<SubjectAnswer, String>,
 ) -> Vec<Row> {
     let count = cases.len() as f64;
     let mut rows = Vec::new();
     for (index, &(case, samples, dt)) in cases.iter().enumerate() {
         let mut within = |share| progress((index as f64 + share) / count);
-        rows.push(judged(
+        rows.push(judge_named(
             GROUP,
             case.to_owned(),
             subject,
-            Expected::Number,
+            ExpectedAnswer::Number,
             TOLERANCE,
-            answer(samples, dt, &mut within).unwrap_or_else(Answer::Refused),
+            answer(samples, dt, &mut within).unwrap_or_else(SubjectAnswer::Refused),
         ));
     }
     rows
@@ -97,12 +96,12 @@ fn rows(
 
 /// Largest error at the corners of a path that goes in, rests, comes out and rests, again and again.
 fn drift(
-    terms: &[Relaxation],
+    terms: &[RelaxationTerm],
     samples: u64,
     dt: f64,
     mut step: impl FnMut(f64) -> Result<Newtons, StepError>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Answer, String> {
+) -> Result<SubjectAnswer, String> {
     let mut reference = Reference::new(terms, Depth(0.0)).map_err(|err| err.to_string())?;
     let (mut depth, mut done, mut worst, mut peak) = (0.0, 0, 0.0f64, 0.0f64);
     for direction in [1.0, 0.0, -1.0, 0.0].into_iter().cycle() {
@@ -125,5 +124,5 @@ fn drift(
         done += leg;
         progress(done as f64 / samples as f64);
     }
-    Ok(Answer::Number { error: worst / peak, warnings: Vec::new() })
+    Ok(SubjectAnswer::Number { error: worst / peak, warnings: Vec::new() })
 }

@@ -1,6 +1,6 @@
 //! Numerical stability at the extremes: cases, the exact answer to each, and the verdict.
 //!
-//! Every family of force models, every integrator and every fit is put to the same cases. Each must
+//! Every family of force models, every integrator and every fit runs the same cases. Each must
 //! give the right number to a stated tolerance or refuse in words that name the reason. Anything else,
 //! a number that is off, NaN, infinity, a refusal of what can be answered, is wrong. Truth is the
 //! [reference](crate::reference) in many digits, or for a fit the parameters that made the record.
@@ -19,14 +19,16 @@ mod scale;
 mod subjects;
 mod tau_step;
 
-pub use judge::{Answer, Expected, Oracle, PathCase, Row, Subject, TOLERANCE, Verdict, judge};
-pub use members::member;
+pub use judge::{
+    ExpectedAnswer, ExtremesSubject, Oracle, PathCase, Row, SubjectAnswer, TOLERANCE, Verdict,
+    judge,
+};
+pub use members::make_member;
 pub use subjects::{FamilyBody, SchemeBody};
 
 use crate::families::{Family, UnknownFamily, all, by_key};
 use std::sync::Arc;
 
-/// How much to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Seconds: corners and middles of every table.
@@ -39,9 +41,7 @@ pub enum Extent {
 
 /// Rows of one group for one subject.
 pub struct Part {
-    /// Group of cases.
     pub group: &'static str,
-    /// What is put to them.
     pub subject: String,
     run: Box<Rows>,
 }

@@ -1,14 +1,12 @@
 //! Speeds, depths and where they change.
 
 use super::judge::{PathCase, Row};
-use super::members::member;
+use super::members::make_member;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
 use crate::families::by_key;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "speed and depth";
-/// Steps of a ramp.
 const STEPS: u32 = 12;
 
 pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
@@ -17,12 +15,12 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
         let Ok(family) = by_key(&key) else {
             return Vec::new();
         };
-        let subject = FamilyBody(member(&*family, 1.0, 20.0, 2.0));
+        let subject = FamilyBody(make_member(&*family, 1.0, 20.0, 2.0));
         let cases = cases(extent);
         let count = cases.len() as f64;
         let rows = cases.iter().enumerate().map(|(index, case)| {
             progress((index + 1) as f64 / count);
-            case.put_to(&subject)
+            case.run_on(&subject)
         });
         rows.collect::<Vec<Row>>()
     })]
@@ -42,7 +40,7 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
             10.0,
         ));
     }
-    cases.push(still("speed 0 at 10 mm", 10.0));
+    cases.push(stationary("speed 0 at 10 mm", 10.0));
     let depths: &[i32] = match extent {
         Extent::Quick => &[-6, 2],
         Extent::Whole | Extent::Soak => &[-9, -6, -3, -2, -1, 0, 1, 2, 3],
@@ -51,9 +49,9 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
         let depth_mm = 10f64.powi(depth);
         cases.push(ramp(format!("1 mm/s to 1e{depth} mm and 1 s of hold"), 1.0, depth_mm));
     }
-    cases.push(still("depth 0", 0.0));
-    cases.push(still("-1e3 mm, far out of contact", -1e3));
-    cases.extend(special());
+    cases.push(stationary("depth 0", 0.0));
+    cases.push(stationary("-1e3 mm, far out of contact", -1e3));
+    cases.extend(special_paths());
     cases
 }
 
@@ -66,7 +64,7 @@ fn ramp(case: String, speed: f64, depth: f64) -> PathCase {
     PathCase { group: GROUP, case, start: 0.0, steps: down.chain(hold).chain(out).collect() }
 }
 
-fn still(case: &str, depth: f64) -> PathCase {
+fn stationary(case: &str, depth: f64) -> PathCase {
     PathCase {
         group: GROUP,
         case: case.to_owned(),
@@ -76,7 +74,7 @@ fn still(case: &str, depth: f64) -> PathCase {
 }
 
 /// Paths that touch the surface awkwardly, jump or crawl.
-fn special() -> Vec<PathCase> {
+fn special_paths() -> Vec<PathCase> {
     let path = |case: &str, start: f64, steps: &[(f64, f64)]| PathCase {
         group: GROUP,
         case: case.to_owned(),

@@ -1,12 +1,11 @@
 //! Small and large numbers: forces 1e-6..1e6 N, the ends of the doubles, subnormal numbers.
 
 use super::judge::PathCase;
-use super::members::member;
+use super::members::make_member;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
 use crate::families::{Family, Model, by_key};
 
-/// Name of the group.
 pub(super) const GROUP: &str = "scale";
 /// A subnormal number: below 2.2e-308 doubles lack digits.
 const SUBNORMAL: f64 = 1e-310;
@@ -24,7 +23,7 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
         let count = cases.len() as f64;
         let rows = cases.into_iter().enumerate().map(|(index, (path, model))| {
             progress((index + 1) as f64 / count);
-            path.put_to(&FamilyBody(model))
+            path.run_on(&FamilyBody(model))
         });
         rows.collect()
     })]
@@ -50,10 +49,10 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
         ],
     };
     for force in forces {
-        let model = member(family, 1.0, 20.0, 10f64.powi(*force));
+        let model = make_member(family, 1.0, 20.0, 10f64.powi(*force));
         cases.push((poke(format!("forces of 1e{force} N"), 20.0, 0.1), model));
     }
-    let usual = || member(family, 1.0, 20.0, 2.0);
+    let usual = || make_member(family, 1.0, 20.0, 2.0);
     let has_many = usual().terms().is_ok_and(|terms| terms.len() > MANY);
     let lengths: &[i32] = match extent {
         Extent::Quick if has_many => &[],
@@ -65,12 +64,12 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
         let time = 10f64.powi(*length);
         cases.push((
             poke(format!("steps and times of 1e{length} s"), 20.0, 0.1 * time),
-            member(family, time, 20.0, 2.0),
+            make_member(family, time, 20.0, 2.0),
         ));
         cases.push((poke(format!("steps of 1e{length} s, times of 1 s"), 20.0, time), usual()));
         cases.push((
             poke(format!("steps of 0.1 s, times of 1e{length} s"), 20.0, 0.1),
-            member(family, time, 20.0, 2.0),
+            make_member(family, time, 20.0, 2.0),
         ));
     }
     cases.push((poke("subnormal depths".to_owned(), SUBNORMAL, 0.1), usual()));
@@ -79,7 +78,7 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
     cases.push((gentle, usual()));
     cases.push((
         poke("subnormal relaxation times".to_owned(), 20.0, 0.1),
-        member(family, SUBNORMAL, 20.0, 2.0),
+        make_member(family, SUBNORMAL, 20.0, 2.0),
     ));
     let mut weak = usual();
     weak.linear.fill(SUBNORMAL);

@@ -1,12 +1,11 @@
 //! Relaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
 
 use super::judge::{PathCase, Row};
-use super::members::member;
+use super::members::make_member;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
 use crate::families::by_key;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "relaxation time and step";
 
 /// Depths in mm of the path: in from outside, down, hold, partly back and down again, out and in.
@@ -37,13 +36,13 @@ fn rows(extent: Extent, key: &str, progress: &mut dyn FnMut(f64)) -> Vec<Row> {
         return Vec::new();
     };
     let [mut taus, steps] = decades(extent);
-    let probe = member(&*family, 1.0, 20.0, 2.0);
+    let probe = make_member(&*family, 1.0, 20.0, 2.0);
     if extent == Extent::Whole && probe.terms().is_ok_and(|terms| terms.len() > MANY) {
         taus.retain(|tau| tau % 3 == 0);
     }
     let mut rows = Vec::new();
     for (index, tau) in taus.iter().enumerate() {
-        let subject = FamilyBody(member(&*family, 10f64.powi(*tau), 20.0, 2.0));
+        let subject = FamilyBody(make_member(&*family, 10f64.powi(*tau), 20.0, 2.0));
         for step in &steps {
             let dt = 10f64.powi(*step);
             let path = PathCase {
@@ -52,7 +51,7 @@ fn rows(extent: Extent, key: &str, progress: &mut dyn FnMut(f64)) -> Vec<Row> {
                 start: -1.0,
                 steps: DEPTHS.iter().map(|&depth| (dt, depth)).collect(),
             };
-            rows.push(path.put_to(&subject));
+            rows.push(path.run_on(&subject));
         }
         progress((index + 1) as f64 / taus.len() as f64);
     }

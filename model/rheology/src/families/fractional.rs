@@ -1,9 +1,9 @@
 //! The fractional Zener body: a spring beside a spring in series with a spring-pot.
 
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::Relaxation;
-use super::table::Kind;
+use super::relaxation::RelaxationTerm;
+use super::table::FamilyKind;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ impl FractionalZener {
     }
 }
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "fractional",
     of: |number| match number {
         None => Some(Arc::new(FractionalZener::default())),
@@ -105,10 +105,10 @@ impl Family for FractionalZener {
         vec![("kelvin".into(), "a continuous spread of relaxation times")]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         vec![
-            Outer::new("tau", "s", OuterRange::Time),
-            Outer::new("alpha", "", OuterRange::Share(0.1, 0.95)),
+            OuterParameter::new("tau", "s", OuterRange::Time),
+            OuterParameter::new("alpha", "", OuterRange::Share(0.1, 0.95)),
         ]
     }
 
@@ -116,8 +116,8 @@ impl Family for FractionalZener {
         vec![("k_0".into(), "N/mm"), ("k_1".into(), "N/mm")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        Relaxation::spread(outer[0], self.spectrum(outer[1]))
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        RelaxationTerm::spread(outer[0], self.spectrum(outer[1]))
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {

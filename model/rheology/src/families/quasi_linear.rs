@@ -1,11 +1,11 @@
 //! Fung's quasi-linear viscoelasticity.
 
 use super::exponential::CURVATURE;
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
 use super::quadrature::gauss_legendre;
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F = int_0^t G(t - s) dT/ds ds` with the elastic response `T = A (e^(B x) - 1)` and the reduced
@@ -41,7 +41,7 @@ impl QuasiLinear {
     }
 }
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "fung",
     of: |number| match number {
         None => Some(Arc::new(QuasiLinear::default())),
@@ -78,11 +78,11 @@ impl Family for QuasiLinear {
         ]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         vec![
-            Outer::new("tau_1", "s", OuterRange::Time),
-            Outer::new("tau_2/tau_1", "", OuterRange::Ratio(3.0, 1e6)),
-            Outer::new("B", "1/mm", CURVATURE),
+            OuterParameter::new("tau_1", "s", OuterRange::Time),
+            OuterParameter::new("tau_2/tau_1", "", OuterRange::Ratio(3.0, 1e6)),
+            OuterParameter::new("B", "1/mm", CURVATURE),
         ]
     }
 
@@ -90,15 +90,15 @@ impl Family for QuasiLinear {
         vec![("A_inf".into(), "N"), ("A_inf_C".into(), "N")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let (tau_1, width) = (outer[0], outer[1].ln());
-        let spring = Drive::exponential(1.0, outer[2]);
+        let spring = DepthDrive::exponential(1.0, outer[2]);
         let (nodes, weights) = gauss_legendre(self.nodes);
         let spectrum = nodes.iter().zip(&weights).map(|(node, weight)| {
             let tau = tau_1 * (0.5 * (node + 1.0) * width).exp();
-            Relaxation::maxwell(spring, tau).scaled(0.5 * weight * width)
+            RelaxationTerm::maxwell(spring, tau).scaled(0.5 * weight * width)
         });
-        vec![vec![Relaxation::spring(spring)], spectrum.collect()]
+        vec![vec![RelaxationTerm::spring(spring)], spectrum.collect()]
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {

@@ -1,6 +1,6 @@
 //! The response of a sum of relaxation terms to any depth history.
 
-use super::relaxation::{Piece, Relaxation, Relaxing};
+use super::relaxation::{DepthPiece, RelaxationState, RelaxationTerm};
 use palpate_model::units::{Depth, Seconds};
 use palpate_model::viscoelastic::Pieces;
 use thiserror::Error;
@@ -18,13 +18,10 @@ pub(super) fn plain(value: &f64) -> String {
 /// A step that has no answer; the state is as it was before.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum StepError {
-    /// NaN or infinite depth.
     #[error("a depth of {0} mm is not a finite number; give the depth of the probe in mm")]
     Depth(f64),
-    /// Negative, NaN or infinite duration.
     #[error("a time step of {0} s is not possible; time steps are zero or more seconds")]
     Time(f64),
-    /// A dashpot moved in no time.
     #[error(
         "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
@@ -34,7 +31,6 @@ pub enum StepError {
         /// Depth after, in mm.
         to: f64,
     },
-    /// Faster than numbers go.
     #[error(
         "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
@@ -46,17 +42,15 @@ pub enum StepError {
         /// Duration in s.
         dt: f64,
     },
-    /// The force at rest cannot be written as a number.
     #[error(
-        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body", plain(.depth)
+        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the model", plain(.depth)
     )]
     Rest {
         /// Depth in mm.
         depth: f64,
     },
-    /// The force cannot be written as a number.
     #[error(
-        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the body", plain(.from), plain(.to), plain(.dt)
+        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the model", plain(.from), plain(.to), plain(.dt)
     )]
     Overflow {
         /// Depth before, in mm.
@@ -75,8 +69,7 @@ pub enum StepError {
 /// crosses the surface or, for terms that soften, the greatest depth so far.
 #[derive(Clone, Debug)]
 pub struct Response {
-    terms: Vec<Relaxing>,
-    /// Column of each term.
+    terms: Vec<RelaxationState>,
     columns: Vec<usize>,
     depth: f64,
     depth_max: f64,
@@ -86,10 +79,10 @@ pub struct Response {
 impl Response {
     /// Columns relaxed with the probe at `depth`: as if it had been held there for ever.
     #[must_use]
-    pub fn new(columns: &[Vec<Relaxation>], depth: Depth) -> Self {
+    pub fn new(columns: &[Vec<RelaxationTerm>], depth: Depth) -> Self {
         let start = depth.0.max(0.0);
-        let terms: Vec<Relaxing> =
-            columns.iter().flatten().map(|term| Relaxing::relaxed(*term, start)).collect();
+        let terms: Vec<RelaxationState> =
+            columns.iter().flatten().map(|term| RelaxationState::relaxed(*term, start)).collect();
         let softens = terms.iter().any(|one| one.softens);
         let owners = columns.iter().enumerate();
         Self {
@@ -108,14 +101,13 @@ impl Response {
         Depth(self.depth)
     }
 
-    /// Greatest depth so far.
     pub fn depth_max(&self) -> Depth {
         Depth(self.depth_max)
     }
 
     /// Sum of all terms, in the unit of their drives.
     pub fn sum(&self) -> f64 {
-        self.terms.iter().map(Relaxing::value).sum()
+        self.terms.iter().map(RelaxationState::value).sum()
     }
 
     /// Adds each column's value to its slot.
@@ -146,7 +138,7 @@ impl Response {
                     return Err(StepError::Overflow { from, to, dt });
                 }
             }
-            self.terms.iter_mut().for_each(Relaxing::settle_jump);
+            self.terms.iter_mut().for_each(RelaxationState::settle_jump);
             self.arrive(to);
             return Ok(());
         }
@@ -185,7 +177,7 @@ impl Response {
             self.add_to(slots);
             return Ok(());
         }
-        let before: Vec<f64> = self.terms.iter().map(Relaxing::value).collect();
+        let before: Vec<f64> = self.terms.iter().map(RelaxationState::value).collect();
         let (x0, x1) = (self.depth.max(0.0), depth.0.max(0.0));
         let piece = self.piece(x0, x1 - x0, dt.0);
         self.step(depth, dt)?;
@@ -206,8 +198,8 @@ impl Response {
         self.softens && x0 < self.depth_max && x1 > self.depth_max
     }
 
-    fn piece(&self, x0: f64, d: f64, dt: f64) -> Piece {
-        Piece { x0, d, dt, x_max: self.depth_max, primary: d >= 0.0 && x0 >= self.depth_max }
+    fn piece(&self, x0: f64, d: f64, dt: f64) -> DepthPiece {
+        DepthPiece { x0, d, dt, x_max: self.depth_max, primary: d >= 0.0 && x0 >= self.depth_max }
     }
 
     /// The parts of a step, in depth in contact and time.
@@ -235,30 +227,30 @@ impl Response {
     }
 
     #[inline]
-    fn advance(&mut self, piece: &Piece, [from, to, dt]: [f64; 3]) -> Result<(), StepError> {
+    fn advance(&mut self, piece: &DepthPiece, [from, to, dt]: [f64; 3]) -> Result<(), StepError> {
         for term in &mut self.terms {
             if !term.prepare(piece) {
                 return Err(StepError::Overflow { from, to, dt });
             }
         }
-        self.terms.iter_mut().for_each(Relaxing::settle);
+        self.terms.iter_mut().for_each(RelaxationState::settle);
         Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::relaxation::{Drive, Relaxation};
+    use super::super::relaxation::{DepthDrive, RelaxationTerm};
     use super::*;
 
     /// A spring that softens, in series with a dashpot: what it lost relaxes like the rest.
     fn softening_maxwell(softens: bool) -> Response {
-        let spring = Drive {
+        let spring = DepthDrive {
             powers: [0.2, 0.01, 0.0, 0.0, 0.0],
             softening: if softens { [-0.1, 0.004, -1e-4] } else { [0.0; 3] },
-            ..Drive::default()
+            ..DepthDrive::default()
         };
-        Response::new(&[vec![Relaxation::maxwell(spring, 3.0)]], Depth(0.0))
+        Response::new(&[vec![RelaxationTerm::maxwell(spring, 3.0)]], Depth(0.0))
     }
 
     /// Two ways of one path: in one step a piece, and in many. Depth over time is the same.

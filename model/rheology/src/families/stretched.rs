@@ -1,9 +1,9 @@
 //! Stretched exponential relaxation: a spring beside one that relaxes after Kohlrausch, Williams and Watts.
 
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::Relaxation;
-use super::table::Kind;
+use super::relaxation::RelaxationTerm;
+use super::table::FamilyKind;
 use std::f64::consts::{LN_10, PI};
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// Both integrands are positive and analytic, so the trapezoid rule converges exponentially (Trefethen & Weideman,
 /// SIAM Rev. 56 (2014) 385-458), and the body is a fixed pattern of Maxwell bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stretched {
+pub(super) struct StretchedExponential {
     digits: u32,
 }
 
@@ -36,17 +36,17 @@ const GUARD_DIGITS: f64 = 0.75;
 /// beyond is lumped there.
 const REACH: f64 = 12.0 * LN_10;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "stretched",
     of: |number| {
         let digits = number.map_or(Some(DIGITS), |one| u32::try_from(one).ok());
         let digits = digits.filter(|one| (1..=10).contains(one))?;
-        Some(Arc::new(Stretched { digits }))
+        Some(Arc::new(StretchedExponential { digits }))
     },
     compared: None,
 };
 
-impl Stretched {
+impl StretchedExponential {
     /// `(u, weight)`: shares of the modulus that relax by `exp(-s e^u)`, together one.
     fn spectrum(self, beta: f64) -> Vec<(f64, f64)> {
         let accuracy = (f64::from(self.digits) + GUARD_DIGITS) * LN_10;
@@ -105,7 +105,7 @@ fn angles(beta: f64, step: f64, accuracy: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-impl Family for Stretched {
+impl Family for StretchedExponential {
     fn key(&self) -> String {
         match self.digits {
             DIGITS => "stretched".into(),
@@ -129,10 +129,10 @@ impl Family for Stretched {
         vec![("kelvin".into(), "relaxation that slows down as it goes on")]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         vec![
-            Outer::new("tau", "s", OuterRange::Time),
-            Outer::new("beta", "", OuterRange::Share(0.1, 0.9)),
+            OuterParameter::new("tau", "s", OuterRange::Time),
+            OuterParameter::new("beta", "", OuterRange::Share(0.1, 0.9)),
         ]
     }
 
@@ -140,8 +140,8 @@ impl Family for Stretched {
         vec![("k_0".into(), "N/mm"), ("k_1".into(), "N/mm")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        Relaxation::spread(outer[0], self.spectrum(outer[1]))
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        RelaxationTerm::spread(outer[0], self.spectrum(outer[1]))
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {
@@ -166,7 +166,7 @@ mod tests {
     fn relaxation_is_the_stretched_exponential_to_as_many_digits_as_asked() {
         for digits in [2, 4, 6, 8] {
             for beta in [0.1, 0.25, 0.5, 0.7, 0.9] {
-                let spectrum = Stretched { digits }.spectrum(beta);
+                let spectrum = StretchedExponential { digits }.spectrum(beta);
                 assert!((spectrum.iter().map(|one| one.1).sum::<f64>() - 1.0).abs() < 1e-14);
                 // Twelve decades of time, but those that are lumped at the ends.
                 for i in -60..=60 {
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn relaxation_changes_evenly_with_beta() {
         // What it is off by changes by 2.5e-5 at most; where a node comes in whole, by 6.5e-5.
-        let family = Stretched { digits: 3 };
+        let family = StretchedExponential { digits: 3 };
         for s in [1e-3f64, 0.1, 1.0, 20.0] {
             let mut before = None;
             for i in 0..=800 {

@@ -1,9 +1,9 @@
 //! Unloading: the modified Kelvin body that is softer where it has been deeper.
 
-use super::family::{Family, Outer};
+use super::family::{Family, OuterParameter};
 use super::power_series::PowerSeries;
-use super::relaxation::{Drive, Relaxation, SOFTENING_MAX};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm, SOFTENING_MAX};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x' + (s1 x + s2 x^2 + s3 x^3) (1 - x / x_max)`,
@@ -34,7 +34,7 @@ impl Unloading {
     }
 }
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "unloading",
     of: |number| Some(Arc::new(Unloading::of_order(number?)?)),
     compared: Some(3..=3),
@@ -61,7 +61,7 @@ impl Family for Unloading {
         vec![(self.loading.key(), "softness after greater depth")]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         self.loading.outer()
     }
 
@@ -70,9 +70,9 @@ impl Family for Unloading {
         self.loading.linear().into_iter().chain(softening).collect()
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let softening = (1..=SOFTENING_MAX)
-            .map(|k| vec![Relaxation::settling(Drive::softening(k, 1.0), outer[0])]);
+            .map(|k| vec![RelaxationTerm::settling(DepthDrive::softening(k, 1.0), outer[0])]);
         let loading = self.loading.columns(outer);
         loading.into_iter().chain(softening).collect()
     }

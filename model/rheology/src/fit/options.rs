@@ -22,7 +22,7 @@ pub(super) const LINEAR_COUNT: usize = 6;
 
 /// A parameter that a fit of a family has.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Known {
+pub(super) struct KnownParameter {
     pub name: String,
     pub unit: &'static str,
     /// Where an outer parameter of the family is searched.
@@ -55,7 +55,6 @@ impl Layout {
         self.outers..self.contact()
     }
 
-    /// How many these are.
     pub fn linear_count(self) -> usize {
         self.linear().len()
     }
@@ -72,7 +71,6 @@ impl Layout {
         self.outers + self.coefficients + usize::from(self.fades) + 1
     }
 
-    /// All parameters.
     pub fn count(self) -> usize {
         self.contact() + 1
     }
@@ -90,7 +88,7 @@ impl Layout {
 #[derive(Clone, Debug)]
 pub struct FitOptions {
     family: Arc<dyn Family>,
-    known: Vec<Known>,
+    known: Vec<KnownParameter>,
     layout: Layout,
     fixed: Vec<Option<f64>>,
     is_at_rest: bool,
@@ -114,22 +112,23 @@ impl FitOptions {
     #[must_use]
     pub fn of(family: Arc<dyn Family>) -> Self {
         let layout = Layout::of(&*family);
-        let outer = family.outer().into_iter().map(|one| Known {
+        let outer = family.outer().into_iter().map(|one| KnownParameter {
             name: one.name,
             unit: one.unit,
             range: Some(one.range),
             is_bound: false,
         });
-        let plain = |name: String, unit| Known { name, unit, range: None, is_bound: false };
+        let plain =
+            |name: String, unit| KnownParameter { name, unit, range: None, is_bound: false };
         let linear = family.linear().into_iter().enumerate();
-        let linear = linear.map(|(k, (name, unit))| Known {
+        let linear = linear.map(|(k, (name, unit))| KnownParameter {
             is_bound: family.is_non_negative(k),
             ..plain(name, unit)
         });
         let initial = layout.initial().map(|_| plain("f0".to_owned(), "N"));
         let own = [("f_offset", "N"), ("x_contact", "mm")];
         let own = own.map(|(name, unit)| plain(name.to_owned(), unit));
-        let known: Vec<Known> = outer.chain(linear).chain(initial).chain(own).collect();
+        let known: Vec<KnownParameter> = outer.chain(linear).chain(initial).chain(own).collect();
         let mut fixed = vec![None; known.len()];
         fixed[layout.contact()] = Some(0.0);
         Self { family, known, layout, fixed, is_at_rest: false }
@@ -140,7 +139,6 @@ impl FitOptions {
         by_key(key).map(Self::of)
     }
 
-    /// The family.
     pub fn family(&self) -> &dyn Family {
         &*self.family
     }
@@ -209,7 +207,7 @@ impl FitOptions {
         &self.fixed
     }
 
-    pub(super) fn known(&self) -> &[Known] {
+    pub(super) fn known(&self) -> &[KnownParameter] {
         &self.known
     }
 

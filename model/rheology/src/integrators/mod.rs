@@ -46,7 +46,7 @@ pub use trapezoid::Trapezoid;
 
 use crate::families::StepError;
 use palpate_model::viscoelastic::BodyError;
-use real::Running;
+use real::CompensatedForce;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -81,23 +81,15 @@ palpate_model::named! {
 }
 
 palpate_model::named! {
-    /// The integrators by name.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Scheme {
-        /// [`ExplicitEuler`].
         ExplicitEuler = "explicit Euler",
-        /// [`ImplicitEuler`].
         ImplicitEuler = "implicit Euler",
-        /// [`Trapezoid`].
         Trapezoid = "trapezoid",
-        /// [`ExponentialLeft`].
         ExponentialLeft = "exponential, forcing held",
-        /// [`ExponentialFirstOrder`].
         ExponentialFirstOrder = "exponential, forcing straight",
-        /// [`Exact`].
         Exact = "exact, depth straight",
-        /// [`RungeKutta`].
         RungeKutta = "Runge-Kutta 4",
     }
 }
@@ -105,27 +97,20 @@ palpate_model::named! {
 /// A body cannot be integrated so.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum IntegratorError {
-    /// No body.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A step has no force.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// No step length.
     #[error("steps of {0} s are not possible; a constant step is a finite time above zero")]
     Time(f64),
-    /// Errors would grow from step to step.
     #[error(
         "{name} is unstable at steps of {dt} s, {h:.3} relaxation times; it is stable below {limit:.3}"
     )]
     Unstable {
-        /// Name of the integrator.
         name: &'static str,
         /// Step in s.
         dt: f64,
-        /// Step over relaxation time.
         h: f64,
-        /// Where it stops being stable.
         limit: f64,
     },
 }
@@ -235,7 +220,7 @@ fn run<R: Real, const N: usize, I: Integrator<R, N>>(
     let start = Start { depth, force: None };
     let mut integrator = I::at_any_step(body, dt, start);
     // A step of no movement from rest changes nothing; the first force is where the body rests.
-    forces.push(drive::Drive::new(body, dt, depth).settled());
+    forces.push(drive::SeriesDrive::new(body, dt, depth).settled());
     for &depth in rest {
         forces.push(integrator.step(depth)?);
     }
@@ -244,16 +229,20 @@ fn run<R: Real, const N: usize, I: Integrator<R, N>>(
 
 /// The new force if it is a number, else why it is none.
 #[inline]
-fn finished<R: Real>(force: Running<R>, ends: [R; 2], dt: f64) -> Result<Running<R>, StepError> {
+fn check_finite<R: Real>(
+    force: CompensatedForce<R>,
+    ends: [R; 2],
+    dt: f64,
+) -> Result<CompensatedForce<R>, StepError> {
     if force.value.is_finite() && ends[1].is_finite() {
         Ok(force)
     } else {
-        Err(unfinished(ends.map(R::to_f64), dt))
+        Err(step_error(ends.map(R::to_f64), dt))
     }
 }
 
 #[cold]
-fn unfinished([from, to]: [f64; 2], dt: f64) -> StepError {
+fn step_error([from, to]: [f64; 2], dt: f64) -> StepError {
     if to.is_finite() { StepError::Overflow { from, to, dt } } else { StepError::Depth(to) }
 }
 

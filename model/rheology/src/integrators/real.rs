@@ -16,17 +16,14 @@ pub trait Real:
     + Neg<Output = Self>
     + sealed::Sealed
 {
-    /// Zero.
     const ZERO: Self;
     /// Far below the last digit of any force, far above the subnormal numbers, which are slow.
     const NEGLIGIBLE: Self;
     /// The nearest number to a double.
     fn of(value: f64) -> Self;
-    /// As a double, exactly.
     fn to_f64(self) -> f64;
     /// Whether it is neither infinite nor NaN.
     fn is_finite(self) -> bool;
-    /// Its size.
     fn abs(self) -> Self;
 }
 
@@ -81,12 +78,12 @@ impl Real for f32 {
 /// The force with its rounding error carried along, as in the exact step of the families: at small
 /// steps an increment is below the last digit of the force long before the force has settled.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Running<R> {
+pub(super) struct CompensatedForce<R> {
     pub value: R,
     carry: R,
 }
 
-impl<R: Real> Running<R> {
+impl<R: Real> CompensatedForce<R> {
     pub fn new(value: R) -> Self {
         Self { value, carry: R::ZERO }
     }

@@ -2,9 +2,9 @@
 //! start, in the middle and at the end of the step.
 
 use super::body::SeriesBody;
-use super::drive::Drive;
-use super::real::{Real, Running};
-use super::{Integrator, Start, finished};
+use super::drive::SeriesDrive;
+use super::real::{CompensatedForce, Real};
+use super::{Integrator, Start, check_finite};
 use crate::families::StepError;
 use std::marker::PhantomData;
 
@@ -22,15 +22,14 @@ pub trait Rule {
     /// Which of the three weights are not zero at every step: the others cost nothing.
     const USES: [bool; 3];
 
-    /// The weights.
     fn weights(h: f64) -> Weights;
 }
 
 /// A body stepped by a rule.
 #[derive(Clone, Copy, Debug)]
 pub struct Stepped<R, const N: usize, T> {
-    drive: Drive<R, N>,
-    force: Running<R>,
+    drive: SeriesDrive<R, N>,
+    force: CompensatedForce<R>,
     forcing: [R; 3],
     share: R,
     rule: PhantomData<T>,
@@ -39,9 +38,9 @@ pub struct Stepped<R, const N: usize, T> {
 impl<R: Real, const N: usize, T: Rule> Integrator<R, N> for Stepped<R, N, T> {
     fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self {
         let weights = T::weights(dt / body.tau_eps);
-        let drive = Drive::new(body, dt, start.depth);
+        let drive = SeriesDrive::new(body, dt, start.depth);
         Self {
-            force: Running::new(start.force.unwrap_or(drive.settled())),
+            force: CompensatedForce::new(start.force.unwrap_or(drive.settled())),
             drive,
             forcing: weights.forcing.map(R::of),
             share: R::of(weights.share),
@@ -64,7 +63,7 @@ impl<R: Real, const N: usize, T: Rule> Integrator<R, N> for Stepped<R, N, T> {
             weighted = weighted + right * forcing.right;
         }
         let force = self.force.relaxed(weighted, self.share);
-        self.force = finished(force, [self.drive.depth(), depth], self.drive.dt())?;
+        self.force = check_finite(force, [self.drive.depth(), depth], self.drive.dt())?;
         self.drive.arrive(&forcing);
         Ok(force.value)
     }

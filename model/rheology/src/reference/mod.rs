@@ -9,7 +9,7 @@ mod digits;
 mod psi;
 mod rule;
 
-use crate::families::{Drive, POWER_MAX, Relaxation, StepError};
+use crate::families::{DepthDrive, POWER_MAX, RelaxationTerm, StepError};
 use digits::{Big, Digits, is_negative, is_zero, nearest};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use psi::Weights;
@@ -26,13 +26,10 @@ const EXPONENT_MAX: f64 = 1e5;
 /// What the reference does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
-    /// Too few or too many digits.
     #[error("a reference has 20 to 1000 digits, not {0}")]
     Digits(usize),
-    /// An exponential beyond all numbers.
     #[error("the force at rest at that depth is beyond the largest number")]
     Overflow,
-    /// A parameter that is no number, or a negative time.
     #[error(
         "a term with a relaxation time below zero or a coefficient that is not finite has no force"
     )]
@@ -73,13 +70,13 @@ struct Function {
 
 impl Reference {
     /// Terms relaxed with the probe at `depth`, in [`REFERENCE_DIGITS`].
-    pub fn new(terms: &[Relaxation], depth: Depth) -> Result<Self, ReferenceError> {
+    pub fn new(terms: &[RelaxationTerm], depth: Depth) -> Result<Self, ReferenceError> {
         Self::with_digits(terms, depth, REFERENCE_DIGITS)
     }
 
     /// Terms relaxed with the probe at `depth`, in at least so many decimal digits, 20 to 1000.
     pub fn with_digits(
-        terms: &[Relaxation],
+        terms: &[RelaxationTerm],
         depth: Depth,
         digits: usize,
     ) -> Result<Self, ReferenceError> {
@@ -202,8 +199,8 @@ impl Reference {
 }
 
 impl Term {
-    fn new(digits: Digits, term: &Relaxation, depth: Depth) -> Result<Self, ReferenceError> {
-        let Relaxation { tau, elastic, rate } = term;
+    fn new(digits: Digits, term: &RelaxationTerm, depth: Depth) -> Result<Self, ReferenceError> {
+        let RelaxationTerm { tau, elastic, rate } = term;
         let numbers = [elastic, rate].into_iter().flat_map(|drive| {
             let (amplitude, b) = drive.exponential.unwrap_or_default();
             let powers = drive.powers.into_iter().chain(drive.softening);
@@ -253,7 +250,7 @@ impl Term {
             _ => Weights::new(digits, dt, &self.tau, self.degree + 1),
         };
         let speed = d / dt;
-        let mut sum = &self.value * &weights.kept;
+        let mut sum = &self.value * &weights.decay;
         // The drive by power of depth, then about x0 by binomials, then by powers of d.
         let zero = digits.zero();
         let mut c = vec![zero; self.degree + 1];
@@ -304,13 +301,13 @@ fn chi(b: &Big, weights: &Weights) -> Big {
     }
     let sum = b + r;
     if is_zero(&sum) {
-        return r * &weights.kept;
+        return r * &weights.decay;
     }
-    r * (b.exp() - &weights.kept) / sum
+    r * (b.exp() - &weights.decay) / sum
 }
 
 impl Function {
-    fn new(digits: Digits, drive: &Drive) -> Self {
+    fn new(digits: Digits, drive: &DepthDrive) -> Self {
         let powers = drive.powers.iter().map(|&value| digits.exact(value));
         let exponential = drive.exponential;
         Self {

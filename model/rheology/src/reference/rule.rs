@@ -68,8 +68,8 @@ impl RuleReference {
             Scheme::ImplicitEuler => (force + &h * &right) / (&one + &h),
             Scheme::Trapezoid => ((&two - &h) * force + &h * (&left + &right)) / (&two + &h),
             Scheme::ExponentialLeft | Scheme::ExponentialFirstOrder => {
-                let Weights { kept, psi, .. } = Weights::new(self.digits, &span, &self.tau, 2);
-                let held = kept * force + &psi[0] * &left;
+                let Weights { decay, psi, .. } = Weights::new(self.digits, &span, &self.tau, 2);
+                let held = decay * force + &psi[0] * &left;
                 match self.scheme {
                     Scheme::ExponentialLeft => held,
                     _ => held + &psi[1] * (&right - &left),

@@ -12,7 +12,6 @@ const AT_PEAK: f64 = 0.005;
 /// One record in a few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordFacts {
-    /// Its name.
     pub record: String,
     /// The specimen pressed, where it is known.
     pub specimen: Option<String>,
@@ -56,14 +55,14 @@ impl RecordFacts {
             } else {
                 0.0
             },
-            peak_n: peak(samples, 0.0),
+            peak_n: peak_force(samples, 0.0),
             arrival: first(deepest - AT_PEAK * stroke),
         }
     }
 }
 
 /// Largest size of the measured force above `offset`, in N.
-pub(super) fn peak(samples: &[FitSample], offset: f64) -> f64 {
+pub(super) fn peak_force(samples: &[FitSample], offset: f64) -> f64 {
     let forces = samples.iter().filter(|one| one.is_measured());
     forces.fold(0.0, |all, one| all.max((one.force.0 - offset).abs()))
 }

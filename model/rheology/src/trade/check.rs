@@ -4,38 +4,20 @@ use super::{Cost, TRADE_FORMAT, TradeCurves};
 use crate::integrators::Precision;
 use thiserror::Error;
 
-/// Curves that are none.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CurveError {
-    /// Another version of the stored form.
     #[error("these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again")]
     Format(u32),
-    /// A number out of its range.
-    #[error("the curves say {what} = {value}, which nothing can be; measure again")]
-    Number {
-        /// Which.
-        what: String,
-        /// Its value.
-        value: f64,
-    },
-    /// Two numbers that contradict each other.
+    #[error("the curves state {what} of {value}, which is not possible; measure again")]
+    Number { what: String, value: f64 },
     #[error(
         "the curves contradict themselves at {0}: they were changed after they were measured; measure again"
     )]
     Contradiction(String),
-    /// Errors that this program does not find.
     #[error(
-        "{what}: the curves say an error of {stored:e} and this palpate finds {found:e}; measure again"
+        "{what}: the curves state an error of {stored:e} and this palpate finds {found:e}; measure again"
     )]
-    Error {
-        /// Which row.
-        what: String,
-        /// What is stored.
-        stored: f64,
-        /// What is computed now.
-        found: f64,
-    },
-    /// Other rows.
+    Error { what: String, stored: f64, found: f64 },
     #[error("the curves have no row {0}; measure again")]
     Missing(String),
 }

@@ -11,16 +11,13 @@ pub const STALE_DAYS: f64 = 90.0;
 pub struct Machine {
     /// Processor, by its own name where the system tells it, else its architecture.
     pub cpu: String,
-    /// Operating system.
     pub os: String,
-    /// Logical cores.
     pub cores: usize,
     /// How palpate was built: `debug` or `release`.
     pub profile: String,
 }
 
 impl Machine {
-    /// In words.
     pub fn words(&self) -> String {
         let Self { cpu, os, cores, profile } = self;
         format!("{cpu}, {cores} logical cores, {os}, {profile} build")
@@ -42,7 +39,7 @@ impl TradeCurves {
         let there = &self.machine;
         if (&there.cpu, &there.os, there.cores) != (&here.cpu, &here.os, here.cores) {
             doubts.push(format!(
-                "these curves are foreign: measured on {}, this is {}; measure here",
+                "these curves were measured on another computer ({}), and this is {}; measure here",
                 there.words(),
                 here.words()
             ));

@@ -3,7 +3,7 @@
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{self, Model, PowerSeries};
-use palpate_rheology::families::{Family, Outer, Relaxation};
+use palpate_rheology::families::{Family, OuterParameter, RelaxationTerm};
 use palpate_rheology::fit::fit_joint;
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::sync::Arc;
@@ -175,13 +175,13 @@ impl Family for WithoutKernel {
     fn cannot_represent(&self) -> &'static str {
         self.0.cannot_represent()
     }
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         self.0.outer()
     }
     fn linear(&self) -> Vec<(String, &'static str)> {
         self.0.linear()
     }
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         self.0.columns(outer)
     }
     fn fading(&self, outer: &[f64]) -> Option<f64> {

@@ -33,7 +33,6 @@ impl Rows {
         }
     }
 
-    /// Writes the six columns.
     #[inline(always)]
     pub fn values(&self, columns: &mut [Lane]) {
         let [c1, c2, c3, c4, c5, c6, ..] = columns else {
