@@ -1,4 +1,4 @@
-//! How much force error matters, as people say it: in newtons, of the peak, or of what a hand notices.
+//! Tolerated error of force: in newtons, of the peak, or of the smallest change that a hand notices.
 
 use palpate_model::units::Newtons;
 use std::fmt;
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_ways_to_say_it() {
+    fn tolerance_is_parsed_in_newtons_percent_of_peak_and_of_threshold() {
         let newtons = |text: &str| {
             let tolerance: Tolerance = text.parse().unwrap();
             tolerance.in_newtons(Newtons(-4.0)).0

@@ -21,7 +21,7 @@ pub(super) struct LocalFit {
 }
 
 /// Least squares of a parabola through points `(x, y)`, read at `at`; `None` for points that do not determine it
-/// or leave nothing to tell the error from.
+/// or leave no degree of freedom for the error.
 pub(super) fn parabola(points: &[[f64; 2]], at: f64) -> Option<LocalFit> {
     fit(points, at, 2)
 }

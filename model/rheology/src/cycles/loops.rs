@@ -212,7 +212,7 @@ impl LoadingPath {
         let has = |phase: Phase| cycle.iter().any(|one| one.phase == phase);
         let is_loop = has(Phase::Unload) && !has(Phase::Creep) && !has(Phase::Sine);
         let of = |phase: Phase| cycle.iter().filter(move |one| one.phase == phase);
-        // What is held after a creep or a sine does not begin at the peak.
+        // A hold after a creep or a sine does not begin at the peak.
         let held: Vec<[f64; 2]> = cycle
             .iter()
             .skip_while(|one| one.phase == Phase::Ramp)

@@ -1,4 +1,4 @@
-//! What repeated indentations of one specimen show: loops, their shift and decay, relaxation, creep, and the answer
+//! Quantities of repeated indentations of one specimen: loops, their shift and decay, relaxation, creep, and the response
 //! to a sine; and what a fitted body's prediction of a record is worth.
 //!
 //! Everything is measured on the record itself; no model is assumed but where a name says so. Standard errors hold

@@ -1,4 +1,4 @@
-//! What a body fitted elsewhere predicts of a record, and by how much it is wrong.
+//! Prediction of a record by a model fitted elsewhere, and its error.
 
 use super::Estimate;
 use super::local::line;

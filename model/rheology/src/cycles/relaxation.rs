@@ -10,7 +10,7 @@ pub struct Relaxation {
     pub duration: Seconds,
     /// Force at the end: a line through the last tenth of the hold, read at its end.
     pub force_end: Estimate<Newtons>,
-    /// What has gone by then, in percent of the peak.
+    /// Fall of the force by then, in percent of the peak (percent relaxation).
     pub percent: Estimate<f64>,
     /// Time from the start of the hold until half of what will have gone at its end has gone.
     pub half_time: Option<Seconds>,

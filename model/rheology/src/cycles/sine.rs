@@ -27,7 +27,7 @@ const LOST_SHARE: f64 = 0.01;
 /// A force that swings by this share of its amplitude below zero is of a specimen that is held and pulls back.
 const PULL_SHARE: f64 = 0.5;
 
-/// What one frequency shows.
+/// Response to a sine at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sinusoid {
     /// The frequency, in Hz.
@@ -53,14 +53,9 @@ pub struct Sinusoid {
 }
 
 impl Sinusoid {
-    /// Whether the force comes back to zero, so that nothing was touched for a part of the swing.
-    pub fn is_contact_lost(&self) -> bool {
-        self.zero_share > LOST_SHARE
-    }
-
-    /// What speaks against the numbers, in words; `None` if nothing does.
+    /// A warning that the numbers are not those of the tissue, because contact is lost.
     pub fn remark(&self) -> Option<String> {
-        self.is_contact_lost().then(|| {
+        (self.zero_share > LOST_SHARE).then(|| {
             format!(
                 "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe loses contact, and stiffness, loss and phase are not those of the tissue, whatever their errors; press deeper or reduce the amplitude",
                 self.frequency,
@@ -74,27 +69,17 @@ impl Sinusoid {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SinusoidError {
     #[error("a frequency of {frequency} Hz is not possible; give a positive number")]
-    Frequency {
-        /// What was given, in Hz.
-        frequency: f64,
-    },
+    Frequency { frequency: f64 },
     #[error(
         "the record holds {cycles:.2} cycles at {frequency} Hz; record at least one, better five"
     )]
-    TooShort {
-        cycles: f64,
-        /// At this frequency in Hz.
-        frequency: f64,
-    },
+    TooShort { cycles: f64, frequency: f64 },
     #[error(
         "{per_cycle:.1} samples in a cycle do not resolve its harmonics; sample at least 12 times as fast as the sine"
     )]
     TooSparse { per_cycle: f64 },
     #[error("the depth does not move at {frequency} Hz; check the frequency")]
-    NoMotion {
-        /// The frequency in Hz.
-        frequency: f64,
-    },
+    NoMotion { frequency: f64 },
 }
 
 /// Coefficients of one response, the standard error of those at the frequency, and the standard deviation of what is
@@ -123,7 +108,7 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
     let amplitude = x[0].hypot(x[1]);
     let depths = || used().map(|one| one.depth.0);
     let range = depths().fold(f64::MIN, f64::max) - depths().fold(f64::MAX, f64::min);
-    // What so little of the motion has that frequency is no answer to it.
+    // With so little motion at the frequency the force is not a response to it.
     if amplitude <= MOTION_MIN * 0.5 * range {
         return Err(SinusoidError::NoMotion { frequency });
     }
@@ -291,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_force_that_comes_back_to_zero_is_told() {
+    fn force_that_returns_to_zero_gives_a_remark() {
         // The swing of 0.2 N about so much, cut at zero: nothing is pulled. With noise, without, and with a zero that has
         // drifted by half a standard deviation.
         let mut random = SplitMix::seeded(9);
@@ -312,9 +297,9 @@ mod tests {
                 }
             }
         }
-        // What is glued on pulls as much as it presses.
+        // A glued specimen pulls as much as it presses.
         let found = sinusoid(&record(1.0, 10.0, |t| 0.2 * (TAU * t).cos()), 1.0).unwrap();
-        assert!(!found.is_contact_lost(), "{found:?}");
+        assert!(found.remark().is_none(), "{found:?}");
     }
 
     #[test]

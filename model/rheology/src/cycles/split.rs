@@ -1,4 +1,4 @@
-//! Cycles and phases of a record that names none, from its depth alone.
+//! Cycles and phases of a record without phase labels, from its depth alone.
 
 use super::CycleSample;
 use palpate_model::rig::Phase;
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn triangles_and_holds_are_told_apart() {
+    fn triangles_and_holds_are_split_into_phases() {
         // In to 10 mm, hold, back, rest, in to 10 mm and back at once.
         let mut depth: Vec<f64> = (0..=100).map(|i| 0.1 * f64::from(i)).collect();
         depth.extend([10.0; 50]);

@@ -21,7 +21,7 @@ impl Default for SteadyRule {
     }
 }
 
-/// What changed from the cycle before.
+/// Change from the cycle before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CycleChange {
     /// The later of the two cycles.

@@ -2,7 +2,7 @@
 //!
 //! Every press has its own initial force and offset, so they are eliminated press by press: with
 //! them as the first columns of an orthogonal triangularisation, the rows below theirs hold what the
-//! press says of the body alone, and the rows of all presses are triangularised together.
+//! press contributes to the body alone, and the rows of all presses are triangularised together.
 
 use super::noise::{Noise, Unknowns};
 use super::protocol::{ProtocolPath, duration_of};
@@ -35,14 +35,7 @@ pub enum ExpectedError {
     #[error(
         "{sample_rate_hz} samples per second over {duration_s:.0} s are too few for a relaxation time of {tau_s} s; sample at {wanted_hz:.0} per second at least"
     )]
-    TooCoarse {
-        tau_s: f64,
-        /// Samples per second asked for.
-        sample_rate_hz: f64,
-        duration_s: f64,
-        /// Samples per second that would do.
-        wanted_hz: f64,
-    },
+    TooCoarse { tau_s: f64, sample_rate_hz: f64, duration_s: f64, wanted_hz: f64 },
     #[error("this protocol cannot separate {names}; add a hold of about 5 tau or a second speed")]
     Inseparable { names: String },
     #[error("the model has no parameter '{name}'; it has {}", PARAMETER_NAMES.join(", "))]
@@ -60,14 +53,7 @@ pub enum ExpectedError {
     #[error(
         "{name} cannot be known to {wanted} % with any protocol up to {longest_s} s; the best found reaches {reached} %; allow more time or noise that is smaller"
     )]
-    Unreachable {
-        name: &'static str,
-        /// Half-width of the wanted 95 % interval in percent.
-        wanted: f64,
-        /// Half-width reached, in percent, to three digits.
-        reached: String,
-        longest_s: f64,
-    },
+    Unreachable { name: &'static str, wanted: f64, reached: String, longest_s: f64 },
 }
 
 /// One parameter as a fit of the protocol's record is expected to find it.
@@ -84,7 +70,7 @@ pub struct ExpectedParameter {
     pub percent: Option<f64>,
 }
 
-/// What a protocol is expected to tell about a body.
+/// Precision that a fit of the protocol's record is expected to have.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExpectedPrecision {
     /// In the order of [`PARAMETER_NAMES`].

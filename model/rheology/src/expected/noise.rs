@@ -60,7 +60,7 @@ pub struct Unknowns {
 }
 
 impl Default for Unknowns {
-    /// What [`crate::fit::FitOptions`] frees by default.
+    /// Those that [`crate::fit::FitOptions`] frees by default.
     fn default() -> Self {
         Self { f0: true, f_offset: true }
     }

@@ -50,12 +50,6 @@ impl ProtocolPath {
         }
     }
 
-    /// Down to `depth`, then back to 0: `count` times, all at `speed`, without rest.
-    #[must_use]
-    pub fn triangle(speed: MmPerS, depth: Depth, count: usize, sample_rate_hz: f64) -> Self {
-        Self::cycles(speed, [Depth(0.0), depth], count, sample_rate_hz)
-    }
-
     /// Down to the second depth, then back to the first: `count` times, all at `speed`. A
     /// shallower turning point above 0 keeps the probe in contact.
     #[must_use]

@@ -1,4 +1,4 @@
-//! What a rig and a specimen allow: speeds, forces, turning points.
+//! Limits of rig and specimen: speeds, forces, turning points.
 
 use super::information::ExpectedError;
 use super::protocol::ProtocolPath;
@@ -14,7 +14,7 @@ const SPEEDS_MAX: usize = 21;
 const PEAK_STEPS: u32 = 256;
 /// Where cycles turn back, as shares of the depth.
 pub(super) const TURNS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
-/// What the rig and the specimen allow, and how it is sampled.
+/// Limits of rig and specimen, and the sampling rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rig {
     /// Speeds are multiples of this.

@@ -52,18 +52,15 @@ pub enum Family {
         speed: MmPerS,
         hold: Seconds,
     },
-    /// Two ramps and holds, fitted together.
+    /// Two ramps and holds, fitted together, with a rest out of the tissue between them.
     TwoSpeeds {
         speeds: [MmPerS; 2],
-        /// Time at depth, after each.
         hold: Seconds,
-        /// Time out of the tissue between them.
         rest: Seconds,
     },
-    /// Up and down at one speed.
+    /// Loading and unloading between a shallower and a deeper turning point.
     Cycles {
         speed: MmPerS,
-        /// Shallower and deeper turning point.
         between: [Depth; 2],
         count: usize,
     },
@@ -89,7 +86,7 @@ impl Family {
 pub struct Proposal {
     #[serde(flatten)]
     pub family: Family,
-    /// What it is expected to tell.
+    /// The precision it is expected to reach.
     #[serde(flatten)]
     pub expected: ExpectedPrecision,
     /// Why these settings, in words.
@@ -157,15 +154,17 @@ impl Search<'_> {
             let found = self.least_hold(&best, |hold| Family::RampHold { speed, hold });
             best = found.or(best);
         }
+        let reason = match best.as_ref()?.0 {
+            Family::RampHold { speed, .. } if speed == speeds[0] => self.fastest_speed_words(speed),
+            _ => "a faster ramp needs a longer hold".to_owned(),
+        };
+        self.proposal(best, &reason)
+    }
+
+    fn proposal(&self, best: BestProtocol, reason: &str) -> Option<Proposal> {
         let (family, expected) = best?;
-        let Family::RampHold { speed, .. } = family else {
-            return None;
-        };
-        let reason = if speed == speeds[0] {
-            format!("{}; {}", self.deciding_words(&expected), self.fastest_speed_words(speed))
-        } else {
-            format!("{}; a faster ramp needs a longer hold", self.deciding_words(&expected))
-        };
+        let name = self.worst(&expected).map_or("nothing", |(target, _)| target.parameter);
+        let reason = format!("{name} decides the length; {reason}");
         Some(Proposal { family, expected, reason })
     }
 
@@ -183,13 +182,11 @@ impl Search<'_> {
                 best = found.or(best);
             }
         }
-        let (family, expected) = best?;
         let reason = format!(
-            "{}; both records are fitted together, and the rest of {:.1} s between them counts",
-            self.deciding_words(&expected),
+            "both records are fitted together, and the rest of {:.1} s between them counts",
             rest.0
         );
-        Some(Proposal { family, expected, reason })
+        self.proposal(best, &reason)
     }
 
     fn cycles(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
@@ -201,12 +198,8 @@ impl Search<'_> {
                 best = found.or(best);
             }
         }
-        let (family, expected) = best?;
-        let reason = format!(
-            "{}; it turns back while the probe still presses, since tissue does not adhere to a probe that pulls",
-            self.deciding_words(&expected)
-        );
-        Some(Proposal { family, expected, reason })
+        let reason = "it turns back while the probe still presses, since tissue does not adhere to a probe that pulls";
+        self.proposal(best, reason)
     }
 
     /// The shortest hold that reaches every target and beats `best`.
@@ -277,16 +270,14 @@ impl Search<'_> {
         beaten.unwrap_or(self.rig.duration_max.0)
     }
 
-    fn expected(&self, family: Family) -> Option<ExpectedPrecision> {
+    /// The expected precision, if the force is allowed and every target is reached.
+    fn evaluate(&mut self, family: Family) -> Option<ExpectedPrecision> {
         let protocol = family.protocol(self.rig);
         let expected = intervals(self.body, &protocol, self.noise, self.unknowns).ok()?;
         // The rig's own limit is in force; what rounding adds is not.
-        (expected.force_max.0 <= self.rig.force_max.0 * (1.0 + 1e-9)).then_some(expected)
-    }
-
-    /// What it is expected to tell, if that reaches every target.
-    fn evaluate(&mut self, family: Family) -> Option<ExpectedPrecision> {
-        let expected = self.expected(family)?;
+        if expected.force_max.0 > self.rig.force_max.0 * (1.0 + 1e-9) {
+            return None;
+        }
         let (target, percent) = self.worst(&expected)?;
         let excess = percent / target.percent;
         if self.closest.is_none_or(|(closest, ..)| excess < closest) {
@@ -306,11 +297,6 @@ impl Search<'_> {
                 Some((*target, found.percent?))
             })
             .max_by(|one, other| excess(one).total_cmp(&excess(other)))
-    }
-
-    fn deciding_words(&self, expected: &ExpectedPrecision) -> String {
-        let name = self.worst(expected).map_or("nothing", |(target, _)| target.parameter);
-        format!("{name} decides the length")
     }
 
     fn fastest_speed_words(&self, speed: MmPerS) -> String {

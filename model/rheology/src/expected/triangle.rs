@@ -1,10 +1,10 @@
-//! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
+//! The inverse of a small orthogonal factorisation, or the columns that it does not separate.
 
 use super::information::{BODY, PARAMETER_NAMES};
 use crate::fit::{CONDITION_MAX, dominant_entries};
 use palpate_model::linalg::Triangle;
 
-/// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
+/// The inverse; the parameters in words where columns of these lengths do not separate them.
 pub fn inverse(
     triangle: &Triangle<BODY>,
     lengths: &[f64; BODY],
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_is_one_and_blindness_has_a_name() {
+    fn inverse_is_exact_and_inseparable_parameters_are_named() {
         let mut triangle = Triangle::<BODY>::default();
         let mut alike = Triangle::<BODY>::default();
         for i in 0..50 {

@@ -1,4 +1,4 @@
-//! What fits make of a record, as answers.
+//! Results of fits, as answers.
 
 use super::judge::SubjectAnswer;
 use crate::families::{Family, Model};

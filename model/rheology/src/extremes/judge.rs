@@ -52,10 +52,10 @@ pub enum ExpectedAnswer {
     Either,
 }
 
-/// What a subject made of a case.
+/// Answer of a subject to a case.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SubjectAnswer {
-    /// A number with this relative error, and the warnings that came with it.
+    /// The relative error, and the warnings that came with it.
     Number {
         error: f64,
         warnings: Vec<String>,
@@ -65,19 +65,8 @@ pub enum SubjectAnswer {
 
 #[must_use]
 pub fn judge(
-    [group, case]: [&'static str; 2],
-    subject: &str,
-    expected: ExpectedAnswer,
-    tolerance: f64,
-    answer: SubjectAnswer,
-) -> Row {
-    judge_named(group, case.to_owned(), subject, expected, tolerance, answer)
-}
-
-/// Judges an answer to a case that is named at run time.
-pub(super) fn judge_named(
     group: &'static str,
-    case: String,
+    case: impl Into<String>,
     subject: &str,
     expected: ExpectedAnswer,
     tolerance: f64,
@@ -109,7 +98,7 @@ pub(super) fn judge_named(
     };
     Row {
         group,
-        case,
+        case: case.into(),
         subject: subject.to_owned(),
         verdict,
         relative_error: error,
@@ -128,7 +117,7 @@ pub trait ExtremesSubject {
     /// The force in N after every step of a path, or a refusal.
     fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String>;
 
-    /// What it should give from rest at `start`, in so many digits.
+    /// The right forces from rest at `start`, in so many digits.
     fn oracle(&self, start: Depth, digits: usize) -> Result<Oracle, String> {
         let exact = Reference::with_digits(&self.terms()?, start, digits);
         exact.map(Oracle::Exact).map_err(|err| err.to_string())
@@ -148,7 +137,7 @@ pub trait ExtremesSubject {
 #[derive(Clone, Debug)]
 pub enum Oracle {
     Exact(Reference),
-    /// What an approximate rule makes of it.
+    /// The response of an approximate rule.
     Rule(RuleReference),
 }
 
@@ -186,12 +175,21 @@ pub struct PathCase {
 }
 
 impl PathCase {
+    pub(super) fn new(
+        group: &'static str,
+        case: impl Into<String>,
+        start: f64,
+        steps: Vec<(f64, f64)>,
+    ) -> Self {
+        Self { group, case: case.into(), start, steps }
+    }
+
     /// Puts the path to a subject.
     pub fn run_on(&self, subject: &dyn ExtremesSubject) -> Row {
         let forces = subject.forces(self);
         let truth = self.truth(subject, forces.as_deref().unwrap_or_default());
         let expected = match truth {
-            // What has no truth has no answer.
+            // Without a true force there is no answer.
             Err(_) => ExpectedAnswer::Refusal,
             Ok(truth)
                 if truth.peak > FORCE_MAX || subject.may_refuse(self) || self.is_too_fast() =>
@@ -209,14 +207,8 @@ impl PathCase {
             // Judged as a number where there is none.
             (Ok(_), Err(_)) => SubjectAnswer::Number { error: 0.0, warnings: Vec::new() },
         };
-        judge_named(
-            self.group,
-            self.case.clone(),
-            &subject.name(),
-            expected,
-            subject.tolerance(self),
-            answer,
-        )
+        let (name, tolerance) = (subject.name(), subject.tolerance(self));
+        judge(self.group, self.case.as_str(), &name, expected, tolerance, answer)
     }
 
     /// Whether a speed of this path is beyond the largest number.
@@ -275,7 +267,7 @@ impl PathCase {
     }
 }
 
-/// What a path comes to, in N.
+/// Peak force of a path and largest error, in N.
 #[derive(Clone, Copy, Debug)]
 struct TrueForces {
     peak: f64,

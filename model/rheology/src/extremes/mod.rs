@@ -46,8 +46,21 @@ pub struct Part {
     run: Box<Rows>,
 }
 
-/// Makes rows and tells the share done, 0 to 1.
+/// Makes rows and reports the share done, 0 to 1.
 type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<Row>;
+
+/// The same of a family.
+type FamilyRows = fn(Extent, &Arc<dyn Family>, &mut dyn FnMut(f64)) -> Vec<Row>;
+
+/// The groups that every family runs: name, words before the key of the family, rows.
+const FAMILY_GROUPS: [(&str, &str, FamilyRows); 6] = [
+    (tau_step::GROUP, "", tau_step::rows),
+    (path::GROUP, "", path::rows),
+    (scale::GROUP, "", scale::rows),
+    (input::GROUP, "", input::rows),
+    (records::GROUP, "fit of ", records::rows),
+    (long::GROUP, "", long::rows),
+];
 
 impl Part {
     fn new(
@@ -58,7 +71,7 @@ impl Part {
         Self { group, subject, run: Box::new(run) }
     }
 
-    /// Its rows; `progress` hears the share done, 0 to 1.
+    /// Runs its cases; `progress` gets the share done, 0 to 1.
     pub fn rows(&self, mut progress: impl FnMut(f64)) -> Vec<Row> {
         (self.run)(&mut progress)
     }
@@ -71,17 +84,33 @@ pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownF
         None => all(),
     };
     let mut parts = Vec::new();
-    for group in
-        [tau_step::parts, path::parts, scale::parts, input::parts, records::parts, long::parts]
-    {
-        parts.extend(families.iter().flat_map(|family| group(extent, &family.key())));
+    for (group, prefix, rows) in FAMILY_GROUPS {
+        parts.extend(families.iter().cloned().map(|family| {
+            let subject = format!("{prefix}{}", family.key());
+            Part::new(group, subject, move |progress| rows(extent, &family, progress))
+        }));
     }
-    // What is of no family is left out where one was asked for.
+    // Groups that concern no family are left out where one is given.
     if family.is_none() {
         parts.extend(integrators::parts(extent));
-        parts.extend(long::scheme_parts(extent));
-        parts.extend(input::thesis_parts());
-        parts.extend(records::thesis_parts(extent));
+        parts.push(long::scheme_part(extent));
+        parts.push(input::thesis_part());
+        parts.push(records::thesis_part(extent));
     }
     Ok(parts)
+}
+
+/// One row after the other; `progress` gets the share done after each.
+fn rows_of<T>(
+    cases: Vec<T>,
+    progress: &mut dyn FnMut(f64),
+    mut row: impl FnMut(T) -> Row,
+) -> Vec<Row> {
+    let count = cases.len() as f64;
+    let rows = cases.into_iter().enumerate().map(|(index, case)| {
+        let row = row(case);
+        progress((index + 1) as f64 / count);
+        row
+    });
+    rows.collect()
 }

@@ -3,27 +3,20 @@
 use super::judge::{PathCase, Row};
 use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, Part};
-use crate::families::by_key;
+use super::{Extent, rows_of};
+use crate::families::Family;
+use std::sync::Arc;
 
 pub(super) const GROUP: &str = "speed and depth";
 const STEPS: u32 = 12;
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let subject = FamilyBody(make_member(&*family, 1.0, 20.0, 2.0));
-        let cases = cases(extent);
-        let count = cases.len() as f64;
-        let rows = cases.iter().enumerate().map(|(index, case)| {
-            progress((index + 1) as f64 / count);
-            case.run_on(&subject)
-        });
-        rows.collect::<Vec<Row>>()
-    })]
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let subject = FamilyBody(make_member(&**family, 1.0, 20.0, 2.0));
+    rows_of(cases(extent), progress, |case| case.run_on(&subject))
 }
 
 /// Every path of this group; the body relaxes in 1 s.
@@ -61,25 +54,17 @@ fn ramp(case: String, speed: f64, depth: f64) -> PathCase {
     let down = (1..=STEPS).map(|i| (dt, depth * f64::from(i) / f64::from(STEPS)));
     let hold = (0..STEPS).map(|_| (1.0 / f64::from(STEPS), depth));
     let out = [(2.0 * depth / speed, -depth), (0.5, -depth)];
-    PathCase { group: GROUP, case, start: 0.0, steps: down.chain(hold).chain(out).collect() }
+    PathCase::new(GROUP, case, 0.0, down.chain(hold).chain(out).collect())
 }
 
 fn stationary(case: &str, depth: f64) -> PathCase {
-    PathCase {
-        group: GROUP,
-        case: case.to_owned(),
-        start: depth,
-        steps: vec![(0.1, depth); STEPS as usize],
-    }
+    PathCase::new(GROUP, case, depth, vec![(0.1, depth); STEPS as usize])
 }
 
 /// Paths that touch the surface awkwardly, jump or crawl.
 fn special_paths() -> Vec<PathCase> {
-    let path = |case: &str, start: f64, steps: &[(f64, f64)]| PathCase {
-        group: GROUP,
-        case: case.to_owned(),
-        start,
-        steps: steps.to_vec(),
+    let path = |case: &str, start: f64, steps: &[(f64, f64)]| {
+        PathCase::new(GROUP, case, start, steps.to_vec())
     };
     let mut crossings = Vec::new();
     for _ in 0..8 {

@@ -3,8 +3,8 @@
 use super::fits::{DEFAULT_FIT, fit_answer};
 use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge};
 use super::members::make_member;
-use super::{Extent, Part};
-use crate::families::{Family, Model, OuterParameter, OuterRange, PowerSeries, by_key};
+use super::{Extent, Part, rows_of};
+use crate::families::{Family, Model, OuterParameter, OuterRange, PowerSeries};
 use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -26,7 +26,7 @@ struct RecordCase {
     force: f64,
     offset: f64,
     tolerance: f64,
-    /// What is done to every sample, after which no body is the true one.
+    /// A change of every sample, after which no body is the true one.
     spoil: Option<fn(&mut FitSample)>,
 }
 
@@ -67,6 +67,10 @@ impl RecordCase {
             samples.iter_mut().for_each(spoil);
         }
         samples
+    }
+
+    fn judge(&self, subject: &str, answer: SubjectAnswer) -> Row {
+        judge(GROUP, self.case, subject, self.expected, self.tolerance, answer)
     }
 }
 
@@ -121,29 +125,23 @@ fn cases(extent: Extent) -> Vec<RecordCase> {
             tolerance: 1e-3,
             ..RecordCase::new("an offset of 1e6 times the signal", Number, full())
         },
-        RecordCase {
-            spoil: Some(|one| one.depth.0 *= 1e-310),
-            ..RecordCase::new("subnormal depths", Refusal, full())
-        },
-        RecordCase {
-            spoil: Some(|one| one.force.0 *= 1e-310),
-            ..RecordCase::new("subnormal forces", Refusal, full())
-        },
-        RecordCase {
-            spoil: Some(|one| one.sigma.0 *= 1e-310),
-            ..RecordCase::new("subnormal uncertainties", Refusal, full())
-        },
-        RecordCase {
-            spoil: Some(|one| one.t.0 *= 1e-310),
-            ..RecordCase::new("subnormal times", Refusal, full())
-        },
-        RecordCase {
-            // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
-            spoil: Some(|one| one.t.0 += 1.8e9),
-            tolerance: 1e-3,
-            ..RecordCase::new("times since 1970", Number, full())
-        },
     ];
+    let subnormal: [(&str, fn(&mut FitSample)); 4] = [
+        ("subnormal depths", |one| one.depth.0 *= 1e-310),
+        ("subnormal forces", |one| one.force.0 *= 1e-310),
+        ("subnormal uncertainties", |one| one.sigma.0 *= 1e-310),
+        ("subnormal times", |one| one.t.0 *= 1e-310),
+    ];
+    cases.extend(subnormal.map(|(case, spoil)| RecordCase {
+        spoil: Some(spoil),
+        ..RecordCase::new(case, Refusal, full())
+    }));
+    cases.push(RecordCase {
+        // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
+        spoil: Some(|one| one.t.0 += 1.8e9),
+        tolerance: 1e-3,
+        ..RecordCase::new("times since 1970", Number, full())
+    });
     if extent == Extent::Quick {
         return cases;
     }
@@ -171,23 +169,21 @@ fn cases(extent: Extent) -> Vec<RecordCase> {
     cases
 }
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    let subject = format!("fit of {key}");
-    vec![Part::new(GROUP, subject.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let mut cases = cases(extent);
-        if times(&*family) > TIMES_SHOWN {
-            for case in &mut cases {
-                if case.expected == ExpectedAnswer::Number {
-                    case.expected = ExpectedAnswer::Either;
-                }
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let mut cases = cases(extent);
+    if times(&**family) > TIMES_SHOWN {
+        for case in &mut cases {
+            if case.expected == ExpectedAnswer::Number {
+                case.expected = ExpectedAnswer::Either;
             }
         }
-        rows(cases, &subject, progress, |case| family_answer(&family, case))
-    })]
+    }
+    let subject = format!("fit of {}", family.key());
+    rows_of(cases, progress, |case| case.judge(&subject, family_answer(family, &case)))
 }
 
 fn family_answer(family: &Arc<dyn Family>, case: &RecordCase) -> SubjectAnswer {
@@ -208,9 +204,9 @@ fn times(family: &dyn Family) -> usize {
 const TIMES_SHOWN: usize = 2;
 
 /// The same records for the fit of the thesis body.
-pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
-    vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
-        rows(cases(extent), DEFAULT_FIT, progress, |case| {
+pub(super) fn thesis_part(extent: Extent) -> Part {
+    Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
+        rows_of(cases(extent), progress, |case| {
             let known = ModifiedKelvin::THESIS;
             let scale = |power: i32| case.force / case.depth.powi(power);
             let body = ModifiedKelvin {
@@ -220,22 +216,8 @@ pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
             };
             let model = thesis(body);
             let samples = case.samples(|path| model.along(path.iter().copied()).ok());
-            fit_answer(Arc::new(PowerSeries::THESIS), &samples, Some(&model))
+            let answer = fit_answer(Arc::new(PowerSeries::THESIS), &samples, Some(&model));
+            case.judge(DEFAULT_FIT, answer)
         })
-    })]
-}
-
-fn rows(
-    cases: Vec<RecordCase>,
-    subject: &str,
-    progress: &mut dyn FnMut(f64),
-    answer: impl Fn(&RecordCase) -> SubjectAnswer,
-) -> Vec<Row> {
-    let count = cases.len() as f64;
-    let rows = cases.iter().enumerate().map(|(index, case)| {
-        let answer = answer(case);
-        progress((index + 1) as f64 / count);
-        judge([GROUP, case.case], subject, case.expected, case.tolerance, answer)
-    });
-    rows.collect()
+    })
 }

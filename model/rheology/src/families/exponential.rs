@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// The exponential response is that of Fung, Am. J. Physiol. 213 (1967) 1532-1544, whose slope grows
 /// in proportion to the force. As `B` tends to zero it is the Kelvin body with `mu1 = A B`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExponentialKelvin;
+pub(super) struct ExponentialKelvin;
 
 /// Range of `B` times the greatest depth: below, the response is straight to 5 % and `A` and `B`
 /// become one number; above, force grows by e^20 = 5e8 over the stroke.

@@ -1,4 +1,4 @@
-//! What a model family is, as distinct from a fitted model.
+//! The model family, as distinct from a fitted model.
 
 use super::model::ModelParameter;
 use super::relaxation::RelaxationTerm;

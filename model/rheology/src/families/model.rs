@@ -173,10 +173,6 @@ impl ModelState {
     pub fn force(&self) -> Newtons {
         Newtons(self.response.sum())
     }
-
-    pub fn depth(&self) -> Depth {
-        self.response.depth()
-    }
 }
 
 impl dyn Family + '_ {

@@ -18,7 +18,7 @@ const UNITS: [&str; POWER_MAX] = ["N/mm", "N/mm^2", "N/mm^3", "N/mm^4", "N/mm^5"
 
 const ORDINALS: [&str; POWER_MAX] = ["first", "second", "third", "fourth", "fifth"];
 
-/// What the second and each later term is.
+/// Words for the second and each later term.
 const ADDED: [&str; POWER_MAX - 1] =
     ["a square of depth", "a cube of depth", "a fourth power of depth", "a fifth power of depth"];
 

@@ -13,7 +13,7 @@ pub const TERMS_MAX: usize = 40;
 /// not identifiable.
 pub const TERMS_COMPARED: usize = 6;
 
-/// What the second and each later term is.
+/// Words for the second and each later term.
 const ADDED: [&str; TERMS_COMPARED - 1] = [
     "a second relaxation time",
     "a third relaxation time",

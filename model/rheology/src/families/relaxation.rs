@@ -1,4 +1,4 @@
-//! One relaxation time: what drives it and its exact step.
+//! One relaxation time: its drive and its exact step.
 //!
 //! Every family is a sum of terms `y + tau y' = p(x) + d/dt q(x)`, where `p` (elastic) and `q` (rate)
 //! are made of powers and exponentials of depth:
@@ -94,7 +94,7 @@ impl DepthDrive {
         all
     }
 
-    /// What softening adds after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
+    /// Contribution of softening after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
     /// divide by has softened nothing.
     #[inline]
     fn softened(&self, x_max: f64) -> impl Iterator<Item = (usize, (f64, f64))> {
@@ -180,20 +180,20 @@ impl DepthDrive {
 pub struct RelaxationTerm {
     /// Relaxation time in s; 0 for a term without memory.
     pub tau: f64,
-    /// What it tends to when held.
+    /// The limit when depth is held.
     pub elastic: DepthDrive,
-    /// What drives it by moving, in units of elastic times s.
+    /// The drive by movement, in units of elastic times s.
     pub rate: DepthDrive,
 }
 
 impl RelaxationTerm {
-    /// What tends to `elastic` in `tau` seconds when held.
+    /// A term that tends to `elastic` in `tau` seconds when depth is held.
     #[must_use]
     pub fn settling(elastic: DepthDrive, tau: f64) -> Self {
         Self { tau, elastic, rate: DepthDrive::default() }
     }
 
-    /// What moving drives by `rate` and fades in `tau` seconds.
+    /// A term that movement drives by `rate` and that fades in `tau` seconds.
     #[must_use]
     pub fn driven(rate: DepthDrive, tau: f64) -> Self {
         Self { tau, elastic: DepthDrive::default(), rate }
@@ -286,7 +286,7 @@ pub(super) struct RelaxationState {
     degree: usize,
     /// A step so short beside the relaxation time that it is a jump.
     is_sudden: bool,
-    /// What the next [`RelaxationState::settle`] adds.
+    /// Change of the value by the next [`RelaxationState::settle`].
     pending: f64,
 }
 
@@ -376,7 +376,7 @@ impl RelaxationState {
         c
     }
 
-    /// What the exponentials add over the piece.
+    /// Contribution of the exponentials over the piece.
     fn exponential(&self, piece: &DepthPiece, speed: f64) -> f64 {
         if piece.d == 0.0 {
             // Held: no rate, and the elastic part stands still.

@@ -25,41 +25,19 @@ pub enum StepError {
     #[error(
         "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
-    Jump {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-    },
+    Jump { from: f64, to: f64 },
     #[error(
         "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
-    Speed {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-        /// Duration in s.
-        dt: f64,
-    },
+    Speed { from: f64, to: f64, dt: f64 },
     #[error(
         "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the model", plain(.depth)
     )]
-    Rest {
-        /// Depth in mm.
-        depth: f64,
-    },
+    Rest { depth: f64 },
     #[error(
         "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the model", plain(.from), plain(.to), plain(.dt)
     )]
-    Overflow {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-        /// Duration in s.
-        dt: f64,
-    },
+    Overflow { from: f64, to: f64, dt: f64 },
 }
 
 /// Columns of terms that are moved together.
@@ -94,15 +72,6 @@ impl Response {
             depth_max: start,
             softens,
         }
-    }
-
-    /// Depth at the end of the last step.
-    pub fn depth(&self) -> Depth {
-        Depth(self.depth)
-    }
-
-    pub fn depth_max(&self) -> Depth {
-        Depth(self.depth_max)
     }
 
     /// Sum of all terms, in the unit of their drives.
@@ -271,7 +240,7 @@ mod tests {
                 let miss = (whole.sum() - cut.sum()).abs();
                 assert!(miss < 1e-13, "{to} in {parts}: {miss:e}");
             }
-            assert_eq!(whole.depth_max(), Depth(12.0));
+            assert_eq!(whole.depth_max, 12.0);
         }
     }
 
@@ -290,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_softened_on_the_way_in() {
+    fn nothing_is_softened_on_first_loading() {
         let (mut soft, mut hard) = (softening_maxwell(true), softening_maxwell(false));
         for (dt, to) in [(1.0, 0.5), (2.0, 8.0), (1.0, 8.0), (0.0, 9.0), (1.0, 11.0)] {
             for body in [&mut soft, &mut hard] {

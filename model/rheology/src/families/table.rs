@@ -1,4 +1,4 @@
-//! Every family there is, and how its key is read.
+//! The table of all families, and the reading of their keys.
 
 use super::family::Family;
 use std::ops::RangeInclusive;
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_family_is_found_by_the_key_that_it_tells() {
+    fn every_family_is_found_by_its_own_key() {
         let all = all();
         assert!(all.len() >= TABLE.len());
         for family in &all {

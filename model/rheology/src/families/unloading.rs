@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// coefficients and has an exact step. Three powers, for a loop may be thick near the surface, in the middle
 /// or near the turning point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unloading {
+pub(super) struct Unloading {
     loading: PowerSeries,
     order: usize,
 }
@@ -26,17 +26,12 @@ pub struct Unloading {
 /// Units of `s1 ..= s3`.
 const UNITS: [&str; SOFTENING_MAX] = ["N/mm", "N/mm^2", "N/mm^3"];
 
-impl Unloading {
-    /// Unloading of the series cut off after `order` terms; `None` unless that is one to five.
-    #[must_use]
-    pub fn of_order(order: usize) -> Option<Self> {
-        PowerSeries::of_order(order).map(|loading| Self { loading, order })
-    }
-}
-
 pub(super) const KIND: FamilyKind = FamilyKind {
     word: "unloading",
-    of: |number| Some(Arc::new(Unloading::of_order(number?)?)),
+    of: |number| {
+        let order = number?;
+        PowerSeries::of_order(order).map(|loading| Arc::new(Unloading { loading, order }) as _)
+    },
     compared: Some(3..=3),
 };
 

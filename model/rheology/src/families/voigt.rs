@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// family that looks at speed directly, the mean speed since the sample before: noise of the depth
 /// goes into its force undamped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Voigt;
+pub(super) struct Voigt;
 
 pub(super) const KIND: FamilyKind = FamilyKind {
     word: "voigt",

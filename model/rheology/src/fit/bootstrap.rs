@@ -39,7 +39,7 @@ pub struct BootstrapInterval {
 }
 
 impl Fitted<'_> {
-    /// Bootstrap intervals of the free parameters of one record; `progress` hears how many fits are
+    /// Bootstrap intervals of the free parameters of one record; `progress` gets how many fits are
     /// done. Refused where the correlation time is so long that the record has too few blocks.
     pub fn bootstrap(
         &self,

@@ -128,7 +128,7 @@ impl ColumnSource {
         self.kinds[outer]
     }
 
-    /// What to divide coefficients of bare columns by to have them in their units.
+    /// Divisors that turn coefficients of bare columns into their units.
     pub fn units(&self, depth_mm: f64) -> Vec<f64> {
         match self.kernel {
             Kernel::ThirdOrder => design::linear_units(depth_mm).to_vec(),
@@ -380,7 +380,7 @@ impl ColumnWalk {
             step.ok()?;
         }
         self.elapsed += block.dt;
-        // What fades at the middle of the block: its mean to second order.
+        // The fading terms at the middle of the block: their mean to second order.
         self.fade_time = self.elapsed - 0.5 * block.dt * (1.0 - 1.0 / block.count as f64);
         Some(())
     }

@@ -71,7 +71,7 @@ impl Memory {
         let (mut diagonal, mut lagged, mut past) = (0.0, 0.0, 0.0);
         let mut next = 0;
         for (&z, &place) in z.iter().zip(places) {
-            // What a gap of so many blocks leaves of the past.
+            // The share of the past that is left after a gap of so many blocks.
             past *= self.forgetting.powi(place.saturating_sub(next) as i32);
             diagonal += z * z;
             lagged += z * past;
@@ -87,7 +87,7 @@ fn long_run(neighbour: f64, forgetting: f64) -> f64 {
 }
 
 /// The memory of a record's residuals; `white` is the variance the blocks would have without.
-/// `None` when the record is too short to tell.
+/// `None` when the record is too short for an estimate.
 ///
 /// Only unknowns that act on this record `alone` have taken their share out of its residuals. One that several
 /// records share is a compromise between them: a specimen twice as stiff leaves residuals of the very shape of the

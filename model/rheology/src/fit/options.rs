@@ -87,11 +87,11 @@ impl Layout {
 /// at 0: depth is counted from contact. No starting values exist: the fit searches for itself.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    family: Arc<dyn Family>,
-    known: Vec<KnownParameter>,
-    layout: Layout,
-    fixed: Vec<Option<f64>>,
-    is_at_rest: bool,
+    pub(super) family: Arc<dyn Family>,
+    pub(super) known: Vec<KnownParameter>,
+    pub(super) layout: Layout,
+    pub(super) fixed: Vec<Option<f64>>,
+    pub(super) is_at_rest: bool,
 }
 
 impl Default for FitOptions {
@@ -190,29 +190,9 @@ impl FitOptions {
         self
     }
 
-    pub(super) fn is_at_rest(&self) -> bool {
-        self.is_at_rest
-    }
-
     /// How many parameters the fit finds.
     pub fn free_count(&self) -> usize {
         self.fixed.iter().filter(|value| value.is_none()).count()
-    }
-
-    pub(super) fn shared_family(&self) -> Arc<dyn Family> {
-        Arc::clone(&self.family)
-    }
-
-    pub(super) fn fixed(&self) -> &[Option<f64>] {
-        &self.fixed
-    }
-
-    pub(super) fn known(&self) -> &[KnownParameter] {
-        &self.known
-    }
-
-    pub(super) fn layout(&self) -> Layout {
-        self.layout
     }
 
     pub(super) fn index_of(&self, name: &str) -> Result<usize, FitError> {
@@ -233,11 +213,11 @@ mod tests {
         let mut options = FitOptions::default();
         assert_eq!(options.names(), PARAMETER_NAMES);
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed()[7], Some(0.0));
+        assert_eq!(options.fixed[7], Some(0.0));
         options.free("x_contact").unwrap();
         options.fix("tau_eps", 1.5).unwrap();
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed()[TAU], Some(1.5));
+        assert_eq!(options.fixed[TAU], Some(1.5));
     }
 
     #[test]

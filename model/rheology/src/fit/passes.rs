@@ -24,12 +24,12 @@ pub(super) struct Pass {
     pub records: Vec<RecordFactor>,
 }
 
-/// What the last column of a record's triangle holds.
+/// Content of the last column of a record's triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
     /// The measured force; there are no derivative columns.
     Force,
-    /// What a point leaves of it.
+    /// The measured force minus that of the point.
     Residual,
 }
 
@@ -72,8 +72,9 @@ impl System<'_> {
     /// refinement; Bjorck, "Numerical Methods for Least Squares Problems", section 2.9).
     pub fn pass(&self, points: &[ParameterPoint], rows: Rows) -> Option<Pass> {
         let each = points.iter().enumerate();
-        let records: Option<Vec<RecordFactor>> =
-            each.map(|(record, point)| self.record_factor(record, point, rows)).collect();
+        let records: Option<Vec<RecordFactor>> = each
+            .map(|(record, point)| self.record_factor(record, point, rows, Column::Residual))
+            .collect();
         let records = records?;
         let factors = records.iter().map(|record| &record.factor);
         Some(Pass { joint: self.stack(factors, Column::Residual), records })
@@ -82,8 +83,14 @@ impl System<'_> {
     /// All records triangularised at given outer parameters, without derivatives.
     pub fn values_pass(&self, outers: &[OuterPoint], rows: Rows) -> Option<Factor> {
         let each = outers.iter().enumerate();
-        let factors: Option<Vec<Factor>> =
-            each.map(|(record, outer)| self.values_factor(record, outer, rows)).collect();
+        let factors: Option<Vec<Factor>> = each
+            .map(|(record, outer)| {
+                let at = vec![0.0; self.layout().linear_count()];
+                let point = ParameterPoint { outer: outer.clone(), at };
+                let factor = self.record_factor(record, &point, rows, Column::Force)?.factor;
+                (rows == Rows::Thin || factor.is_finite()).then_some(factor)
+            })
+            .collect();
         Some(self.stack(factors?.iter(), Column::Force))
     }
 
@@ -183,19 +190,18 @@ impl System<'_> {
         record: usize,
         point: &ParameterPoint,
         rows: Rows,
+        last_is: Column,
     ) -> Option<RecordFactor> {
         let Record { samples, thin, .. } = &self.records[record];
-        let slopes = self.slopes(record);
+        let is_residual = last_is == Column::Residual;
+        let slopes = if is_residual { self.slopes(record) } else { Vec::new() };
         let scale = self.scale(&point.outer);
         if rows == Rows::Thin {
             let factor = self.source.thin_factor(&thin.blocks, scale, point, &slopes)?;
-            return Some(RecordFactor {
-                factor: factor.subtract_explained(&point.at),
-                blocks: Vec::new(),
-            });
+            let factor = if is_residual { factor.subtract_explained(&point.at) } else { factor };
+            return Some(RecordFactor { factor, blocks: Vec::new() });
         }
-        let linear = self.layout().linear_count();
-        let width = linear + slopes.len() + 1;
+        let width = self.layout().linear_count() + slopes.len() + 1;
         let mut triangle = Triangle::new(width);
         let mut sums = NoiseSums::new(samples.len(), width);
         let mut lanes = vec![[0.0; LANES]; width];
@@ -205,39 +211,18 @@ impl System<'_> {
                 || {
                     filled.write(&mut lanes, point, &slopes);
                     self.forces(block, &mut lanes);
-                    subtract(&mut lanes, &point.at);
+                    if is_residual {
+                        subtract(&mut lanes, &point.at);
+                    }
                     self.weigh(block, &mut lanes);
-                    sums.add(&lanes, block);
+                    if is_residual {
+                        sums.add(&lanes, block);
+                    }
                     triangle.push_lanes(&mut lanes, block.len());
                 },
             );
         })?;
         Some(RecordFactor { factor: triangle.finish(), blocks: sums.finish() })
-    }
-
-    fn values_factor(&self, record: usize, outer: &OuterPoint, rows: Rows) -> Option<Factor> {
-        let Record { samples, thin, .. } = &self.records[record];
-        let scale = self.scale(outer);
-        let point =
-            ParameterPoint { outer: outer.clone(), at: vec![0.0; self.layout().linear_count()] };
-        if rows == Rows::Thin {
-            return self.source.thin_factor(&thin.blocks, scale, &point, &[]);
-        }
-        let mut triangle = Triangle::new(point.at.len() + 1);
-        let mut lanes = vec![[0.0; LANES]; point.at.len() + 1];
-        self.source.walk(samples, scale, &point, &[], |block, filled| {
-            wide(
-                #[inline(always)]
-                || {
-                    filled.write(&mut lanes, &point, &[]);
-                    self.forces(block, &mut lanes);
-                    self.weigh(block, &mut lanes);
-                    triangle.push_lanes(&mut lanes, block.len());
-                },
-            );
-        })?;
-        let factor = triangle.finish();
-        factor.is_finite().then_some(factor)
     }
 
     /// Writes the force as the last column.

@@ -1,4 +1,4 @@
-//! How a body that is known predicts a record that its fit has not seen.
+//! Prediction of a record by a model fitted to other records.
 
 use super::sample::{FitError, FitSample};
 use super::triangle::Triangle;
@@ -18,7 +18,7 @@ pub struct ForcePrediction {
 }
 
 /// Predicts `score` of a record from rest at its first depth; the body stays as it is, while the record's own offset,
-/// which no other record can tell, is found on `own`.
+/// which no other record determines, is found on `own`.
 ///
 /// The factor of [`ForcePrediction::scale`] is found on `own` too.
 pub fn predict(

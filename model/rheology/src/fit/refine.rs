@@ -160,7 +160,7 @@ impl Iterate {
         }
         let pass = system.pass(&points, rows)?;
         let linear = system.linear;
-        let passive: Vec<usize> = match system.has_zero(&points) {
+        let passive: Vec<usize> = match system.first_zero(&points).is_some() {
             true => system.passive(&points),
             false => (0..linear).collect(),
         };

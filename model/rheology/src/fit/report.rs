@@ -1,4 +1,4 @@
-//! What a fit found.
+//! The report of a fit.
 
 use super::columns::{ColumnSource, OuterPoint, ParameterPoint};
 use super::design::Scale;
@@ -8,6 +8,7 @@ use super::sample::FitSample;
 use super::sentences;
 use super::solve::Fitted;
 use super::uncertainty::{Uncertainty, UncertaintyEstimate};
+use crate::distinct;
 use crate::families::{Model, ModelParameter, OuterRange, by_key};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -50,7 +51,7 @@ pub struct FitReport {
     pub is_at_rest: bool,
     /// Autocorrelation of the residuals; `None` where the record is too short to show any.
     pub noise: Option<NoiseEstimate>,
-    /// What a reader of the numbers must know, one sentence each.
+    /// Warnings without which the numbers would be misread, one sentence each.
     pub warnings: Vec<String>,
     /// Findings that are not numbers, one sentence each: autocorrelation of the noise, depths at
     /// which the body is unstable or returns energy.
@@ -86,13 +87,7 @@ pub struct NamedReport {
 impl JointReport {
     /// The warnings of all records, each once.
     pub fn warnings(&self) -> Vec<String> {
-        let mut all: Vec<String> = Vec::new();
-        for warning in self.records.iter().flat_map(|one| &one.report.warnings) {
-            if !all.contains(warning) {
-                all.push(warning.clone());
-            }
-        }
-        all
+        distinct(self.records.iter().flat_map(|one| one.report.warnings.clone()))
     }
 }
 
@@ -172,7 +167,7 @@ impl Fitted<'_> {
         let uncertainty = Uncertainty::of(&self.system, &self.refined);
         let system = &self.system;
         let known = system.known().iter().enumerate();
-        let shared = known.filter(|(k, _)| system.is_shared(*k));
+        let shared = known.filter(|(k, _)| system.shared[*k]);
         let records = (0..system.records.len()).map(|record| NamedReport {
             record: system.records[record].name.to_owned(),
             report: self.record_report(&uncertainty, record),
@@ -186,7 +181,7 @@ impl Fitted<'_> {
             shared: shared.map(|(_, one)| one.name.clone()).collect(),
             samples: system.measured(),
             free: system.unknowns.len(),
-            weighted_square: self.refined.sum / system.sigma_scale().powi(2),
+            weighted_square: self.refined.sum / system.sigma_scale.powi(2),
             rmse_n: (squares.sum::<f64>() / system.measured() as f64).sqrt(),
             effective_samples: effective.sum::<f64>().max(1.0),
             records,
@@ -223,7 +218,7 @@ impl Fitted<'_> {
         let system = &self.system;
         let samples = system.records[record].samples;
         let measured = system.records[record].measured;
-        let residuals = self.residuals(record);
+        let (r2, rmse_n) = self.residuals(record);
         let parameters = self.parameters(uncertainty, record);
         let noise = uncertainty.memory(record).map(|memory| {
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
@@ -244,8 +239,8 @@ impl Fitted<'_> {
                 linear: values(layout.outers..layout.outers + layout.coefficients),
             },
             parameters,
-            r2: residuals.r2,
-            rmse_n: residuals.rmse_n,
+            r2,
+            rmse_n,
             samples: measured,
             censored: samples.len() - measured,
             free: system.unknowns.len(),
@@ -259,9 +254,9 @@ impl Fitted<'_> {
         report
     }
 
-    /// Unweighted residuals of the final model: in one pass, unless all weights are one and the sum
+    /// Share of the variance explained and rms of the unweighted residuals: in one pass, unless all weights are one and the sum
     /// is known already.
-    fn residuals(&self, record: usize) -> ResidualStatistics {
+    fn residuals(&self, record: usize) -> (f64, f64) {
         let system = &self.system;
         let (samples, point) = (system.records[record].samples, &self.refined.points[record]);
         let measured = || samples.iter().filter(|sample| sample.is_measured());
@@ -270,14 +265,14 @@ impl Fitted<'_> {
         let total: f64 = measured().map(|sample| (sample.force.0 - mean).powi(2)).sum();
         let is_even = measured().all(|sample| system.weight(sample) == 1.0);
         if is_even && system.records.len() == 1 && self.refined.is_converged {
-            return ResidualStatistics::of(self.refined.sum, total, count);
+            return residual_statistics(self.refined.sum, total, count);
         }
         let forces = system.source.forces(samples, system.scale(&point.outer), point);
         let pairs = samples.iter().zip(forces.unwrap_or_default());
         let squares = pairs
             .filter(|(sample, _)| sample.is_measured())
             .map(|(sample, force)| (sample.force.0 - force).powi(2));
-        ResidualStatistics::of(squares.sum(), total, count)
+        residual_statistics(squares.sum(), total, count)
     }
 
     /// Values with their errors and intervals.
@@ -317,18 +312,9 @@ fn interval(value: f64, error: UncertaintyEstimate, range: Option<OuterRange>) -
     [(value - half).max(lowest), value + half]
 }
 
-struct ResidualStatistics {
-    r2: f64,
-    rmse_n: f64,
-}
-
-impl ResidualStatistics {
-    fn of(sum: f64, total: f64, count: f64) -> Self {
-        Self {
-            r2: if total > 0.0 { 1.0 - sum / total } else { f64::NAN },
-            rmse_n: (sum / count).sqrt(),
-        }
-    }
+/// Explained share of the variance and root mean square, from sums of squares left and in all.
+fn residual_statistics(sum: f64, total: f64, count: f64) -> (f64, f64) {
+    (if total > 0.0 { 1.0 - sum / total } else { f64::NAN }, (sum / count).sqrt())
 }
 
 /// Autocorrelation over blocks as time and shares. The lasting part of variance `A` decays as

@@ -1,4 +1,4 @@
-//! What a fit is given, and the words in which it refuses.
+//! Samples of a fit, and its errors.
 
 use palpate_model::units::{Depth, Newtons, Seconds};
 use thiserror::Error;
@@ -35,43 +35,21 @@ pub enum FitError {
     )]
     TooFewSamples { samples: usize, parameters: usize },
     #[error("sample {index} has a {what} of {value}; remove samples that are not finite numbers")]
-    NotFinite {
-        /// Sample, counted from 0.
-        index: usize,
-        what: &'static str,
-        value: f64,
-    },
+    NotFinite { index: usize, what: &'static str, value: f64 },
     #[error(
         "the record has a {what} of {value:e} {unit}, out of scale: a fit needs numbers between 1e-50 and 1e50; check its unit"
     )]
     Scale { what: &'static str, value: f64, unit: &'static str },
     #[error("sample {index} has a force uncertainty of {sigma} N; it must be greater than zero")]
-    SigmaNotPositive {
-        /// Sample, counted from 0.
-        index: usize,
-        /// Its uncertainty in N.
-        sigma: f64,
-    },
+    SigmaNotPositive { index: usize, sigma: f64 },
     #[error(
         "sample {index} is at {t} s after {before} s; times must increase, remove repeated samples and sort the record"
     )]
-    TimeNotIncreasing {
-        /// Sample, counted from 0.
-        index: usize,
-        /// Its time in s.
-        t: f64,
-        /// The time before in s.
-        before: f64,
-    },
+    TimeNotIncreasing { index: usize, t: f64, before: f64 },
     #[error(
         "the depth never exceeds {deepest} mm and contact is at {contact} mm, so the probe never enters the tissue; check the contact position"
     )]
-    NeverInTissue {
-        /// Greatest depth in mm.
-        deepest: f64,
-        /// Assumed contact in mm.
-        contact: f64,
-    },
+    NeverInTissue { deepest: f64, contact: f64 },
     #[error("this record cannot separate {}: {advice}", list(.names))]
     Inseparable { names: Vec<String>, advice: String },
     #[error("{reason}, in {record}")]
@@ -85,17 +63,11 @@ pub enum FitError {
     #[error(
         "the force never changes from {force} N, so it does not depend on the tissue; check the load cell and the columns"
     )]
-    ConstantForce {
-        /// The force in N.
-        force: f64,
-    },
+    ConstantForce { force: f64 },
     #[error(
         "the depth never changes from {depth} mm, so the tissue is not indented; move deeper, or check the columns"
     )]
-    ConstantDepth {
-        /// The depth in mm.
-        depth: f64,
-    },
+    ConstantDepth { depth: f64 },
     #[error("the model has no parameter '{name}'; it has {known}")]
     UnknownParameter { name: String, known: String },
     #[error("{name} cannot be fixed at {value}; {reason}")]

@@ -35,7 +35,7 @@ const GROWN: (usize, f64) = (40, 6.0);
 /// records together. `None` where the family has no finite force at all.
 pub(super) fn best_outers(system: &System<'_>) -> Option<Vec<OuterPoint>> {
     let count = system.records.len();
-    let is_common = |k: usize| system.is_shared(k) || system.fixed(0, k).is_some();
+    let is_common = |k: usize| system.shared[k] || system.fixed(0, k).is_some();
     if count > 1 && (0..system.layout().outers).all(is_common) {
         let contacts = (0..count).map(|record| search_contact(&system.single_record(record)));
         return search_outers(&system.for_search(), &contacts.collect::<Option<Vec<f64>>>()?);
@@ -46,12 +46,12 @@ pub(super) fn best_outers(system: &System<'_>) -> Option<Vec<OuterPoint>> {
         search_outers(&alone.for_search(), &[contact])?.pop()
     });
     let mut each: Vec<OuterPoint> = each.collect::<Option<_>>()?;
-    // What only some of them share starts where the first record has it.
+    // A parameter that only some of them share starts where the first record has it.
     let first = each[0].values.clone();
     for one in &mut each {
         let shared = one.values.iter_mut().zip(&first).enumerate();
         shared
-            .filter(|(k, _)| count > 1 && system.is_shared(*k))
+            .filter(|(k, _)| count > 1 && system.shared[*k])
             .for_each(|(_, (value, first))| *value = *first);
     }
     Some(each)
@@ -187,10 +187,11 @@ fn refine_deepest(
     system: &System<'_>,
     starts: impl Iterator<Item = Vec<ParameterPoint>>,
 ) -> Option<RefinedFit> {
+    let is_refused = |end: &RefinedFit| system.first_zero(&end.points).is_some();
     starts
         .filter_map(|start| refine(system, &start, Rows::Thin, StopRule::Gain(GAIN_VALLEY)))
         .min_by(|a, b| {
-            let refused = system.has_zero(&a.points).cmp(&system.has_zero(&b.points));
+            let refused = is_refused(a).cmp(&is_refused(b));
             refused.then(a.sum.total_cmp(&b.sum))
         })
 }
@@ -210,7 +211,9 @@ fn grow_series(
     let taus: Vec<f64> = log_taus.iter().map(|log_tau| log_tau.exp()).collect();
     let outers = contacts.iter().map(|&contact| OuterPoint { values: taus.clone(), contact });
     let factor = dense.values_pass(&outers.collect::<Vec<_>>(), Rows::Thin)?;
-    let solution = non_negative(&factor, &dense.all_bounds(grid + 1));
+    // Neither spring nor weight may be negative, whatever the family says.
+    let bounds: Vec<bool> = (0..dense.linear).map(|k| k <= grid).collect();
+    let solution = non_negative(&factor, &bounds);
     // Weight and centre of each run of neighbours.
     let mut groups: Vec<(f64, f64)> = Vec::new();
     let mut is_running = false;

@@ -17,7 +17,7 @@ const LONGEST_SHARE: f64 = 0.45;
 /// A relaxation time less certain than this share of its value is hardly known.
 const UNCERTAIN_SHARE: f64 = 0.5;
 
-/// What a reader of the numbers must know.
+/// Warnings without which the numbers would be misread.
 pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut warnings = Vec::new();
     let layout = fitted.system.layout();

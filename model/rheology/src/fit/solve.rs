@@ -222,7 +222,7 @@ fn joint_system<'a>(
     let mut is_shared = vec![false; options.names().len()];
     for name in shared {
         let index = options.index_of(name)?;
-        if !options.layout().is_body(index) {
+        if !options.layout.is_body(index) {
             return Err(FitError::NotShareable {
                 name: (*name).to_owned(),
                 known: options.body_names().join(", "),
@@ -236,7 +236,7 @@ fn joint_system<'a>(
     System::new(records, options, is_shared)
 }
 
-/// What the search on the thinned records ends at.
+/// The end of the search on the thinned records.
 fn search_start(system: &System<'_>) -> Result<Vec<ParameterPoint>, FitError> {
     let found = best_outers(system).and_then(|outers| system.solved(&outers, Rows::Thin));
     let Some((points, _)) = found else {
@@ -254,7 +254,7 @@ fn search_start(system: &System<'_>) -> Result<Vec<ParameterPoint>, FitError> {
     let rows = system.search_rows();
     let refined = refine(system, &points, rows, StopRule::Gain(GAIN_THIN));
     let points = refined.ok_or(FitError::Overflow)?.points;
-    // What the thinned records refuse, all samples would at many times the cost.
+    // All samples would refuse what the thinned records refuse, at many times the cost.
     system.model(&points)?;
     Ok(points)
 }

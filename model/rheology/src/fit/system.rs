@@ -67,12 +67,12 @@ impl<'a> System<'a> {
         shared: Vec<bool>,
     ) -> Result<Self, FitError> {
         let several = records.len() > 1;
-        let layout = options.layout();
+        let layout = options.layout;
         let named = |name: &str, reason: FitError| match several {
             true => FitError::InRecord { record: name.to_owned(), reason: Box::new(reason) },
             false => reason,
         };
-        let fixed = options.fixed().to_vec();
+        let fixed = options.fixed.clone();
         let is_own = |k: &usize| fixed[*k].is_none() && !(several && shared[*k]);
         let own = (0..layout.count()).filter(is_own).count();
         let mut depth_mm = 0.0f64;
@@ -85,7 +85,7 @@ impl<'a> System<'a> {
             .flat_map(|(_, samples)| samples.iter())
             .find(|sample| sample.is_measured())
             .map_or(1.0, |sample| sample.sigma.0);
-        let source = ColumnSource::new(options.shared_family(), options.is_at_rest());
+        let source = ColumnSource::new(Arc::clone(&options.family), options.is_at_rest);
         let mut system = Self {
             records: records
                 .iter()
@@ -125,7 +125,7 @@ impl<'a> System<'a> {
 
     /// Name, unit and range of every parameter.
     pub fn known(&self) -> &[KnownParameter] {
-        self.options.known()
+        &self.options.known
     }
 
     fn list_unknowns(mut self) -> Self {
@@ -184,16 +184,16 @@ impl<'a> System<'a> {
 
     /// The same records with another family, its body the same in all.
     pub fn with_family(&self, options: &FitOptions) -> Self {
-        let (own, layout) = (self.layout(), options.layout());
+        let (own, layout) = (self.layout(), options.layout);
         let fixed = self.fixed.iter().map(|before| {
-            let mut fixed = options.fixed().to_vec();
+            let mut fixed = options.fixed.clone();
             fixed[layout.offset()] = before[own.offset()];
             fixed
         });
         let is_body = |k| layout.is_body(k);
         Self {
             fixed: fixed.collect(),
-            source: ColumnSource::new(options.shared_family(), true),
+            source: ColumnSource::new(Arc::clone(&options.family), true),
             options: options.clone(),
             shared: (0..layout.count()).map(is_body).collect(),
             ..self.clone()
@@ -242,11 +242,6 @@ impl<'a> System<'a> {
         self.fixed[record][parameter]
     }
 
-    /// Whether a free parameter is the same in every record.
-    pub fn is_shared(&self, parameter: usize) -> bool {
-        self.shared[parameter]
-    }
-
     /// Whether a record's contact position is found.
     pub fn is_contact_free(&self, record: usize) -> bool {
         self.fixed(record, self.layout().contact()).is_none()
@@ -273,12 +268,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// Whether a coefficient that must not be negative is at zero: what the records do not hold ends there.
-    pub fn has_zero(&self, points: &[ParameterPoint]) -> bool {
-        self.first_zero(points).is_some()
-    }
-
-    /// The first such parameter.
+    /// The first coefficient that must not be negative and is at zero: what the records do not hold ends there.
     pub fn first_zero(&self, points: &[ParameterPoint]) -> Option<usize> {
         let layout = self.layout();
         let is_zero = |record: usize, point: &ParameterPoint, k: usize| {
@@ -303,16 +293,6 @@ impl<'a> System<'a> {
             !self.known()[unknown.parameter].is_bound || at[unknown.parameter - outers] > 0.0
         };
         (0..self.linear).filter(is_passive).collect()
-    }
-
-    /// Which linear unknowns must not be negative when the first so many coefficients must not, whatever the family says.
-    pub fn all_bounds(&self, coefficients: usize) -> Vec<bool> {
-        (0..self.linear).map(|k| k < coefficients).collect()
-    }
-
-    /// The sigma that weighs one.
-    pub fn sigma_scale(&self) -> f64 {
-        self.sigma_scale
     }
 
     /// Weight of a sample relative to the first.

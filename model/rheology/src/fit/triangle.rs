@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn names_the_combination_that_is_blind() {
+    fn inseparable_combination_is_named() {
         let mut triangle = Triangle::new(4);
         for i in 0..300 {
             let x = f64::from(i) * 0.01;

@@ -2,10 +2,11 @@
 
 use crate::families::{DepthDrive, POWER_MAX, RelaxationTerm};
 use palpate_model::viscoelastic::{BodyError, ModifiedKelvin};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// `F + tau_eps F' = mu1 x + .. + muN x^N + tau_sig x x'`, `N` from 1 to 5.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "[f64; N]: Serialize", deserialize = "[f64; N]: Deserialize<'de>"))]
 pub struct SeriesBody<const N: usize> {
     /// Relaxation time in s.
     pub tau_eps: f64,
@@ -55,27 +56,5 @@ impl<const N: usize> SeriesBody<N> {
             // x x' is the rate of x^2 / 2.
             rate: DepthDrive::power(2, 0.5 * self.tau_sig),
         }
-    }
-}
-
-/// A padded body as it is stored; arrays of a generic length are not.
-#[derive(Serialize, Deserialize)]
-struct StoredBody {
-    tau_eps: f64,
-    mu: [f64; POWER_MAX],
-    tau_sig: f64,
-}
-
-impl Serialize for SeriesBody<POWER_MAX> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self { tau_eps, mu, tau_sig } = *self;
-        StoredBody { tau_eps, mu, tau_sig }.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for SeriesBody<POWER_MAX> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let StoredBody { tau_eps, mu, tau_sig } = StoredBody::deserialize(deserializer)?;
-        Ok(Self { tau_eps, mu, tau_sig })
     }
 }

@@ -1,4 +1,4 @@
-//! What drives the body at the two ends of a step.
+//! Forcing of the body at the two ends of a step.
 
 use super::body::SeriesBody;
 use super::real::Real;

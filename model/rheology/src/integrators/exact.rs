@@ -18,7 +18,7 @@ pub struct Exact<R, const N: usize> {
     force: CompensatedForce<R>,
 }
 
-/// What one step length does.
+/// Coefficients for one step length.
 #[derive(Clone, Copy, Debug)]
 struct Table<R, const N: usize> {
     psi_0: R,

@@ -24,25 +24,16 @@
 mod body;
 mod drive;
 mod exact;
-mod explicit_euler;
-mod exponential_first_order;
-mod exponential_left;
-mod implicit_euler;
 mod real;
 mod rule;
-mod runge_kutta;
-mod trapezoid;
 
 pub use body::SeriesBody;
 pub use exact::Exact;
-pub use explicit_euler::ExplicitEuler;
-pub use exponential_first_order::ExponentialFirstOrder;
-pub use exponential_left::ExponentialLeft;
-pub use implicit_euler::ImplicitEuler;
 pub use real::Real;
-pub use rule::{Rule, Stepped, Weights};
-pub use runge_kutta::RungeKutta;
-pub use trapezoid::Trapezoid;
+pub use rule::{
+    ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Rule, RungeKutta,
+    Stepped, Trapezoid, Weights,
+};
 
 use crate::families::StepError;
 use palpate_model::viscoelastic::BodyError;
@@ -106,13 +97,7 @@ pub enum IntegratorError {
     #[error(
         "{name} is unstable at steps of {dt} s, {h:.3} relaxation times; it is stable below {limit:.3}"
     )]
-    Unstable {
-        name: &'static str,
-        /// Step in s.
-        dt: f64,
-        h: f64,
-        limit: f64,
-    },
+    Unstable { name: &'static str, dt: f64, h: f64, limit: f64 },
 }
 
 /// Where the fourth-order polynomial of Runge-Kutta reaches one: the real root of
@@ -141,7 +126,7 @@ impl Scheme {
         }
     }
 
-    /// What a step of `h` relaxation times makes of the force and of the forcing at its start, middle and
+    /// Weights, in a step of `h` relaxation times, of the force and of the forcing at its start, middle and
     /// end. The exact step of a linear forcing is the exponential one with the forcing straight.
     #[must_use]
     pub fn weights(self, h: f64) -> Weights {

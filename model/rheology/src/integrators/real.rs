@@ -29,51 +29,37 @@ pub trait Real:
 
 mod sealed {
     pub trait Sealed {}
-    impl Sealed for f64 {}
-    impl Sealed for f32 {}
 }
 
-impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const NEGLIGIBLE: Self = palpate_model::viscoelastic::NEGLIGIBLE;
-    #[inline]
-    fn of(value: f64) -> Self {
-        value
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        self
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    #[inline]
-    fn abs(self) -> Self {
-        self.abs()
-    }
+macro_rules! real {
+    ($real:ty, $negligible:expr) => {
+        impl sealed::Sealed for $real {}
+
+        impl Real for $real {
+            const ZERO: Self = 0.0;
+            const NEGLIGIBLE: Self = $negligible;
+            #[inline]
+            fn of(value: f64) -> Self {
+                value as $real
+            }
+            #[inline]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline]
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+        }
+    };
 }
 
-impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const NEGLIGIBLE: Self = 1e-30;
-    #[inline]
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    #[inline]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-}
+real!(f64, palpate_model::viscoelastic::NEGLIGIBLE);
+real!(f32, 1e-30);
 
 /// The force with its rounding error carried along, as in the exact step of the families: at small
 /// steps an increment is below the last digit of the force long before the force has settled.

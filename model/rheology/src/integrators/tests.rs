@@ -223,7 +223,7 @@ fn small_steps_do_not_wear_single_precision_out() {
 }
 
 #[test]
-fn what_cannot_be_stepped_is_refused() {
+fn impossible_steps_are_refused() {
     let body = SeriesBody::from(THESIS);
     let mut forces = vec![1.0];
     let mut refusal = |scheme: Scheme, body: &SeriesBody<3>, dt: f64, depths: &[f64]| {

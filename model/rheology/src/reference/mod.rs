@@ -23,7 +23,7 @@ pub const REFERENCE_DIGITS: usize = 75;
 /// Exponents of e beyond this are refused: doubles end at 710.
 const EXPONENT_MAX: f64 = 1e5;
 
-/// What the reference does not know.
+/// A force that the reference does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
     #[error("a reference has 20 to 1000 digits, not {0}")]
@@ -231,7 +231,7 @@ impl Term {
         self.elastic.is_beyond(depth) || self.rate.is_beyond(depth)
     }
 
-    /// What a move in no time adds to `tau` times the value.
+    /// Change of `tau` times the value by a move in no time.
     fn impulse(&self, [x0, x1]: &[Big; 2], [m0, m1]: [Option<&Big>; 2]) -> Big {
         self.rate.at(x1, m1) - self.rate.at(x0, m0)
     }
@@ -278,7 +278,7 @@ impl Term {
         }
         if let Some((amplitude, b)) = &self.elastic.exponential {
             let chi = chi(&(b * d), &weights);
-            // What the probe rests on and what it adds, each without the difference of large numbers.
+            // The part at rest and the part of the move, each without the difference of large numbers.
             let rest = (b * x0).exp_m1() * &weights.psi[0];
             sum += amplitude * (rest + (b * x0).exp() * (chi - &weights.psi[0]));
         }

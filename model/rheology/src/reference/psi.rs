@@ -5,7 +5,7 @@ use super::digits::{Big, Digits};
 /// Beyond this `r`, `e^-r` times any double is below the smallest double: nothing is left of the past.
 pub(super) const FORGOTTEN: usize = 2000;
 
-/// What a step of `r = dt / tau` does to a filter.
+/// Weights of a step of `r = dt / tau` of a filter.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
     /// `r`; `None` where it is endless.

@@ -1,4 +1,4 @@
-//! What an approximate integrator should give: its own textbook step, stages and all, in many digits.
+//! The textbook step of an approximate integrator, with all its stages, in many digits.
 
 use super::REFERENCE_DIGITS;
 use super::digits::{Big, Digits, nearest};

@@ -1,4 +1,4 @@
-//! What one evaluation of a model costs, counted from its terms: the same number on every machine.
+//! Cost of one evaluation of a model, counted from its terms: the same number on every machine.
 
 use crate::families::{DepthDrive, RelaxationTerm};
 use serde::Serialize;

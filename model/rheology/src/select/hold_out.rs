@@ -2,7 +2,7 @@
 //! of the same record.
 //!
 //! The body is fitted to the other records alone. What the held-out record has of its own, its sensor
-//! offset, is found on that record, because no other can tell it; the body is not.
+//! offset, is found on that record, because no other determines it; the body is not.
 
 use super::facts::{RecordFacts, are_unlike};
 use crate::families::Model;
@@ -32,7 +32,7 @@ palpate_model::named! {
     }
 }
 
-/// What cannot be held out, and why.
+/// Nothing can be held out as asked.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HoldOutError {
     #[error("'{0}' cannot be held out; choose auto, speed, depth, specimen or none")]
@@ -57,7 +57,7 @@ impl FromStr for HoldOut {
 }
 
 palpate_model::named! {
-    /// What is new to the body in a record held out.
+    /// Difference of a held-out record from the fitted ones.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Unseen {
@@ -108,7 +108,7 @@ pub(super) struct Fold {
     pub cut: Option<usize>,
 }
 
-/// What is left out in turn; empty where nothing can be.
+/// Records left out in turn; empty where none can be.
 pub(super) fn folds(
     hold_out: HoldOut,
     facts: &[RecordFacts],
@@ -178,7 +178,7 @@ fn cut(facts: &RecordFacts, samples: &[FitSample]) -> Option<usize> {
     (counted(seen) >= REST_MIN && counted(rest) >= REST_MIN).then_some(cut)
 }
 
-/// What is new in a record to a body fitted to others.
+/// Difference of a record from those that a fold leaves.
 fn classify_unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> Unseen {
     let train = || (0..facts.len()).filter(|index| !test.contains(index));
     let one = &facts[record];
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_new_in_a_record() {
+    fn held_out_kind_follows_speed_and_depth() {
         let mut facts = [facts(1.0, 10.0), facts(1.02, 20.0), facts(5.0, 20.5), facts(1.0, 20.0)];
         for (one, specimen) in facts.iter_mut().zip(["A", "B", "A", "B"]) {
             one.specimen = Some(specimen.into());
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn the_standard_error_of_a_mean() {
+    fn standard_error_of_a_mean_is_exact() {
         assert_eq!(std_error(&[1.0]), None);
         // Variance 1 of 1, 2, 3; its mean errs by 1 over the root of 3.
         assert!((std_error(&[1.0, 2.0, 3.0]).unwrap() - 3f64.sqrt().recip()).abs() < 1e-15);

@@ -1,4 +1,4 @@
-//! What each extra term buys and what it costs.
+//! Gain and cost of each extra term.
 
 use super::cost::StepCost;
 use super::run::Candidate;

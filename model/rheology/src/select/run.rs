@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What is compared, and how.
+/// Families to compare, and the criterion.
 #[derive(Debug)]
 pub struct SelectOptions {
     pub families: Vec<Arc<dyn Family>>,
@@ -113,7 +113,7 @@ pub struct Selection {
     pub candidates: Vec<Candidate>,
     /// Families that the records do not hold.
     pub refused: Vec<RefusedFamily>,
-    /// What each extra term buys.
+    /// Gain of each extra term.
     pub steps: Vec<LadderStep>,
     /// The choice, or why there is none.
     pub verdict: SelectionVerdict,

@@ -1,4 +1,4 @@
-//! The choice, or why there is none.
+//! The choice of a family, or the reason why there is none.
 
 use super::run::Candidate;
 use serde::Serialize;
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_with_a_short_memory_is_no_curve() {
+    fn noise_with_short_correlation_is_not_lack_of_fit() {
         let counts = |samples, effective| SampleCounts { records: 2, samples, effective };
         // A filter's memory of fifty samples in a minute at 1 kHz; a short record of white noise.
         assert!(!counts(60_000, 1200.0).is_curve());

@@ -1,6 +1,7 @@
-//! What to use for a tolerance and a rate.
+//! The cheapest setting for a tolerance and a rate.
 
 use super::{FamilyRow, TradeCurves};
+use crate::distinct;
 use crate::tolerance::Tolerance;
 use palpate_model::units::Newtons;
 use serde::Serialize;
@@ -19,7 +20,7 @@ pub struct AdvisedSetting {
     pub cost_ns: f64,
 }
 
-/// A setting, or why there is none.
+/// A setting, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Advice {
@@ -28,7 +29,7 @@ pub enum Advice {
     None(String),
 }
 
-/// What to use for one tolerance and one rate.
+/// The cheapest settings for one tolerance and one rate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recommendation {
     pub tolerance: String,
@@ -52,14 +53,8 @@ impl TradeCurves {
     /// second, takes no more than `share` (0 to 1) of each period. An integrator may take several steps
     /// a period and never takes one longer than the period. The fit has no rate to keep up with.
     pub fn recommend(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Recommendation {
-        let targets = self.families.iter().map(|row| row.target.as_str());
-        let mut names: Vec<&str> = Vec::new();
-        for target in targets {
-            if !names.contains(&target) {
-                names.push(target);
-            }
-        }
-        let families = names.into_iter().map(|target| {
+        let targets = distinct(self.families.iter().map(|row| row.target.as_str()));
+        let families = targets.into_iter().map(|target| {
             let rows = self.families.iter().filter(|row| row.target == target);
             let advice = family(&rows.collect::<Vec<_>>(), tolerance, rate_hz, share);
             (target.to_owned(), advice)
@@ -148,21 +143,15 @@ fn best(
     tolerance: Tolerance,
     pace: Option<(f64, f64)>,
 ) -> Advice {
-    let mut exact: Vec<&AdvisedSetting> = Vec::new();
-    let mut nearest: Option<&AdvisedSetting> = None;
-    for (choice, is_exact) in &candidates {
-        if *is_exact {
-            exact.push(choice);
-        }
-        if nearest.is_none_or(|known| choice.error_of_peak < known.error_of_peak) {
-            nearest = Some(choice);
-        }
-    }
+    let all = candidates.iter().map(|(choice, _)| choice);
+    let nearest = all.min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
+    let exact = candidates.iter().filter(|(_, is_exact)| *is_exact).map(|(choice, _)| choice);
+    let exact: Vec<&AdvisedSetting> = exact.collect();
     let least = |choices: &[&AdvisedSetting]| {
         let costs = choices.iter().map(|choice| choice.cost_ns);
         costs.fold(f64::INFINITY, f64::min)
     };
-    // What keeps pace, or else the cheapest, to say by how much it does not.
+    // Those that keep pace, or else the cheapest, to state by how much it does not.
     let in_time: Vec<&AdvisedSetting> = exact
         .iter()
         .filter(|choice| {

@@ -1,4 +1,4 @@
-//! Where and when curves were measured, and whether that still says anything here and now.
+//! Machine and date of a measurement, and whether it still holds here and now.
 
 use super::TradeCurves;
 use serde::{Deserialize, Serialize};
@@ -32,7 +32,7 @@ impl Machine {
 }
 
 impl TradeCurves {
-    /// What speaks against planning from these curves here and now, a sentence each: measured on
+    /// Reasons not to plan from these curves here and now, a sentence each: measured on
     /// another machine, by another build or version, too long ago (`age_days`), or in haste.
     pub fn doubts(&self, here: &Machine, version: &str, age_days: f64) -> Vec<String> {
         let mut doubts = Vec::new();

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// Version of the stored form; another one is not read.
 pub const TRADE_FORMAT: u32 = 1;
 
-/// What something cost, and how sure that is.
+/// A measured time and its repeatability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Time of one in ns: the least over all rounds, since other work on the machine only adds.
@@ -61,7 +61,7 @@ pub struct IntegratorRow {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FamilyRow {
     pub family: String,
-    /// What it stands for: rows of one target compete.
+    /// Rows of one target compete.
     pub target: String,
     /// Largest force of the target, in N.
     pub peak_n: f64,

@@ -148,7 +148,7 @@ fn the_cheapest_that_does_is_recommended() {
 }
 
 #[test]
-fn none_is_said_with_its_reason() {
+fn missing_advice_states_its_reason() {
     let curves = curves();
     let one = Tolerance::PercentOfPeak(1.0);
     let fast = curves.recommend(one, 1e6, 0.1);

@@ -31,11 +31,11 @@ fn thesis_protocol(rate: f64) -> ProtocolPath {
 }
 
 #[test]
-fn published_figures() {
+fn published_figures_are_reproduced() {
     let one = thesis_protocol(1e3);
     let speeds = [MmPerS(0.75), MmPerS(1.5)];
     let two = ProtocolPath::two_speeds(speeds, DEPTH, Seconds(50.0), Seconds(10.0), 1e3);
-    let triangle = ProtocolPath::triangle(MmPerS(0.75), DEPTH, 1, 1e3);
+    let triangle = ProtocolPath::cycles(MmPerS(0.75), [Depth(0.0), DEPTH], 1, 1e3);
     let cases = [
         (&one, WITHOUT_OFFSET, [0.158, 0.111, 0.073, 0.036, 0.068]),
         (&one, Unknowns::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
@@ -165,7 +165,7 @@ fn quadrature_and_recursions_agree_with_every_pair_of_samples() {
         thesis_protocol(20.0),
         ProtocolPath::cycles(MmPerS(1.5), [Depth(15.0), DEPTH], 6, 15.0),
         thesis_protocol(10.0),
-        ProtocolPath::triangle(MmPerS(6.0), DEPTH, 7, 10.0),
+        ProtocolPath::cycles(MmPerS(6.0), [Depth(0.0), DEPTH], 7, 10.0),
     ];
     for (protocol, time) in
         protocols.iter().flat_map(|protocol| [0.01, 0.5, 1.023, 8.0].map(|time| (protocol, time)))
@@ -324,7 +324,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
 }
 
 #[test]
-fn impossible_wishes_are_refused_in_words() {
+fn impossible_targets_are_refused_in_words() {
     let noise = Noise::white(Newtons(0.02));
     let ask = |name: &str, percent: f64, rig: Rig| {
         let targets = [Target::new(name, percent).unwrap()];

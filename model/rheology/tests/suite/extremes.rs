@@ -154,7 +154,7 @@ fn a_fit_is_judged_by_its_parameters_and_warnings() {
     let verdict = |expected, error, warnings: &[&str]| {
         let warnings = warnings.iter().map(|&text| text.to_owned()).collect();
         let answer = SubjectAnswer::Number { error, warnings };
-        judge(["test", "case"], "fit", expected, 1e-6, answer).verdict
+        judge("test", "case", "fit", expected, 1e-6, answer).verdict
     };
     assert_eq!(verdict(ExpectedAnswer::Number, 1e-7, &["slow"]), Verdict::Right);
     assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &["slow"]), Verdict::Flagged);

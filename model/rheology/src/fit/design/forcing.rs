@@ -1,4 +1,4 @@
-//! What drives the columns over a block of even steps.
+//! Forcing of the columns over a block of even steps.
 
 use super::rows::{LANES, Lane};
 use palpate_model::viscoelastic::PSI_COUNT;

@@ -1,4 +1,4 @@
-//! Whether the path so far can tell the parameters apart, in words.
+//! Whether the path so far separates the parameters, in words.
 
 use super::super::design::{Columns, legendre_from_powers};
 use super::super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
@@ -142,14 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn one_ramp_is_blind_for_one_pair() {
+    fn one_ramp_does_not_separate_one_pair() {
         assert_eq!(groups(&[(0.0, 0.0), (40.0, 1.0)]), [["mu1", "tau_sig"]]);
         // Also where the ramp starts above the surface.
         assert_eq!(groups(&[(0.0, -0.1), (44.0, 1.0)]), [["mu1", "tau_sig"]]);
     }
 
     #[test]
-    fn a_hold_or_a_second_speed_sees_everything() {
+    fn hold_or_second_speed_separates_all_parameters() {
         let none: Vec<Vec<&str>> = Vec::new();
         assert_eq!(groups(&[(0.0, 0.0), (40.0, 1.0), (45.0, 1.0)]), none);
         assert_eq!(groups(&[(0.0, 0.0), (20.0, 0.5), (30.0, 1.0)]), none);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn says_so_in_words() {
+    fn reasons_name_the_parameters_and_the_remedy() {
         let blind = BlindParameters::of(&[(0.0, 0.0), (40.0, 1.0)], 1.023, &SCALED);
         let reason = blind.reason(1).unwrap();
         assert!(reason.contains("mu1") && reason.contains("tau_sig"), "{reason}");

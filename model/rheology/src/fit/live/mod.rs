@@ -34,7 +34,7 @@ const IDENTIFIED_SHARE: f64 = 0.5;
 /// Blocks in which the autocorrelation of the residuals is estimated: coarser than in the fit of record,
 /// since it is estimated again with every answer.
 const NOISE_BLOCKS: usize = 256;
-/// Residuals this small beside the forces are rounding of sums of products.
+/// Residuals this small relative to the forces are rounding of sums of products.
 const ROUNDING: f64 = 1e-6;
 
 /// The fit in progress: memory and cost of a sample do not grow with the run.
@@ -119,7 +119,7 @@ impl LiveFit {
         let mut bank = self.bank.clone();
         bank.flush();
         let grams: Vec<_> = (0..bank.grid().nodes).map(|node| bank.gram(node)).collect();
-        // What the probe did while no force counted identifies nothing.
+        // Movement while no force counts identifies nothing.
         let corners = path::until(self.path.corners(), self.measured_until);
         let judge = |minimum: &Minimum| {
             let jet = minimum.stencil.jet(minimum.place);

@@ -9,6 +9,7 @@
 use super::options::FitOptions;
 use super::sample::{FitError, FitSample, NamedSamples};
 use super::solve::Fitted;
+use crate::distinct;
 use palpate_model::calibration::{ForceUncertainty, Term};
 use palpate_model::units::{Depth, Newtons};
 use serde::Serialize;
@@ -33,7 +34,7 @@ pub struct Traced<'a> {
     pub compliance: Option<(&'a str, f64)>,
 }
 
-/// What calibration and compliance add to the uncertainty of a fit.
+/// Uncertainty of a fit from calibration and machine compliance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Systematic {
     pub calibrations: Vec<StatedTerms>,
@@ -45,7 +46,7 @@ pub struct Systematic {
     pub is_extrapolated: bool,
 }
 
-/// What one calibration states of its errors.
+/// Error terms that one calibration states and does not state.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StatedTerms {
     pub name: String,
@@ -216,17 +217,6 @@ impl Spread {
 fn thinned(samples: &[FitSample]) -> Vec<FitSample> {
     let stride = samples.len().div_ceil(SAMPLES_MAX).max(1);
     samples.iter().step_by(stride).copied().collect()
-}
-
-/// Each once, in the order of their coming.
-fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for one in all {
-        if !found.contains(&one) {
-            found.push(one);
-        }
-    }
-    found
 }
 
 /// The samples taken, those of the chosen records as another calibration or compliance would have read them.

@@ -1,4 +1,4 @@
-//! Systematic errors in a sentence, and beside the statistical ones of a report.
+//! Systematic errors in a sentence, and in a report next to the statistical ones.
 
 use super::super::report::{FitReport, JointReport};
 use super::{StatedTerms, Systematic};
@@ -78,7 +78,7 @@ impl Systematic {
 }
 
 impl FitReport {
-    /// This report with the systematic errors beside the statistical ones, and the sentence on them.
+    /// This report with the systematic errors next to the statistical ones, and the sentence on them.
     #[must_use]
     pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
         self.add_systematic(systematic);
@@ -95,7 +95,7 @@ impl FitReport {
 }
 
 impl JointReport {
-    /// This report with the systematic errors of every record beside the statistical ones.
+    /// This report with the systematic errors of every record next to the statistical ones.
     #[must_use]
     pub fn with_systematic(mut self, systematic: &[Systematic]) -> Self {
         for (record, own) in self.records.iter_mut().zip(systematic) {

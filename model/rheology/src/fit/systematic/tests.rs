@@ -37,7 +37,7 @@ fn calibration() -> Calibration {
 }
 
 #[test]
-fn it_is_what_draws_of_whole_calibrations_scatter() {
+fn systematic_error_equals_the_scatter_of_drawn_calibrations() {
     let (samples, options) = (record(5.0), FitOptions::default());
     let calibration = calibration();
     let uncertainty = ForceUncertainty::of(&calibration).unwrap();
@@ -85,7 +85,7 @@ fn it_is_what_draws_of_whole_calibrations_scatter() {
 }
 
 #[test]
-fn fewer_samples_tell_the_same() {
+fn systematic_error_does_not_depend_on_thinning() {
     let options = FitOptions::default();
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let of = |samples: &[FitSample]| {
@@ -148,7 +148,7 @@ fn records_of_one_calibration_move_together_and_of_two_apart() {
 }
 
 #[test]
-fn of_two_calibrations_it_is_told_which_states_what() {
+fn sentence_names_what_each_of_two_calibrations_states() {
     let (one, options) = (record(5.0), FitOptions::default());
     let drifting = Calibration {
         zero_before: Some(Volts(1.28)),
@@ -172,7 +172,7 @@ fn of_two_calibrations_it_is_told_which_states_what() {
 }
 
 #[test]
-fn every_family_tells_what_the_calibration_adds() {
+fn every_family_reports_the_systematic_error_of_the_calibration() {
     let samples = record(5.0);
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let traced = traced(&samples, "thesis", &uncertainty);
@@ -196,7 +196,7 @@ fn every_family_tells_what_the_calibration_adds() {
 }
 
 #[test]
-fn a_compliance_known_badly_makes_stiffness_known_badly() {
+fn uncertain_compliance_makes_stiffness_uncertain() {
     let (samples, options) = (record(5.0), FitOptions::default());
     let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
     let uncertainty = ForceUncertainty::of(&line).unwrap();
