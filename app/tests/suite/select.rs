@@ -130,14 +130,14 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let candidates = found["candidates"].as_array().unwrap();
     let rms = |one: &&Value| one["rms_n"].as_f64().unwrap();
     let closest = candidates.iter().min_by(|a, b| rms(a).total_cmp(&rms(b))).unwrap();
-    let even = format!("what even {} leaves", closest["family"].as_str().unwrap());
+    let even = format!("the residuals of {}", closest["family"].as_str().unwrap());
     let said = found["verdict"]["sentences"][0].as_str().unwrap();
     assert!(said.contains(&even), "{said}");
 
     let specimen = ["--hold-out", "specimen"];
     let nameless = palpate(at, &[&args[..], &specimen].concat());
     assert_eq!(nameless.status.code(), Some(2));
-    assert!(stdout(&nameless).contains("does not say"));
+    assert!(stdout(&nameless).contains("does not name"));
     let few = [&args[..], &specimen, &["--specimens", "A,B"]].concat();
     assert_eq!(palpate(at, &few).status.code(), Some(2));
     let named = [&args[..], &specimen, &["--specimens", "A,A,B,B"]].concat();

@@ -1,4 +1,4 @@
-//! What a sample of the exact step costs at a constant rate, beside what memory allows.
+//! Time of a sample of the exact step at a constant rate, against the bound that memory sets.
 //!
 //! `cargo run --release -p palpate-rheology --example exact_step_speed`
 

@@ -1,13 +1,13 @@
 //! Draws `docs/pictures/master_curve.svg` and prints its figures: a published Prony series reproduced, and
 //! how many terms the same curve needs when their relaxation times are fitted too.
 //!
-//! `cargo run -p palpate-model --example master_curve -- time_user_master.csv docs/pictures/master_curve.svg`
+//! `cargo run -p palpate-rheology --example master_curve -- time_user_master.csv docs/pictures/master_curve.svg`
 
 #![expect(clippy::print_stdout, reason = "an example prints what it found")]
 
 mod drawing;
 
-use drawing::{Axes, BLUE, RED};
+use drawing::{Axes, BLUE, LEFT_PANEL, RED, RIGHT_PANEL, START};
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{Model, Prony};
 use palpate_rheology::fit::{FitOptions, FitSample, fit, fit_coefficients};
@@ -25,19 +25,14 @@ const STEP: f64 = 1e-9;
 /// Terms fitted with free relaxation times, as long as the curve holds so many.
 const FREE: std::ops::RangeInclusive<usize> = 1..=40;
 
-/// Plot areas in px: left, top, width, height.
-const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
-const RIGHT_PANEL: [f64; 4] = [530.0, 60.0, 360.0, 260.0];
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
-        return Err(
-            "give the curve and the picture to write: master_curve CURVE.csv OUT.svg".into()
-        );
-    };
-    let curve = read(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
-    let samples = relaxation(&curve);
+    // Columns t in s and modulus in MPa, under a row of names and one of units.
+    let usage = "give the curve and the picture to write: master_curve CURVE.csv OUT.svg";
+    drawing::draw_table(usage, 2, fit_curve)
+}
+
+fn fit_curve(curve: &[[f64; 2]]) -> Result<String, Box<dyn Error>> {
+    let samples = relaxation(curve);
     let taus: Vec<f64> = DECADES.map(|decade| 10f64.powi(decade)).collect();
     let family = Prony::of_terms(taus.len()).ok_or("too many terms")?;
     let fixed = fit_coefficients(Arc::new(family), &taus, &[("master curve", &samples)])?;
@@ -66,27 +61,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             best = fit.body;
         }
     }
-    let picture = picture(&samples, &fixed, &best, &ladder)?;
-    std::fs::write(&svg, picture).map_err(|err| format!("cannot write {svg}: {err}"))?;
-    Ok(())
-}
-
-/// Columns t in s and modulus in MPa, under a row of names and one of units.
-fn read(path: &str) -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let row = |(row, line): (usize, &str)| {
-        let fields: Result<Vec<f64>, _> =
-            line.split(',').map(|field| field.trim().parse()).collect();
-        match fields.as_deref() {
-            Ok(&[t, modulus]) => Ok((t, modulus)),
-            _ => Err(format!("row {} is not two numbers", row + 1).into()),
-        }
-    };
-    text.lines().enumerate().skip(2).map(row).collect()
+    picture(&samples, &fixed, &best, &ladder)
 }
 
 /// A curve of moduli as the force after a step to 1 mm, so that MPa stand for N/mm.
-fn relaxation(curve: &[(f64, f64)]) -> Vec<FitSample> {
+fn relaxation(curve: &[[f64; 2]]) -> Vec<FitSample> {
     let sample = |t, depth, force, sigma| FitSample {
         t: Seconds(t),
         depth: Depth(depth),
@@ -94,20 +73,20 @@ fn relaxation(curve: &[(f64, f64)]) -> Vec<FitSample> {
         sigma: Newtons(sigma),
     };
     let step = [sample(0.0, 0.0, 0.0, f64::INFINITY), sample(STEP, 1.0, 0.0, f64::INFINITY)];
-    let held = curve.iter().map(|&(t, modulus)| sample(t, 1.0, modulus, 1.0));
+    let held = curve.iter().map(|&[t, modulus]| sample(t, 1.0, modulus, 1.0));
     step.into_iter().chain(held).collect()
 }
 
 /// Root mean square of what a model leaves, in MPa.
 fn rms(model: &Model, samples: &[FitSample]) -> Result<f64, Box<dyn Error>> {
     let forces = model.along(samples.iter().map(|sample| (sample.t, sample.depth)))?;
-    let left = samples
+    let squares = samples
         .iter()
         .zip(forces)
         .filter(|(sample, _)| sample.is_measured())
         .map(|(sample, force)| (sample.force.0 - force).powi(2));
     let count = samples.iter().filter(|sample| sample.is_measured()).count();
-    Ok((left.sum::<f64>() / count as f64).sqrt())
+    Ok((squares.sum::<f64>() / count as f64).sqrt())
 }
 
 fn picture(
@@ -116,11 +95,7 @@ fn picture(
     best: &Model,
     ladder: &[(f64, f64)],
 ) -> Result<String, Box<dyn Error>> {
-    let mut svg = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"930\" height=\"380\" \
-         font-family=\"sans-serif\" font-size=\"13\">\n\
-         <rect width=\"930\" height=\"380\" fill=\"white\"/>\n",
-    );
+    let mut svg = START.to_owned();
     let axes = Axes { panel: LEFT_PANEL, x: (-3.0, 29.0), y: (0.0, 1800.0) };
     axes.draw(
         &mut svg,

@@ -5,50 +5,25 @@
 mod drawing;
 mod maxwell_fit;
 
-use drawing::{Axes, BLUE, RED};
+use drawing::{Axes, BLUE, LEFT_PANEL, RED, RIGHT_PANEL, START};
 use maxwell_fit::{Integrator, Maxwell, MaxwellFit, MaxwellState, StrainSample, fit_maxwell};
 use palpate_model::Seconds;
 use std::error::Error;
 
-/// Plot area of a panel in px: left, top, width, height.
-const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
-const RIGHT_PANEL: [f64; 4] = [530.0, 60.0, 360.0, 260.0];
 const DASHED: &str = "stroke-dasharray=\"4 5\"";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
-        return Err(
-            "give the recording and the picture to write: rheos RECORDING.csv OUT.svg".into()
-        );
-    };
-    let samples = read(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
-    std::fs::write(&svg, picture(&samples)?).map_err(|err| format!("cannot write {svg}: {err}"))?;
-    Ok(())
+    let usage = "give the recording and the picture to write: rheos RECORDING.csv OUT.svg";
+    drawing::draw_table(usage, 0, picture)
 }
 
-/// Columns t, strain, stress; no header.
-fn read(path: &str) -> Result<Vec<StrainSample>, Box<dyn Error>> {
-    let text = std::fs::read_to_string(path)?;
-    let sample = |(row, line): (usize, &str)| {
-        let fields: Result<Vec<f64>, _> =
-            line.split(',').map(|field| field.trim().parse()).collect();
-        match fields.as_deref() {
-            Ok(&[t, strain, stress]) => Ok(StrainSample { t: Seconds(t), strain, stress }),
-            _ => Err(format!("row {} is not three numbers", row + 1).into()),
-        }
-    };
-    text.lines().enumerate().map(sample).collect()
-}
-
-fn picture(samples: &[StrainSample]) -> Result<String, Box<dyn Error>> {
+fn picture(rows: &[[f64; 3]]) -> Result<String, Box<dyn Error>> {
+    let sample = |&[t, strain, stress]: &[f64; 3]| StrainSample { t: Seconds(t), strain, stress };
+    let samples: Vec<StrainSample> = rows.iter().map(sample).collect();
+    let samples = samples.as_slice();
     let exact = fit_maxwell(samples, Integrator::Exact)?;
     let backward = fit_maxwell(samples, Integrator::BackwardDifference)?;
-    let mut svg = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"930\" height=\"380\" \
-         font-family=\"sans-serif\" font-size=\"13\">\n\
-         <rect width=\"930\" height=\"380\" fill=\"white\"/>\n",
-    );
+    let mut svg = START.to_owned();
     recording(&mut svg, samples, [&exact, &backward])?;
     bias(&mut svg, exact.body)?;
     svg.push_str("</svg>\n");

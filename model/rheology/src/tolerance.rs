@@ -1,4 +1,4 @@
-//! How much force error matters, as people say it: in newtons, of the peak, or of what a hand notices.
+//! Tolerated error of force: in newtons, of the peak, or of the smallest change that a hand notices.
 
 use palpate_model::units::Newtons;
 use std::fmt;
@@ -14,7 +14,6 @@ pub const THRESHOLD_SHARE: f64 = 0.1;
 /// A tolerated error of force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// So many newtons.
     Newtons(Newtons),
     /// So many percent of the peak force.
     PercentOfPeak(f64),
@@ -28,7 +27,6 @@ pub enum Tolerance {
     "'{text}' is not a tolerance of force; write newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd), above zero"
 )]
 pub struct BadTolerance {
-    /// What was given.
     pub text: String,
 }
 
@@ -86,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_ways_to_say_it() {
+    fn tolerance_is_parsed_in_newtons_percent_of_peak_and_of_threshold() {
         let newtons = |text: &str| {
             let tolerance: Tolerance = text.parse().unwrap();
             tolerance.in_newtons(Newtons(-4.0)).0

@@ -135,7 +135,7 @@ fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
                 one.frequency, one.zero_share, one.storage.value
             );
             assert!((0.2..0.5).contains(&one.zero_share), "{one:?}");
-            assert!(one.remark().unwrap().contains("lost the tissue"));
+            assert!(one.remark().unwrap().contains("loses contact"));
         }
     }
 }

@@ -1,10 +1,44 @@
-//! Axes, lines and dots of the pictures that examples draw.
+//! Arguments of the examples that draw, and axes, lines and dots of their pictures.
 
+use std::error::Error;
 use std::fmt::Write;
 
 /// Okabe-Ito blue and vermilion.
 pub const BLUE: &str = "#0072B2";
 pub const RED: &str = "#D55E00";
+
+/// Plot areas of two panels side by side, in px: left, top, width, height.
+pub const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
+pub const RIGHT_PANEL: [f64; 4] = [530.0, 60.0, 360.0, 260.0];
+
+/// The start of a picture of two panels.
+pub const START: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"930\" height=\"380\" \
+     font-family=\"sans-serif\" font-size=\"13\">\n\
+     <rect width=\"930\" height=\"380\" fill=\"white\"/>\n";
+
+/// Reads the table named first on the command line, rows of `N` numbers after `skipped` lines, and writes the picture
+/// of them to the path named second.
+pub fn draw_table<const N: usize>(
+    usage: &str,
+    skipped: usize,
+    picture: impl Fn(&[[f64; N]]) -> Result<String, Box<dyn Error>>,
+) -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
+        return Err(usage.into());
+    };
+    let text = std::fs::read_to_string(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
+    let row = |(row, line): (usize, &str)| {
+        let fields = line.split(',').map(|field| field.trim().parse());
+        let fields = fields.collect::<Result<Vec<f64>, _>>().ok();
+        let fields = fields.and_then(|fields| <[f64; N]>::try_from(fields).ok());
+        fields.ok_or_else(|| format!("cannot read {csv}: row {} is not {N} numbers", row + 1))
+    };
+    let rows: Vec<[f64; N]> =
+        text.lines().enumerate().skip(skipped).map(row).collect::<Result<_, _>>()?;
+    std::fs::write(&svg, picture(&rows)?).map_err(|err| format!("cannot write {svg}: {err}"))?;
+    Ok(())
+}
 
 /// A plot area, in px as left, top, width, height, and the values at its ends.
 pub struct Axes {

@@ -38,13 +38,13 @@ pub enum Integrator {
     BackwardDifference,
 }
 
-/// What a step of length `dt` does to the response to strain.
+/// Coefficients of a step of length `dt`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaxwellStep {
     /// `dt / tau`.
     pub r: f64,
-    /// Share of the response lost, `1 - e^-r`.
-    pub lost: f64,
+    /// Share of the response that decays, `1 - e^-r`.
+    pub decayed: f64,
     /// Response to a unit of strain.
     pub gain: f64,
 }
@@ -54,16 +54,16 @@ impl MaxwellStep {
     #[must_use]
     pub fn new(dt: f64, tau: f64, integrator: Integrator) -> Self {
         let r = dt / tau;
-        let lost = psi(0, r);
+        let decayed = psi(0, r);
         let gain = match integrator {
-            Integrator::Exact if r > 0.0 => lost / r,
+            Integrator::Exact if r > 0.0 => decayed / r,
             Integrator::Exact | Integrator::BackwardDifference => 1.0,
         };
-        Self { r, lost, gain }
+        Self { r, decayed, gain }
     }
 }
 
-/// What a Maxwell body remembers.
+/// State of a Maxwell body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaxwellState {
     /// Stress over `k`.
@@ -96,7 +96,7 @@ impl MaxwellState {
         }
         let step = MaxwellStep::new(dt.0, tau, integrator);
         let forcing = step.gain * (strain_to - self.strain);
-        self.response.relax(forcing, step.lost);
+        self.response.relax(forcing, step.decayed);
         self.strain = strain_to;
         body.k * self.response.value
     }
@@ -144,12 +144,12 @@ mod tests {
             let mut state = MaxwellState::at_rest_from(0.5);
             let stress = state.step(&BODY, integrator, 0.8, Seconds(0.0));
             assert!((stress - 0.6).abs() < 1e-15);
-            let kept = state.clone();
+            let before = state.clone();
             let bad = [(f64::NAN, 1.0), (1.0, -1.0), (1.0, f64::INFINITY)];
             for (strain, dt) in bad {
                 assert!(state.step(&BODY, integrator, strain, Seconds(dt)).is_nan());
             }
-            assert_eq!(state, kept);
+            assert_eq!(state, before);
         }
     }
 }

@@ -41,7 +41,6 @@ pub struct MaxwellFit {
     pub k_std_error: f64,
     /// Sum of squared residuals, in the squared unit of the stress.
     pub residual_sum: f64,
-    /// Samples used.
     pub samples: usize,
 }
 
@@ -131,13 +130,13 @@ fn walk(
         let step = MaxwellStep::new(pair[1].t.0 - pair[0].t.0, tau, integrator);
         let strain = pair[1].strain - pair[0].strain;
         // d(e^-r)/d(ln tau) = r e^-r; d(psi_0 / r)/d(ln tau) = psi_0 / r - e^-r.
-        let kept = 1.0 - step.lost;
+        let decay = 1.0 - step.decayed;
         let gain_slope = match integrator {
-            Integrator::Exact => step.gain - kept,
+            Integrator::Exact => step.gain - decay,
             Integrator::BackwardDifference => 0.0,
         };
-        slope += gain_slope * strain + step.r * kept * response - step.lost * slope;
-        response += step.gain * strain - step.lost * response;
+        slope += gain_slope * strain + step.r * decay * response - step.decayed * slope;
+        response += step.gain * strain - step.decayed * response;
         visit(&pair[1], response, slope);
     }
 }

@@ -4,21 +4,19 @@ use super::local::{line, mean};
 use super::{CycleSample, Estimate};
 use palpate_model::units::{Depth, Newtons, Seconds};
 
-/// What one hold of a force shows.
+/// Creep of one hold of a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
     /// From the first to the last sample.
     pub duration: Seconds,
-    /// Mean force.
     pub force: Newtons,
     /// Standard deviation of the force about it: how well it was held, noise included.
     pub force_sd: Newtons,
-    /// Depth at the start.
     pub depth_start: Depth,
     /// Depth at the end: a line through the last tenth of the hold, read at its end. Its error has a part that no
     /// number of samples averages away where the step of the axis is known.
     pub depth_end: Estimate<Depth>,
-    /// What was added, in percent of the depth at the start.
+    /// Growth of the depth, in percent of the depth at the start.
     pub percent: f64,
     /// Slope of that line in mm/s: what a longer hold would still add.
     pub rate_end: Estimate<f64>,

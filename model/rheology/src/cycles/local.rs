@@ -15,23 +15,23 @@ pub(super) fn mean(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]
 
 /// Value and slope of a polynomial at a place, each with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Local {
+pub(super) struct LocalFit {
     pub value: [f64; 2],
     pub slope: [f64; 2],
 }
 
 /// Least squares of a parabola through points `(x, y)`, read at `at`; `None` for points that do not determine it
-/// or leave nothing to tell the error from.
-pub(super) fn parabola(points: &[[f64; 2]], at: f64) -> Option<Local> {
+/// or leave no degree of freedom for the error.
+pub(super) fn parabola(points: &[[f64; 2]], at: f64) -> Option<LocalFit> {
     fit(points, at, 2)
 }
 
 /// The same of a straight line.
-pub(super) fn line(points: &[[f64; 2]], at: f64) -> Option<Local> {
+pub(super) fn line(points: &[[f64; 2]], at: f64) -> Option<LocalFit> {
     fit(points, at, 1)
 }
 
-fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<Local> {
+fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<LocalFit> {
     let columns = degree + 1;
     let reach = points.iter().fold(0.0f64, |reach, point| reach.max((point[0] - at).abs()));
     if points.len() <= columns || reach <= 0.0 {
@@ -48,7 +48,7 @@ fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<Local> {
     let found = triangle.solve(columns)?;
     let variance = triangle.residual_sum() / (points.len() - columns) as f64;
     let error = |index: usize| Some((variance * triangle.inverse_diagonal(index, columns)?).sqrt());
-    Some(Local { value: [found[0], error(0)?], slope: [found[1] / reach, error(1)? / reach] })
+    Some(LocalFit { value: [found[0], error(0)?], slope: [found[1] / reach, error(1)? / reach] })
 }
 
 /// Most bins a way is cut into to find a force on it: straight lines between them then miss a curve by less than
@@ -73,7 +73,7 @@ pub(super) fn bins(points: &[[f64; 2]]) -> Vec<[f64; 3]> {
             *total += term;
         }
     }
-    // Within a bin y changes by its own slope too, so the noise is told from neighbouring samples.
+    // Within a bin y changes by its own slope too, so the noise is estimated from neighbouring samples.
     let noise = noise_of(points);
     sums.iter()
         .filter(|sum| sum[0] > 0.0)

@@ -8,63 +8,58 @@ use palpate_model::rig::Phase;
 use palpate_model::signal::work;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 
-/// Forces at which the place of a loop is told, as shares of the first cycle's peak above its start: where the probe
-/// begins to feel tissue, at the foot of the loop, and halfway up.
+/// Forces at which the position of a loop is measured, as shares of the first cycle's peak above its start: where the force
+/// begins to rise, at the foot of the loop, and halfway up.
 pub const LEVELS: [f64; 3] = [0.02, 0.1, 0.5];
 /// Which of [`LEVELS`] is halfway.
 const HALF: usize = 2;
 
-/// Last part of the way in from which the force at the turning point is read, and half the window of a stiffness:
+/// Last part of loading from which the force at the turning point is read, and half the window of a stiffness:
 /// a twentieth is short beside the curvature of tissue and long beside noise.
 const NEAR: f64 = 0.05;
-/// First part of the way in over which the force at the start is averaged.
+/// First part of loading over which the force at the start is averaged.
 const START: f64 = 0.01;
 
-/// The depth at which the way in last rose through a force.
+/// The depth at which loading last rose through a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelDepth {
-    /// The force.
     pub force: Newtons,
-    /// The depth.
     pub depth: Estimate<Depth>,
 }
 
-/// Slope of force over depth on the way in.
+/// Slope of force over depth on loading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stiffness {
-    /// Where.
     pub depth: Depth,
     /// Tangent of a parabola through a tenth of the way around, in N/mm.
     pub slope: Estimate<f64>,
 }
 
-/// What one cycle shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CycleAnalysis {
     /// Its number in the record.
     pub cycle: u32,
     /// Time at its first sample.
     pub start: Seconds,
-    /// Time to its last sample.
     pub duration: Seconds,
-    /// Mean speed of the way in.
+    /// Mean speed of loading.
     pub speed: MmPerS,
-    /// Greatest depth of the way in.
+    /// Greatest depth of loading.
     pub depth_peak: Depth,
-    /// Force over the first hundredth of the way in: what is left of the cycle before, or drift.
+    /// Force over the first hundredth of loading: what is left of the cycle before, or drift.
     pub force_start: Option<Estimate<Newtons>>,
-    /// Force at the turning point, read from the last twentieth of the way in.
+    /// Force at the turning point, read from the last twentieth of loading.
     pub force_peak: Estimate<Newtons>,
-    /// Energy that the way in took, in N*mm.
+    /// Energy that loading took, in N*mm.
     pub work_loading: f64,
-    /// Energy that the whole loop kept, in N*mm; `None` where the way back was not recorded, or where the probe did more
-    /// between the ways than hold its depth.
+    /// Energy that the whole loop dissipates, in N*mm; `None` where unloading was not recorded, or where the probe did more
+    /// between loading and unloading than hold its depth.
     pub work_loop: Option<f64>,
     /// Depths at [`LEVELS`]; `None` where the force never rises through one.
     pub levels: [Option<LevelDepth>; 3],
     /// Stiffness at the depth asked for.
     pub stiffness: Option<Stiffness>,
-    /// The hold of the depth that follows the way in, if there was one of twenty samples.
+    /// The hold of the depth that follows loading, if there was one of twenty samples.
     pub relaxation: Option<Relaxation>,
     /// The holds of a force of twenty samples or more, one for each step of the plan.
     pub creep: Vec<Creep>,
@@ -83,7 +78,7 @@ impl CycleAnalysis {
     }
 }
 
-/// Analyses every cycle of a record in order of time. Cycles without a way in are left out; `at` is the depth of the
+/// Analyses every cycle of a record in order of time. Cycles without loading are left out; `at` is the depth of the
 /// stiffness, 80 % of the first cycle's depth if none is given; `pulse` is the least step of the depth, where it is
 /// known.
 #[must_use]
@@ -96,12 +91,12 @@ pub fn analyse(
     let mut levels = None;
     let of_cycles: Vec<CycleSample> =
         samples.iter().filter(|one| is_of_cycle(one.phase)).copied().collect();
-    // Steps of one cycle, as in a relaxation in several steps, each have a way in.
+    // Steps of one cycle, as in a relaxation in several steps, each have loading.
     let is_same = |one: &CycleSample, next: &CycleSample| {
         one.cycle == next.cycle && (next.phase != Phase::Ramp || one.phase == Phase::Ramp)
     };
     for cycle in of_cycles.chunk_by(is_same) {
-        let Some(way) = WayIn::of(cycle) else {
+        let Some(way) = LoadingPath::of(cycle) else {
             continue;
         };
         let force_start = way.force_start();
@@ -116,7 +111,7 @@ pub fn analyse(
     cycles
 }
 
-/// Slope of force over depth on the way in around a depth; `None` outside the way or with too few samples.
+/// Slope of force over depth on loading around a depth; `None` outside loading or with too few samples.
 #[must_use]
 pub fn stiffness_at(way_in: &[[f64; 2]], at: Depth) -> Option<Stiffness> {
     let (low, high) = reach(way_in);
@@ -140,7 +135,7 @@ fn reach(points: &[[f64; 2]]) -> (f64, f64) {
 }
 
 /// The ramp of a cycle as depth and force.
-struct WayIn {
+struct LoadingPath {
     points: Vec<[f64; 2]>,
     duration: f64,
     depth_start: f64,
@@ -148,7 +143,7 @@ struct WayIn {
     force_peak: Estimate<Newtons>,
 }
 
-impl WayIn {
+impl LoadingPath {
     fn of(cycle: &[CycleSample]) -> Option<Self> {
         let ramp: Vec<&CycleSample> = cycle.iter().filter(|one| one.phase == Phase::Ramp).collect();
         let (first, last) = (*ramp.first()?, *ramp.last()?);
@@ -217,7 +212,7 @@ impl WayIn {
         let has = |phase: Phase| cycle.iter().any(|one| one.phase == phase);
         let is_loop = has(Phase::Unload) && !has(Phase::Creep) && !has(Phase::Sine);
         let of = |phase: Phase| cycle.iter().filter(move |one| one.phase == phase);
-        // What is held after a creep or a sine does not begin at the peak.
+        // A hold after a creep or a sine does not begin at the peak.
         let held: Vec<[f64; 2]> = cycle
             .iter()
             .skip_while(|one| one.phase == Phase::Ramp)

@@ -1,8 +1,8 @@
-//! What repeated indentations of one specimen show: loops, their shift and decay, relaxation, creep, and the answer
+//! Quantities of repeated indentations of one specimen: loops, their shift and decay, relaxation, creep, and the response
 //! to a sine; and what a fitted body's prediction of a record is worth.
 //!
 //! Everything is measured on the record itself; no model is assumed but where a name says so. Standard errors hold
-//! for noise that does not remember. [`analyse`] does the cycles; [`sine`], [`creep`] and [`predict`] stand alone.
+//! for independent noise. [`analyse`] does the cycles; [`sine`], [`creep`] and [`predict`] stand alone.
 
 mod creep;
 mod local;
@@ -19,7 +19,7 @@ pub use predict::{Prediction, PredictionError, predict};
 pub use relaxation::{Relaxation, relaxation};
 pub use sine::{Sinusoid, SinusoidError, sinusoid};
 pub use split::by_depth;
-pub use steady::{Change, Steadiness, SteadyRule};
+pub use steady::{CycleChange, Steadiness, SteadyRule};
 
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -29,9 +29,7 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 pub struct CycleSample {
     /// Time from the start of the record.
     pub t: Seconds,
-    /// Depth from contact.
     pub depth: Depth,
-    /// Force above tare.
     pub force: Newtons,
     /// Ramp, hold, creep or unload; other phases are between cycles.
     pub phase: Phase,
@@ -44,9 +42,8 @@ pub struct CycleSample {
 /// A measured number and its standard error, of one unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate<T> {
-    /// The number.
     pub value: T,
-    /// Its standard error, for noise that does not remember.
+    /// For independent noise.
     pub std_error: T,
 }
 

@@ -1,4 +1,4 @@
-//! What a body fitted elsewhere predicts of a record, and by how much it is wrong.
+//! Prediction of a record by a model fitted elsewhere, and its error.
 
 use super::Estimate;
 use super::local::line;
@@ -7,7 +7,7 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use thiserror::Error;
 
-/// Last part of the way in and of the rest from which errors at the turning point and at the end are read.
+/// Last part of loading and of the rest from which errors at the turning point and at the end are read.
 const NEAR: f64 = 0.02;
 
 /// A prediction beside its record; errors are predicted minus measured.
@@ -25,7 +25,7 @@ pub struct Prediction {
     pub sd: Newtons,
     /// Largest error, with its sign, and when it was. A single sample: noise is in it.
     pub worst: (Newtons, Seconds),
-    /// Error at the turning point, from a line through the last fiftieth of the way in.
+    /// Error at the turning point, from a line through the last fiftieth of loading.
     pub at_peak: Estimate<Newtons>,
     /// Error at the end, from a line through the last fiftieth of what follows; `None` where nothing follows.
     pub at_end: Option<Estimate<Newtons>>,
@@ -34,15 +34,10 @@ pub struct Prediction {
 /// There is nothing to compare.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PredictionError {
-    /// Too few samples with a known force.
     #[error(
         "{measured} samples with a known force before the turning point are too few for a comparison; record more"
     )]
-    TooFew {
-        /// How many there are.
-        measured: usize,
-    },
-    /// The prediction is not a number.
+    TooFew { measured: usize },
     #[error("the prediction is not a number; check the body and that times of the record increase")]
     NotFinite,
 }

@@ -4,14 +4,13 @@ use super::Estimate;
 use super::local::{bins, last_rise, line, mean};
 use palpate_model::units::{Newtons, Seconds};
 
-/// What one hold shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relaxation {
     /// From the first to the last sample of the hold.
     pub duration: Seconds,
     /// Force at the end: a line through the last tenth of the hold, read at its end.
     pub force_end: Estimate<Newtons>,
-    /// What has gone by then, in percent of the peak.
+    /// Fall of the force by then, in percent of the peak (percent relaxation).
     pub percent: Estimate<f64>,
     /// Time from the start of the hold until half of what will have gone at its end has gone.
     pub half_time: Option<Seconds>,
@@ -29,7 +28,7 @@ const TAIL: f64 = 0.1;
 /// A difference of so many standard errors is no noise.
 const SIGNIFICANT: f64 = 3.0;
 
-/// Largest ratio of two falls in a row from which an end can be told: at 0.9 the end is nine falls away.
+/// Largest ratio of two falls in a row from which an end can be extrapolated: at 0.9 the end is nine falls away.
 const RATIO_MAX: f64 = 0.9;
 
 /// Measures a hold from its points (time in s, force in N) and the force at its start; `None` for fewer than twenty.

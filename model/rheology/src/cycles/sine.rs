@@ -27,18 +27,15 @@ const LOST_SHARE: f64 = 0.01;
 /// A force that swings by this share of its amplitude below zero is of a specimen that is held and pulls back.
 const PULL_SHARE: f64 = 0.5;
 
-/// What one frequency shows.
+/// Response to a sine at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sinusoid {
     /// The frequency, in Hz.
     pub frequency: f64,
-    /// Whole cycles evaluated.
     pub cycles: u32,
-    /// Mean depth.
     pub depth_mean: Depth,
     /// Amplitude of the depth at the frequency.
     pub depth_amplitude: Depth,
-    /// Mean force.
     pub force_mean: Newtons,
     /// Amplitude of the force at the frequency.
     pub force_amplitude: Estimate<Newtons>,
@@ -56,16 +53,11 @@ pub struct Sinusoid {
 }
 
 impl Sinusoid {
-    /// Whether the force comes back to zero, so that nothing was touched for a part of the swing.
-    pub fn is_contact_lost(&self) -> bool {
-        self.zero_share > LOST_SHARE
-    }
-
-    /// What speaks against the numbers, in words; `None` if nothing does.
+    /// A warning that the numbers are not those of the tissue, because contact is lost.
     pub fn remark(&self) -> Option<String> {
-        self.is_contact_lost().then(|| {
+        (self.zero_share > LOST_SHARE).then(|| {
             format!(
-                "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe lost the tissue, and stiffness, loss and phase are not those of the tissue, whatever their errors; go deeper or swing less",
+                "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe loses contact, and stiffness, loss and phase are not those of the tissue, whatever their errors; press deeper or reduce the amplitude",
                 self.frequency,
                 100.0 * self.zero_share
             )
@@ -76,41 +68,23 @@ impl Sinusoid {
 /// A record holds no sine that could be evaluated.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SinusoidError {
-    /// The frequency is no frequency.
-    #[error("a frequency of {frequency} Hz is none; give a positive number")]
-    Frequency {
-        /// What was given, in Hz.
-        frequency: f64,
-    },
-    /// Less than one cycle.
+    #[error("a frequency of {frequency} Hz is not possible; give a positive number")]
+    Frequency { frequency: f64 },
     #[error(
         "the record holds {cycles:.2} cycles at {frequency} Hz; record at least one, better five"
     )]
-    TooShort {
-        /// Cycles there are.
-        cycles: f64,
-        /// At this frequency in Hz.
-        frequency: f64,
-    },
-    /// Too few samples in a cycle.
+    TooShort { cycles: f64, frequency: f64 },
     #[error(
-        "{per_cycle:.1} samples in a cycle do not tell its harmonics apart; sample at least 12 times as fast as the sine"
+        "{per_cycle:.1} samples in a cycle do not resolve its harmonics; sample at least 12 times as fast as the sine"
     )]
-    TooSparse {
-        /// Samples in a cycle.
-        per_cycle: f64,
-    },
-    /// The depth does not move at this frequency.
+    TooSparse { per_cycle: f64 },
     #[error("the depth does not move at {frequency} Hz; check the frequency")]
-    NoMotion {
-        /// The frequency in Hz.
-        frequency: f64,
-    },
+    NoMotion { frequency: f64 },
 }
 
 /// Coefficients of one response, the standard error of those at the frequency, and the standard deviation of what is
 /// left.
-struct Fitted {
+struct HarmonicFit {
     coefficients: [f64; COLUMNS],
     error: f64,
     noise: f64,
@@ -134,7 +108,7 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
     let amplitude = x[0].hypot(x[1]);
     let depths = || used().map(|one| one.depth.0);
     let range = depths().fold(f64::MIN, f64::max) - depths().fold(f64::MAX, f64::min);
-    // What so little of the motion has that frequency is no answer to it.
+    // With so little motion at the frequency the force is not a response to it.
     if amplitude <= MOTION_MIN * 0.5 * range {
         return Err(SinusoidError::NoMotion { frequency });
     }
@@ -209,7 +183,7 @@ fn phasor(coefficients: &[f64; COLUMNS], harmonic: usize) -> [f64; 2] {
     [coefficients[2 * harmonic], -coefficients[2 * harmonic + 1]]
 }
 
-fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> Option<Fitted> {
+fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> Option<HarmonicFit> {
     let mut triangle = Triangle::<COLUMNS>::default();
     let mut count = 0usize;
     for (t, y) in points {
@@ -229,7 +203,11 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
     let variance = triangle.residual_sum() / free as f64;
     let errors =
         triangle.inverse_diagonal(2, COLUMNS - 1)? + triangle.inverse_diagonal(3, COLUMNS - 1)?;
-    Some(Fitted { coefficients, error: (variance * 0.5 * errors).sqrt(), noise: variance.sqrt() })
+    Some(HarmonicFit {
+        coefficients,
+        error: (variance * 0.5 * errors).sqrt(),
+        noise: variance.sqrt(),
+    })
 }
 
 #[cfg(test)]
@@ -298,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_force_that_comes_back_to_zero_is_told() {
+    fn force_that_returns_to_zero_gives_a_remark() {
         // The swing of 0.2 N about so much, cut at zero: nothing is pulled. With noise, without, and with a zero that has
         // drifted by half a standard deviation.
         let mut random = SplitMix::seeded(9);
@@ -310,18 +288,18 @@ mod tests {
                     pressed + drift + rms * noise[(t * 1e3).round() as usize % noise.len()]
                 };
                 let found = sinusoid(&record(1.0, 10.0, force), 1.0).unwrap();
-                let told = found.remark();
-                assert_eq!(told.is_some(), is_lost, "{mean} {rms} {drift}: {found:?}");
+                let remark = found.remark();
+                assert_eq!(remark.is_some(), is_lost, "{mean} {rms} {drift}: {found:?}");
                 if mean == 0.1 {
                     // Below a cosine of one half it is cut for a third of the swing.
                     assert!((0.32..0.40).contains(&found.zero_share), "{found:?}");
-                    assert!(told.unwrap().contains("lost the tissue"));
+                    assert!(remark.unwrap().contains("loses contact"));
                 }
             }
         }
-        // What is glued on pulls as much as it presses.
+        // A glued specimen pulls as much as it presses.
         let found = sinusoid(&record(1.0, 10.0, |t| 0.2 * (TAU * t).cos()), 1.0).unwrap();
-        assert!(!found.is_contact_lost(), "{found:?}");
+        assert!(found.remark().is_none(), "{found:?}");
     }
 
     #[test]
@@ -347,11 +325,12 @@ mod tests {
     #[test]
     fn refusals_say_what_is_missing() {
         let all = record(1.0, 2.0, |_| 1.0);
-        let said = |samples: &[CycleSample], f: f64| sinusoid(samples, f).unwrap_err().to_string();
-        assert!(said(&all, 0.1).contains("0.20 cycles"));
-        assert!(said(&all, 200.0).contains("5.0 samples"));
-        assert!(said(&all, f64::NAN).contains("is none"));
-        assert!(said(&all, 7.0).contains("does not move"));
-        assert!(said(&[], 7.0).contains("cycles"));
+        let message =
+            |samples: &[CycleSample], f: f64| sinusoid(samples, f).unwrap_err().to_string();
+        assert!(message(&all, 0.1).contains("0.20 cycles"));
+        assert!(message(&all, 200.0).contains("5.0 samples"));
+        assert!(message(&all, f64::NAN).contains("is not possible"));
+        assert!(message(&all, 7.0).contains("does not move"));
+        assert!(message(&[], 7.0).contains("cycles"));
     }
 }

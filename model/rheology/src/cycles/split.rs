@@ -1,4 +1,4 @@
-//! Cycles and phases of a record that names none, from its depth alone.
+//! Cycles and phases of a record without phase labels, from its depth alone.
 
 use super::CycleSample;
 use palpate_model::rig::Phase;
@@ -10,8 +10,8 @@ const HIGH: f64 = 0.7;
 /// Within this share of the range of its greatest depth a cycle holds.
 const HOLD: f64 = 0.005;
 
-/// Divides a record into cycles, each a way in, a hold where the depth stays within half a percent of its greatest, and
-/// a way back. A cycle begins where the depth is least before it rises through most of its range.
+/// Divides a record into cycles, each of loading, a hold where the depth stays within half a percent of its greatest, and
+/// unloading. A cycle begins where the depth is least before it rises through most of its range.
 #[must_use]
 pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
     let low = depth.iter().copied().fold(f64::INFINITY, f64::min);
@@ -24,14 +24,14 @@ pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
         let part = &depth[start..end];
         let top = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let is_held = |x: &f64| *x >= top - HOLD * range;
-        // The way in ends at the greatest depth it reaches, not where the band of the hold begins.
+        // Loading ends at the greatest depth it reaches, not where the band of the hold begins.
         let arrival = part.iter().position(is_held).unwrap_or(0);
         let late = part.iter().rposition(is_held).unwrap_or(0);
         let turn = (arrival..=late)
             .take_while(|&i| i == arrival || part[i] > part[i - 1])
             .last()
             .unwrap_or(arrival);
-        // Nor does the way back begin where it leaves the band.
+        // Nor does unloading begin where it leaves the band.
         let leaving = (turn + 1..=late).rev().find(|&i| part[i] >= part[i - 1]).unwrap_or(turn);
         for (i, &x) in part.iter().enumerate() {
             let phase = match i {
@@ -52,7 +52,6 @@ pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
     all
 }
 
-/// Where each cycle begins.
 fn starts(depth: &[f64], low: f64, high: f64) -> Vec<usize> {
     let mut starts = Vec::new();
     // The least depth since the last cycle was deep.
@@ -79,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn triangles_and_holds_are_told_apart() {
+    fn triangles_and_holds_are_split_into_phases() {
         // In to 10 mm, hold, back, rest, in to 10 mm and back at once.
         let mut depth: Vec<f64> = (0..=100).map(|i| 0.1 * f64::from(i)).collect();
         depth.extend([10.0; 50]);

@@ -21,9 +21,9 @@ impl Default for SteadyRule {
     }
 }
 
-/// What changed from the cycle before.
+/// Change from the cycle before.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
+pub struct CycleChange {
     /// The later of the two cycles.
     pub cycle: u32,
     /// Change of the peak in percent of the one before; negative where it fell.
@@ -38,7 +38,7 @@ pub struct Change {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steadiness {
     /// One for every cycle but the first.
-    pub changes: Vec<Change>,
+    pub changes: Vec<CycleChange>,
     /// First cycle after which nothing changed by more than the rule, so many times in a row, to the end of the record;
     /// `None` if there is none.
     pub steady_from: Option<u32>,
@@ -47,7 +47,7 @@ pub struct Steadiness {
 impl SteadyRule {
     /// Judges cycles in their order.
     pub fn judge(&self, cycles: &[CycleAnalysis]) -> Steadiness {
-        let changes: Vec<Change> =
+        let changes: Vec<CycleChange> =
             cycles.windows(2).map(|pair| change(&pair[0], &pair[1])).collect();
         let late = changes.iter().rev().take_while(|change| self.is_small(change)).count();
         // A change belongs between two cycles: the first of the row is the one into the cycle after the steady one.
@@ -56,19 +56,19 @@ impl SteadyRule {
         Steadiness { changes, steady_from }
     }
 
-    fn is_small(&self, change: &Change) -> bool {
+    fn is_small(&self, change: &CycleChange) -> bool {
         change.peak_percent.abs() < self.percent
             && change.shift_percent.is_some_and(|shift| shift.abs() < self.percent)
     }
 }
 
-fn change(before: &CycleAnalysis, after: &CycleAnalysis) -> Change {
+fn change(before: &CycleAnalysis, after: &CycleAnalysis) -> CycleChange {
     let (one, other) = (before.force_peak.value.0, after.force_peak.value.0);
     let shift = match (before.at_half(), after.at_half()) {
         (Some(from), Some(to)) => Some(Depth(to.0 - from.0)),
         _ => None,
     };
-    Change {
+    CycleChange {
         cycle: after.cycle,
         peak_percent: 100.0 * (other / one - 1.0),
         shift,

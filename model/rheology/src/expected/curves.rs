@@ -2,7 +2,7 @@
 
 use super::information::{ExpectedError, intervals};
 use super::noise::{Noise, Unknowns};
-use super::protocol::Protocol;
+use super::protocol::ProtocolPath;
 use super::rig::{Rig, allowed_speeds, shallowest_turn};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -14,13 +14,11 @@ const DECADE: [f64; 10] = [1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0];
 const DECADES: i32 = 3;
 /// Holds begin at the decade of so many relaxation times.
 const HOLD_TAUS: f64 = 0.1;
-/// Most cycles drawn.
 const CYCLES: usize = 12;
 /// Rates begin at so many samples per second.
 const RATE_HZ: f64 = 10.0;
 /// From the fastest allowed speed to the next one drawn.
 const SPEED_RATIO: usize = 3;
-/// Speeds drawn.
 const SPEEDS: usize = 4;
 
 /// Half-widths of 95 % intervals along one choice.
@@ -30,8 +28,8 @@ pub struct Curve {
     pub speed: MmPerS,
     /// Hold in s, number of cycles, or samples per second.
     pub x: Vec<f64>,
-    /// At each `x` in percent, in the order of [`super::PARAMETER_NAMES`]; `None` where nothing can
-    /// be told.
+    /// At each `x` in percent, in the order of [`super::PARAMETER_NAMES`]; `None` where the
+    /// protocol does not separate the parameters.
     pub percent: Vec<[Option<f64>; 5]>,
 }
 
@@ -63,11 +61,11 @@ pub fn curves(
     let tau = body.checked()?.tau_eps;
     let speeds = allowed_speeds(body, rig)?;
     let drawn = || speeds.iter().copied().step_by(SPEED_RATIO).take(SPEEDS);
-    let at = |protocol: Protocol| match intervals(body, &protocol, noise, unknowns) {
+    let at = |protocol: ProtocolPath| match intervals(body, &protocol, noise, unknowns) {
         Ok(expected) => expected.parameters.map(|parameter| parameter.percent),
         Err(_) => [None; 5],
     };
-    let curve = |speed: MmPerS, x: Vec<f64>, protocol: &dyn Fn(f64) -> Protocol| Curve {
+    let curve = |speed: MmPerS, x: Vec<f64>, protocol: &dyn Fn(f64) -> ProtocolPath| Curve {
         speed,
         percent: x.iter().map(|&x| at(protocol(x))).collect(),
         x,
@@ -79,19 +77,21 @@ pub fn curves(
         hold: drawn()
             .map(|speed| {
                 curve(speed, decades(HOLD_TAUS * tau), &|hold| {
-                    Protocol::ramp_hold(speed, depth, Seconds(hold), rate)
+                    ProtocolPath::ramp_hold(speed, depth, Seconds(hold), rate)
                 })
             })
             .collect(),
         cycles: drawn()
             .map(|speed| {
                 curve(speed, counts.clone(), &|count| {
-                    Protocol::cycles(speed, between, count as usize, rate)
+                    ProtocolPath::cycles(speed, between, count as usize, rate)
                 })
             })
             .collect(),
         between,
-        rate: curve(speed, decades(RATE_HZ), &|rate| Protocol::ramp_hold(speed, depth, hold, rate)),
+        rate: curve(speed, decades(RATE_HZ), &|rate| {
+            ProtocolPath::ramp_hold(speed, depth, hold, rate)
+        }),
         rate_hold: hold,
     })
 }

@@ -2,10 +2,10 @@
 //!
 //! Every press has its own initial force and offset, so they are eliminated press by press: with
 //! them as the first columns of an orthogonal triangularisation, the rows below theirs hold what the
-//! press says of the body alone, and the rows of all presses are triangularised together.
+//! press contributes to the body alone, and the rows of all presses are triangularised together.
 
 use super::noise::{Noise, Unknowns};
-use super::protocol::{Protocol, duration_of};
+use super::protocol::{ProtocolPath, duration_of};
 use super::response::{COLUMNS, DIRECT_MAX, NUISANCES, Press, STEPS_PER_TAU_MIN};
 use super::triangle;
 use palpate_model::linalg::Triangle;
@@ -14,10 +14,9 @@ use palpate_model::viscoelastic::{BodyError, ModifiedKelvin};
 use serde::Serialize;
 use thiserror::Error;
 
-/// Parameters of a body.
 pub(super) const BODY: usize = COLUMNS - NUISANCES;
 
-/// Names of the parameters of a body, in the order of [`Expected::parameters`].
+/// Names of the parameters of a body, in the order of [`ExpectedPrecision::parameters`].
 pub const PARAMETER_NAMES: [&str; BODY] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
 /// Their units, in the same order.
@@ -29,89 +28,32 @@ const Z975: f64 = 1.959_963_984_540_054;
 /// Nothing could be expected; the text says what to change.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ExpectedError {
-    /// The body is none.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A number that cannot be.
     #[error("a {what} of {value} is not possible; give a finite number above zero")]
-    BadNumber {
-        /// Which number, with its unit.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A long record of a body that relaxes between samples.
+    BadNumber { what: &'static str, value: f64 },
     #[error(
-        "a body that relaxes in {tau_s} s cannot be planned for at {sample_rate_hz} samples per second over {duration_s:.0} s; sample at {wanted_hz:.0} per second at least"
+        "{sample_rate_hz} samples per second over {duration_s:.0} s are too few for a relaxation time of {tau_s} s; sample at {wanted_hz:.0} per second at least"
     )]
-    TooCoarse {
-        /// Relaxation time.
-        tau_s: f64,
-        /// Samples per second asked for.
-        sample_rate_hz: f64,
-        /// Time of the press.
-        duration_s: f64,
-        /// Samples per second that would do.
-        wanted_hz: f64,
-    },
-    /// Different parameters give the same force on this path.
+    TooCoarse { tau_s: f64, sample_rate_hz: f64, duration_s: f64, wanted_hz: f64 },
     #[error("this protocol cannot separate {names}; add a hold of about 5 tau or a second speed")]
-    Inseparable {
-        /// The parameters that cannot be told apart, in words.
-        names: String,
-    },
-    /// A target for something that is not a parameter of the body.
-    #[error("a body has no parameter called '{name}'; it has {}", PARAMETER_NAMES.join(", "))]
-    UnknownParameter {
-        /// The name given.
-        name: String,
-    },
-    /// Relative to nothing.
-    #[error("{name} is zero in this body, so an interval in percent of it means nothing")]
-    ZeroParameter {
-        /// The parameter.
-        name: &'static str,
-    },
-    /// No speed of the rig is gentle enough.
+    Inseparable { names: String },
+    #[error("the model has no parameter '{name}'; it has {}", PARAMETER_NAMES.join(", "))]
+    UnknownParameter { name: String },
+    #[error("{name} is zero in this model, so an interval in percent of it means nothing")]
+    ZeroParameter { name: &'static str },
     #[error(
         "pressing to {depth_mm} mm takes {force_n:.2} N even at {speed_mm_per_s} mm/s, and {allowed_n} N are allowed; press less deep or allow more force"
     )]
-    TooForceful {
-        /// Depth asked for.
-        depth_mm: f64,
-        /// Peak force at the slowest speed tried.
-        force_n: f64,
-        /// That speed.
-        speed_mm_per_s: f64,
-        /// The ceiling.
-        allowed_n: f64,
-    },
-    /// No speed of the rig is fast enough.
+    TooForceful { depth_mm: f64, force_n: f64, speed_mm_per_s: f64, allowed_n: f64 },
     #[error(
         "pressing to {depth_mm} mm at {speed_mm_per_s} mm/s takes more than half of the {allowed_s} s allowed; allow more time or press less deep"
     )]
-    TooLittleTime {
-        /// Depth asked for.
-        depth_mm: f64,
-        /// The rig's fastest speed.
-        speed_mm_per_s: f64,
-        /// Longest protocol allowed.
-        allowed_s: f64,
-    },
-    /// No protocol is good enough.
+    TooLittleTime { depth_mm: f64, speed_mm_per_s: f64, allowed_s: f64 },
     #[error(
         "{name} cannot be known to {wanted} % with any protocol up to {longest_s} s; the best found reaches {reached} %; allow more time or noise that is smaller"
     )]
-    Unreachable {
-        /// The parameter that is furthest from its target.
-        name: &'static str,
-        /// Half-width of the wanted 95 % interval in percent.
-        wanted: f64,
-        /// Half-width reached, in percent, to three digits.
-        reached: String,
-        /// Longest protocol tried.
-        longest_s: f64,
-    },
+    Unreachable { name: &'static str, wanted: f64, reached: String, longest_s: f64 },
 }
 
 /// One parameter as a fit of the protocol's record is expected to find it.
@@ -121,7 +63,6 @@ pub struct ExpectedParameter {
     pub name: &'static str,
     /// Value in the assumed body.
     pub value: f64,
-    /// Unit of value and error.
     pub unit: &'static str,
     /// Standard deviation of the fitted value.
     pub std_error: f64,
@@ -129,9 +70,9 @@ pub struct ExpectedParameter {
     pub percent: Option<f64>,
 }
 
-/// What a protocol is expected to tell about a body.
+/// Precision that a fit of the protocol's record is expected to have.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Expected {
+pub struct ExpectedPrecision {
     /// In the order of [`PARAMETER_NAMES`].
     pub parameters: [ExpectedParameter; BODY],
     /// Lowest force on the path. Below zero the probe would have to pull: real tissue lets go of
@@ -139,17 +80,17 @@ pub struct Expected {
     pub force_min: Newtons,
     /// Highest force on the path.
     pub force_max: Newtons,
-    /// Time of the protocol, [`Protocol::duration`].
+    /// Time of the protocol, [`ProtocolPath::duration`].
     pub duration: Seconds,
 }
 
 /// The intervals that a least-squares fit of every sample, all of equal weight, is expected to have.
 pub fn intervals(
     body: &ModifiedKelvin,
-    protocol: &Protocol,
+    protocol: &ProtocolPath,
     noise: &Noise,
     unknowns: Unknowns,
-) -> Result<Expected, ExpectedError> {
+) -> Result<ExpectedPrecision, ExpectedError> {
     protocol.check()?;
     noise.check()?;
     body.checked()?;
@@ -189,7 +130,7 @@ pub fn intervals(
             percent: share.is_finite().then_some(100.0 * share),
         }
     });
-    Ok(Expected {
+    Ok(ExpectedPrecision {
         parameters,
         force_min: Newtons(forces[0]),
         force_max: Newtons(forces[1]),
@@ -236,7 +177,6 @@ fn variances(
     })
 }
 
-/// What one press adds.
 struct PressSums {
     triangle: Triangle<COLUMNS>,
     /// Double sum of all columns over the correlation of slow noise.

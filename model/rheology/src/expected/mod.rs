@@ -1,4 +1,4 @@
-//! What a protocol will be able to tell about a body, before it is run.
+//! Precision that a protocol will reach, predicted before it is run.
 //!
 //! For small noise a least-squares fit scatters around the truth with the covariance
 //! `(J'J)^-1 J'CJ (J'J)^-1`, where `J` holds the derivatives of the force by the unknowns along the
@@ -10,11 +10,11 @@
 //! Start at [`intervals`] for one protocol and at [`shortest`] for the search.
 //!
 //! ```
-//! use palpate_rheology::expected::{Noise, Protocol, Unknowns, intervals};
+//! use palpate_rheology::expected::{Noise, ProtocolPath, Unknowns, intervals};
 //! use palpate_model::viscoelastic::ModifiedKelvin;
 //! use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 //!
-//! let protocol = Protocol::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(50.0), 1000.0);
+//! let protocol = ProtocolPath::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(50.0), 1000.0);
 //! let noise = Noise::white(Newtons(0.02));
 //! let expected = intervals(&ModifiedKelvin::THESIS, &protocol, &noise, Unknowns::default())?;
 //! let tau = &expected.parameters[0];
@@ -35,9 +35,10 @@ mod triangle;
 
 pub use curves::{Curve, Curves, curves};
 pub use information::{
-    Expected, ExpectedError, ExpectedParameter, PARAMETER_NAMES, PARAMETER_UNITS, intervals,
+    ExpectedError, ExpectedParameter, ExpectedPrecision, PARAMETER_NAMES, PARAMETER_UNITS,
+    intervals,
 };
 pub use noise::{Memory, Noise, Unknowns};
-pub use protocol::{Piece, Protocol};
+pub use protocol::{PathPiece, ProtocolPath};
 pub use rig::Rig;
 pub use search::{Family, Proposal, Target, shortest};

@@ -1,4 +1,4 @@
-//! What disturbs a measurement, and what else a fit of it does not know.
+//! Noise of a measurement, and unknowns other than the body.
 
 use super::ExpectedError;
 use palpate_model::units::{Newtons, Seconds};
@@ -13,7 +13,7 @@ pub struct Noise {
     pub memory: Option<Memory>,
 }
 
-/// Noise that forgets exponentially: its covariance over a lag `t` is `sd^2 exp(-t / time)`.
+/// Noise whose autocorrelation decays exponentially: its covariance over a lag `t` is `sd^2 exp(-t / time)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Memory {
     /// Standard deviation in N.
@@ -47,10 +47,10 @@ impl Noise {
     }
 }
 
-/// What a fit has to find besides the five parameters of the body.
+/// Unknowns of a fit other than the five parameters of the body.
 ///
-/// Both take from what the record says of the body; a known offset makes mu1 two to three times as
-/// sure.
+/// Both widen the intervals of the body; a known offset makes the interval of mu1 two to three times
+/// narrower.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Unknowns {
     /// The force at the start of every press, in a body that was not quite at rest.
@@ -60,7 +60,7 @@ pub struct Unknowns {
 }
 
 impl Default for Unknowns {
-    /// What [`crate::fit::FitOptions`] frees by default.
+    /// Those that [`crate::fit::FitOptions`] frees by default.
     fn default() -> Self {
         Self { f0: true, f_offset: true }
     }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// A stretch in which the depth changes at constant speed, or not at all.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Piece {
+pub struct PathPiece {
     /// Depth at its end, in mm.
     pub to: Depth,
     /// How long it takes, in s.
@@ -18,16 +18,16 @@ pub struct Piece {
 /// The corners are sharp. A rig rounds them over speed / acceleration, which matters when that is
 /// not short beside the relaxation time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Protocol {
+pub struct ProtocolPath {
     /// Each press begins at depth 0 in a body at rest and is a list of pieces.
-    pub presses: Vec<Vec<Piece>>,
+    pub presses: Vec<Vec<PathPiece>>,
     /// Rest before every press but the first, in s: counts as time, not as measurement.
     pub rest: Seconds,
     /// Samples per second.
     pub sample_rate_hz: f64,
 }
 
-impl Protocol {
+impl ProtocolPath {
     /// One ramp at `speed` to `depth` and `hold` seconds there (none for a hold of 0).
     #[must_use]
     pub fn ramp_hold(speed: MmPerS, depth: Depth, hold: Seconds, sample_rate_hz: f64) -> Self {
@@ -50,12 +50,6 @@ impl Protocol {
         }
     }
 
-    /// Down to `depth`, then back to 0: `count` times, all at `speed`, without rest.
-    #[must_use]
-    pub fn triangle(speed: MmPerS, depth: Depth, count: usize, sample_rate_hz: f64) -> Self {
-        Self::cycles(speed, [Depth(0.0), depth], count, sample_rate_hz)
-    }
-
     /// Down to the second depth, then back to the first: `count` times, all at `speed`. A
     /// shallower turning point above 0 keeps the probe in contact.
     #[must_use]
@@ -64,7 +58,7 @@ impl Protocol {
         let mut at = Depth(0.0);
         let mut pieces = Vec::with_capacity(2 * count);
         for turn in (0..count).flat_map(|_| [bottom, top]) {
-            pieces.push(Piece { to: turn, duration: Seconds((turn - at).abs().0 / speed.0) });
+            pieces.push(PathPiece { to: turn, duration: Seconds((turn - at).abs().0 / speed.0) });
             at = turn;
         }
         Self { presses: vec![pieces], rest: Seconds(0.0), sample_rate_hz }
@@ -101,14 +95,14 @@ impl Protocol {
     }
 }
 
-fn press(speed: MmPerS, depth: Depth, hold: Seconds) -> Vec<Piece> {
-    let ramp = Piece { to: depth, duration: Seconds(depth.0 / speed.0) };
-    let hold = Piece { to: depth, duration: hold };
+fn press(speed: MmPerS, depth: Depth, hold: Seconds) -> Vec<PathPiece> {
+    let ramp = PathPiece { to: depth, duration: Seconds(depth.0 / speed.0) };
+    let hold = PathPiece { to: depth, duration: hold };
     if hold.duration.0 > 0.0 { vec![ramp, hold] } else { vec![ramp] }
 }
 
 /// Time of one press, in s.
-pub(super) fn duration_of(press: &[Piece]) -> f64 {
+pub(super) fn duration_of(press: &[PathPiece]) -> f64 {
     press.iter().map(|piece| piece.duration.0).sum()
 }
 
@@ -119,12 +113,12 @@ mod tests {
     #[test]
     fn durations_count_rests_between_presses_only() {
         let depth = Depth(30.0);
-        let one = Protocol::ramp_hold(MmPerS(0.75), depth, Seconds(50.0), 1e3);
+        let one = ProtocolPath::ramp_hold(MmPerS(0.75), depth, Seconds(50.0), 1e3);
         assert_eq!(one.duration(), Seconds(90.0));
         let speeds = [MmPerS(0.75), MmPerS(1.5)];
-        let two = Protocol::two_speeds(speeds, depth, Seconds(50.0), Seconds(10.0), 1e3);
+        let two = ProtocolPath::two_speeds(speeds, depth, Seconds(50.0), Seconds(10.0), 1e3);
         assert_eq!(two.duration(), Seconds(170.0));
-        let cycles = Protocol::cycles(MmPerS(2.0), [Depth(20.0), depth], 3, 1e3);
+        let cycles = ProtocolPath::cycles(MmPerS(2.0), [Depth(20.0), depth], 3, 1e3);
         assert_eq!(cycles.duration(), Seconds(15.0 + 5.0 * 5.0));
         assert!([one, two, cycles].iter().all(|one| one.check().is_ok()));
     }
@@ -132,7 +126,7 @@ mod tests {
     #[test]
     fn impossible_paths_are_refused_in_words() {
         let of = |speed, depth, rate| {
-            let protocol = Protocol::ramp_hold(MmPerS(speed), Depth(depth), Seconds(1.0), rate);
+            let protocol = ProtocolPath::ramp_hold(MmPerS(speed), Depth(depth), Seconds(1.0), rate);
             protocol.check().unwrap_err()
         };
         let is_number = |refused, number: &str| matches!(refused, ExpectedError::BadNumber { what, .. } if what.contains(number));

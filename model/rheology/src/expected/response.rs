@@ -7,10 +7,10 @@
 //! Maclaurin) is `(dt / tau)^2 / 6` of a sum, half of that in an interval: 0.13 % with
 //! [`STEPS_PER_TAU`] samples to a relaxation time. With fewer of them, or in a press of fewer than
 //! [`DIRECT_MIN`], all samples are visited; but not more than [`DIRECT_MAX`], beyond which the
-//! integral has to do down to [`STEPS_PER_TAU_MIN`], with 2 %, and below that nothing is said.
+//! integral has to do down to [`STEPS_PER_TAU_MIN`], with 2 %, and below that the press is refused.
 
 use super::noise::{Noise, Unknowns};
-use super::protocol::{Piece, duration_of};
+use super::protocol::{PathPiece, duration_of};
 use palpate_model::viscoelastic::{ModifiedKelvin, StepWeights, forcing, psi_derivatives};
 
 /// Initial force, offset, `log tau`, `mu1`, `mu2`, `mu3`, `tau_sig`.
@@ -36,9 +36,8 @@ const GAUSS: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// A point on the path.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct PressPoint {
     /// How many samples it stands for; 0 at the ends of pieces, which are there for the force.
     pub weight: f64,
     /// Derivatives of the force in N by every unknown.
@@ -52,12 +51,12 @@ pub(super) struct Point {
 
 /// Filtered powers and viscous drive, and their derivatives by `log tau`.
 #[derive(Clone, Copy, Debug, Default)]
-struct Filtered {
+struct FilteredDrive {
     values: [f64; 4],
     slopes: [f64; 4],
 }
 
-impl Filtered {
+impl FilteredDrive {
     /// After depth has moved straight from `x0` by `d` within `dt` seconds.
     fn after(&self, x0: f64, d: f64, dt: f64, tau: f64) -> Self {
         if dt <= 0.0 {
@@ -79,19 +78,18 @@ impl Filtered {
     }
 }
 
-/// What the body and the slow noise remember at one time of a press.
+/// Filter states of the body and of the slow noise at one time of a press.
 #[derive(Clone, Copy, Debug, Default)]
-struct State {
+struct PressState {
     elapsed: f64,
-    body: Filtered,
+    body: FilteredDrive,
     /// The same with the noise's correlation time in the place of tau.
-    slow: Filtered,
+    slow: FilteredDrive,
 }
 
-/// A body under one press.
 pub(super) struct Press<'a> {
     pub body: &'a ModifiedKelvin,
-    pub pieces: &'a [Piece],
+    pub pieces: &'a [PathPiece],
     pub sample_rate_hz: f64,
     pub noise: &'a Noise,
     pub unknowns: Unknowns,
@@ -108,7 +106,7 @@ impl Press<'_> {
     }
 
     /// Calls `take` at every point.
-    pub fn visit(&self, take: impl FnMut(Point)) {
+    pub fn visit(&self, take: impl FnMut(PressPoint)) {
         let samples = duration_of(self.pieces) * self.sample_rate_hz;
         let is_coarse = self.body.tau_eps * self.sample_rate_hz < STEPS_PER_TAU;
         if samples <= DIRECT_MIN || (is_coarse && samples <= DIRECT_MAX) {
@@ -119,10 +117,10 @@ impl Press<'_> {
     }
 
     /// Every sample, the first at the start of the press.
-    pub fn visit_samples(&self, mut take: impl FnMut(Point)) {
+    pub fn visit_samples(&self, mut take: impl FnMut(PressPoint)) {
         let dt = self.sample_rate_hz.recip();
-        let kept = self.memory_secs().map_or(0.0, |time| (-dt / time).exp());
-        // sum over earlier samples of kept^lag row
+        let decay = self.memory_secs().map_or(0.0, |time| (-dt / time).exp());
+        // sum over earlier samples of decay^lag row
         let mut history = [0.0; COLUMNS];
         let mut index = 0.0;
         let mut before = [0.0; COLUMNS];
@@ -133,7 +131,7 @@ impl Press<'_> {
                 let since = index * dt - start.elapsed;
                 let mut point = self.point(&self.after(start, x0, speed, since));
                 for k in 0..COLUMNS {
-                    history[k] = kept * (history[k] + before[k]);
+                    history[k] = decay * (history[k] + before[k]);
                     point.lagged[k] = history[k] + 0.5 * point.row[k];
                 }
                 before = point.row;
@@ -145,7 +143,7 @@ impl Press<'_> {
         });
     }
 
-    fn visit_quadrature(&self, mut take: impl FnMut(Point)) {
+    fn visit_quadrature(&self, mut take: impl FnMut(PressPoint)) {
         let rate = self.sample_rate_hz;
         let memory = self.memory_secs();
         let shortest = memory.map_or(self.body.tau_eps, |time| time.min(self.body.tau_eps));
@@ -157,16 +155,16 @@ impl Press<'_> {
         });
         let first = self.row(1.0, 1.0, [0.0; 4], [0.0; 4]);
         // Slow noise at a sample and all before it: the integral, and half of the first sample.
-        let at = |state: &State| {
+        let at = |state: &PressState| {
             let mut point = self.point(state);
-            let kept = memory.map_or(0.0, |time| (-state.elapsed / time).exp());
+            let decay = memory.map_or(0.0, |time| (-state.elapsed / time).exp());
             for (lagged, first) in point.lagged.iter_mut().zip(first) {
-                *lagged = lag_scale * *lagged + 0.5 * kept * first;
+                *lagged = lag_scale * *lagged + 0.5 * decay * first;
             }
             point
         };
         let end = duration_of(self.pieces) * (1.0 - 1e-12);
-        take(Point { weight: 0.5, ..at(&State::default()) });
+        take(PressPoint { weight: 0.5, ..at(&PressState::default()) });
         self.walk(|start, x0, speed, duration| {
             let mut from = 0.0;
             while from < duration {
@@ -176,7 +174,7 @@ impl Press<'_> {
                 let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
                 for (abscissa, weight) in GAUSS {
                     for since in [middle - half * abscissa, middle + half * abscissa] {
-                        take(Point {
+                        take(PressPoint {
                             weight: weight * half * rate,
                             ..at(&self.after(start, x0, speed, since))
                         });
@@ -186,13 +184,13 @@ impl Press<'_> {
             }
             let corner = self.after(start, x0, speed, duration);
             let weight = if corner.elapsed < end { 0.0 } else { 0.5 };
-            take(Point { weight, ..at(&corner) });
+            take(PressPoint { weight, ..at(&corner) });
         });
     }
 
     /// Calls `piece(state, depth, speed, duration)` at the start of every piece.
-    fn walk(&self, mut piece: impl FnMut(&State, f64, f64, f64)) {
-        let mut state = State::default();
+    fn walk(&self, mut piece: impl FnMut(&PressState, f64, f64, f64)) {
+        let mut state = PressState::default();
         let mut depth = 0.0;
         for next in self.pieces {
             let speed = (next.to.0 - depth) / next.duration.0;
@@ -202,9 +200,9 @@ impl Press<'_> {
         }
     }
 
-    fn after(&self, from: &State, x0: f64, speed: f64, dt: f64) -> State {
+    fn after(&self, from: &PressState, x0: f64, speed: f64, dt: f64) -> PressState {
         let d = speed * dt;
-        State {
+        PressState {
             elapsed: from.elapsed + dt,
             body: from.body.after(x0, d, dt, self.body.tau_eps),
             slow: self.memory_secs().map_or(from.slow, |time| from.slow.after(x0, d, dt, time)),
@@ -212,9 +210,9 @@ impl Press<'_> {
     }
 
     /// Weight 0; `lagged` is the row passed through the noise's own filter, of gain 1.
-    fn point(&self, state: &State) -> Point {
+    fn point(&self, state: &PressState) -> PressPoint {
         let tau = self.body.tau_eps;
-        let Filtered { values, slopes } = state.body;
+        let FilteredDrive { values, slopes } = state.body;
         let decay = (-state.elapsed / tau).exp();
         let row = self.row(decay, 1.0, values, slopes);
         // Two filters in series are the difference of the two, 1 / ((1 + T s)(1 + tau s)) =
@@ -230,7 +228,7 @@ impl Press<'_> {
             self.row(both_decay, 1.0 - slow_decay, both, both_slopes)
         });
         let [mu1, mu2, mu3] = self.body.mu;
-        Point {
+        PressPoint {
             weight: 0.0,
             row,
             lagged,

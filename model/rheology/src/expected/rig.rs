@@ -1,7 +1,7 @@
-//! What a rig and a specimen allow: speeds, forces, turning points.
+//! Limits of rig and specimen: speeds, forces, turning points.
 
 use super::information::ExpectedError;
-use super::protocol::Protocol;
+use super::protocol::ProtocolPath;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use serde::Serialize;
@@ -14,12 +14,11 @@ const SPEEDS_MAX: usize = 21;
 const PEAK_STEPS: u32 = 256;
 /// Where cycles turn back, as shares of the depth.
 pub(super) const TURNS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
-/// What the rig and the specimen allow, and how it is sampled.
+/// Limits of rig and specimen, and the sampling rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rig {
     /// Speeds are multiples of this.
     pub speed_quantum: MmPerS,
-    /// Fastest speed.
     pub speed_max: MmPerS,
     /// Depth of every protocol, in mm.
     pub depth: Depth,
@@ -103,7 +102,7 @@ fn peak(body: &ModifiedKelvin, depth: Depth, speed: MmPerS) -> f64 {
 }
 
 /// Whether the force of one press falls below zero anywhere.
-pub(super) fn pulls(body: &ModifiedKelvin, protocol: &Protocol) -> bool {
+pub(super) fn has_tension(body: &ModifiedKelvin, protocol: &ProtocolPath) -> bool {
     let mut state = KelvinState::at_rest();
     let mut depth = 0.0;
     protocol.presses[0].iter().any(|piece| {
@@ -121,8 +120,8 @@ pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &Rig, speed: MmPerS) -
     let turns = TURNS.map(|share| Depth(share * rig.depth.0));
     let presses = |turn: &Depth| {
         // The second cycle does what all later ones do.
-        let twice = Protocol::cycles(speed, [*turn, rig.depth], 2, rig.sample_rate_hz);
-        !pulls(body, &twice)
+        let twice = ProtocolPath::cycles(speed, [*turn, rig.depth], 2, rig.sample_rate_hz);
+        !has_tension(body, &twice)
     };
     turns.into_iter().find(presses).unwrap_or(turns[TURNS.len() - 1])
 }

@@ -4,10 +4,12 @@
 //! to what the rig makes. For each speed the shortest hold (or the smallest number of cycles) that
 //! reaches every target is found by bisection. No randomness: the same question, the same answer.
 
-use super::information::{Expected, ExpectedError, PARAMETER_NAMES, check_resolved, intervals};
+use super::information::{
+    ExpectedError, ExpectedPrecision, PARAMETER_NAMES, check_resolved, intervals,
+};
 use super::noise::{Noise, Unknowns};
-use super::protocol::Protocol;
-use super::rig::{Rig, TURNS, allowed_speeds, pulls};
+use super::protocol::ProtocolPath;
+use super::rig::{Rig, TURNS, allowed_speeds, has_tension};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
@@ -19,7 +21,6 @@ const CYCLES_MAX: usize = 64;
 /// Holds closer than this are the same.
 const HOLD_RATIO: f64 = 1.003;
 
-/// A wanted interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Target {
     /// One of [`PARAMETER_NAMES`].
@@ -38,7 +39,7 @@ impl Target {
         if percent > 0.0 && percent.is_finite() {
             Ok(Self { parameter, percent })
         } else {
-            Err(ExpectedError::BadNumber { what: "wanted interval in percent", value: percent })
+            Err(ExpectedError::BadNumber { what: "target interval in percent", value: percent })
         }
     }
 }
@@ -47,43 +48,35 @@ impl Target {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "family", rename_all = "kebab-case")]
 pub enum Family {
-    /// One ramp and hold.
     RampHold {
-        /// Speed of the ramp.
         speed: MmPerS,
-        /// Time at depth.
         hold: Seconds,
     },
-    /// Two ramps and holds, fitted together.
+    /// Two ramps and holds, fitted together, with a rest out of the tissue between them.
     TwoSpeeds {
-        /// Speed of each ramp.
         speeds: [MmPerS; 2],
-        /// Time at depth, after each.
         hold: Seconds,
-        /// Time out of the tissue between them.
         rest: Seconds,
     },
-    /// Up and down at one speed.
+    /// Loading and unloading between a shallower and a deeper turning point.
     Cycles {
-        /// The speed.
         speed: MmPerS,
-        /// Shallower and deeper turning point.
         between: [Depth; 2],
-        /// How often.
         count: usize,
     },
 }
 
 impl Family {
-    /// The protocol on a rig.
-    pub fn protocol(&self, rig: &Rig) -> Protocol {
+    pub fn protocol(&self, rig: &Rig) -> ProtocolPath {
         let (depth, rate) = (rig.depth, rig.sample_rate_hz);
         match *self {
-            Self::RampHold { speed, hold } => Protocol::ramp_hold(speed, depth, hold, rate),
+            Self::RampHold { speed, hold } => ProtocolPath::ramp_hold(speed, depth, hold, rate),
             Self::TwoSpeeds { speeds, hold, rest } => {
-                Protocol::two_speeds(speeds, depth, hold, rest, rate)
+                ProtocolPath::two_speeds(speeds, depth, hold, rest, rate)
             }
-            Self::Cycles { speed, between, count } => Protocol::cycles(speed, between, count, rate),
+            Self::Cycles { speed, between, count } => {
+                ProtocolPath::cycles(speed, between, count, rate)
+            }
         }
     }
 }
@@ -91,12 +84,11 @@ impl Family {
 /// The shortest protocol of one family that reaches every target.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proposal {
-    /// Family and settings.
     #[serde(flatten)]
     pub family: Family,
-    /// What it is expected to tell.
+    /// The precision it is expected to reach.
     #[serde(flatten)]
-    pub expected: Expected,
+    pub expected: ExpectedPrecision,
     /// Why these settings, in words.
     pub reason: String,
 }
@@ -153,30 +145,32 @@ struct Search<'a> {
     closest: Option<(f64, Target, f64)>,
 }
 
-type Found = Option<(Family, Expected)>;
+type BestProtocol = Option<(Family, ExpectedPrecision)>;
 
 impl Search<'_> {
     fn ramp_hold(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
-        let mut best: Found = None;
+        let mut best: BestProtocol = None;
         for &speed in speeds {
             let found = self.least_hold(&best, |hold| Family::RampHold { speed, hold });
             best = found.or(best);
         }
+        let reason = match best.as_ref()?.0 {
+            Family::RampHold { speed, .. } if speed == speeds[0] => self.fastest_speed_words(speed),
+            _ => "a faster ramp needs a longer hold".to_owned(),
+        };
+        self.proposal(best, &reason)
+    }
+
+    fn proposal(&self, best: BestProtocol, reason: &str) -> Option<Proposal> {
         let (family, expected) = best?;
-        let Family::RampHold { speed, .. } = family else {
-            return None;
-        };
-        let reason = if speed == speeds[0] {
-            format!("{}; {}", self.decides(&expected), self.why_fastest(speed))
-        } else {
-            format!("{}; a faster ramp needs a longer hold", self.decides(&expected))
-        };
+        let name = self.worst(&expected).map_or("nothing", |(target, _)| target.parameter);
+        let reason = format!("{name} decides the length; {reason}");
         Some(Proposal { family, expected, reason })
     }
 
     fn two_speeds(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
         let rest = Seconds(REST_TAUS * self.body.tau_eps);
-        let mut best: Found = None;
+        let mut best: BestProtocol = None;
         let coarse: Vec<MmPerS> = speeds.iter().copied().step_by(2).collect();
         for (index, &fast) in coarse.iter().enumerate() {
             for &slow in &coarse[index + 1..] {
@@ -188,17 +182,15 @@ impl Search<'_> {
                 best = found.or(best);
             }
         }
-        let (family, expected) = best?;
         let reason = format!(
-            "{}; both records are fitted together, and the rest of {:.1} s between them counts",
-            self.decides(&expected),
+            "both records are fitted together, and the rest of {:.1} s between them counts",
             rest.0
         );
-        Some(Proposal { family, expected, reason })
+        self.proposal(best, &reason)
     }
 
     fn cycles(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
-        let mut best: Found = None;
+        let mut best: BestProtocol = None;
         for &speed in speeds {
             for share in TURNS {
                 let between = [Depth(share * self.rig.depth.0), self.rig.depth];
@@ -206,16 +198,16 @@ impl Search<'_> {
                 best = found.or(best);
             }
         }
-        let (family, expected) = best?;
-        let reason = format!(
-            "{}; it turns back while the probe still presses, since tissue lets go of a probe that pulls",
-            self.decides(&expected)
-        );
-        Some(Proposal { family, expected, reason })
+        let reason = "it turns back while the probe still presses, since tissue does not adhere to a probe that pulls";
+        self.proposal(best, reason)
     }
 
     /// The shortest hold that reaches every target and beats `best`.
-    fn least_hold(&mut self, best: &Found, family: impl Fn(Seconds) -> Family) -> Found {
+    fn least_hold(
+        &mut self,
+        best: &BestProtocol,
+        family: impl Fn(Seconds) -> Family,
+    ) -> BestProtocol {
         let limit = self.limit(best);
         let none = family(Seconds(0.0));
         let protocol = none.protocol(self.rig);
@@ -223,44 +215,49 @@ impl Search<'_> {
         if spare < 0.0 {
             return None;
         }
-        if let Some(expected) = self.reaches(none) {
+        if let Some(expected) = self.evaluate(none) {
             return Some((none, expected));
         }
         let mut high = family(Seconds(spare));
-        let mut found = (high, self.reaches(high)?);
+        let mut found = (high, self.evaluate(high)?);
         let (mut low_secs, mut high_secs) = (1e-3 * self.body.tau_eps, spare);
         while high_secs > HOLD_RATIO * low_secs {
             let middle = (low_secs * high_secs).sqrt();
             high = family(Seconds(middle));
-            match self.reaches(high) {
+            match self.evaluate(high) {
                 Some(expected) => (found, high_secs) = ((high, expected), middle),
                 None => low_secs = middle,
             }
         }
         // A hold that a person can type; rounded up, it reaches what the exact one does.
-        let rounded = family(Seconds(rounded_up(high_secs)));
+        let rounded = family(Seconds(round_up(high_secs)));
         if rounded.protocol(self.rig).duration().0 <= limit
-            && let Some(expected) = self.reaches(rounded)
+            && let Some(expected) = self.evaluate(rounded)
         {
             found = (rounded, expected);
         }
         Some(found)
     }
 
-    fn least_cycles(&mut self, best: &Found, speed: MmPerS, between: [Depth; 2]) -> Found {
+    fn least_cycles(
+        &mut self,
+        best: &BestProtocol,
+        speed: MmPerS,
+        between: [Depth; 2],
+    ) -> BestProtocol {
         let limit = self.limit(best);
         let family = |count| Family::Cycles { speed, between, count };
         let secs = |count| family(count).protocol(self.rig).duration().0;
-        if pulls(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
+        if has_tension(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
             return None;
         }
         let per_cycle = secs(2) - secs(1);
         let most = (1.0 + (limit - secs(1)) / per_cycle).floor() as usize;
         let (mut low, mut high) = (0, most.min(CYCLES_MAX));
-        let mut found = (family(high), self.reaches(family(high))?);
+        let mut found = (family(high), self.evaluate(family(high))?);
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
-            match self.reaches(family(middle)) {
+            match self.evaluate(family(middle)) {
                 Some(expected) => (found, high) = ((family(middle), expected), middle),
                 None => low = middle,
             }
@@ -268,21 +265,19 @@ impl Search<'_> {
         Some(found)
     }
 
-    fn limit(&self, best: &Found) -> f64 {
+    fn limit(&self, best: &BestProtocol) -> f64 {
         let beaten = best.as_ref().map(|(_, expected)| expected.duration.0);
         beaten.unwrap_or(self.rig.duration_max.0)
     }
 
-    fn expected(&self, family: Family) -> Option<Expected> {
+    /// The expected precision, if the force is allowed and every target is reached.
+    fn evaluate(&mut self, family: Family) -> Option<ExpectedPrecision> {
         let protocol = family.protocol(self.rig);
         let expected = intervals(self.body, &protocol, self.noise, self.unknowns).ok()?;
         // The rig's own limit is in force; what rounding adds is not.
-        (expected.force_max.0 <= self.rig.force_max.0 * (1.0 + 1e-9)).then_some(expected)
-    }
-
-    /// What it is expected to tell, if that reaches every target.
-    fn reaches(&mut self, family: Family) -> Option<Expected> {
-        let expected = self.expected(family)?;
+        if expected.force_max.0 > self.rig.force_max.0 * (1.0 + 1e-9) {
+            return None;
+        }
         let (target, percent) = self.worst(&expected)?;
         let excess = percent / target.percent;
         if self.closest.is_none_or(|(closest, ..)| excess < closest) {
@@ -292,7 +287,7 @@ impl Search<'_> {
     }
 
     /// The target that is furthest from being reached, with the interval there is.
-    fn worst(&self, expected: &Expected) -> Option<(Target, f64)> {
+    fn worst(&self, expected: &ExpectedPrecision) -> Option<(Target, f64)> {
         let excess = |(target, percent): &(Target, f64)| percent / target.percent;
         self.targets
             .iter()
@@ -304,18 +299,13 @@ impl Search<'_> {
             .max_by(|one, other| excess(one).total_cmp(&excess(other)))
     }
 
-    fn decides(&self, expected: &Expected) -> String {
-        let name = self.worst(expected).map_or("nothing", |(target, _)| target.parameter);
-        format!("{name} decides the length")
-    }
-
-    fn why_fastest(&self, speed: MmPerS) -> String {
+    fn fastest_speed_words(&self, speed: MmPerS) -> String {
         if speed.0 + self.rig.speed_quantum.0 > self.rig.speed_max.0 * (1.0 + 1e-9) {
-            format!("{} mm/s is the rig's fastest speed", shown(speed))
+            format!("{} mm/s is the rig's fastest speed", displayed(speed))
         } else {
             format!(
                 "{} mm/s is the fastest speed that stays under {:.2} N",
-                shown(speed),
+                displayed(speed),
                 self.rig.force_max.0
             )
         }
@@ -323,12 +313,12 @@ impl Search<'_> {
 }
 
 /// A speed without the rounding of its multiplication.
-fn shown(speed: MmPerS) -> f64 {
+fn displayed(speed: MmPerS) -> f64 {
     (speed.0 * 1e6).round() * 1e-6
 }
 
 /// The next number of three digits.
-fn rounded_up(value: f64) -> f64 {
+fn round_up(value: f64) -> f64 {
     let digits = 2 - value.log10().floor() as i32;
     // Dividing by a power of ten gives the nearest number to the decimal fraction; multiplying by a
     // negative power does not.
@@ -348,7 +338,7 @@ mod tests {
     #[test]
     fn holds_are_rounded_up_to_what_a_person_types() {
         for (value, rounded) in [(12.301, 12.4), (0.012_31, 0.0124), (1234.0, 1240.0), (5.0, 5.0)] {
-            assert!((rounded_up(value) / rounded - 1.0).abs() < 1e-12, "{value}");
+            assert!((round_up(value) / rounded - 1.0).abs() < 1e-12, "{value}");
         }
     }
 

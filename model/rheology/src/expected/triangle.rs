@@ -1,10 +1,10 @@
-//! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
+//! The inverse of a small orthogonal factorisation, or the columns that it does not separate.
 
 use super::information::{BODY, PARAMETER_NAMES};
-use crate::fit::{CONDITION_MAX, heaviest};
+use crate::fit::{CONDITION_MAX, dominant_entries};
 use palpate_model::linalg::Triangle;
 
-/// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
+/// The inverse; the parameters in words where columns of these lengths do not separate them.
 pub fn inverse(
     triangle: &Triangle<BODY>,
     lengths: &[f64; BODY],
@@ -28,7 +28,7 @@ pub fn inverse(
     let inverse = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
     let (condition, blind) = largest_singular(&inverse);
     if condition.is_nan() || condition > CONDITION_MAX {
-        return Err(named(&blind));
+        return Err(combination_words(&blind));
     }
     Ok(std::array::from_fn(|i| inverse[i].map(|value| value / lengths[i])))
 }
@@ -52,9 +52,9 @@ fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
     (value, vector)
 }
 
-fn named(blind: &[f64; BODY]) -> String {
+fn combination_words(blind: &[f64; BODY]) -> String {
     let names: Vec<&str> =
-        heaviest(blind).into_iter().map(|place| PARAMETER_NAMES[place]).collect();
+        dominant_entries(blind).into_iter().map(|place| PARAMETER_NAMES[place]).collect();
     match names.as_slice() {
         [one, other] => format!("{one} from {other}"),
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_is_one_and_blindness_has_a_name() {
+    fn inverse_is_exact_and_inseparable_parameters_are_named() {
         let mut triangle = Triangle::<BODY>::default();
         let mut alike = Triangle::<BODY>::default();
         for i in 0..50 {

@@ -1,6 +1,6 @@
-//! What fits make of a record, as answers.
+//! Results of fits, as answers.
 
-use super::judge::Answer;
+use super::judge::SubjectAnswer;
 use crate::families::{Family, Model};
 use crate::fit::{FitOptions, FitSample, fit};
 use std::sync::Arc;
@@ -9,14 +9,14 @@ use std::sync::Arc;
 pub(super) const DEFAULT_FIT: &str = "fit of the thesis body";
 
 /// Fits a family; the error is that of the worst parameter of the body against `truth`.
-pub(super) fn fitted(
+pub(super) fn fit_answer(
     family: Arc<dyn Family>,
     samples: &[FitSample],
     truth: Option<&Model>,
-) -> Answer {
+) -> SubjectAnswer {
     let report = match fit(samples, &FitOptions::of(family)) {
         Ok(report) => report,
-        Err(err) => return Answer::Refused(err.to_string()),
+        Err(err) => return SubjectAnswer::Refused(err.to_string()),
     };
     let mut numbers = vec![report.r2, report.rmse_n];
     numbers.extend(report.noise.map(|noise| noise.effective_samples));
@@ -33,7 +33,7 @@ pub(super) fn fitted(
     });
     // NaN or infinity anywhere in a report is an error without end.
     let is_finite = numbers.iter().all(|value| value.is_finite());
-    Answer::Number {
+    SubjectAnswer::Number {
         error: if is_finite { error } else { f64::INFINITY },
         warnings: report.warnings,
     }

@@ -1,28 +1,20 @@
-//! What is no number, and time that stands still or runs backwards.
+//! Inputs that are not numbers, and times that do not increase.
 
-use super::fits::{DEFAULT_FIT, fitted};
-use super::judge::{Answer, Expected, PathCase, Row, judge};
-use super::members::member;
+use super::fits::{DEFAULT_FIT, fit_answer};
+use super::judge::{ExpectedAnswer, PathCase, Row, judge};
+use super::members::make_member;
 use super::records::ramp_hold;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
-use crate::families::{Family, PowerSeries, by_key};
+use crate::families::{Family, PowerSeries};
 use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "input";
 
-pub(super) fn parts(_extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |_| {
-        by_key(&key).map_or_else(|_| Vec::new(), |family| rows(&family))
-    })]
-}
-
-fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
-    let usual = || member(&**family, 1.0, 20.0, 2.0);
+pub(super) fn rows(_: Extent, family: &Arc<dyn Family>, _: &mut dyn FnMut(f64)) -> Vec<Row> {
+    let usual = || make_member(&**family, 1.0, 20.0, 2.0);
     let mut rows = Vec::new();
     for (case, start, step) in [
         ("NaN depth at the start", f64::NAN, (0.1, 1.0)),
@@ -34,32 +26,22 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
         ("infinite duration of a step", 0.0, (f64::INFINITY, 1.0)),
         ("negative duration of a step", 0.0, (-0.1, 1.0)),
     ] {
-        let path = PathCase {
-            group: GROUP,
-            case: case.to_owned(),
-            start,
-            steps: vec![(0.1, 0.5), step, (0.1, 1.0)],
-        };
-        rows.push(path.put_to(&FamilyBody(usual())));
+        let path = PathCase::new(GROUP, case, start, vec![(0.1, 0.5), step, (0.1, 1.0)]);
+        rows.push(path.run_on(&FamilyBody(usual())));
     }
     rows.push(after_bad_steps(&**family));
-    let plain = |case: &str| PathCase {
-        group: GROUP,
-        case: case.to_owned(),
-        start: 0.0,
-        steps: vec![(0.1, 1.0), (0.1, 1.0)],
-    };
+    let plain = |case: &str| PathCase::new(GROUP, case, 0.0, vec![(0.1, 1.0), (0.1, 1.0)]);
     for (name, value) in
         [("NaN", f64::NAN), ("infinite", f64::INFINITY), ("negative infinite", f64::NEG_INFINITY)]
     {
         let mut model = usual();
         model.linear[0] = value;
-        rows.push(plain(&format!("{name} coefficient")).put_to(&FamilyBody(model)));
+        rows.push(plain(&format!("{name} coefficient")).run_on(&FamilyBody(model)));
         for index in 0..usual().outer.len() {
             let mut model = usual();
             model.outer[index] = value;
             let name = format!("{name} relaxation time or other outer parameter");
-            rows.push(plain(&name).put_to(&FamilyBody(model)));
+            rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }
     for index in 0..usual().outer.len() {
@@ -67,27 +49,22 @@ fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
             let mut model = usual();
             model.outer[index] = value;
             let name = format!("relaxation time or other outer parameter of {value}");
-            rows.push(plain(&name).put_to(&FamilyBody(model)));
+            rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }
-    rows.extend(bad_records(|samples| fitted(Arc::clone(family), samples, None)).map(
-        |(case, answer)| {
-            let subject = format!("fit of {}", family.key());
-            judge([GROUP, case], &subject, Expected::Refusal, 0.0, answer)
-        },
-    ));
+    rows.extend(record_rows(family, &format!("fit of {}", family.key())));
     rows
 }
 
-/// A body that refused steps goes on as if they had not been asked for.
+/// Refused steps leave a body as it was.
 fn after_bad_steps(family: &dyn Family) -> Row {
-    struct Refusing(FamilyBody);
-    impl super::judge::Subject for Refusing {
+    struct BodyAfterRefusals(FamilyBody);
+    impl super::judge::ExtremesSubject for BodyAfterRefusals {
         fn name(&self) -> String {
             self.0.name()
         }
 
-        fn terms(&self) -> Result<Vec<crate::families::Relaxation>, String> {
+        fn terms(&self) -> Result<Vec<crate::families::RelaxationTerm>, String> {
             self.0.terms()
         }
 
@@ -107,19 +84,13 @@ fn after_bad_steps(family: &dyn Family) -> Row {
             Ok(forces)
         }
     }
-    let path = PathCase {
-        group: GROUP,
-        case: "refused steps between good ones".to_owned(),
-        start: 0.0,
-        steps: vec![(0.1, 1.0), (0.5, 9.0), (0.2, 9.0), (0.1, 4.0)],
-    };
-    path.put_to(&Refusing(FamilyBody(member(family, 1.0, 20.0, 2.0))))
+    let steps = vec![(0.1, 1.0), (0.5, 9.0), (0.2, 9.0), (0.1, 4.0)];
+    let path = PathCase::new(GROUP, "refused steps between good ones", 0.0, steps);
+    path.run_on(&BodyAfterRefusals(FamilyBody(make_member(family, 1.0, 20.0, 2.0))))
 }
 
-/// A good record with one sample spoilt, and what a fit makes of it.
-fn bad_records(
-    fit: impl Fn(&[FitSample]) -> Answer,
-) -> impl Iterator<Item = (&'static str, Answer)> {
+/// A good record with one sample spoilt, put to a fit that must refuse it.
+fn record_rows(family: &Arc<dyn Family>, subject: &str) -> Vec<Row> {
     type Spoil = fn(&mut Vec<FitSample>);
     let spoilt: [(&str, Spoil); 14] = [
         ("a NaN time", |all| all[7].t = Seconds(f64::NAN)),
@@ -147,18 +118,19 @@ fn bad_records(
             all.iter_mut().for_each(|one| one.depth.0 -= 100.0);
         }),
     ];
-    spoilt.into_iter().map(move |(case, spoil)| {
+    let rows = spoilt.into_iter().map(|(case, spoil)| {
         let mut samples = ramp_hold(60);
         spoil(&mut samples);
-        (case, fit(&samples))
-    })
+        let answer = fit_answer(Arc::clone(family), &samples, None);
+        judge(GROUP, case, subject, ExpectedAnswer::Refusal, 0.0, answer)
+    });
+    rows.collect()
 }
 
-/// The same records put to the fit of the thesis body.
-pub(super) fn thesis_parts() -> Vec<Part> {
-    vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
-        let rows = bad_records(|samples| fitted(Arc::new(PowerSeries::THESIS), samples, None));
-        rows.map(|(case, answer)| judge([GROUP, case], DEFAULT_FIT, Expected::Refusal, 0.0, answer))
-            .collect()
-    })]
+/// The same records for the fit of the thesis body.
+pub(super) fn thesis_part() -> Part {
+    Part::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
+        let family: Arc<dyn Family> = Arc::new(PowerSeries::THESIS);
+        record_rows(&family, DEFAULT_FIT)
+    })
 }

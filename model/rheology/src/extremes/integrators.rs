@@ -11,7 +11,6 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 const GROUP: &str = "integrators, relaxation time and step";
 /// Name of the group of all else.
 const OTHER: &str = "integrators, depth and force";
-/// Samples of a ramp.
 const SAMPLES: u32 = 20;
 
 pub(super) fn parts(extent: Extent) -> Vec<Part> {
@@ -31,7 +30,7 @@ pub(super) fn parts(extent: Extent) -> Vec<Part> {
                     let subject = subject(10f64.powi(*tau), 1.0);
                     for step in &steps {
                         let case = format!("tau 1e{tau} s, step 1e{step} s");
-                        rows.push(poke(GROUP, case, 20.0, 10f64.powi(*step)).put_to(&subject));
+                        rows.push(poke(GROUP, case, 20.0, 10f64.powi(*step)).run_on(&subject));
                     }
                     progress((index + 1) as f64 / taus.len() as f64);
                 }
@@ -60,61 +59,44 @@ fn poke(group: &'static str, case: String, depth: f64, dt: f64) -> PathCase {
     let down = (1..=SAMPLES).map(|i| f64::from(i) / samples);
     let hold = (0..SAMPLES).map(|_| 1.0);
     let back = (1..=SAMPLES).map(|i| 1.0 - 0.5 * f64::from(i) / samples);
-    PathCase {
-        group,
-        case,
-        start: 0.0,
-        steps: down.chain(hold).chain(back).map(|share| (dt, share * depth)).collect(),
-    }
+    let steps = down.chain(hold).chain(back).map(|share| (dt, share * depth)).collect();
+    PathCase::new(group, case, 0.0, steps)
 }
 
 fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<Row> {
-    let mut rows = Vec::new();
-    let mut put = |case: &str, path: PathCase, body: SchemeBody| {
-        let case = case.to_owned();
-        rows.push(PathCase { case, ..path }.put_to(&body));
-    };
     let path = |depth: f64, dt: f64| poke(OTHER, String::new(), depth, dt);
-    for (case, depth) in [
-        ("depths of 1e-6 mm", 1e-6),
-        ("depths of 1e-3 mm", 1e-3),
-        ("depths of 1e3 mm", 1e3),
-        ("depth 0", 0.0),
-        ("out of contact", -1e3),
-    ] {
-        put(case, path(depth, 0.01), subject(1.0, 1.0));
-    }
-    for (case, force) in
-        [("forces of 1e-6 N", 1e-6), ("forces of 1e6 N", 1e6), ("forces of zero", 0.0)]
-    {
-        put(case, path(20.0, 0.01), subject(1.0, force));
-    }
-    for (case, at, value) in [
-        ("NaN depth at the start", None, f64::NAN),
-        ("infinite depth at the start", None, f64::INFINITY),
-        ("NaN depth in a step", Some(5), f64::NAN),
-        ("infinite depth in a step", Some(5), f64::INFINITY),
-    ] {
-        let mut path = path(20.0, 0.01);
-        match at {
-            Some(at) => path.steps[at].1 = value,
-            None => path.start = value,
-        }
-        put(case, path, subject(1.0, 1.0));
-    }
-    for (case, dt) in
-        [("NaN step", f64::NAN), ("infinite step", f64::INFINITY), ("negative step", -0.01)]
-    {
-        put(case, path(20.0, dt), subject(1.0, 1.0));
-    }
-    for (case, tau) in [
-        ("NaN relaxation time", f64::NAN),
-        ("infinite relaxation time", f64::INFINITY),
-        ("relaxation time of zero", 0.0),
-        ("negative relaxation time", -1.0),
-    ] {
-        put(case, path(20.0, 0.01), subject(tau, 1.0));
-    }
-    put("NaN coefficients", path(20.0, 0.01), subject(1.0, f64::NAN));
-    rows
+    let usual = || path(20.0, 0.01);
+    let from = |start: f64| PathCase { start, ..usual() };
+    let through = |depth: f64| {
+        let mut path = usual();
+        path.steps[5].1 = depth;
+        path
+    };
+    let body = subject(1.0, 1.0);
+    let cases = [
+        ("depths of 1e-6 mm", path(1e-6, 0.01), body),
+        ("depths of 1e-3 mm", path(1e-3, 0.01), body),
+        ("depths of 1e3 mm", path(1e3, 0.01), body),
+        ("depth 0", path(0.0, 0.01), body),
+        ("out of contact", path(-1e3, 0.01), body),
+        ("forces of 1e-6 N", usual(), subject(1.0, 1e-6)),
+        ("forces of 1e6 N", usual(), subject(1.0, 1e6)),
+        ("forces of zero", usual(), subject(1.0, 0.0)),
+        ("NaN depth at the start", from(f64::NAN), body),
+        ("infinite depth at the start", from(f64::INFINITY), body),
+        ("NaN depth in a step", through(f64::NAN), body),
+        ("infinite depth in a step", through(f64::INFINITY), body),
+        ("NaN step", path(20.0, f64::NAN), body),
+        ("infinite step", path(20.0, f64::INFINITY), body),
+        ("negative step", path(20.0, -0.01), body),
+        ("NaN relaxation time", usual(), subject(f64::NAN, 1.0)),
+        ("infinite relaxation time", usual(), subject(f64::INFINITY, 1.0)),
+        ("relaxation time of zero", usual(), subject(0.0, 1.0)),
+        ("negative relaxation time", usual(), subject(-1.0, 1.0)),
+        ("NaN coefficients", usual(), subject(1.0, f64::NAN)),
+    ];
+    let rows = cases
+        .into_iter()
+        .map(|(case, path, body)| PathCase { case: case.to_owned(), ..path }.run_on(&body));
+    rows.collect()
 }

@@ -1,6 +1,6 @@
-//! What right means.
+//! The criterion of a right answer.
 
-use crate::families::{Relaxation, StepError};
+use crate::families::{RelaxationTerm, StepError};
 use crate::reference::{REFERENCE_DIGITS, Reference, RuleReference};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use serde::Serialize;
@@ -14,44 +14,36 @@ const FORCE_MIN: f64 = 1e-180;
 const FORCE_MAX: f64 = 1e299;
 
 palpate_model::named! {
-    /// What became of one case.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Verdict {
-        /// The right number.
         Right = "right",
         /// No number, and the reason in words.
         Refused = "refused",
         /// Numbers of a fit, with a warning in words not to rely on them.
         Flagged = "flagged",
-        /// Anything else.
         Wrong = "WRONG",
     }
 }
 
-/// One case put to one subject.
+/// One case run on one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Group of cases.
     pub group: &'static str,
-    /// The case in words.
     pub case: String,
     /// Family, integrator or fit.
     pub subject: String,
-    /// What became of it.
     pub verdict: Verdict,
     /// Error of the answer: of a force relative to the peak of the path, of parameters the largest
     /// relative one; null where there is no finite number.
     pub relative_error: Option<f64>,
-    /// What it may be.
     pub tolerance: f64,
     /// The refusal or warning; what is wrong; empty where the number is right.
     pub sentence: String,
 }
 
-/// What a case should meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Expected {
+pub enum ExpectedAnswer {
     /// A number: a double can hold the answer.
     Number,
     /// A refusal: there is no answer.
@@ -60,68 +52,53 @@ pub enum Expected {
     Either,
 }
 
-/// What a subject made of a case.
+/// Answer of a subject to a case.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Answer {
-    /// A number with this relative error, and the warnings that came with it.
+pub enum SubjectAnswer {
+    /// The relative error, and the warnings that came with it.
     Number {
-        /// Relative error.
         error: f64,
-        /// Warnings in words.
         warnings: Vec<String>,
     },
-    /// A refusal.
     Refused(String),
 }
 
-/// Judges an answer.
 #[must_use]
 pub fn judge(
-    [group, case]: [&'static str; 2],
-    subject: &str,
-    expected: Expected,
-    tolerance: f64,
-    answer: Answer,
-) -> Row {
-    judged(group, case.to_owned(), subject, expected, tolerance, answer)
-}
-
-/// Judges an answer to a case that is named at run time.
-pub(super) fn judged(
     group: &'static str,
-    case: String,
+    case: impl Into<String>,
     subject: &str,
-    expected: Expected,
+    expected: ExpectedAnswer,
     tolerance: f64,
-    answer: Answer,
+    answer: SubjectAnswer,
 ) -> Row {
     let (verdict, error, sentence) = match answer {
-        Answer::Refused(reason) if reason.trim().is_empty() => {
+        SubjectAnswer::Refused(reason) if reason.trim().is_empty() => {
             (Verdict::Wrong, None, "refused without a reason".to_owned())
         }
-        Answer::Refused(reason) if expected == Expected::Number => {
+        SubjectAnswer::Refused(reason) if expected == ExpectedAnswer::Number => {
             (Verdict::Wrong, None, format!("refused what has an answer: {reason}"))
         }
-        Answer::Refused(reason) => (Verdict::Refused, None, reason),
-        Answer::Number { error, .. } if !error.is_finite() => {
+        SubjectAnswer::Refused(reason) => (Verdict::Refused, None, reason),
+        SubjectAnswer::Number { error, .. } if !error.is_finite() => {
             (Verdict::Wrong, None, "the answer is not a finite number".to_owned())
         }
-        Answer::Number { error, .. } if expected == Expected::Refusal => {
+        SubjectAnswer::Number { error, .. } if expected == ExpectedAnswer::Refusal => {
             (Verdict::Wrong, Some(error), "a number where there is no answer".to_owned())
         }
-        Answer::Number { error, .. } if error <= tolerance => {
+        SubjectAnswer::Number { error, .. } if error <= tolerance => {
             (Verdict::Right, Some(error), String::new())
         }
-        Answer::Number { error, warnings } if !warnings.is_empty() => {
+        SubjectAnswer::Number { error, warnings } if !warnings.is_empty() => {
             (Verdict::Flagged, Some(error), warnings.join("; "))
         }
-        Answer::Number { error, .. } => {
+        SubjectAnswer::Number { error, .. } => {
             (Verdict::Wrong, Some(error), format!("off by {error:.1e}, more than {tolerance:.0e}"))
         }
     };
     Row {
         group,
-        case,
+        case: case.into(),
         subject: subject.to_owned(),
         verdict,
         relative_error: error,
@@ -131,17 +108,16 @@ pub(super) fn judged(
 }
 
 /// Something that turns depth over time into force.
-pub trait Subject {
-    /// Its name.
+pub trait ExtremesSubject {
     fn name(&self) -> String;
 
     /// The terms whose exact response it should give; a refusal in words where there are none.
-    fn terms(&self) -> Result<Vec<Relaxation>, String>;
+    fn terms(&self) -> Result<Vec<RelaxationTerm>, String>;
 
     /// The force in N after every step of a path, or a refusal.
     fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String>;
 
-    /// What it should give from rest at `start`, in so many digits.
+    /// The right forces from rest at `start`, in so many digits.
     fn oracle(&self, start: Depth, digits: usize) -> Result<Oracle, String> {
         let exact = Reference::with_digits(&self.terms()?, start, digits);
         exact.map(Oracle::Exact).map_err(|err| err.to_string())
@@ -158,12 +134,10 @@ pub trait Subject {
     }
 }
 
-/// Forces in many digits.
 #[derive(Clone, Debug)]
 pub enum Oracle {
-    /// The exact response.
     Exact(Reference),
-    /// What an approximate rule makes of it.
+    /// The response of an approximate rule.
     Rule(RuleReference),
 }
 
@@ -190,12 +164,9 @@ impl Oracle {
     }
 }
 
-/// A depth history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathCase {
-    /// Group of cases.
     pub group: &'static str,
-    /// What it is, in words.
     pub case: String,
     /// Depth in mm at which the body is at rest at first.
     pub start: f64,
@@ -204,37 +175,40 @@ pub struct PathCase {
 }
 
 impl PathCase {
+    pub(super) fn new(
+        group: &'static str,
+        case: impl Into<String>,
+        start: f64,
+        steps: Vec<(f64, f64)>,
+    ) -> Self {
+        Self { group, case: case.into(), start, steps }
+    }
+
     /// Puts the path to a subject.
-    pub fn put_to(&self, subject: &dyn Subject) -> Row {
+    pub fn run_on(&self, subject: &dyn ExtremesSubject) -> Row {
         let forces = subject.forces(self);
         let truth = self.truth(subject, forces.as_deref().unwrap_or_default());
         let expected = match truth {
-            // What has no truth has no answer.
-            Err(_) => Expected::Refusal,
+            // Without a true force there is no answer.
+            Err(_) => ExpectedAnswer::Refusal,
             Ok(truth)
                 if truth.peak > FORCE_MAX || subject.may_refuse(self) || self.is_too_fast() =>
             {
-                Expected::Either
+                ExpectedAnswer::Either
             }
-            Ok(_) => Expected::Number,
+            Ok(_) => ExpectedAnswer::Number,
         };
         let answer = match (forces, truth) {
-            (Err(reason), _) => Answer::Refused(reason),
-            (Ok(_), Ok(truth)) => Answer::Number {
+            (Err(reason), _) => SubjectAnswer::Refused(reason),
+            (Ok(_), Ok(truth)) => SubjectAnswer::Number {
                 error: truth.error / truth.peak.max(FORCE_MIN),
                 warnings: Vec::new(),
             },
             // Judged as a number where there is none.
-            (Ok(_), Err(_)) => Answer::Number { error: 0.0, warnings: Vec::new() },
+            (Ok(_), Err(_)) => SubjectAnswer::Number { error: 0.0, warnings: Vec::new() },
         };
-        judged(
-            self.group,
-            self.case.clone(),
-            &subject.name(),
-            expected,
-            subject.tolerance(self),
-            answer,
-        )
+        let (name, tolerance) = (subject.name(), subject.tolerance(self));
+        judge(self.group, self.case.as_str(), &name, expected, tolerance, answer)
     }
 
     /// Whether a speed of this path is beyond the largest number.
@@ -247,10 +221,10 @@ impl PathCase {
     }
 
     /// The exact force, as far as forces are given compared with them.
-    fn truth(&self, subject: &dyn Subject, forces: &[f64]) -> Result<Truth, String> {
+    fn truth(&self, subject: &dyn ExtremesSubject, forces: &[f64]) -> Result<TrueForces, String> {
         let terms = subject.terms()?;
         let mut reference = subject.oracle(Depth(self.start), self.digits(&terms))?;
-        let mut truth = Truth {
+        let mut truth = TrueForces {
             peak: reference.force().0.abs(),
             error: if forces.is_empty() || forces.len() == self.steps.len() {
                 0.0
@@ -277,7 +251,7 @@ impl PathCase {
 
     /// Digits the reference needs: its closed forms lose those between the smallest number and one,
     /// twice.
-    fn digits(&self, terms: &[Relaxation]) -> usize {
+    fn digits(&self, terms: &[RelaxationTerm]) -> usize {
         let drives = terms.iter().flat_map(|term| [term.elastic, term.rate]);
         let coefficients = drives.flat_map(|drive| {
             let (amplitude, b) = drive.exponential.unwrap_or_default();
@@ -293,9 +267,9 @@ impl PathCase {
     }
 }
 
-/// What a path comes to, in N.
+/// Peak force of a path and largest error, in N.
 #[derive(Clone, Copy, Debug)]
-struct Truth {
+struct TrueForces {
     peak: f64,
     error: f64,
 }

@@ -1,15 +1,15 @@
 //! Long records at a constant step, streamed: 1e8 samples, 24 h at 1 kHz.
 
-use super::judge::{Answer, Expected, Row, judged};
-use super::members::member;
+use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge};
+use super::members::make_member;
 use super::{Extent, Part};
-use crate::families::{Relaxation, StepError, by_key};
+use crate::families::{Family, RelaxationTerm, StepError};
 use crate::integrators::{Exact, Integrator, Scheme, SeriesBody, Start};
 use crate::reference::Reference;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "long records";
 /// Depth moves by a power of two, so that no sample is rounded and the path is as straight as it says.
 const MOVE: f64 = 1.0 / 65_536.0;
@@ -30,79 +30,71 @@ const LONGEST: [Case; 2] = [
     ("24 h at 1 kHz, 86.4e6 samples", 86_400_000, 1e-3),
 ];
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let model = member(&*family, 2.0, 20.0, 2.0);
-        let has_many = model.terms().is_ok_and(|terms| terms.len() > MANY);
-        let cases: &[Case] = match extent {
-            Extent::Quick if has_many => &[SHORTEST],
-            Extent::Quick => &[SHORT],
-            Extent::Whole if has_many => &[SHORT],
-            Extent::Whole => &[LONG],
-            Extent::Soak => &LONGEST,
-        };
-        rows(cases, &key, progress, |samples, dt, progress| {
-            let words = |err: &dyn std::fmt::Display| err.to_string();
-            let mut body = model.at_rest_from(Depth(0.0)).map_err(|err| words(&err))?;
-            let terms = model.terms().map_err(|err| words(&err))?;
-            let step = |depth| body.step(Depth(depth), Seconds(dt));
-            drift(&terms, samples, dt, step, progress)
-        })
-    })]
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let model = make_member(&**family, 2.0, 20.0, 2.0);
+    let has_many = model.terms().is_ok_and(|terms| terms.len() > MANY);
+    let cases: &[Case] = match extent {
+        Extent::Quick if has_many => &[SHORTEST],
+        Extent::Quick => &[SHORT],
+        Extent::Whole if has_many => &[SHORT],
+        Extent::Whole => &[LONG],
+        Extent::Soak => &LONGEST,
+    };
+    case_rows(cases, &family.key(), progress, |samples, dt, progress| {
+        let words = |err: &dyn std::fmt::Display| err.to_string();
+        let mut body = model.at_rest_from(Depth(0.0)).map_err(|err| words(&err))?;
+        let terms = model.terms().map_err(|err| words(&err))?;
+        let step = |depth| body.step(Depth(depth), Seconds(dt));
+        drift(&terms, samples, dt, step, progress)
+    })
 }
 
 /// The same for the exact step at a constant rate, which is made for records as long as these.
-pub(super) fn scheme_parts(extent: Extent) -> Vec<Part> {
+pub(super) fn scheme_part(extent: Extent) -> Part {
     let subject = format!("{}, f64", Scheme::Exact.name());
-    vec![Part::new(GROUP, subject.clone(), move |progress| {
+    Part::new(GROUP, subject.clone(), move |progress| {
         let body = SeriesBody::<3>::from(ModifiedKelvin::THESIS);
         let cases: &[Case] = match extent {
             Extent::Quick => &[SHORT],
             Extent::Whole | Extent::Soak => &LONGEST,
         };
-        rows(cases, &subject, progress, |samples, dt, progress| {
+        case_rows(cases, &subject, progress, |samples, dt, progress| {
             let start = Start { depth: 0.0, force: None };
             let mut exact = Exact::<f64, 3>::at_any_step(&body, dt, start);
             let step = |depth| exact.step(depth).map(Newtons);
             drift(&[body.term()], samples, dt, step, progress)
         })
-    })]
+    })
 }
 
-fn rows(
+fn case_rows(
     cases: &[Case],
     subject: &str,
     progress: &mut dyn FnMut(f64),
-    answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<Answer, String>,
+    answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<SubjectAnswer, String>,
 ) -> Vec<Row> {
     let count = cases.len() as f64;
     let mut rows = Vec::new();
     for (index, &(case, samples, dt)) in cases.iter().enumerate() {
         let mut within = |share| progress((index as f64 + share) / count);
-        rows.push(judged(
-            GROUP,
-            case.to_owned(),
-            subject,
-            Expected::Number,
-            TOLERANCE,
-            answer(samples, dt, &mut within).unwrap_or_else(Answer::Refused),
-        ));
+        let answer = answer(samples, dt, &mut within).unwrap_or_else(SubjectAnswer::Refused);
+        rows.push(judge(GROUP, case, subject, ExpectedAnswer::Number, TOLERANCE, answer));
     }
     rows
 }
 
 /// Largest error at the corners of a path that goes in, rests, comes out and rests, again and again.
 fn drift(
-    terms: &[Relaxation],
+    terms: &[RelaxationTerm],
     samples: u64,
     dt: f64,
     mut step: impl FnMut(f64) -> Result<Newtons, StepError>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Answer, String> {
+) -> Result<SubjectAnswer, String> {
     let mut reference = Reference::new(terms, Depth(0.0)).map_err(|err| err.to_string())?;
     let (mut depth, mut done, mut worst, mut peak) = (0.0, 0, 0.0f64, 0.0f64);
     for direction in [1.0, 0.0, -1.0, 0.0].into_iter().cycle() {
@@ -125,5 +117,5 @@ fn drift(
         done += leg;
         progress(done as f64 / samples as f64);
     }
-    Ok(Answer::Number { error: worst / peak, warnings: Vec::new() })
+    Ok(SubjectAnswer::Number { error: worst / peak, warnings: Vec::new() })
 }

@@ -8,7 +8,7 @@ use crate::families::{Family, Model, OuterRange};
 /// Made from the units of the parameters alone, so that no family can be forgotten. The second
 /// coefficient of a power series is negative, as in tissue.
 #[must_use]
-pub fn member(family: &dyn Family, tau: f64, depth: f64, force: f64) -> Model {
+pub fn make_member(family: &dyn Family, tau: f64, depth: f64, force: f64) -> Model {
     let mut times = 0;
     let outer = family.outer().into_iter().map(|one| match one.range {
         // A decade from time to time.

@@ -1,6 +1,6 @@
 //! Numerical stability at the extremes: cases, the exact answer to each, and the verdict.
 //!
-//! Every family of force models, every integrator and every fit is put to the same cases. Each must
+//! Every family of force models, every integrator and every fit runs the same cases. Each must
 //! give the right number to a stated tolerance or refuse in words that name the reason. Anything else,
 //! a number that is off, NaN, infinity, a refusal of what can be answered, is wrong. Truth is the
 //! [reference](crate::reference) in many digits, or for a fit the parameters that made the record.
@@ -19,14 +19,16 @@ mod scale;
 mod subjects;
 mod tau_step;
 
-pub use judge::{Answer, Expected, Oracle, PathCase, Row, Subject, TOLERANCE, Verdict, judge};
-pub use members::member;
+pub use judge::{
+    ExpectedAnswer, ExtremesSubject, Oracle, PathCase, Row, SubjectAnswer, TOLERANCE, Verdict,
+    judge,
+};
+pub use members::make_member;
 pub use subjects::{FamilyBody, SchemeBody};
 
 use crate::families::{Family, UnknownFamily, all, by_key};
 use std::sync::Arc;
 
-/// How much to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Seconds: corners and middles of every table.
@@ -39,15 +41,26 @@ pub enum Extent {
 
 /// Rows of one group for one subject.
 pub struct Part {
-    /// Group of cases.
     pub group: &'static str,
-    /// What is put to them.
     pub subject: String,
     run: Box<Rows>,
 }
 
-/// Makes rows and tells the share done, 0 to 1.
+/// Makes rows and reports the share done, 0 to 1.
 type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<Row>;
+
+/// The same of a family.
+type FamilyRows = fn(Extent, &Arc<dyn Family>, &mut dyn FnMut(f64)) -> Vec<Row>;
+
+/// The groups that every family runs: name, words before the key of the family, rows.
+const FAMILY_GROUPS: [(&str, &str, FamilyRows); 6] = [
+    (tau_step::GROUP, "", tau_step::rows),
+    (path::GROUP, "", path::rows),
+    (scale::GROUP, "", scale::rows),
+    (input::GROUP, "", input::rows),
+    (records::GROUP, "fit of ", records::rows),
+    (long::GROUP, "", long::rows),
+];
 
 impl Part {
     fn new(
@@ -58,7 +71,7 @@ impl Part {
         Self { group, subject, run: Box::new(run) }
     }
 
-    /// Its rows; `progress` hears the share done, 0 to 1.
+    /// Runs its cases; `progress` gets the share done, 0 to 1.
     pub fn rows(&self, mut progress: impl FnMut(f64)) -> Vec<Row> {
         (self.run)(&mut progress)
     }
@@ -71,17 +84,33 @@ pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownF
         None => all(),
     };
     let mut parts = Vec::new();
-    for group in
-        [tau_step::parts, path::parts, scale::parts, input::parts, records::parts, long::parts]
-    {
-        parts.extend(families.iter().flat_map(|family| group(extent, &family.key())));
+    for (group, prefix, rows) in FAMILY_GROUPS {
+        parts.extend(families.iter().cloned().map(|family| {
+            let subject = format!("{prefix}{}", family.key());
+            Part::new(group, subject, move |progress| rows(extent, &family, progress))
+        }));
     }
-    // What is of no family is left out where one was asked for.
+    // Groups that concern no family are left out where one is given.
     if family.is_none() {
         parts.extend(integrators::parts(extent));
-        parts.extend(long::scheme_parts(extent));
-        parts.extend(input::thesis_parts());
-        parts.extend(records::thesis_parts(extent));
+        parts.push(long::scheme_part(extent));
+        parts.push(input::thesis_part());
+        parts.push(records::thesis_part(extent));
     }
     Ok(parts)
+}
+
+/// One row after the other; `progress` gets the share done after each.
+fn rows_of<T>(
+    cases: Vec<T>,
+    progress: &mut dyn FnMut(f64),
+    mut row: impl FnMut(T) -> Row,
+) -> Vec<Row> {
+    let count = cases.len() as f64;
+    let rows = cases.into_iter().enumerate().map(|(index, case)| {
+        let row = row(case);
+        progress((index + 1) as f64 / count);
+        row
+    });
+    rows.collect()
 }

@@ -1,31 +1,22 @@
 //! Speeds, depths and where they change.
 
 use super::judge::{PathCase, Row};
-use super::members::member;
+use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, Part};
-use crate::families::by_key;
+use super::{Extent, rows_of};
+use crate::families::Family;
+use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "speed and depth";
-/// Steps of a ramp.
 const STEPS: u32 = 12;
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let subject = FamilyBody(member(&*family, 1.0, 20.0, 2.0));
-        let cases = cases(extent);
-        let count = cases.len() as f64;
-        let rows = cases.iter().enumerate().map(|(index, case)| {
-            progress((index + 1) as f64 / count);
-            case.put_to(&subject)
-        });
-        rows.collect::<Vec<Row>>()
-    })]
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let subject = FamilyBody(make_member(&**family, 1.0, 20.0, 2.0));
+    rows_of(cases(extent), progress, |case| case.run_on(&subject))
 }
 
 /// Every path of this group; the body relaxes in 1 s.
@@ -42,7 +33,7 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
             10.0,
         ));
     }
-    cases.push(still("speed 0 at 10 mm", 10.0));
+    cases.push(stationary("speed 0 at 10 mm", 10.0));
     let depths: &[i32] = match extent {
         Extent::Quick => &[-6, 2],
         Extent::Whole | Extent::Soak => &[-9, -6, -3, -2, -1, 0, 1, 2, 3],
@@ -51,9 +42,9 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
         let depth_mm = 10f64.powi(depth);
         cases.push(ramp(format!("1 mm/s to 1e{depth} mm and 1 s of hold"), 1.0, depth_mm));
     }
-    cases.push(still("depth 0", 0.0));
-    cases.push(still("-1e3 mm, far out of contact", -1e3));
-    cases.extend(special());
+    cases.push(stationary("depth 0", 0.0));
+    cases.push(stationary("-1e3 mm, far out of contact", -1e3));
+    cases.extend(special_paths());
     cases
 }
 
@@ -63,25 +54,17 @@ fn ramp(case: String, speed: f64, depth: f64) -> PathCase {
     let down = (1..=STEPS).map(|i| (dt, depth * f64::from(i) / f64::from(STEPS)));
     let hold = (0..STEPS).map(|_| (1.0 / f64::from(STEPS), depth));
     let out = [(2.0 * depth / speed, -depth), (0.5, -depth)];
-    PathCase { group: GROUP, case, start: 0.0, steps: down.chain(hold).chain(out).collect() }
+    PathCase::new(GROUP, case, 0.0, down.chain(hold).chain(out).collect())
 }
 
-fn still(case: &str, depth: f64) -> PathCase {
-    PathCase {
-        group: GROUP,
-        case: case.to_owned(),
-        start: depth,
-        steps: vec![(0.1, depth); STEPS as usize],
-    }
+fn stationary(case: &str, depth: f64) -> PathCase {
+    PathCase::new(GROUP, case, depth, vec![(0.1, depth); STEPS as usize])
 }
 
 /// Paths that touch the surface awkwardly, jump or crawl.
-fn special() -> Vec<PathCase> {
-    let path = |case: &str, start: f64, steps: &[(f64, f64)]| PathCase {
-        group: GROUP,
-        case: case.to_owned(),
-        start,
-        steps: steps.to_vec(),
+fn special_paths() -> Vec<PathCase> {
+    let path = |case: &str, start: f64, steps: &[(f64, f64)]| {
+        PathCase::new(GROUP, case, start, steps.to_vec())
     };
     let mut crossings = Vec::new();
     for _ in 0..8 {

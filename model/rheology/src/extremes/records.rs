@@ -1,25 +1,24 @@
 //! Records of few samples, of too little movement, of odd sizes.
 
-use super::fits::{DEFAULT_FIT, fitted};
-use super::judge::{Answer, Expected, Row, judge};
-use super::members::member;
-use super::{Extent, Part};
-use crate::families::{Family, Model, Outer, OuterRange, PowerSeries, by_key};
+use super::fits::{DEFAULT_FIT, fit_answer};
+use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge};
+use super::members::make_member;
+use super::{Extent, Part, rows_of};
+use crate::families::{Family, Model, OuterParameter, OuterRange, PowerSeries};
 use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "records";
 /// Largest relative error of a parameter from a record without noise: rounding times the condition of
 /// the worst design.
 const TOLERANCE: f64 = 1e-6;
 
 /// A record without noise of any size.
-struct Plan {
+struct RecordCase {
     case: &'static str,
-    expected: Expected,
+    expected: ExpectedAnswer,
     /// Depth over time at a scale of 1 s and 20 mm.
     path: Vec<(f64, f64)>,
     time: f64,
@@ -27,12 +26,12 @@ struct Plan {
     force: f64,
     offset: f64,
     tolerance: f64,
-    /// What is done to every sample, after which no body is the true one.
+    /// A change of every sample, after which no body is the true one.
     spoil: Option<fn(&mut FitSample)>,
 }
 
-impl Plan {
-    fn new(case: &'static str, expected: Expected, path: Vec<(f64, f64)>) -> Self {
+impl RecordCase {
+    fn new(case: &'static str, expected: ExpectedAnswer, path: Vec<(f64, f64)>) -> Self {
         Self {
             case,
             expected,
@@ -69,6 +68,10 @@ impl Plan {
         }
         samples
     }
+
+    fn judge(&self, subject: &str, answer: SubjectAnswer) -> Row {
+        judge(GROUP, self.case, subject, self.expected, self.tolerance, answer)
+    }
 }
 
 /// A ramp to 20 mm in 5 s, a hold of 15 s, half the way back in 1 s and a hold of 4 s, in `count`
@@ -83,8 +86,8 @@ fn path(count: u32) -> Vec<(f64, f64)> {
 
 /// A record of the thesis body along that path.
 pub(super) fn ramp_hold(count: u32) -> Vec<FitSample> {
-    let plan = Plan::new("", Expected::Number, path(count));
-    plan.samples(|path| thesis(ModifiedKelvin::THESIS).along(path.iter().copied()).ok())
+    let case = RecordCase::new("", ExpectedAnswer::Number, path(count));
+    case.samples(|path| thesis(ModifiedKelvin::THESIS).along(path.iter().copied()).ok())
 }
 
 /// A thesis body as a model of the third order.
@@ -97,60 +100,58 @@ fn thesis(body: ModifiedKelvin) -> Model {
     }
 }
 
-fn plans(extent: Extent) -> Vec<Plan> {
-    use Expected::{Either, Number, Refusal};
+fn cases(extent: Extent) -> Vec<RecordCase> {
+    use ExpectedAnswer::{Either, Number, Refusal};
     let full = || path(161);
     let ramp: Vec<(f64, f64)> =
         (0..100).map(|i| f64::from(i) * 0.05).map(|t| (t, 4.0 * t)).collect();
     let stairs: Vec<(f64, f64)> =
         full().chunks(2).flat_map(|pair| pair.iter().map(|&(t, _)| (t, pair[0].1))).collect();
-    let mut plans = vec![
-        Plan::new("0 samples", Refusal, Vec::new()),
-        Plan::new("1 sample", Refusal, path(161)[..1].to_vec()),
-        Plan::new("2 samples", Refusal, path(2)),
-        Plan::new("5 samples", Either, path(5)),
-        Plan::new("constant depth", Refusal, (0..100).map(|i| (0.1 * f64::from(i), 8.0)).collect()),
-        Plan::new("ramp only", Either, ramp),
-        Plan::new("every depth twice", Number, stairs),
-        Plan::new("ramp, hold and half back", Number, full()),
-        Plan {
+    let mut cases = vec![
+        RecordCase::new("0 samples", Refusal, Vec::new()),
+        RecordCase::new("1 sample", Refusal, path(161)[..1].to_vec()),
+        RecordCase::new("2 samples", Refusal, path(2)),
+        RecordCase::new("5 samples", Either, path(5)),
+        RecordCase::new(
+            "constant depth",
+            Refusal,
+            (0..100).map(|i| (0.1 * f64::from(i), 8.0)).collect(),
+        ),
+        RecordCase::new("ramp only", Either, ramp),
+        RecordCase::new("every depth twice", Number, stairs),
+        RecordCase::new("ramp, hold and half back", Number, full()),
+        RecordCase {
             offset: 2e6,
             tolerance: 1e-3,
-            ..Plan::new("an offset of 1e6 times the signal", Number, full())
-        },
-        Plan {
-            spoil: Some(|one| one.depth.0 *= 1e-310),
-            ..Plan::new("subnormal depths", Refusal, full())
-        },
-        Plan {
-            spoil: Some(|one| one.force.0 *= 1e-310),
-            ..Plan::new("subnormal forces", Refusal, full())
-        },
-        Plan {
-            spoil: Some(|one| one.sigma.0 *= 1e-310),
-            ..Plan::new("subnormal uncertainties", Refusal, full())
-        },
-        Plan {
-            spoil: Some(|one| one.t.0 *= 1e-310),
-            ..Plan::new("subnormal times", Refusal, full())
-        },
-        Plan {
-            // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
-            spoil: Some(|one| one.t.0 += 1.8e9),
-            tolerance: 1e-3,
-            ..Plan::new("times since 1970", Number, full())
+            ..RecordCase::new("an offset of 1e6 times the signal", Number, full())
         },
     ];
+    let subnormal: [(&str, fn(&mut FitSample)); 4] = [
+        ("subnormal depths", |one| one.depth.0 *= 1e-310),
+        ("subnormal forces", |one| one.force.0 *= 1e-310),
+        ("subnormal uncertainties", |one| one.sigma.0 *= 1e-310),
+        ("subnormal times", |one| one.t.0 *= 1e-310),
+    ];
+    cases.extend(subnormal.map(|(case, spoil)| RecordCase {
+        spoil: Some(spoil),
+        ..RecordCase::new(case, Refusal, full())
+    }));
+    cases.push(RecordCase {
+        // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
+        spoil: Some(|one| one.t.0 += 1.8e9),
+        tolerance: 1e-3,
+        ..RecordCase::new("times since 1970", Number, full())
+    });
     if extent == Extent::Quick {
-        return plans;
+        return cases;
     }
-    let sized = |case: &'static str, expected, [time, depth, force]: [f64; 3]| Plan {
+    let sized = |case: &'static str, expected, [time, depth, force]: [f64; 3]| RecordCase {
         time,
         depth,
         force,
-        ..Plan::new(case, expected, full())
+        ..RecordCase::new(case, expected, full())
     };
-    plans.extend([
+    cases.extend([
         sized("forces of 1e-6 N", Number, [1.0, 1.0, 1e-6]),
         sized("forces of 1e6 N", Number, [1.0, 1.0, 1e6]),
         sized("forces of 1e-100 N", Either, [1.0, 1.0, 1e-100]),
@@ -165,74 +166,58 @@ fn plans(extent: Extent) -> Vec<Plan> {
         sized("relaxation in 1e-100 s", Either, [1e-100, 1.0, 1.0]),
         sized("relaxation in 1e100 s", Either, [1e100, 1.0, 1.0]),
     ]);
-    plans
+    cases
 }
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    let subject = format!("fit of {key}");
-    vec![Part::new(GROUP, subject.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let mut plans = plans(extent);
-        if times(&*family) > TIMES_SHOWN {
-            for plan in &mut plans {
-                if plan.expected == Expected::Number {
-                    plan.expected = Expected::Either;
-                }
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let mut cases = cases(extent);
+    if times(&**family) > TIMES_SHOWN {
+        for case in &mut cases {
+            if case.expected == ExpectedAnswer::Number {
+                case.expected = ExpectedAnswer::Either;
             }
         }
-        rows(plans, &subject, progress, |plan| family_answer(&family, plan))
-    })]
+    }
+    let subject = format!("fit of {}", family.key());
+    rows_of(cases, progress, |case| case.judge(&subject, family_answer(family, &case)))
 }
 
-fn family_answer(family: &Arc<dyn Family>, plan: &Plan) -> Answer {
+fn family_answer(family: &Arc<dyn Family>, case: &RecordCase) -> SubjectAnswer {
     // Relaxation times around a second on the record's scale.
     let first = if times(&**family) > 1 { 0.2 } else { 1.0 };
-    let body = member(&**family, first * plan.time, 20.0 * plan.depth, 2.0 * plan.force);
-    let samples = plan.samples(|path| body.along(path.iter().copied()).ok());
-    fitted(Arc::clone(family), &samples, Some(&body))
+    let body = make_member(&**family, first * case.time, 20.0 * case.depth, 2.0 * case.force);
+    let samples = case.samples(|path| body.along(path.iter().copied()).ok());
+    fit_answer(Arc::clone(family), &samples, Some(&body))
 }
 
 fn times(family: &dyn Family) -> usize {
     let outer = family.outer();
-    let is_time = |one: &&Outer| one.range == OuterRange::Time;
+    let is_time = |one: &&OuterParameter| one.range == OuterRange::Time;
     outer.iter().filter(is_time).count()
 }
 
 /// More relaxation times than these, a decade apart, are beyond what a record of 25 s can show.
 const TIMES_SHOWN: usize = 2;
 
-/// The same records put to the fit of the thesis body.
-pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
-    vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
-        rows(plans(extent), DEFAULT_FIT, progress, |plan| {
+/// The same records for the fit of the thesis body.
+pub(super) fn thesis_part(extent: Extent) -> Part {
+    Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
+        rows_of(cases(extent), progress, |case| {
             let known = ModifiedKelvin::THESIS;
-            let scale = |power: i32| plan.force / plan.depth.powi(power);
+            let scale = |power: i32| case.force / case.depth.powi(power);
             let body = ModifiedKelvin {
-                tau_eps: known.tau_eps * plan.time,
+                tau_eps: known.tau_eps * case.time,
                 mu: [1, 2, 3].map(|power| known.mu[power as usize - 1] * scale(power)),
-                tau_sig: known.tau_sig * scale(2) * plan.time,
+                tau_sig: known.tau_sig * scale(2) * case.time,
             };
             let model = thesis(body);
-            let samples = plan.samples(|path| model.along(path.iter().copied()).ok());
-            fitted(Arc::new(PowerSeries::THESIS), &samples, Some(&model))
+            let samples = case.samples(|path| model.along(path.iter().copied()).ok());
+            let answer = fit_answer(Arc::new(PowerSeries::THESIS), &samples, Some(&model));
+            case.judge(DEFAULT_FIT, answer)
         })
-    })]
-}
-
-fn rows(
-    plans: Vec<Plan>,
-    subject: &str,
-    progress: &mut dyn FnMut(f64),
-    answer: impl Fn(&Plan) -> Answer,
-) -> Vec<Row> {
-    let count = plans.len() as f64;
-    let rows = plans.iter().enumerate().map(|(index, plan)| {
-        let answer = answer(plan);
-        progress((index + 1) as f64 / count);
-        judge([GROUP, plan.case], subject, plan.expected, plan.tolerance, answer)
-    });
-    rows.collect()
+    })
 }

@@ -1,12 +1,12 @@
 //! Small and large numbers: forces 1e-6..1e6 N, the ends of the doubles, subnormal numbers.
 
-use super::judge::PathCase;
-use super::members::member;
+use super::judge::{PathCase, Row};
+use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, Part};
-use crate::families::{Family, Model, by_key};
+use super::{Extent, rows_of};
+use crate::families::{Family, Model};
+use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "scale";
 /// A subnormal number: below 2.2e-308 doubles lack digits.
 const SUBNORMAL: f64 = 1e-310;
@@ -14,31 +14,20 @@ const SUBNORMAL: f64 = 1e-310;
 /// Families of more terms than this leave out the ends of the doubles when it has to be quick.
 const MANY: usize = 12;
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| {
-        let Ok(family) = by_key(&key) else {
-            return Vec::new();
-        };
-        let cases = cases(extent, &*family);
-        let count = cases.len() as f64;
-        let rows = cases.into_iter().enumerate().map(|(index, (path, model))| {
-            progress((index + 1) as f64 / count);
-            path.put_to(&FamilyBody(model))
-        });
-        rows.collect()
-    })]
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
+    let cases = cases(extent, &**family);
+    rows_of(cases, progress, |(path, model)| path.run_on(&FamilyBody(model)))
 }
 
 /// Down to `depth` and back in steps of `dt`.
 fn poke(case: String, depth: f64, dt: f64) -> PathCase {
     let shares = [0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 0.5, -0.5, -0.5, 1.0];
-    PathCase {
-        group: GROUP,
-        case,
-        start: -0.5 * depth,
-        steps: shares.map(|share| (dt, share * depth)).to_vec(),
-    }
+    let steps = shares.map(|share| (dt, share * depth)).to_vec();
+    PathCase::new(GROUP, case, -0.5 * depth, steps)
 }
 
 fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
@@ -50,10 +39,10 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
         ],
     };
     for force in forces {
-        let model = member(family, 1.0, 20.0, 10f64.powi(*force));
+        let model = make_member(family, 1.0, 20.0, 10f64.powi(*force));
         cases.push((poke(format!("forces of 1e{force} N"), 20.0, 0.1), model));
     }
-    let usual = || member(family, 1.0, 20.0, 2.0);
+    let usual = || make_member(family, 1.0, 20.0, 2.0);
     let has_many = usual().terms().is_ok_and(|terms| terms.len() > MANY);
     let lengths: &[i32] = match extent {
         Extent::Quick if has_many => &[],
@@ -65,12 +54,12 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
         let time = 10f64.powi(*length);
         cases.push((
             poke(format!("steps and times of 1e{length} s"), 20.0, 0.1 * time),
-            member(family, time, 20.0, 2.0),
+            make_member(family, time, 20.0, 2.0),
         ));
         cases.push((poke(format!("steps of 1e{length} s, times of 1 s"), 20.0, time), usual()));
         cases.push((
             poke(format!("steps of 0.1 s, times of 1e{length} s"), 20.0, 0.1),
-            member(family, time, 20.0, 2.0),
+            make_member(family, time, 20.0, 2.0),
         ));
     }
     cases.push((poke("subnormal depths".to_owned(), SUBNORMAL, 0.1), usual()));
@@ -79,7 +68,7 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
     cases.push((gentle, usual()));
     cases.push((
         poke("subnormal relaxation times".to_owned(), 20.0, 0.1),
-        member(family, SUBNORMAL, 20.0, 2.0),
+        make_member(family, SUBNORMAL, 20.0, 2.0),
     ));
     let mut weak = usual();
     weak.linear.fill(SUBNORMAL);

@@ -1,7 +1,7 @@
-//! What is put to the paths: the exact step of every family, and every integrator.
+//! Subjects of the paths: the exact step of every family, and every integrator.
 
-use super::judge::{Oracle, PathCase, Subject, TOLERANCE};
-use crate::families::{Model, Relaxation};
+use super::judge::{ExtremesSubject, Oracle, PathCase, TOLERANCE};
+use crate::families::{Model, RelaxationTerm};
 use crate::integrators::{Precision, Real, Scheme, SeriesBody};
 use crate::reference::{Reference, RuleReference};
 use palpate_model::units::{Depth, Seconds};
@@ -10,12 +10,12 @@ use palpate_model::units::{Depth, Seconds};
 #[derive(Clone, Debug)]
 pub struct FamilyBody(pub Model);
 
-impl Subject for FamilyBody {
+impl ExtremesSubject for FamilyBody {
     fn name(&self) -> String {
         self.0.family.clone()
     }
 
-    fn terms(&self) -> Result<Vec<Relaxation>, String> {
+    fn terms(&self) -> Result<Vec<RelaxationTerm>, String> {
         let model = self.0.clone().checked().map_err(|err| err.to_string())?;
         model.terms().map_err(|err| err.to_string())
     }
@@ -34,11 +34,8 @@ impl Subject for FamilyBody {
 /// The thesis body, with another relaxation time, stepped by an integrator.
 #[derive(Clone, Copy, Debug)]
 pub struct SchemeBody {
-    /// The integrator.
     pub scheme: Scheme,
-    /// Its numbers.
     pub precision: Precision,
-    /// The body.
     pub body: SeriesBody<3>,
 }
 
@@ -59,12 +56,12 @@ impl SchemeBody {
     }
 }
 
-impl Subject for SchemeBody {
+impl ExtremesSubject for SchemeBody {
     fn name(&self) -> String {
         format!("{}, {}", self.scheme.name(), self.precision.name())
     }
 
-    fn terms(&self) -> Result<Vec<Relaxation>, String> {
+    fn terms(&self) -> Result<Vec<RelaxationTerm>, String> {
         let body = self.body.checked().map_err(|err| err.to_string())?;
         Ok(vec![body.term()])
     }
@@ -85,7 +82,6 @@ impl Subject for SchemeBody {
         exact.map(Oracle::Exact).map_err(|err| err.to_string())
     }
 
-    /// Rounding.
     fn tolerance(&self, _path: &PathCase) -> f64 {
         match self.precision {
             Precision::F32 => TOLERANCE_SINGLE,

@@ -1,12 +1,12 @@
 //! Relaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
 
+use super::Extent;
 use super::judge::{PathCase, Row};
-use super::members::member;
+use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, Part};
-use crate::families::by_key;
+use crate::families::Family;
+use std::sync::Arc;
 
-/// Name of the group.
 pub(super) const GROUP: &str = "relaxation time and step";
 
 /// Depths in mm of the path: in from outside, down, hold, partly back and down again, out and in.
@@ -19,11 +19,6 @@ const DEPTHS: [f64; 20] = [
 /// half a minute for all.
 const MANY: usize = 12;
 
-pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
-    let key = key.to_owned();
-    vec![Part::new(GROUP, key.clone(), move |progress| rows(extent, &key, progress))]
-}
-
 /// Powers of ten of relaxation times and of steps.
 pub(super) fn decades(extent: Extent) -> [Vec<i32>; 2] {
     match extent {
@@ -32,27 +27,24 @@ pub(super) fn decades(extent: Extent) -> [Vec<i32>; 2] {
     }
 }
 
-fn rows(extent: Extent, key: &str, progress: &mut dyn FnMut(f64)) -> Vec<Row> {
-    let Ok(family) = by_key(key) else {
-        return Vec::new();
-    };
+pub(super) fn rows(
+    extent: Extent,
+    family: &Arc<dyn Family>,
+    progress: &mut dyn FnMut(f64),
+) -> Vec<Row> {
     let [mut taus, steps] = decades(extent);
-    let probe = member(&*family, 1.0, 20.0, 2.0);
+    let probe = make_member(&**family, 1.0, 20.0, 2.0);
     if extent == Extent::Whole && probe.terms().is_ok_and(|terms| terms.len() > MANY) {
         taus.retain(|tau| tau % 3 == 0);
     }
     let mut rows = Vec::new();
     for (index, tau) in taus.iter().enumerate() {
-        let subject = FamilyBody(member(&*family, 10f64.powi(*tau), 20.0, 2.0));
+        let subject = FamilyBody(make_member(&**family, 10f64.powi(*tau), 20.0, 2.0));
         for step in &steps {
             let dt = 10f64.powi(*step);
-            let path = PathCase {
-                group: GROUP,
-                case: format!("tau 1e{tau} s, step 1e{step} s"),
-                start: -1.0,
-                steps: DEPTHS.iter().map(|&depth| (dt, depth)).collect(),
-            };
-            rows.push(path.put_to(&subject));
+            let case = format!("tau 1e{tau} s, step 1e{step} s");
+            let steps = DEPTHS.iter().map(|&depth| (dt, depth)).collect();
+            rows.push(PathCase::new(GROUP, case, -1.0, steps).run_on(&subject));
         }
         progress((index + 1) as f64 / taus.len() as f64);
     }

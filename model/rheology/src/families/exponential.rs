@@ -1,9 +1,9 @@
 //! An exponential spring in a Kelvin body.
 
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + tau_eps F' = T + tau_sig dT/dt` with `T = A (e^(B x) - 1)`: the Kelvin body with its spring
@@ -12,13 +12,13 @@ use std::sync::Arc;
 /// The exponential response is that of Fung, Am. J. Physiol. 213 (1967) 1532-1544, whose slope grows
 /// in proportion to the force. As `B` tends to zero it is the Kelvin body with `mu1 = A B`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExponentialKelvin;
+pub(super) struct ExponentialKelvin;
 
 /// Range of `B` times the greatest depth: below, the response is straight to 5 % and `A` and `B`
 /// become one number; above, force grows by e^20 = 5e8 over the stroke.
 pub(super) const CURVATURE: OuterRange = OuterRange::PerDepth(0.05, 20.0);
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "exponential",
     of: |number| number.is_none().then(|| Arc::new(ExponentialKelvin) as _),
     compared: None,
@@ -45,18 +45,21 @@ impl Family for ExponentialKelvin {
         vec![("kelvin".into(), "stiffness that grows with force")]
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        vec![Outer::new("tau_eps", "s", OuterRange::Time), Outer::new("B", "1/mm", CURVATURE)]
+    fn outer(&self) -> Vec<OuterParameter> {
+        vec![
+            OuterParameter::new("tau_eps", "s", OuterRange::Time),
+            OuterParameter::new("B", "1/mm", CURVATURE),
+        ]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
         vec![("A".into(), "N"), ("A_tau_sig".into(), "N*s")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let (tau, spring) = (outer[0], Drive::exponential(1.0, outer[1]));
-        let elastic = Relaxation::settling(spring, tau);
-        let viscous = Relaxation::driven(spring, tau);
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        let (tau, spring) = (outer[0], DepthDrive::exponential(1.0, outer[1]));
+        let elastic = RelaxationTerm::settling(spring, tau);
+        let viscous = RelaxationTerm::driven(spring, tau);
         vec![vec![elastic], vec![viscous]]
     }
 

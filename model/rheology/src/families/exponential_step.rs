@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn both_agree_with_the_integral() {
+    fn chi_and_omega_agree_with_the_integral() {
         let sizes = [1e-9, 1e-4, 0.01, 0.3, 0.49, 0.51, 0.99, 1.01, 3.0, 20.0];
         for r in sizes {
             for size in sizes {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_the_range() {
+    fn chi_and_omega_are_right_at_the_ends_of_their_range() {
         assert_eq!(chi_omega(0.0, 0.0), (0.0, 0.0));
         assert_eq!(chi_omega(1.0, f64::INFINITY), (1f64.exp(), 1f64.exp_m1()));
         let (chi, omega) = chi_omega(0.0, 2.0);

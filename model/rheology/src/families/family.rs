@@ -1,7 +1,7 @@
-//! What a model family is, as distinct from a fitted model.
+//! The model family, as distinct from a fitted model.
 
 use super::model::ModelParameter;
-use super::relaxation::Relaxation;
+use super::relaxation::RelaxationTerm;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -14,7 +14,6 @@ pub trait Family: Debug + Send + Sync {
     /// Short name for files and the command line, such as `series-3`.
     fn key(&self) -> String;
 
-    /// Name in words.
     fn name(&self) -> String;
 
     /// The equation, with its source.
@@ -29,13 +28,13 @@ pub trait Family: Debug + Send + Sync {
     }
 
     /// Parameters in which it is not linear.
-    fn outer(&self) -> Vec<Outer>;
+    fn outer(&self) -> Vec<OuterParameter>;
 
     /// Its coefficients: name and unit.
     fn linear(&self) -> Vec<(String, &'static str)>;
 
     /// The columns for outer parameters in their units, one for each coefficient.
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>>;
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>>;
 
     /// The same parameters with a coarser and cheaper response, to search with; `None` where the
     /// response is cheap already.
@@ -76,16 +75,13 @@ pub enum Kernel {
 
 /// A parameter in which a family is not linear.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outer {
-    /// Name.
+pub struct OuterParameter {
     pub name: String,
-    /// Unit.
     pub unit: &'static str,
-    /// Where it is searched.
     pub range: OuterRange,
 }
 
-impl Outer {
+impl OuterParameter {
     pub(super) fn new(name: impl Into<String>, unit: &'static str, range: OuterRange) -> Self {
         Self { name: name.into(), unit, range }
     }

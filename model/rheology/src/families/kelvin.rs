@@ -1,9 +1,9 @@
 //! The Kelvin body, or standard linear solid.
 
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + eta x'`, with `eta = mu1 tau_sig`.
@@ -13,7 +13,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kelvin;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "kelvin",
     of: |number| number.is_none().then(|| Arc::new(Kelvin) as _),
     compared: None,
@@ -43,18 +43,18 @@ impl Family for Kelvin {
         ]
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        vec![Outer::new("tau_eps", "s", OuterRange::Time)]
+    fn outer(&self) -> Vec<OuterParameter> {
+        vec![OuterParameter::new("tau_eps", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
         vec![("mu1".into(), "N/mm"), ("eta".into(), "N*s/mm")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let tau = outer[0];
-        let elastic = Relaxation::settling(Drive::power(1, 1.0), tau);
-        let viscous = Relaxation::driven(Drive::power(1, 1.0), tau);
+        let elastic = RelaxationTerm::settling(DepthDrive::power(1, 1.0), tau);
+        let viscous = RelaxationTerm::driven(DepthDrive::power(1, 1.0), tau);
         vec![vec![elastic], vec![viscous]]
     }
 

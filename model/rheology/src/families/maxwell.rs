@@ -1,9 +1,9 @@
 //! The Maxwell body: a spring and a dashpot in series.
 
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + (eta / k) F' = eta x'`, as the spring `k` and its relaxation time `tau = eta / k`.
@@ -12,7 +12,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Maxwell;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "maxwell",
     of: |number| number.is_none().then(|| Arc::new(Maxwell) as _),
     compared: None,
@@ -35,16 +35,16 @@ impl Family for Maxwell {
         "a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading"
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        vec![Outer::new("tau", "s", OuterRange::Time)]
+    fn outer(&self) -> Vec<OuterParameter> {
+        vec![OuterParameter::new("tau", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
         vec![("k".into(), "N/mm")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        vec![vec![Relaxation::maxwell(Drive::power(1, 1.0), outer[0])]]
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        vec![vec![RelaxationTerm::maxwell(DepthDrive::power(1, 1.0), outer[0])]]
     }
 
     fn fading(&self, outer: &[f64]) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! A fitted model: a family with its parameters known.
 
 use super::family::Family;
-use super::relaxation::Relaxation;
+use super::relaxation::RelaxationTerm;
 use super::response::{Response, StepError, plain};
 use super::{UnknownFamily, by_key};
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -11,11 +11,9 @@ use thiserror::Error;
 /// A named number with its unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelParameter {
-    /// Name.
     pub name: String,
     /// Value, in `unit`.
     pub value: f64,
-    /// Unit.
     pub unit: String,
 }
 
@@ -28,7 +26,6 @@ impl ModelParameter {
 /// A model of one family with all its parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
-    /// Key of the family.
     pub family: String,
     /// Outer parameters, in the family's order and units.
     pub outer: Vec<f64>,
@@ -39,42 +36,18 @@ pub struct Model {
 /// Numbers that are no model.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ModelError {
-    /// No such family.
     #[error(transparent)]
     Family(#[from] UnknownFamily),
-    /// Too many or too few numbers.
     #[error("a model of family {family} has {wanted} numbers and {given} were given; give {names}")]
-    Count {
-        /// The family.
-        family: String,
-        /// How many it has.
-        wanted: usize,
-        /// How many came.
-        given: usize,
-        /// Their names.
-        names: String,
-    },
-    /// A number out of its range.
+    Count { family: String, wanted: usize, given: usize, names: String },
     #[error("{family}: {name} cannot be {}; it must be {must}", plain(.value))]
-    Value {
-        /// The family.
-        family: String,
-        /// The parameter.
-        name: String,
-        /// Its value.
-        value: f64,
-        /// What is allowed.
-        must: &'static str,
-    },
+    Value { family: String, name: String, value: f64, must: &'static str },
 }
 
-/// A path has no force.
 #[derive(Clone, Debug, PartialEq, Error)]
-pub enum AlongError {
-    /// The model is none.
+pub enum ModelPathError {
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A step has no answer.
     #[error(transparent)]
     Step(#[from] StepError),
 }
@@ -115,13 +88,13 @@ impl Model {
     }
 
     /// Its terms, those of one relaxation time joined, ready for any depth history.
-    pub fn terms(&self) -> Result<Vec<Relaxation>, ModelError> {
+    pub fn terms(&self) -> Result<Vec<RelaxationTerm>, ModelError> {
         let family = by_key(&self.family)?;
         Ok(joined(&family.columns(&self.outer), self.linear.iter().copied()))
     }
 
     /// The body, relaxed with the probe at `depth`.
-    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, AlongError> {
+    pub fn at_rest_from(&self, depth: Depth) -> Result<ModelState, ModelPathError> {
         if !depth.is_finite() {
             return Err(StepError::Depth(depth.0).into());
         }
@@ -129,14 +102,14 @@ impl Model {
         if !response.sum().is_finite() {
             return Err(StepError::Rest { depth: depth.0 }.into());
         }
-        Ok(Body { response })
+        Ok(ModelState { response })
     }
 
     /// The force in N along a path of `(time, depth)`, from a body relaxed at its first point.
     pub fn along(
         &self,
         path: impl IntoIterator<Item = (Seconds, Depth)>,
-    ) -> Result<Vec<f64>, AlongError> {
+    ) -> Result<Vec<f64>, ModelPathError> {
         let mut path = path.into_iter();
         let Some((mut before, start)) = path.next() else {
             return Ok(Vec::new());
@@ -168,10 +141,10 @@ impl Model {
 
 /// Columns times coefficients, terms of one relaxation time joined: each costs a state.
 pub(crate) fn joined(
-    columns: &[Vec<Relaxation>],
+    columns: &[Vec<RelaxationTerm>],
     linear: impl IntoIterator<Item = f64>,
-) -> Vec<Relaxation> {
-    let mut joined: Vec<Relaxation> = Vec::new();
+) -> Vec<RelaxationTerm> {
+    let mut joined: Vec<RelaxationTerm> = Vec::new();
     for (column, coefficient) in columns.iter().zip(linear) {
         for term in column {
             let term = term.scaled(coefficient);
@@ -184,32 +157,25 @@ pub(crate) fn joined(
     joined
 }
 
-/// A body of any family and what it remembers.
+/// A model with its depth history.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct ModelState {
     response: Response,
 }
 
-impl Body {
+impl ModelState {
     /// Moves straight to `depth` within `dt` and returns the force there.
     pub fn step(&mut self, depth: Depth, dt: Seconds) -> Result<Newtons, StepError> {
         self.response.step(depth, dt)?;
         Ok(self.force())
     }
 
-    /// The force now.
     pub fn force(&self) -> Newtons {
         Newtons(self.response.sum())
-    }
-
-    /// The depth now.
-    pub fn depth(&self) -> Depth {
-        self.response.depth()
     }
 }
 
 impl dyn Family + '_ {
-    /// A model of this family.
     pub fn model(&self, outer: &[f64], linear: &[f64]) -> Result<Model, ModelError> {
         Model { family: self.key(), outer: outer.to_vec(), linear: linear.to_vec() }.checked()
     }

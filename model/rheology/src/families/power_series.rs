@@ -1,8 +1,8 @@
 //! Power series in the modified Kelvin body: the elastic part cut off after one to five terms.
 
-use super::family::{Family, Kernel, Outer, OuterRange};
-use super::relaxation::{Drive, POWER_MAX, Relaxation};
-use super::table::Kind;
+use super::family::{Family, Kernel, OuterParameter, OuterRange};
+use super::relaxation::{DepthDrive, POWER_MAX, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x'`.
@@ -18,12 +18,11 @@ const UNITS: [&str; POWER_MAX] = ["N/mm", "N/mm^2", "N/mm^3", "N/mm^4", "N/mm^5"
 
 const ORDINALS: [&str; POWER_MAX] = ["first", "second", "third", "fourth", "fifth"];
 
-/// What the second and each later term is.
+/// Words for the second and each later term.
 const ADDED: [&str; POWER_MAX - 1] =
     ["a square of depth", "a cube of depth", "a fourth power of depth", "a fifth power of depth"];
 
 impl PowerSeries {
-    /// The order of the thesis.
     pub const THESIS: Self = Self { order: 3 };
 
     /// The series cut off after `order` terms; `None` unless that is one to five.
@@ -33,7 +32,7 @@ impl PowerSeries {
     }
 }
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "series",
     of: |number| Some(Arc::new(PowerSeries::of_order(number?)?)),
     compared: Some(1..=POWER_MAX),
@@ -69,8 +68,8 @@ impl Family for PowerSeries {
         }
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        vec![Outer::new("tau_eps", "s", OuterRange::Time)]
+    fn outer(&self) -> Vec<OuterParameter> {
+        vec![OuterParameter::new("tau_eps", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
@@ -78,11 +77,12 @@ impl Family for PowerSeries {
         mu.chain([("tau_sig".to_owned(), "N*s/mm^2")]).collect()
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let tau = outer[0];
-        let elastic = (1..=self.order).map(|k| Relaxation::settling(Drive::power(k, 1.0), tau));
+        let elastic =
+            (1..=self.order).map(|k| RelaxationTerm::settling(DepthDrive::power(k, 1.0), tau));
         // x x' is the rate of x^2 / 2.
-        let viscous = Relaxation::driven(Drive::power(2, 0.5), tau);
+        let viscous = RelaxationTerm::driven(DepthDrive::power(2, 0.5), tau);
         elastic.chain([viscous]).map(|term| vec![term]).collect()
     }
 

@@ -1,19 +1,19 @@
 //! The generalised Maxwell body: a spring beside several Maxwell bodies.
 
-use super::family::{Family, Outer, OuterRange};
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::family::{Family, OuterParameter, OuterRange};
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// Most terms: more than one for each of the thirty-one decades of the longest master curve published
 /// with its series.
 pub const TERMS_MAX: usize = 40;
 
-/// Most terms a selection tries on a recording: beyond one for each decade that it shows, terms cannot
-/// be told apart.
+/// Most terms a selection tries on a recording: beyond one for each decade that it shows, terms are
+/// not identifiable.
 pub const TERMS_COMPARED: usize = 6;
 
-/// What the second and each later term is.
+/// Words for the second and each later term.
 const ADDED: [&str; TERMS_COMPARED - 1] = [
     "a second relaxation time",
     "a third relaxation time",
@@ -45,7 +45,7 @@ impl Prony {
     }
 }
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "prony",
     of: |number| Some(Arc::new(Prony::of_terms(number?)?)),
     compared: Some(2..=TERMS_COMPARED),
@@ -78,8 +78,8 @@ impl Family for Prony {
         vec![(simpler, words.unwrap_or(&"another relaxation time"))]
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        let time = |i| Outer::new(format!("tau_{i}"), "s", OuterRange::Time);
+    fn outer(&self) -> Vec<OuterParameter> {
+        let time = |i| OuterParameter::new(format!("tau_{i}"), "s", OuterRange::Time);
         (1..=self.terms).map(time).collect()
     }
 
@@ -87,10 +87,13 @@ impl Family for Prony {
         (0..=self.terms).map(|i| (format!("k_{i}"), "N/mm")).collect()
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let spring = Drive::power(1, 1.0);
-        let relaxing = outer.iter().map(|&tau| Relaxation::maxwell(spring, tau));
-        std::iter::once(Relaxation::spring(spring)).chain(relaxing).map(|term| vec![term]).collect()
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        let spring = DepthDrive::power(1, 1.0);
+        let relaxing = outer.iter().map(|&tau| RelaxationTerm::maxwell(spring, tau));
+        std::iter::once(RelaxationTerm::spring(spring))
+            .chain(relaxing)
+            .map(|term| vec![term])
+            .collect()
     }
 
     fn is_non_negative(&self, coefficient: usize) -> bool {

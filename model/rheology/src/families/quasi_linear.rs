@@ -1,11 +1,11 @@
 //! Fung's quasi-linear viscoelasticity.
 
 use super::exponential::CURVATURE;
-use super::family::{Family, Outer, OuterRange};
+use super::family::{Family, OuterParameter, OuterRange};
 use super::model::ModelParameter;
 use super::quadrature::gauss_legendre;
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F = int_0^t G(t - s) dT/ds ds` with the elastic response `T = A (e^(B x) - 1)` and the reduced
@@ -16,46 +16,31 @@ use std::sync::Arc;
 /// `E1(t / tau_2) - E1(t / tau_1) = int e^(-t / tau) d ln tau` between the two, the force is the
 /// spring's plus an integral of Maxwell bodies over `ln tau`, taken by Gauss-Legendre quadrature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct QuasiLinear {
+pub(super) struct QuasiLinear {
     nodes: usize,
 }
 
 /// Nodes of the quadrature unless asked otherwise: the exponential integrals to 1e-4 of the spectrum's
 /// width over six decades of relaxation times, to 1e-7 over four.
-pub const QUASI_LINEAR_NODES: usize = 24;
+const NODES: usize = 24;
 
 /// Nodes that suffice to find the valley: one for each decade of the widest spectrum.
 const COARSE_NODES: usize = 6;
 
-impl Default for QuasiLinear {
-    fn default() -> Self {
-        Self { nodes: QUASI_LINEAR_NODES }
-    }
-}
-
-impl QuasiLinear {
-    /// The family with another number of relaxation times in the spectrum, 1 to 64; `None` for other numbers.
-    #[must_use]
-    pub fn of_nodes(nodes: usize) -> Option<Self> {
-        (1..=64).contains(&nodes).then_some(Self { nodes })
-    }
-}
-
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "fung",
-    of: |number| match number {
-        None => Some(Arc::new(QuasiLinear::default())),
-        Some(nodes) => Some(Arc::new(QuasiLinear::of_nodes(nodes)?)),
+    of: |number| {
+        let nodes = number.unwrap_or(NODES);
+        (1..=64).contains(&nodes).then(|| Arc::new(QuasiLinear { nodes }) as _)
     },
     compared: None,
 };
 
 impl Family for QuasiLinear {
     fn key(&self) -> String {
-        if self.nodes == QUASI_LINEAR_NODES {
-            "fung".into()
-        } else {
-            format!("fung-{}", self.nodes)
+        match self.nodes {
+            NODES => "fung".into(),
+            nodes => format!("fung-{nodes}"),
         }
     }
 
@@ -78,11 +63,11 @@ impl Family for QuasiLinear {
         ]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         vec![
-            Outer::new("tau_1", "s", OuterRange::Time),
-            Outer::new("tau_2/tau_1", "", OuterRange::Ratio(3.0, 1e6)),
-            Outer::new("B", "1/mm", CURVATURE),
+            OuterParameter::new("tau_1", "s", OuterRange::Time),
+            OuterParameter::new("tau_2/tau_1", "", OuterRange::Ratio(3.0, 1e6)),
+            OuterParameter::new("B", "1/mm", CURVATURE),
         ]
     }
 
@@ -90,20 +75,20 @@ impl Family for QuasiLinear {
         vec![("A_inf".into(), "N"), ("A_inf_C".into(), "N")]
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let (tau_1, width) = (outer[0], outer[1].ln());
-        let spring = Drive::exponential(1.0, outer[2]);
+        let spring = DepthDrive::exponential(1.0, outer[2]);
         let (nodes, weights) = gauss_legendre(self.nodes);
         let spectrum = nodes.iter().zip(&weights).map(|(node, weight)| {
             let tau = tau_1 * (0.5 * (node + 1.0) * width).exp();
-            Relaxation::maxwell(spring, tau).scaled(0.5 * weight * width)
+            RelaxationTerm::maxwell(spring, tau).scaled(0.5 * weight * width)
         });
-        vec![vec![Relaxation::spring(spring)], spectrum.collect()]
+        vec![vec![RelaxationTerm::spring(spring)], spectrum.collect()]
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {
-        (self.nodes > COARSE_NODES)
-            .then(|| Arc::new(Self { nodes: COARSE_NODES }) as Arc<dyn Family>)
+        let nodes = COARSE_NODES;
+        (self.nodes > nodes).then(|| Arc::new(Self { nodes }) as _)
     }
 
     fn is_non_negative(&self, _coefficient: usize) -> bool {
@@ -125,7 +110,7 @@ mod tests {
 
     /// The integral of `e^(-t / tau)` over `ln tau`, from the columns.
     fn spectrum(nodes: usize, ratio: f64, t: f64) -> f64 {
-        let family = QuasiLinear::of_nodes(nodes).unwrap();
+        let family = QuasiLinear { nodes };
         let columns = family.columns(&[1.0, ratio, 1.0]);
         let shares = columns[1].iter().map(|term| {
             let (amplitude, _) = term.rate.exponential.unwrap();
@@ -142,7 +127,7 @@ mod tests {
                 let t = 1e-2 * 10f64.powf(0.05 * f64::from(i));
                 let exact = spectrum(64, ratio, t);
                 assert!((exact - spectrum(60, ratio, t)).abs() < 1e-11);
-                let miss = (spectrum(QUASI_LINEAR_NODES, ratio, t) - exact).abs();
+                let miss = (spectrum(NODES, ratio, t) - exact).abs();
                 assert!(miss < tolerance * ratio.ln(), "{ratio:e} {t:e}: {miss:e}");
             }
         }

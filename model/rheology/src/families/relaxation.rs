@@ -1,4 +1,4 @@
-//! One relaxation time: what drives it and its exact step.
+//! One relaxation time: its drive and its exact step.
 //!
 //! Every family is a sum of terms `y + tau y' = p(x) + d/dt q(x)`, where `p` (elastic) and `q` (rate)
 //! are made of powers and exponentials of depth:
@@ -23,7 +23,7 @@ const SUDDEN: f64 = 1e-290;
 
 /// A function of depth that is zero at zero depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drive {
+pub struct DepthDrive {
     /// Coefficients of `x, x^2 .. x^5`, in N/mm^k (times s for a rate).
     pub powers: [f64; POWER_MAX],
     /// Amplitude `A` of `A (e^(B x) - 1)`, in N, and `B` in 1/mm.
@@ -33,7 +33,7 @@ pub struct Drive {
     pub softening: [f64; SOFTENING_MAX],
 }
 
-impl Drive {
+impl DepthDrive {
     /// `coefficient * x^power`, `power` 1 to 5.
     #[must_use]
     pub fn power(power: usize, coefficient: f64) -> Self {
@@ -94,7 +94,7 @@ impl Drive {
         all
     }
 
-    /// What softening adds after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
+    /// Contribution of softening after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
     /// divide by has softened nothing.
     #[inline]
     fn softened(&self, x_max: f64) -> impl Iterator<Item = (usize, (f64, f64))> {
@@ -177,51 +177,49 @@ impl Drive {
 
 /// One term `y + tau y' = elastic(x) + d/dt rate(x)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Relaxation {
+pub struct RelaxationTerm {
     /// Relaxation time in s; 0 for a term without memory.
     pub tau: f64,
-    /// What it tends to when held.
-    pub elastic: Drive,
-    /// What drives it by moving, in units of elastic times s.
-    pub rate: Drive,
+    /// The limit when depth is held.
+    pub elastic: DepthDrive,
+    /// The drive by movement, in units of elastic times s.
+    pub rate: DepthDrive,
 }
 
-impl Relaxation {
-    /// What tends to `elastic` in `tau` seconds when held.
+impl RelaxationTerm {
+    /// A term that tends to `elastic` in `tau` seconds when depth is held.
     #[must_use]
-    pub fn settling(elastic: Drive, tau: f64) -> Self {
-        Self { tau, elastic, rate: Drive::default() }
+    pub fn settling(elastic: DepthDrive, tau: f64) -> Self {
+        Self { tau, elastic, rate: DepthDrive::default() }
     }
 
-    /// What moving drives by `rate` and fades in `tau` seconds.
+    /// A term that movement drives by `rate` and that fades in `tau` seconds.
     #[must_use]
-    pub fn driven(rate: Drive, tau: f64) -> Self {
-        Self { tau, elastic: Drive::default(), rate }
+    pub fn driven(rate: DepthDrive, tau: f64) -> Self {
+        Self { tau, elastic: DepthDrive::default(), rate }
     }
 
-    /// A spring without memory.
     #[must_use]
-    pub fn spring(elastic: Drive) -> Self {
+    pub fn spring(elastic: DepthDrive) -> Self {
         Self::settling(elastic, 0.0)
     }
 
     /// A spring in series with a dashpot that lets it relax in `tau` seconds.
     #[must_use]
-    pub fn maxwell(spring: Drive, tau: f64) -> Self {
+    pub fn maxwell(spring: DepthDrive, tau: f64) -> Self {
         Self::driven(spring.scaled(tau), tau)
     }
 
     /// Columns of a straight spring, and of one beside it whose modulus relaxes by
     /// `sum weight exp(-e^u t / tau)`.
     pub(super) fn spread(tau: f64, spectrum: Vec<(f64, f64)>) -> Vec<Vec<Self>> {
-        let spring = Drive::power(1, 1.0);
+        let spring = DepthDrive::power(1, 1.0);
         let relaxing = spectrum
             .into_iter()
             .map(|(u, weight)| Self::maxwell(spring, tau * (-u).exp()).scaled(weight));
         vec![vec![Self::spring(spring)], relaxing.collect()]
     }
 
-    /// The term times a number.
     #[must_use]
     pub fn scaled(self, by: f64) -> Self {
         Self { tau: self.tau, elastic: self.elastic.scaled(by), rate: self.rate.scaled(by) }
@@ -264,7 +262,7 @@ const SLOW: f64 = 1e-8;
 
 /// A straight piece of depth in contact.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct DepthPiece {
     pub x0: f64,
     pub d: f64,
     /// Duration in s, above zero.
@@ -277,8 +275,8 @@ pub(super) struct Piece {
 
 /// A term and its present value.
 #[derive(Clone, Debug)]
-pub(super) struct Relaxing {
-    pub term: Relaxation,
+pub(super) struct RelaxationState {
+    pub term: RelaxationTerm,
     /// Whether its elastic part or its rate depends on the greatest depth so far.
     pub softens: bool,
     value: Compensated,
@@ -288,13 +286,13 @@ pub(super) struct Relaxing {
     degree: usize,
     /// A step so short beside the relaxation time that it is a jump.
     is_sudden: bool,
-    /// What the next [`Relaxing::settle`] adds.
+    /// Change of the value by the next [`RelaxationState::settle`].
     pending: f64,
 }
 
-impl Relaxing {
+impl RelaxationState {
     /// A term held for ever at a depth in contact.
-    pub fn relaxed(term: Relaxation, depth: f64) -> Self {
+    pub fn relaxed(term: RelaxationTerm, depth: f64) -> Self {
         Self {
             term,
             softens: term.elastic.softens() || term.rate.softens(),
@@ -313,7 +311,7 @@ impl Relaxing {
 
     /// Prepares a step; `false` if its drive is not a finite number.
     #[inline]
-    pub fn prepare(&mut self, piece: &Piece) -> bool {
+    pub fn prepare(&mut self, piece: &DepthPiece) -> bool {
         if piece.dt != self.dt {
             self.dt = piece.dt;
             let r = piece.dt / self.term.tau;
@@ -326,7 +324,7 @@ impl Relaxing {
             self.pending = rise / self.term.tau;
             return self.is_bounded();
         }
-        let Piece { x0, d, dt, .. } = *piece;
+        let DepthPiece { x0, d, dt, .. } = *piece;
         // Powers that no drive has must not be formed: they may be no numbers where the force is one.
         let (speed, degree) = (d / dt, self.degree);
         let mut sum = if degree == 0 {
@@ -358,8 +356,8 @@ impl Relaxing {
 
     /// Coefficients by power of depth of the drive along the piece.
     #[inline]
-    fn polynomial(&self, piece: &Piece, speed: f64) -> [f64; POWER_MAX + 1] {
-        let Relaxation { elastic, rate, .. } = &self.term;
+    fn polynomial(&self, piece: &DepthPiece, speed: f64) -> [f64; POWER_MAX + 1] {
+        let RelaxationTerm { elastic, rate, .. } = &self.term;
         let mut c = [0.0; POWER_MAX + 1];
         for k in 1..=POWER_MAX {
             c[k] += elastic.powers[k - 1];
@@ -378,8 +376,8 @@ impl Relaxing {
         c
     }
 
-    /// What the exponentials add over the piece.
-    fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
+    /// Contribution of the exponentials over the piece.
+    fn exponential(&self, piece: &DepthPiece, speed: f64) -> f64 {
         if piece.d == 0.0 {
             // Held: no rate, and the elastic part stands still.
             return self
@@ -404,8 +402,8 @@ impl Relaxing {
 
     /// Mean of the term over a step, its value having been `before`: integrating `y + tau y' = u` needs
     /// no more than both ends.
-    pub fn mean(&self, before: f64, piece: &Piece) -> f64 {
-        let Relaxation { tau, elastic, rate } = &self.term;
+    pub fn mean(&self, before: f64, piece: &DepthPiece) -> f64 {
+        let RelaxationTerm { tau, elastic, rate } = &self.term;
         if piece.dt < SLOW * tau {
             return 0.5 * (before + self.value());
         }
@@ -415,7 +413,6 @@ impl Relaxing {
         elastic.mean(x0, x1, x_max) + (driven - tau * (self.value() - before)) / piece.dt
     }
 
-    /// Takes the prepared step.
     #[inline]
     pub fn settle(&mut self) {
         self.value.relax(self.pending, self.psi[0]);
@@ -429,7 +426,7 @@ impl Relaxing {
     /// Prepares a move from `x0` to `x1` in no time, which the elastic memory does not feel; `false`
     /// where the force is too large for a number.
     pub fn prepare_jump(&mut self, [x0, x1]: [f64; 2], [m0, m1]: [f64; 2]) -> bool {
-        let Relaxation { tau, elastic, rate } = &self.term;
+        let RelaxationTerm { tau, elastic, rate } = &self.term;
         self.pending = if *tau == 0.0 {
             // Without memory it is where the elastic part is.
             elastic.at(x1, m1) - self.value.value
@@ -439,7 +436,6 @@ impl Relaxing {
         self.is_bounded()
     }
 
-    /// Takes the prepared jump.
     pub fn settle_jump(&mut self) {
         self.value.add(self.pending);
     }

@@ -1,6 +1,6 @@
 //! The response of a sum of relaxation terms to any depth history.
 
-use super::relaxation::{Piece, Relaxation, Relaxing};
+use super::relaxation::{DepthPiece, RelaxationState, RelaxationTerm};
 use palpate_model::units::{Depth, Seconds};
 use palpate_model::viscoelastic::Pieces;
 use thiserror::Error;
@@ -18,54 +18,26 @@ pub(super) fn plain(value: &f64) -> String {
 /// A step that has no answer; the state is as it was before.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum StepError {
-    /// NaN or infinite depth.
     #[error("a depth of {0} mm is not a finite number; give the depth of the probe in mm")]
     Depth(f64),
-    /// Negative, NaN or infinite duration.
     #[error("a time step of {0} s is not possible; time steps are zero or more seconds")]
     Time(f64),
-    /// A dashpot moved in no time.
     #[error(
         "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
-    Jump {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-    },
-    /// Faster than numbers go.
+    Jump { from: f64, to: f64 },
     #[error(
         "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
-    Speed {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-        /// Duration in s.
-        dt: f64,
-    },
-    /// The force at rest cannot be written as a number.
+    Speed { from: f64, to: f64, dt: f64 },
     #[error(
-        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body", plain(.depth)
+        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the model", plain(.depth)
     )]
-    Rest {
-        /// Depth in mm.
-        depth: f64,
-    },
-    /// The force cannot be written as a number.
+    Rest { depth: f64 },
     #[error(
-        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the body", plain(.from), plain(.to), plain(.dt)
+        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the model", plain(.from), plain(.to), plain(.dt)
     )]
-    Overflow {
-        /// Depth before, in mm.
-        from: f64,
-        /// Depth after, in mm.
-        to: f64,
-        /// Duration in s.
-        dt: f64,
-    },
+    Overflow { from: f64, to: f64, dt: f64 },
 }
 
 /// Columns of terms that are moved together.
@@ -75,8 +47,7 @@ pub enum StepError {
 /// crosses the surface or, for terms that soften, the greatest depth so far.
 #[derive(Clone, Debug)]
 pub struct Response {
-    terms: Vec<Relaxing>,
-    /// Column of each term.
+    terms: Vec<RelaxationState>,
     columns: Vec<usize>,
     depth: f64,
     depth_max: f64,
@@ -86,10 +57,10 @@ pub struct Response {
 impl Response {
     /// Columns relaxed with the probe at `depth`: as if it had been held there for ever.
     #[must_use]
-    pub fn new(columns: &[Vec<Relaxation>], depth: Depth) -> Self {
+    pub fn new(columns: &[Vec<RelaxationTerm>], depth: Depth) -> Self {
         let start = depth.0.max(0.0);
-        let terms: Vec<Relaxing> =
-            columns.iter().flatten().map(|term| Relaxing::relaxed(*term, start)).collect();
+        let terms: Vec<RelaxationState> =
+            columns.iter().flatten().map(|term| RelaxationState::relaxed(*term, start)).collect();
         let softens = terms.iter().any(|one| one.softens);
         let owners = columns.iter().enumerate();
         Self {
@@ -103,19 +74,9 @@ impl Response {
         }
     }
 
-    /// Depth at the end of the last step.
-    pub fn depth(&self) -> Depth {
-        Depth(self.depth)
-    }
-
-    /// Greatest depth so far.
-    pub fn depth_max(&self) -> Depth {
-        Depth(self.depth_max)
-    }
-
     /// Sum of all terms, in the unit of their drives.
     pub fn sum(&self) -> f64 {
-        self.terms.iter().map(Relaxing::value).sum()
+        self.terms.iter().map(RelaxationState::value).sum()
     }
 
     /// Adds each column's value to its slot.
@@ -146,7 +107,7 @@ impl Response {
                     return Err(StepError::Overflow { from, to, dt });
                 }
             }
-            self.terms.iter_mut().for_each(Relaxing::settle_jump);
+            self.terms.iter_mut().for_each(RelaxationState::settle_jump);
             self.arrive(to);
             return Ok(());
         }
@@ -185,7 +146,7 @@ impl Response {
             self.add_to(slots);
             return Ok(());
         }
-        let before: Vec<f64> = self.terms.iter().map(Relaxing::value).collect();
+        let before: Vec<f64> = self.terms.iter().map(RelaxationState::value).collect();
         let (x0, x1) = (self.depth.max(0.0), depth.0.max(0.0));
         let piece = self.piece(x0, x1 - x0, dt.0);
         self.step(depth, dt)?;
@@ -206,8 +167,8 @@ impl Response {
         self.softens && x0 < self.depth_max && x1 > self.depth_max
     }
 
-    fn piece(&self, x0: f64, d: f64, dt: f64) -> Piece {
-        Piece { x0, d, dt, x_max: self.depth_max, primary: d >= 0.0 && x0 >= self.depth_max }
+    fn piece(&self, x0: f64, d: f64, dt: f64) -> DepthPiece {
+        DepthPiece { x0, d, dt, x_max: self.depth_max, primary: d >= 0.0 && x0 >= self.depth_max }
     }
 
     /// The parts of a step, in depth in contact and time.
@@ -235,30 +196,30 @@ impl Response {
     }
 
     #[inline]
-    fn advance(&mut self, piece: &Piece, [from, to, dt]: [f64; 3]) -> Result<(), StepError> {
+    fn advance(&mut self, piece: &DepthPiece, [from, to, dt]: [f64; 3]) -> Result<(), StepError> {
         for term in &mut self.terms {
             if !term.prepare(piece) {
                 return Err(StepError::Overflow { from, to, dt });
             }
         }
-        self.terms.iter_mut().for_each(Relaxing::settle);
+        self.terms.iter_mut().for_each(RelaxationState::settle);
         Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::relaxation::{Drive, Relaxation};
+    use super::super::relaxation::{DepthDrive, RelaxationTerm};
     use super::*;
 
     /// A spring that softens, in series with a dashpot: what it lost relaxes like the rest.
     fn softening_maxwell(softens: bool) -> Response {
-        let spring = Drive {
+        let spring = DepthDrive {
             powers: [0.2, 0.01, 0.0, 0.0, 0.0],
             softening: if softens { [-0.1, 0.004, -1e-4] } else { [0.0; 3] },
-            ..Drive::default()
+            ..DepthDrive::default()
         };
-        Response::new(&[vec![Relaxation::maxwell(spring, 3.0)]], Depth(0.0))
+        Response::new(&[vec![RelaxationTerm::maxwell(spring, 3.0)]], Depth(0.0))
     }
 
     /// Two ways of one path: in one step a piece, and in many. Depth over time is the same.
@@ -279,7 +240,7 @@ mod tests {
                 let miss = (whole.sum() - cut.sum()).abs();
                 assert!(miss < 1e-13, "{to} in {parts}: {miss:e}");
             }
-            assert_eq!(whole.depth_max(), Depth(12.0));
+            assert_eq!(whole.depth_max, 12.0);
         }
     }
 
@@ -298,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_softened_on_the_way_in() {
+    fn nothing_is_softened_on_first_loading() {
         let (mut soft, mut hard) = (softening_maxwell(true), softening_maxwell(false));
         for (dt, to) in [(1.0, 0.5), (2.0, 8.0), (1.0, 8.0), (0.0, 9.0), (1.0, 11.0)] {
             for body in [&mut soft, &mut hard] {

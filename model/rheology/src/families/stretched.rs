@@ -1,11 +1,9 @@
 //! Stretched exponential relaxation: a spring beside one that relaxes after Kohlrausch, Williams and Watts.
 
-use super::family::{Family, Outer, OuterRange};
-use super::model::ModelParameter;
-use super::relaxation::Relaxation;
-use super::table::Kind;
+use super::family::OuterRange;
+use super::spectrum::Spectrum;
+use super::table::FamilyKind;
 use std::f64::consts::{LN_10, PI};
-use std::sync::Arc;
 
 /// Relaxation modulus `k0 + k1 exp(-(t / tau)^beta)`; the force is `k0 x + k1 int exp(-((t - s) / tau)^beta) x' ds`.
 ///
@@ -21,64 +19,56 @@ use std::sync::Arc;
 ///
 /// Both integrands are positive and analytic, so the trapezoid rule converges exponentially (Trefethen & Weideman,
 /// SIAM Rev. 56 (2014) 385-458), and the body is a fixed pattern of Maxwell bodies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stretched {
-    digits: u32,
-}
+static STRETCHED: Spectrum = Spectrum {
+    word: "stretched",
+    name: "stretched exponential (Kohlrausch-Williams-Watts)",
+    equation: "F = k0 x + k1 int exp(-((t - s)/tau)^beta) x' ds",
+    cannot_represent: "stiffness that grows with depth; unloading that differs from loading; beta above 0.9, which is nearly a Kelvin body",
+    adds: "relaxation that slows down as it goes on",
+    exponent: ("beta", OuterRange::Share(0.1, 0.9)),
+    digits_max: 10,
+    shares,
+};
 
-/// Digits of the modulus unless asked otherwise: a tenth of what a good load cell resolves.
-const DIGITS: u32 = 4;
-/// Digits that suffice to find the valley: a percent of the modulus.
-const COARSE_DIGITS: u32 = 2;
+pub(super) const KIND: FamilyKind =
+    FamilyKind { word: "stretched", of: |number| STRETCHED.family(number), compared: None };
+
 /// Digits beyond those asked for: the bound of the rule grows where a strip of analyticity ends.
 const GUARD_DIGITS: f64 = 0.75;
-/// Logarithm of relaxation times shorter than `tau` that no recording can tell from none: twelve decades. What lies
+/// Logarithm of relaxation times shorter than `tau` that no recording resolves: twelve decades. What lies
 /// beyond is lumped there.
 const REACH: f64 = 12.0 * LN_10;
 
-pub(super) const KIND: Kind = Kind {
-    word: "stretched",
-    of: |number| {
-        let digits = number.map_or(Some(DIGITS), |one| u32::try_from(one).ok());
-        let digits = digits.filter(|one| (1..=10).contains(one))?;
-        Some(Arc::new(Stretched { digits }))
-    },
-    compared: None,
-};
-
-impl Stretched {
-    /// `(u, weight)`: shares of the modulus that relax by `exp(-s e^u)`, together one.
-    fn spectrum(self, beta: f64) -> Vec<(f64, f64)> {
-        let accuracy = (f64::from(self.digits) + GUARD_DIGITS) * LN_10;
-        let p = beta / (1.0 - beta);
-        // The real part of w stays positive up to +-i pi / (2 p), that of e^u up to +-i pi / 2, and near phi = pi w
-        // grows like a power 1 / (1 - beta) of the distance. A rule errs by exp(-2 pi width / step).
-        let step = 2.0 * PI * (0.5 * PI / p).min(0.5 * PI) / accuracy;
-        let angles = angles(beta, 2.0 * PI * (0.5 * PI * (1.0 - beta)) / accuracy, accuracy);
-        // K ends where the smallest w, at phi = 0, is large, and falls like exp(-beta u).
-        let least = (1.0 - beta).ln() + p * beta.ln();
-        let first = ((least - (accuracy + 4.0).ln()) / (p * step)).floor() as i32;
-        let (last, share_of_last) = end((accuracy / beta).min(REACH) / step);
-        let mut shares: Vec<(f64, f64)> = (first..=last)
-            .map(|m| {
-                let u = step * f64::from(m);
-                let sum = angles.iter().map(|(weight, ln_a)| {
-                    let w = (ln_a - p * u).exp();
-                    weight * w * (-w).exp()
-                });
-                let sum: f64 = sum.filter(|one| one.is_finite()).sum();
-                let share = if m == last { share_of_last } else { 1.0 };
-                (u, share * step * p * sum)
-            })
-            .collect();
-        // Faster ones are lumped into the fastest two, so that the instantaneous modulus is exact.
-        let missing = 1.0 - shares.iter().map(|one| one.1).sum::<f64>();
-        if let [.., before, fastest] = shares.as_mut_slice() {
-            before.1 += missing * (1.0 - share_of_last);
-            fastest.1 += missing * share_of_last;
-        }
-        shares
+fn shares(digits: u32, beta: f64) -> Vec<(f64, f64)> {
+    let accuracy = (f64::from(digits) + GUARD_DIGITS) * LN_10;
+    let p = beta / (1.0 - beta);
+    // The real part of w stays positive up to +-i pi / (2 p), that of e^u up to +-i pi / 2, and near phi = pi w
+    // grows like a power 1 / (1 - beta) of the distance. A rule errs by exp(-2 pi width / step).
+    let step = 2.0 * PI * (0.5 * PI / p).min(0.5 * PI) / accuracy;
+    let angles = angles(beta, 2.0 * PI * (0.5 * PI * (1.0 - beta)) / accuracy, accuracy);
+    // K ends where the smallest w, at phi = 0, is large, and falls like exp(-beta u).
+    let least = (1.0 - beta).ln() + p * beta.ln();
+    let first = ((least - (accuracy + 4.0).ln()) / (p * step)).floor() as i32;
+    let (last, share_of_last) = end((accuracy / beta).min(REACH) / step);
+    let mut shares: Vec<(f64, f64)> = (first..=last)
+        .map(|m| {
+            let u = step * f64::from(m);
+            let sum = angles.iter().map(|(weight, ln_a)| {
+                let w = (ln_a - p * u).exp();
+                weight * w * (-w).exp()
+            });
+            let sum: f64 = sum.filter(|one| one.is_finite()).sum();
+            let share = if m == last { share_of_last } else { 1.0 };
+            (u, share * step * p * sum)
+        })
+        .collect();
+    // Faster ones are lumped into the fastest two, so that the instantaneous modulus is exact.
+    let missing = 1.0 - shares.iter().map(|one| one.1).sum::<f64>();
+    if let [.., before, fastest] = shares.as_mut_slice() {
+        before.1 += missing * (1.0 - share_of_last);
+        fastest.1 += missing * share_of_last;
     }
+    shares
 }
 
 /// The last of the nodes 1, 2, 3 .. that reach so far, and how much of it counts: a node comes in with nothing, so that
@@ -105,59 +95,6 @@ fn angles(beta: f64, step: f64, accuracy: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-impl Family for Stretched {
-    fn key(&self) -> String {
-        match self.digits {
-            DIGITS => "stretched".into(),
-            digits => format!("stretched-{digits}"),
-        }
-    }
-
-    fn name(&self) -> String {
-        "stretched exponential (Kohlrausch-Williams-Watts)".into()
-    }
-
-    fn equation(&self) -> &'static str {
-        "F = k0 x + k1 int exp(-((t - s)/tau)^beta) x' ds"
-    }
-
-    fn cannot_represent(&self) -> &'static str {
-        "stiffness that grows with depth; unloading that differs from loading; beta above 0.9, which is nearly a Kelvin body"
-    }
-
-    fn adds_to(&self) -> Vec<(String, &'static str)> {
-        vec![("kelvin".into(), "relaxation that slows down as it goes on")]
-    }
-
-    fn outer(&self) -> Vec<Outer> {
-        vec![
-            Outer::new("tau", "s", OuterRange::Time),
-            Outer::new("beta", "", OuterRange::Share(0.1, 0.9)),
-        ]
-    }
-
-    fn linear(&self) -> Vec<(String, &'static str)> {
-        vec![("k_0".into(), "N/mm"), ("k_1".into(), "N/mm")]
-    }
-
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        Relaxation::spread(outer[0], self.spectrum(outer[1]))
-    }
-
-    fn coarse(&self) -> Option<Arc<dyn Family>> {
-        let digits = COARSE_DIGITS;
-        (self.digits > digits).then(|| Arc::new(Self { digits }) as _)
-    }
-
-    fn is_non_negative(&self, coefficient: usize) -> bool {
-        coefficient > 0
-    }
-
-    fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter::new("k_instant", linear[0] + linear[1], "N/mm")]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,7 +103,7 @@ mod tests {
     fn relaxation_is_the_stretched_exponential_to_as_many_digits_as_asked() {
         for digits in [2, 4, 6, 8] {
             for beta in [0.1, 0.25, 0.5, 0.7, 0.9] {
-                let spectrum = Stretched { digits }.spectrum(beta);
+                let spectrum = shares(digits, beta);
                 assert!((spectrum.iter().map(|one| one.1).sum::<f64>() - 1.0).abs() < 1e-14);
                 // Twelve decades of time, but those that are lumped at the ends.
                 for i in -60..=60 {
@@ -182,13 +119,12 @@ mod tests {
 
     #[test]
     fn relaxation_changes_evenly_with_beta() {
-        // What it is off by changes by 2.5e-5 at most; where a node comes in whole, by 6.5e-5.
-        let family = Stretched { digits: 3 };
+        // The error changes by 2.5e-5 at most; where a node comes in whole, by 6.5e-5.
         for s in [1e-3f64, 0.1, 1.0, 20.0] {
             let mut before = None;
             for i in 0..=800 {
                 let beta = 0.1 + 0.001 * f64::from(i);
-                let spectrum = family.spectrum(beta);
+                let spectrum = shares(3, beta);
                 let shares = spectrum.iter().map(|(u, share)| share * (-s * u.exp()).exp());
                 let off = shares.sum::<f64>() - (-s.powf(beta)).exp();
                 let moved = (off - before.unwrap_or(off)).abs();

@@ -1,4 +1,4 @@
-//! Every family there is, and how its key is read.
+//! The table of all families, and the reading of their keys.
 
 use super::family::Family;
 use std::ops::RangeInclusive;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Every kind of family, the simplest first: a kind that is not here is in no list and has no key.
-const TABLE: &[Kind] = &[
+const TABLE: &[FamilyKind] = &[
     super::voigt::KIND,
     super::maxwell::KIND,
     super::kelvin::KIND,
@@ -20,7 +20,7 @@ const TABLE: &[Kind] = &[
 ];
 
 /// Families of one equation.
-pub(super) struct Kind {
+pub(super) struct FamilyKind {
     /// Their key, before a hyphen and a number where there is one.
     pub word: &'static str,
     /// The family of the word alone or with a number; `None` where there is none.
@@ -29,13 +29,10 @@ pub(super) struct Kind {
     pub compared: Option<RangeInclusive<usize>>,
 }
 
-/// No family has this key.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("there is no model family '{key}'; there are {known}")]
 pub struct UnknownFamily {
-    /// What was asked for.
     pub key: String,
-    /// Keys there are.
     pub known: String,
 }
 
@@ -43,7 +40,7 @@ pub struct UnknownFamily {
 /// unloading of other orders than the third is there by its key.
 #[must_use]
 pub fn all() -> Vec<Arc<dyn Family>> {
-    let members = |kind: &Kind| -> Vec<Arc<dyn Family>> {
+    let members = |kind: &FamilyKind| -> Vec<Arc<dyn Family>> {
         match kind.compared.clone() {
             None => (kind.of)(None).into_iter().collect(),
             Some(numbers) => numbers.filter_map(|one| (kind.of)(Some(one))).collect(),
@@ -73,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_family_is_found_by_the_key_that_it_tells() {
+    fn every_family_is_found_by_its_own_key() {
         let all = all();
         assert!(all.len() >= TABLE.len());
         for family in &all {
@@ -82,7 +79,7 @@ mod tests {
                 assert!(by_key(&simpler).is_ok() && words.len() > 5, "{simpler}");
             }
         }
-        // Keys of families that are compared only where somebody names them.
+        // Keys of families that are compared only where they are named.
         for key in ["prony-1", "prony-40", "unloading-1", "fung-8", "fractional-12"] {
             assert_eq!(by_key(key).unwrap().key(), key);
         }

@@ -1,9 +1,9 @@
 //! Unloading: the modified Kelvin body that is softer where it has been deeper.
 
-use super::family::{Family, Outer};
+use super::family::{Family, OuterParameter};
 use super::power_series::PowerSeries;
-use super::relaxation::{Drive, Relaxation, SOFTENING_MAX};
-use super::table::Kind;
+use super::relaxation::{DepthDrive, RelaxationTerm, SOFTENING_MAX};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x' + (s1 x + s2 x^2 + s3 x^3) (1 - x / x_max)`,
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// coefficients and has an exact step. Three powers, for a loop may be thick near the surface, in the middle
 /// or near the turning point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unloading {
+pub(super) struct Unloading {
     loading: PowerSeries,
     order: usize,
 }
@@ -26,17 +26,12 @@ pub struct Unloading {
 /// Units of `s1 ..= s3`.
 const UNITS: [&str; SOFTENING_MAX] = ["N/mm", "N/mm^2", "N/mm^3"];
 
-impl Unloading {
-    /// Unloading of the series cut off after `order` terms; `None` unless that is one to five.
-    #[must_use]
-    pub fn of_order(order: usize) -> Option<Self> {
-        PowerSeries::of_order(order).map(|loading| Self { loading, order })
-    }
-}
-
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "unloading",
-    of: |number| Some(Arc::new(Unloading::of_order(number?)?)),
+    of: |number| {
+        let order = number?;
+        PowerSeries::of_order(order).map(|loading| Arc::new(Unloading { loading, order }) as _)
+    },
     compared: Some(3..=3),
 };
 
@@ -61,7 +56,7 @@ impl Family for Unloading {
         vec![(self.loading.key(), "softness after greater depth")]
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         self.loading.outer()
     }
 
@@ -70,9 +65,9 @@ impl Family for Unloading {
         self.loading.linear().into_iter().chain(softening).collect()
     }
 
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         let softening = (1..=SOFTENING_MAX)
-            .map(|k| vec![Relaxation::settling(Drive::softening(k, 1.0), outer[0])]);
+            .map(|k| vec![RelaxationTerm::settling(DepthDrive::softening(k, 1.0), outer[0])]);
         let loading = self.loading.columns(outer);
         loading.into_iter().chain(softening).collect()
     }

@@ -1,8 +1,8 @@
 //! The Voigt body: a spring and a dashpot side by side.
 
-use super::family::{Family, Outer};
-use super::relaxation::{Drive, Relaxation};
-use super::table::Kind;
+use super::family::{Family, OuterParameter};
+use super::relaxation::{DepthDrive, RelaxationTerm};
+use super::table::FamilyKind;
 use std::sync::Arc;
 
 /// `F = k x + eta x'`.
@@ -11,9 +11,9 @@ use std::sync::Arc;
 /// family that looks at speed directly, the mean speed since the sample before: noise of the depth
 /// goes into its force undamped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Voigt;
+pub(super) struct Voigt;
 
-pub(super) const KIND: Kind = Kind {
+pub(super) const KIND: FamilyKind = FamilyKind {
     word: "voigt",
     of: |number| number.is_none().then(|| Arc::new(Voigt) as _),
     compared: None,
@@ -36,7 +36,7 @@ impl Family for Voigt {
         "relaxation at constant depth: its force falls at once when the probe stops; a jump of depth, which would take an infinite force; stiffness that grows with depth"
     }
 
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         Vec::new()
     }
 
@@ -44,9 +44,9 @@ impl Family for Voigt {
         vec![("k".into(), "N/mm"), ("eta".into(), "N*s/mm")]
     }
 
-    fn columns(&self, _outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let dashpot = Relaxation::driven(Drive::power(1, 1.0), 0.0);
-        vec![vec![Relaxation::spring(Drive::power(1, 1.0))], vec![dashpot]]
+    fn columns(&self, _outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        let dashpot = RelaxationTerm::driven(DepthDrive::power(1, 1.0), 0.0);
+        vec![vec![RelaxationTerm::spring(DepthDrive::power(1, 1.0))], vec![dashpot]]
     }
 }
 

@@ -1,9 +1,9 @@
-//! Sums of a record's columns over blocks of samples, from which the memory of its residuals is judged.
+//! Sums of a record's columns over blocks of samples, from which the autocorrelation of its residuals is estimated.
 
 use super::design::{LANES, Lane};
 use super::sample::FitSample;
 
-/// Blocks of residuals kept for judging their memory, at most about.
+/// About the largest number of blocks in which autocorrelation is estimated.
 const NOISE_BLOCKS: usize = 400;
 
 /// Sums over one block of samples of all columns of a record's triangle, times their weights.

@@ -1,11 +1,11 @@
 //! Block bootstrap: the fit repeated on its own residuals, shuffled in blocks.
 //!
-//! Blocks longer than the memory keep it; what lies within a block stays together (Kunsch, Ann.
+//! Blocks longer than the correlation time preserve it; what lies within a block stays together (Kunsch, Ann.
 //! Stat. 17 (1989) 1217-1241). It assumes neither a shape of the noise nor a parabola of the sum of
 //! squares, and takes hundreds of fits.
 
 use super::record::Record;
-use super::refine::{Settle, refine};
+use super::refine::{StopRule, refine};
 use super::sample::{FitError, FitSample};
 use super::solve::Fitted;
 use super::system::Rows;
@@ -20,7 +20,6 @@ const MEMORIES: f64 = 4.0;
 /// Fewer blocks than this cannot be shuffled to any purpose.
 const BLOCKS_MIN: usize = 8;
 
-/// What to repeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bootstrap {
     /// Seed of the shuffling: the same seed gives the same intervals on any machine.
@@ -32,7 +31,6 @@ pub struct Bootstrap {
 /// A 95 % interval from the percentiles of repeated fits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BootstrapInterval {
-    /// The parameter.
     pub name: String,
     /// Standard deviation of the repeated fits, in the parameter's unit.
     pub std_dev: f64,
@@ -41,8 +39,8 @@ pub struct BootstrapInterval {
 }
 
 impl Fitted<'_> {
-    /// Bootstrap intervals of the free parameters of one record; `progress` hears how many fits are
-    /// done. Refused where the residuals remember so long that the record has too few blocks.
+    /// Bootstrap intervals of the free parameters of one record; `progress` gets how many fits are
+    /// done. Refused where the correlation time is so long that the record has too few blocks.
     pub fn bootstrap(
         &self,
         record: usize,
@@ -53,7 +51,7 @@ impl Fitted<'_> {
             return Ok(Vec::new());
         }
         let uncertainty = Uncertainty::of(&self.system, &self.refined);
-        let sources: Vec<Residuals> = (0..self.system.records.len())
+        let sources: Vec<ResidualSource> = (0..self.system.records.len())
             .map(|record| self.residual_source(&uncertainty, record))
             .collect();
         if let Some(short) = sources.iter().find(|source| source.blocks() < BLOCKS_MIN) {
@@ -71,9 +69,9 @@ impl Fitted<'_> {
                 .map(|(source, record)| source.shuffled(record.samples, &mut random))
                 .collect();
             let system = self.system.with_samples(&shuffled);
-            let refined = refine(&system, &self.refined.points, Rows::All, Settle::Noise);
+            let refined = refine(&system, &self.refined.points, Rows::All, StopRule::Noise);
             let refined = refined.ok_or(FitError::Overflow)?;
-            let values = system.physical(record, &refined.points[record]);
+            let values = system.physical_values(record, &refined.points[record]);
             for (list, &parameter) in found.iter_mut().zip(&free) {
                 list.push(values[parameter]);
             }
@@ -99,7 +97,7 @@ impl Fitted<'_> {
 
     /// Model and residuals of a record, the latter in units of each sample's sigma and widened by
     /// what the fit has taken out of them.
-    fn residual_source(&self, uncertainty: &Uncertainty, record: usize) -> Residuals {
+    fn residual_source(&self, uncertainty: &Uncertainty, record: usize) -> ResidualSource {
         let Record { samples, measured, .. } = self.system.records[record];
         let point = &self.refined.points[record];
         let scale = self.system.scale(&point.outer);
@@ -112,7 +110,7 @@ impl Fitted<'_> {
             .collect();
         let block = uncertainty.block_length(record);
         let memory = uncertainty.memory(record);
-        let remembered = memory
+        let correlation_samples = memory
             .filter(|memory| memory.neighbour > 0.0)
             .map_or(0.0, |memory| block / -memory.forgetting.ln());
         let white = uncertainty.scatter.unwrap_or(0.0).powi(2);
@@ -124,18 +122,18 @@ impl Fitted<'_> {
         let widened = (effective / (effective - taken).max(1.0)).sqrt();
         residuals.iter_mut().for_each(|residual| *residual *= widened);
         // The cube root of the count is the usual length for noise without memory.
-        let length = (MEMORIES * remembered).max((measured as f64).cbrt()) as usize;
-        Residuals { model, length: length.clamp(1, residuals.len().max(1)), residuals }
+        let length = (MEMORIES * correlation_samples).max((measured as f64).cbrt()) as usize;
+        ResidualSource { model, length: length.clamp(1, residuals.len().max(1)), residuals }
     }
 }
 
-struct Residuals {
+struct ResidualSource {
     model: Vec<f64>,
     residuals: Vec<f64>,
     length: usize,
 }
 
-impl Residuals {
+impl ResidualSource {
     /// How many blocks the record has.
     fn blocks(&self) -> usize {
         self.residuals.len() / self.length
@@ -143,7 +141,7 @@ impl Residuals {
 
     fn shuffled(&self, samples: &[FitSample], random: &mut SplitMix) -> Vec<FitSample> {
         let starts = self.residuals.len() - self.length + 1;
-        let (mut at, mut left) = (0, 0);
+        let (mut next, mut remaining) = (0, 0);
         samples
             .iter()
             .zip(&self.model)
@@ -151,11 +149,11 @@ impl Residuals {
                 if !sample.is_measured() {
                     return *sample;
                 }
-                if left == 0 {
-                    (at, left) = (random.below(starts), self.length);
+                if remaining == 0 {
+                    (next, remaining) = (random.below(starts), self.length);
                 }
-                let residual = self.residuals[at] * sample.sigma.0;
-                (at, left) = (at + 1, left - 1);
+                let residual = self.residuals[next] * sample.sigma.0;
+                (next, remaining) = (next + 1, remaining - 1);
                 FitSample { force: Newtons(model + residual), ..*sample }
             })
             .collect()

@@ -8,7 +8,7 @@ use super::options::Layout;
 use super::sample::FitSample;
 use super::thin::Block;
 use super::triangle::{Factor, Triangle};
-use crate::families::{Family, Kernel, OuterRange, Relaxation, Response, joined};
+use crate::families::{Family, Kernel, OuterRange, RelaxationTerm, Response, joined};
 use palpate_model::units::{Depth, Seconds};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const DIFFERENCE: f64 = 1e-5;
 
 /// The parameters in which the model is not linear.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Outer {
+pub(super) struct OuterPoint {
     /// Those of the family in their units. Steps of a relaxation time are taken in its logarithm, but that is never
     /// stored: rounding `ln 80` costs another parameter up to the tenth digit.
     pub values: Vec<f64>,
@@ -28,8 +28,8 @@ pub(super) struct Outer {
 
 /// All parameters of one record: outer ones, and coefficients of its columns.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Point {
-    pub outer: Outer,
+pub(super) struct ParameterPoint {
+    pub outer: OuterPoint,
     pub at: Vec<f64>,
 }
 
@@ -51,7 +51,7 @@ pub(super) fn coordinate(range: OuterRange, value: f64) -> f64 {
 }
 
 /// The value a step of the search coordinate away.
-pub(super) fn stepped(range: OuterRange, value: f64, step: f64) -> f64 {
+pub(super) fn step_value(range: OuterRange, value: f64, step: f64) -> f64 {
     match range {
         OuterRange::Share(..) => value + step,
         _ => value + value * step.exp_m1(),
@@ -59,7 +59,7 @@ pub(super) fn stepped(range: OuterRange, value: f64, step: f64) -> f64 {
 }
 
 /// Derivative of an outer parameter by its search coordinate.
-pub(super) fn stretch(range: OuterRange, value: f64) -> f64 {
+pub(super) fn coordinate_slope(range: OuterRange, value: f64) -> f64 {
     match range {
         OuterRange::Share(..) => 1.0,
         _ => value,
@@ -68,7 +68,7 @@ pub(super) fn stretch(range: OuterRange, value: f64) -> f64 {
 
 /// Where a family's columns come from.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(super) struct ColumnSource {
     pub family: Arc<dyn Family>,
     pub layout: Layout,
     kernel: Kernel,
@@ -76,14 +76,14 @@ pub(super) struct Source {
 }
 
 /// Columns at up to 64 samples, and slopes where they were asked for.
-pub(super) enum Filled<'r> {
+pub(super) enum ColumnBlock<'r> {
     Kernel(&'r Rows),
     Terms(&'r [Lane]),
 }
 
-impl Filled<'_> {
+impl ColumnBlock<'_> {
     #[inline(always)]
-    pub fn write(&self, columns: &mut [Lane], point: &Point, slopes: &[Slope]) {
+    pub fn write(&self, columns: &mut [Lane], point: &ParameterPoint, slopes: &[Slope]) {
         match self {
             Self::Kernel(rows) => {
                 rows.values(columns);
@@ -100,7 +100,7 @@ impl Filled<'_> {
     }
 }
 
-impl Source {
+impl ColumnSource {
     /// A body `at_rest` at its first depth has no kernel: that one starts from zero force.
     pub fn new(family: Arc<dyn Family>, at_rest: bool) -> Self {
         Self {
@@ -124,11 +124,11 @@ impl Source {
         self.kinds == [OuterRange::Time]
     }
 
-    pub fn kind(&self, outer: usize) -> OuterRange {
+    pub fn range_kind(&self, outer: usize) -> OuterRange {
         self.kinds[outer]
     }
 
-    /// What to divide coefficients of bare columns by to have them in their units.
+    /// Divisors that turn coefficients of bare columns into their units.
     pub fn units(&self, depth_mm: f64) -> Vec<f64> {
         match self.kernel {
             Kernel::ThirdOrder => design::linear_units(depth_mm).to_vec(),
@@ -137,7 +137,7 @@ impl Source {
     }
 
     /// Coefficients of bare columns, of which each is one parameter.
-    pub fn bare(&self, at: &[f64]) -> Vec<f64> {
+    pub fn to_bare(&self, at: &[f64]) -> Vec<f64> {
         let mut bare = at.to_vec();
         if self.is_fast() {
             bare[..3].copy_from_slice(&design::powers_from_legendre(&six(at)));
@@ -146,7 +146,7 @@ impl Source {
     }
 
     /// Coefficients of the columns, from those of bare ones.
-    pub fn basis(&self, bare: &[f64]) -> Vec<f64> {
+    pub fn to_basis(&self, bare: &[f64]) -> Vec<f64> {
         match self.kernel {
             Kernel::ThirdOrder => design::legendre_from_powers(&six(bare)).to_vec(),
             Kernel::Terms => bare.to_vec(),
@@ -154,7 +154,7 @@ impl Source {
     }
 
     /// How many of the first columns are nearly orthogonal combinations of the bare ones up to them.
-    pub fn combined(&self) -> usize {
+    pub fn combined_count(&self) -> usize {
         if self.is_fast() { 3 } else { 0 }
     }
 
@@ -165,37 +165,37 @@ impl Source {
         &self,
         samples: &[FitSample],
         scale: Scale,
-        point: &Point,
+        point: &ParameterPoint,
         slopes: &[Slope],
-        mut visit: impl FnMut(&[FitSample], &Filled<'_>),
+        mut visit: impl FnMut(&[FitSample], &ColumnBlock<'_>),
     ) -> Option<()> {
         match (self.kernel, slopes) {
             (Kernel::ThirdOrder, []) => {
                 design::walk::<false>(samples, scale, point.outer.values[0], |block, rows| {
-                    visit(block, &Filled::Kernel(rows));
+                    visit(block, &ColumnBlock::Kernel(rows));
                 });
             }
             (Kernel::ThirdOrder, _) => {
                 design::walk::<true>(samples, scale, point.outer.values[0], |block, rows| {
-                    visit(block, &Filled::Kernel(rows));
+                    visit(block, &ColumnBlock::Kernel(rows));
                 });
             }
             (Kernel::Terms, _) => {
                 let mut lanes = vec![[0.0; LANES]; self.layout.linear_count() + slopes.len()];
-                let mut moving = self.moving(samples[0].depth.0, scale, point, slopes);
+                let mut walk = self.start_walk(samples[0].depth.0, scale, point, slopes);
                 let mut before = samples[0].t.0;
                 for block in samples.chunks(LANES) {
                     for (i, sample) in block.iter().enumerate() {
-                        moving.advance(sample.depth.0, sample.t.0 - before)?;
+                        walk.advance(sample.depth.0, sample.t.0 - before)?;
                         before = sample.t.0;
                         if sample.is_measured() {
-                            let row = moving.row(self.layout);
+                            let row = walk.row(self.layout);
                             for (lane, value) in lanes.iter_mut().zip(row) {
                                 lane[i] = *value;
                             }
                         }
                     }
-                    visit(block, &Filled::Terms(&lanes));
+                    visit(block, &ColumnBlock::Terms(&lanes));
                 }
             }
         }
@@ -203,21 +203,26 @@ impl Source {
     }
 
     /// The modelled force at every sample; `None` where there is no finite one.
-    pub fn forces(&self, samples: &[FitSample], scale: Scale, point: &Point) -> Option<Vec<f64>> {
+    pub fn forces(
+        &self,
+        samples: &[FitSample],
+        scale: Scale,
+        point: &ParameterPoint,
+    ) -> Option<Vec<f64>> {
         let mut forces = Vec::with_capacity(samples.len());
         if self.is_fast() {
-            let bare = six(&self.bare(&point.at));
+            let bare = six(&self.to_bare(&point.at));
             design::walk::<false>(samples, scale, point.outer.values[0], |block, rows| {
                 forces.extend_from_slice(&rows.force(&bare)[..block.len()]);
             });
             return Some(forces);
         }
-        let mut moving = self.moving(samples.first()?.depth.0, scale, point, &[]);
+        let mut walk = self.start_walk(samples.first()?.depth.0, scale, point, &[]);
         let mut before = samples[0].t.0;
         for sample in samples {
-            moving.advance(sample.depth.0, sample.t.0 - before)?;
+            walk.advance(sample.depth.0, sample.t.0 - before)?;
             before = sample.t.0;
-            let row = moving.row(self.layout);
+            let row = walk.row(self.layout);
             forces.push(row.iter().zip(&point.at).map(|(a, b)| a * b).sum());
         }
         Some(forces)
@@ -228,7 +233,7 @@ impl Source {
         &self,
         blocks: &[Block],
         scale: Scale,
-        point: &Point,
+        point: &ParameterPoint,
         slopes: &[Slope],
     ) -> Option<Factor> {
         if self.is_fast() && slopes.is_empty() {
@@ -237,11 +242,11 @@ impl Source {
         let width = self.layout.linear_count() + slopes.len() + 1;
         let mut triangle = Triangle::new(width);
         let mut columns = vec![0.0; width];
-        let mut moving = self.moving(blocks.first()?.depth, scale, point, slopes);
+        let mut walk = self.start_walk(blocks.first()?.depth, scale, point, slopes);
         for block in blocks {
-            moving.advance_mean(block)?;
+            walk.advance_mean(block)?;
             if block.weight > 0.0 {
-                columns[..width - 1].copy_from_slice(moving.row(self.layout));
+                columns[..width - 1].copy_from_slice(walk.row(self.layout));
                 columns[width - 1] = block.force;
                 triangle.push(&columns, block.weight);
             }
@@ -251,31 +256,37 @@ impl Source {
     }
 
     /// Visits the ends of a thinned record's blocks on its redrawn path, with bare columns and slopes there.
-    pub fn redrawn(
+    pub fn visit_redrawn(
         &self,
         blocks: &[Block],
         scale: Scale,
-        point: &Point,
+        point: &ParameterPoint,
         slopes: &[Slope],
         mut visit: impl FnMut(&Block, &[f64]),
     ) -> Option<()> {
         if self.is_fast() {
             let tau = point.outer.values[0];
-            design_blocks::redrawn(blocks, scale, tau, &six(&point.at), &mut visit);
+            design_blocks::visit_redrawn(blocks, scale, tau, &six(&point.at), &mut visit);
             return Some(());
         }
-        let mut moving = self.moving(blocks.first()?.redrawn, scale, point, slopes);
+        let mut walk = self.start_walk(blocks.first()?.redrawn, scale, point, slopes);
         for block in blocks {
-            moving.advance(block.redrawn, block.dt)?;
-            visit(block, moving.row(self.layout));
+            walk.advance(block.redrawn, block.dt)?;
+            visit(block, walk.row(self.layout));
         }
         Some(())
     }
 
-    fn moving(&self, start: f64, scale: Scale, point: &Point, slopes: &[Slope]) -> Moving {
-        let Outer { values, contact } = &point.outer;
+    fn start_walk(
+        &self,
+        start: f64,
+        scale: Scale,
+        point: &ParameterPoint,
+        slopes: &[Slope],
+    ) -> ColumnWalk {
+        let OuterPoint { values, contact } = &point.outer;
         let contact = contact * scale.depth_mm;
-        let body = |columns: &[Vec<Relaxation>], contact: f64| Body {
+        let body = |columns: &[Vec<RelaxationTerm>], contact: f64| ContactResponse {
             response: Response::new(columns, Depth(start - contact)),
             contact,
             values: vec![0.0; columns.len()],
@@ -291,13 +302,13 @@ impl Source {
                 Slope::Outer(index) => {
                     let [up, down] = [DIFFERENCE, -DIFFERENCE].map(|step| {
                         let mut shifted = values.clone();
-                        shifted[index] = stepped(self.kinds[index], values[index], step);
+                        shifted[index] = step_value(self.kinds[index], values[index], step);
                         fading.push(self.family.fading(&shifted));
                         joined(&self.family.columns(&shifted), coefficients())
                     });
-                    let only = |one: &[Relaxation], other: &[Relaxation]| {
-                        let kept = one.iter().filter(|term| !other.contains(term));
-                        vec![kept.copied().collect::<Vec<_>>()]
+                    let only = |one: &[RelaxationTerm], other: &[RelaxationTerm]| {
+                        let terms = one.iter().filter(|term| !other.contains(term));
+                        vec![terms.copied().collect::<Vec<_>>()]
                     };
                     bodies.push(body(&only(&up, &down), contact));
                     bodies.push(body(&only(&down, &up), contact));
@@ -311,39 +322,38 @@ impl Source {
                 }
             }
         }
-        Moving {
+        ColumnWalk {
             bodies,
             fading,
             initial,
             elapsed: 0.0,
-            shown: 0.0,
+            fade_time: 0.0,
             row: vec![0.0; self.layout.linear_count() + slopes.len()],
         }
     }
 }
 
 /// A response to depth over its own contact position.
-struct Body {
+struct ContactResponse {
     response: Response,
-    /// In mm.
     contact: f64,
     /// Of its columns, now or as means over a block.
     values: Vec<f64>,
 }
 
 /// The columns of a family, then for each slope the body shifted up and down, on their way along a record.
-struct Moving {
-    bodies: Vec<Body>,
+struct ColumnWalk {
+    bodies: Vec<ContactResponse>,
     /// Time in which the initial force fades, for each body.
     fading: Vec<Option<f64>>,
     initial: f64,
     elapsed: f64,
-    /// Time at which what fades is shown.
-    shown: f64,
+    /// Time at which the fading terms are evaluated.
+    fade_time: f64,
     row: Vec<f64>,
 }
 
-impl Moving {
+impl ColumnWalk {
     fn advance(&mut self, depth: f64, dt: f64) -> Option<()> {
         for body in &mut self.bodies {
             if dt > 0.0 {
@@ -354,7 +364,7 @@ impl Moving {
             body.response.add_to(&mut body.values);
         }
         self.elapsed += dt;
-        self.shown = self.elapsed;
+        self.fade_time = self.elapsed;
         Some(())
     }
 
@@ -370,8 +380,8 @@ impl Moving {
             step.ok()?;
         }
         self.elapsed += block.dt;
-        // What fades at the middle of the block: its mean to second order.
-        self.shown = self.elapsed - 0.5 * block.dt * (1.0 - 1.0 / block.count as f64);
+        // The fading terms at the middle of the block: their mean to second order.
+        self.fade_time = self.elapsed - 0.5 * block.dt * (1.0 - 1.0 / block.count as f64);
         Some(())
     }
 
@@ -379,7 +389,7 @@ impl Moving {
     fn row(&mut self, layout: Layout) -> &[f64] {
         let Layout { coefficients, .. } = layout;
         let linear = layout.linear_count();
-        let faded = |tau: Option<f64>| tau.map_or(0.0, |tau| (-self.shown / tau).exp());
+        let faded = |tau: Option<f64>| tau.map_or(0.0, |tau| (-self.fade_time / tau).exp());
         self.row[..coefficients].copy_from_slice(&self.bodies[0].values);
         if layout.fades {
             self.row[coefficients] = faded(self.fading[0]);

@@ -1,4 +1,4 @@
-//! Whether the records can tell the parameters apart at all.
+//! Whether the records can separate the parameters at all.
 //!
 //! Judged on the path behind the measured depth, not on the measured depth: one ramp at constant
 //! speed cannot separate `mu1` from `tau_sig` (the filtered drive is exactly speed times the
@@ -7,22 +7,26 @@
 //! pieces as stay within a tolerance (`thin::redraw`), which removes stairs and noise and keeps
 //! ramps and holds.
 
-use super::columns::{Point, Slope};
+use super::columns::{ParameterPoint, Slope};
 use super::sample::FitError;
 use super::system::{System, Unknown};
 use super::triangle::Triangle;
 
 /// Whether the derivatives by the outer parameters belong to the design that is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Judged {
+pub(super) enum JudgedParameters {
     /// Only the parameters in which the model is linear: no coefficients are known yet.
     Linear,
     /// These and the outer ones.
     WithOuter,
 }
 
-/// Refuses if the parameters cannot be told apart on the redrawn path.
-pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Result<(), FitError> {
+/// Refuses if the parameters are not separable on the redrawn path.
+pub(super) fn check(
+    system: &System<'_>,
+    points: &[ParameterPoint],
+    judged: JudgedParameters,
+) -> Result<(), FitError> {
     let layout = system.layout();
     let unknowns: Vec<Unknown> = system
         .unknowns
@@ -30,7 +34,7 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
         .copied()
         .filter(|unknown| match unknown.parameter {
             k if k == layout.contact() => false,
-            k => judged == Judged::WithOuter || layout.linear().contains(&k),
+            k => judged == JudgedParameters::WithOuter || layout.linear().contains(&k),
         })
         .collect();
     let width = unknowns.len();
@@ -38,7 +42,7 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
     for (record, point) in points.iter().enumerate() {
         push_rows(system, record, point, &unknowns, &mut triangle)?;
     }
-    let Some(blind) = triangle.finish().blind(width) else {
+    let Some(blind) = triangle.finish().inseparable_columns(width) else {
         return Ok(());
     };
     let names = blind.into_iter().map(|place| name(system, &unknowns[place]));
@@ -71,7 +75,7 @@ fn name(system: &System<'_>, unknown: &Unknown) -> String {
 fn push_rows(
     system: &System<'_>,
     record: usize,
-    point: &Point,
+    point: &ParameterPoint,
     unknowns: &[Unknown],
     triangle: &mut Triangle,
 ) -> Result<(), FitError> {
@@ -94,7 +98,7 @@ fn push_rows(
     let mut row = vec![0.0; unknowns.len() + 1];
     let blocks = &system.records[record].thin.blocks;
     let scale = system.scale(&point.outer);
-    let walked = system.source.redrawn(blocks, scale, point, &slopes, |block, values| {
+    let walked = system.source.visit_redrawn(blocks, scale, point, &slopes, |block, values| {
         for (slot, place) in row.iter_mut().zip(&places) {
             *slot = place.map_or(0.0, |k| values[k]);
         }

@@ -33,12 +33,12 @@ mod uncertainty;
 pub use bootstrap::{Bootstrap, BootstrapInterval};
 pub use live::{LiveFit, ResidualBlocks};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
-pub use predict::{Predicted, predict};
+pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
-pub use report::{FitReport, JointReport, NamedReport, NoiseFound, Parameter};
+pub use report::{FitReport, JointReport, NamedReport, NoiseEstimate, Parameter};
 pub use sample::{FitError, FitSample};
 pub use solve::{Fitted, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
     Systematic, SystematicError, TermError, Traced, systematic, systematic_joint,
 };
-pub(crate) use triangle::{CONDITION_MAX, heaviest};
+pub(crate) use triangle::{CONDITION_MAX, dominant_entries};

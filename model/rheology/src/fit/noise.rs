@@ -1,9 +1,9 @@
-//! What the residuals remember, and what that does to the uncertainty.
+//! Autocorrelation of the residuals, and its effect on the uncertainty.
 //!
 //! Textbook intervals assume that every sample errs independently. Forces measured on tissue do
 //! not: the model is never quite right, and drift and breathing outlast many samples, so that such
 //! intervals cover the truth far too rarely. Here the residuals, summed over some hundred blocks,
-//! are described as white noise with an exponentially forgetting part on top. In blocks that is an
+//! are described as white noise with an exponentially decaying part on top. In blocks that is an
 //! ARMA(1,1) process, whatever the block length (Granger & Morris, J. R. Stat. Soc. A 139 (1976)
 //! 246-257); the neighbouring-sample correlation alone would understate the memory as soon as some
 //! of the noise is white. Its parameters maximise the restricted likelihood (Harville, J. Am. Stat.
@@ -40,7 +40,6 @@ pub(super) struct Blocks {
     pub columns: Vec<Vec<f64>>,
     /// Position of each block in time; censored stretches leave gaps.
     pub places: Vec<usize>,
-    /// Samples in a block.
     pub length: f64,
 }
 
@@ -58,7 +57,6 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Noise without memory.
     pub fn none(level: f64) -> Self {
         Self { level, neighbour: 0.0, forgetting: 0.0, uncertainty: 0.0 }
     }
@@ -73,7 +71,7 @@ impl Memory {
         let (mut diagonal, mut lagged, mut past) = (0.0, 0.0, 0.0);
         let mut next = 0;
         for (&z, &place) in z.iter().zip(places) {
-            // What a gap of so many blocks leaves of the past.
+            // The share of the past that is left after a gap of so many blocks.
             past *= self.forgetting.powi(place.saturating_sub(next) as i32);
             diagonal += z * z;
             lagged += z * past;
@@ -89,13 +87,13 @@ fn long_run(neighbour: f64, forgetting: f64) -> f64 {
 }
 
 /// The memory of a record's residuals; `white` is the variance the blocks would have without.
-/// `None` when the record is too short to tell.
+/// `None` when the record is too short for an estimate.
 ///
 /// Only unknowns that act on this record `alone` have taken their share out of its residuals. One that several
 /// records share is a compromise between them: a specimen twice as stiff leaves residuals of the very shape of the
 /// shared column, which must count as memory and not as taken out.
 pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memory> {
-    let whitened = Whitened::new(blocks, alone)?;
+    let whitened = WhitenedBlocks::new(blocks, alone)?;
     let spare = whitened.spare();
     if white <= 0.0 || !white.is_finite() {
         return Some(Memory::none(white.max(0.0)));
@@ -147,9 +145,9 @@ pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memo
 fn neighbour(forgetting: f64, share: f64) -> f64 {
     let r = -forgetting.ln();
     // Lag-one correlation of block means of exp(-t): (1 - e^-r)^2 / (2 (r - 1 + e^-r)).
-    let lost = -(-r).exp_m1();
-    let within = if r < 1e-3 { r * r * (1.0 - r / 3.0) } else { 2.0 * (r - lost) };
-    share * lost * lost / within
+    let decayed = -(-r).exp_m1();
+    let within = if r < 1e-3 { r * r * (1.0 - r / 3.0) } else { 2.0 * (r - decayed) };
+    share * decayed * decayed / within
 }
 
 fn logit(share: f64) -> f64 {
@@ -222,7 +220,7 @@ fn uncertainty(at: [f64; 2], of: impl Fn([f64; 2]) -> f64, spare: f64) -> f64 {
 }
 
 /// Residual and orthonormal columns by block, ready to be whitened for any memory.
-struct Whitened {
+struct WhitenedBlocks {
     rows: Vec<[f64; COLUMNS_MAX]>,
     /// Whether a row has no neighbour before it.
     is_first: Vec<bool>,
@@ -230,7 +228,6 @@ struct Whitened {
     columns: usize,
 }
 
-/// One choice of memory.
 struct Whitening {
     /// Generalised residual sum of squares for a level of one.
     square: f64,
@@ -238,7 +235,7 @@ struct Whitening {
     logs: f64,
 }
 
-impl Whitened {
+impl WhitenedBlocks {
     fn new(blocks: &Blocks, alone: &[bool]) -> Option<Self> {
         let own = blocks.columns.iter().zip(alone);
         let own: Vec<&[f64]> =
@@ -279,7 +276,7 @@ impl Whitened {
         let mut innovation = [0.0; COLUMNS_MAX];
         let (mut variance, mut logs) = (gamma, 0.0);
         for (row, is_first) in self.rows.iter().zip(&self.is_first) {
-            // After a gap the process begins anew.
+            // After a gap the process starts again.
             if !is_first {
                 let share = theta / variance;
                 for k in 0..COLUMNS_MAX {
@@ -358,9 +355,9 @@ fn orthonormal(columns: &[&[f64]]) -> Vec<Vec<f64>> {
                 }
             }
         }
-        let left = norm(&column);
-        if left > 1e-9 * length {
-            column.iter_mut().for_each(|value| *value /= left);
+        let remainder = norm(&column);
+        if remainder > 1e-9 * length {
+            column.iter_mut().for_each(|value| *value /= remainder);
             basis.push(column);
         }
     }

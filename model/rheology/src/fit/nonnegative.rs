@@ -41,7 +41,7 @@ pub(super) fn non_negative(factor: &Factor, is_bound: &[bool]) -> Vec<f64> {
 /// The unbounded solution over some columns, zero in the others.
 fn best(factor: &Factor, passive: &[bool]) -> Vec<f64> {
     let chosen: Vec<usize> = (0..passive.len()).filter(|&k| passive[k]).collect();
-    let found = factor.keeping(&chosen).solve(chosen.len());
+    let found = factor.select_columns(&chosen).solve(chosen.len());
     let mut solution = vec![0.0; passive.len()];
     for (&k, value) in chosen.iter().zip(found) {
         solution[k] = value;
@@ -52,7 +52,7 @@ fn best(factor: &Factor, passive: &[bool]) -> Vec<f64> {
 /// How fast the fit improves with each column: correlation with what is left, relative to both sizes.
 fn gradient(factor: &Factor, solution: &[f64]) -> Vec<f64> {
     let last = factor.width() - 1;
-    let left: Vec<f64> = (0..factor.width())
+    let residual: Vec<f64> = (0..factor.width())
         .map(|i| {
             let row = factor.row(i);
             let fitted: f64 = row.iter().zip(solution).map(|(a, b)| a * b).sum();
@@ -63,8 +63,8 @@ fn gradient(factor: &Factor, solution: &[f64]) -> Vec<f64> {
     (0..solution.len())
         .map(|k| {
             let (mut along, mut size) = (0.0, 0.0);
-            for (i, left) in left.iter().enumerate() {
-                along += factor.row(i)[k] * left;
+            for (i, residual) in residual.iter().enumerate() {
+                along += factor.row(i)[k] * residual;
                 size += factor.row(i)[k].powi(2);
             }
             along / (size * force).sqrt().max(f64::MIN_POSITIVE)

@@ -22,7 +22,7 @@ pub(super) const LINEAR_COUNT: usize = 6;
 
 /// A parameter that a fit of a family has.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Known {
+pub(super) struct KnownParameter {
     pub name: String,
     pub unit: &'static str,
     /// Where an outer parameter of the family is searched.
@@ -55,7 +55,6 @@ impl Layout {
         self.outers..self.contact()
     }
 
-    /// How many these are.
     pub fn linear_count(self) -> usize {
         self.linear().len()
     }
@@ -72,7 +71,6 @@ impl Layout {
         self.outers + self.coefficients + usize::from(self.fades) + 1
     }
 
-    /// All parameters.
     pub fn count(self) -> usize {
         self.contact() + 1
     }
@@ -89,11 +87,11 @@ impl Layout {
 /// at 0: depth is counted from contact. No starting values exist: the fit searches for itself.
 #[derive(Clone, Debug)]
 pub struct FitOptions {
-    family: Arc<dyn Family>,
-    known: Vec<Known>,
-    layout: Layout,
-    fixed: Vec<Option<f64>>,
-    is_at_rest: bool,
+    pub(super) family: Arc<dyn Family>,
+    pub(super) known: Vec<KnownParameter>,
+    pub(super) layout: Layout,
+    pub(super) fixed: Vec<Option<f64>>,
+    pub(super) is_at_rest: bool,
 }
 
 impl Default for FitOptions {
@@ -114,22 +112,23 @@ impl FitOptions {
     #[must_use]
     pub fn of(family: Arc<dyn Family>) -> Self {
         let layout = Layout::of(&*family);
-        let outer = family.outer().into_iter().map(|one| Known {
+        let outer = family.outer().into_iter().map(|one| KnownParameter {
             name: one.name,
             unit: one.unit,
             range: Some(one.range),
             is_bound: false,
         });
-        let plain = |name: String, unit| Known { name, unit, range: None, is_bound: false };
+        let plain =
+            |name: String, unit| KnownParameter { name, unit, range: None, is_bound: false };
         let linear = family.linear().into_iter().enumerate();
-        let linear = linear.map(|(k, (name, unit))| Known {
+        let linear = linear.map(|(k, (name, unit))| KnownParameter {
             is_bound: family.is_non_negative(k),
             ..plain(name, unit)
         });
         let initial = layout.initial().map(|_| plain("f0".to_owned(), "N"));
         let own = [("f_offset", "N"), ("x_contact", "mm")];
         let own = own.map(|(name, unit)| plain(name.to_owned(), unit));
-        let known: Vec<Known> = outer.chain(linear).chain(initial).chain(own).collect();
+        let known: Vec<KnownParameter> = outer.chain(linear).chain(initial).chain(own).collect();
         let mut fixed = vec![None; known.len()];
         fixed[layout.contact()] = Some(0.0);
         Self { family, known, layout, fixed, is_at_rest: false }
@@ -140,7 +139,6 @@ impl FitOptions {
         by_key(key).map(Self::of)
     }
 
-    /// The family.
     pub fn family(&self) -> &dyn Family {
         &*self.family
     }
@@ -192,29 +190,9 @@ impl FitOptions {
         self
     }
 
-    pub(super) fn is_at_rest(&self) -> bool {
-        self.is_at_rest
-    }
-
     /// How many parameters the fit finds.
     pub fn free_count(&self) -> usize {
         self.fixed.iter().filter(|value| value.is_none()).count()
-    }
-
-    pub(super) fn shared_family(&self) -> Arc<dyn Family> {
-        Arc::clone(&self.family)
-    }
-
-    pub(super) fn fixed(&self) -> &[Option<f64>] {
-        &self.fixed
-    }
-
-    pub(super) fn known(&self) -> &[Known] {
-        &self.known
-    }
-
-    pub(super) fn layout(&self) -> Layout {
-        self.layout
     }
 
     pub(super) fn index_of(&self, name: &str) -> Result<usize, FitError> {
@@ -235,11 +213,11 @@ mod tests {
         let mut options = FitOptions::default();
         assert_eq!(options.names(), PARAMETER_NAMES);
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed()[7], Some(0.0));
+        assert_eq!(options.fixed[7], Some(0.0));
         options.free("x_contact").unwrap();
         options.fix("tau_eps", 1.5).unwrap();
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed()[TAU], Some(1.5));
+        assert_eq!(options.fixed[TAU], Some(1.5));
     }
 
     #[test]

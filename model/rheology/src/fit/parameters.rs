@@ -1,6 +1,6 @@
 //! From unknowns to the parameters of each record in their units and back, and where these may go.
 
-use super::columns::{Outer, Point, coordinate, stretch};
+use super::columns::{OuterPoint, ParameterPoint, coordinate, coordinate_slope};
 use super::design::Scale;
 use super::record::Record;
 use super::sample::{FitError, FitSample};
@@ -14,8 +14,8 @@ const LENGTHS: f64 = 10.0;
 const INTERVALS: f64 = 0.125;
 /// Deepest contact position tried, as a share of the travel.
 const CONTACT_SHARE_MAX: f64 = 0.85;
-/// Share of its greatest depth by which the probe must come back in some record before what having
-/// been deeper adds can be told: less than a tenth would be extrapolated over all the rest.
+/// Share of its greatest depth by which the probe must retract in some record before softening can be
+/// identified: less than a tenth would be extrapolated over all the rest.
 const RETURN_MIN: f64 = 0.1;
 
 impl System<'_> {
@@ -37,21 +37,21 @@ impl System<'_> {
                     }
                 })
                 .collect(),
-            // Before its first depth a contact cannot be told from other elastic coefficients and an offset, since a
-            // shifted cubic is a cubic.
+            // Before its first depth a contact is not separable from other elastic coefficients and an offset, since
+            // a shifted cubic is a cubic.
             contact: (shallowest, shallowest + CONTACT_SHARE_MAX),
         }
     }
 
     /// Refuses a family that softens where no record unloads.
     pub fn check_return(&self) -> Result<(), FitError> {
-        let middle = self.middle();
+        let middle = self.range_middles();
         let columns = self.source.family.columns(&middle);
         let softens = columns.iter().flatten();
         if !softens.into_iter().any(|term| term.elastic.softens() || term.rate.softens()) {
             return Ok(());
         }
-        let share = self.records.iter().map(Record::returned);
+        let share = self.records.iter().map(Record::return_share);
         let share = share.fold(0.0, f64::max);
         if share >= RETURN_MIN {
             return Ok(());
@@ -59,7 +59,7 @@ impl System<'_> {
         Err(FitError::Unsupported {
             family: self.source.family.name(),
             reason: format!(
-                "while its force is known the probe comes back by {:.0} % of its greatest depth, and {:.0} % are needed to tell unloading from loading; record the unloading, press deeper, or come back more slowly so that the tissue keeps touching",
+                "while the force is known the probe retracts by {:.0} % of its greatest depth, and {:.0} % are needed to separate unloading from loading; record the unloading, press deeper, or unload more slowly so that contact lasts",
                 100.0 * share,
                 100.0 * RETURN_MIN
             ),
@@ -67,28 +67,28 @@ impl System<'_> {
     }
 
     /// Outer parameters in the middle of their ranges.
-    fn middle(&self) -> Vec<f64> {
+    fn range_middles(&self) -> Vec<f64> {
         let ends = self.ranges[0].outers.iter().enumerate();
         ends.map(|(k, (low, high))| self.outer_value(k, 0.5 * (low + high))).collect()
     }
 
     /// An outer parameter in its unit, from its search coordinate.
     pub fn outer_value(&self, outer: usize, z: f64) -> f64 {
-        match self.source.kind(outer) {
+        match self.source.range_kind(outer) {
             OuterRange::Share(..) => z,
             _ => z.exp(),
         }
     }
 
     /// Points in the middle of all ranges, with no coefficients.
-    pub fn middle_points(&self) -> Vec<Point> {
+    pub fn middle_points(&self) -> Vec<ParameterPoint> {
         let fixed = |record: usize| {
-            let middle = self.middle().into_iter().enumerate();
+            let middle = self.range_middles().into_iter().enumerate();
             middle.map(move |(k, value)| self.fixed(record, k).unwrap_or(value))
         };
         let each = 0..self.records.len();
-        each.map(|record| Point {
-            outer: Outer {
+        each.map(|record| ParameterPoint {
+            outer: OuterPoint {
                 values: fixed(record).collect(),
                 contact: self.fixed_contact(record).unwrap_or(0.0),
             },
@@ -98,18 +98,18 @@ impl System<'_> {
     }
 
     /// The body of the first record, if the family allows its numbers.
-    pub fn model(&self, points: &[Point]) -> Result<Model, FitError> {
+    pub fn model(&self, points: &[ParameterPoint]) -> Result<Model, FitError> {
         let refused =
             |reason: String| FitError::Unsupported { family: self.source.family.name(), reason };
         // The search keeps within the bounds, so what the records do not hold ends on one.
-        if let Some(parameter) = self.zero(points) {
+        if let Some(parameter) = self.first_zero(points) {
             return Err(refused(format!(
-                "{} would have to be zero or negative; these records hold fewer terms",
+                "{} would have to be zero or negative; these records support fewer terms",
                 self.known()[parameter].name
             )));
         }
         let layout = self.layout();
-        let mut values = self.physical(0, &points[0]);
+        let mut values = self.physical_values(0, &points[0]);
         values.truncate(layout.outers + layout.coefficients);
         let linear = values.split_off(layout.outers);
         let model = self.source.family.model(&values, &linear);
@@ -117,7 +117,7 @@ impl System<'_> {
     }
 
     /// Moves points to where [`System::pinned`] keeps a parameter.
-    pub fn pin(&self, points: &mut [Point], record: usize, parameter: usize, value: f64) {
+    pub fn pin(&self, points: &mut [ParameterPoint], record: usize, parameter: usize, value: f64) {
         let layout = self.layout();
         for (other, point) in points.iter_mut().enumerate() {
             if !(self.shared[parameter] || other == record) {
@@ -129,9 +129,9 @@ impl System<'_> {
                 point.outer.contact = value / self.depth_mm;
             } else {
                 let k = parameter - layout.outers;
-                let mut bare = self.source.bare(&point.at);
+                let mut bare = self.source.to_bare(&point.at);
                 bare[k] = value * self.source.units(self.depth_mm)[k];
-                point.at = self.source.basis(&bare);
+                point.at = self.source.to_basis(&bare);
             }
         }
     }
@@ -156,10 +156,10 @@ impl System<'_> {
 
     /// Search coordinate of an outer parameter.
     pub fn coordinate(&self, outer: usize, value: f64) -> f64 {
-        coordinate(self.source.kind(outer), value)
+        coordinate(self.source.range_kind(outer), value)
     }
 
-    pub fn scale(&self, outer: &Outer) -> Scale {
+    pub fn scale(&self, outer: &OuterPoint) -> Scale {
         Scale { depth_mm: self.depth_mm, contact: outer.contact }
     }
 
@@ -179,8 +179,8 @@ impl System<'_> {
                 && self.shared[parameter] == self.shared[unknown.parameter]
         };
         // A combined column stands for its own bare one where those before it are free to make up for the rest.
-        if k < self.source.combined() && !(0..k).all(is_free_alike) {
-            self.source.basis(&unit)
+        if k < self.source.combined_count() && !(0..k).all(is_free_alike) {
+            self.source.to_basis(&unit)
         } else {
             unit
         }
@@ -192,16 +192,16 @@ impl System<'_> {
         let linear = self.layout().linear().zip(units);
         let bare: Vec<f64> =
             linear.map(|(k, unit)| self.fixed(record, k).unwrap_or(0.0) * unit).collect();
-        self.source.basis(&bare)
+        self.source.to_basis(&bare)
     }
 
     /// A record's coefficients, from the linear unknowns.
     pub fn coefficients(&self, record: usize, solution: &[f64]) -> Vec<f64> {
-        self.changed(record, &self.fixed_coefficients(record), solution)
+        self.apply_change(record, &self.fixed_coefficients(record), solution)
     }
 
     /// A record's coefficients after a change of the linear unknowns.
-    pub fn changed(&self, record: usize, at: &[f64], change: &[f64]) -> Vec<f64> {
+    pub fn apply_change(&self, record: usize, at: &[f64], change: &[f64]) -> Vec<f64> {
         let mut all = at.to_vec();
         for (value, unknown) in change.iter().zip(&self.unknowns[..self.linear]) {
             for (slot, share) in all.iter_mut().zip(self.column(record, *unknown)) {
@@ -212,10 +212,10 @@ impl System<'_> {
     }
 
     /// All parameters of a record in their units.
-    pub fn physical(&self, record: usize, point: &Point) -> Vec<f64> {
+    pub fn physical_values(&self, record: usize, point: &ParameterPoint) -> Vec<f64> {
         let layout = self.layout();
         let units = self.source.units(self.depth_mm);
-        let bare = self.source.bare(&point.at);
+        let bare = self.source.to_bare(&point.at);
         (0..layout.count())
             .map(|k| match self.fixed(record, k) {
                 Some(value) => value,
@@ -228,7 +228,7 @@ impl System<'_> {
 
     /// A free parameter of a record, in its unit, as a combination of small changes of the
     /// unknowns.
-    pub fn combination(&self, record: usize, parameter: usize, point: &Point) -> Vec<f64> {
+    pub fn combination(&self, record: usize, parameter: usize, point: &ParameterPoint) -> Vec<f64> {
         let layout = self.layout();
         let units = self.source.units(self.depth_mm);
         let mut combination = vec![0.0; self.unknowns.len()];
@@ -240,14 +240,14 @@ impl System<'_> {
             if layout.linear().contains(&unknown.parameter) {
                 if layout.linear().contains(&parameter) {
                     let k = parameter - layout.outers;
-                    let bare = self.source.bare(&self.column(record, *unknown));
+                    let bare = self.source.to_bare(&self.column(record, *unknown));
                     *slot = bare[k] / units[k];
                 }
             } else if is_same && parameter == layout.contact() {
                 *slot = self.depth_mm;
             } else if is_same {
-                let kind = self.source.kind(parameter);
-                *slot = stretch(kind, point.outer.values[parameter]);
+                let kind = self.source.range_kind(parameter);
+                *slot = coordinate_slope(kind, point.outer.values[parameter]);
             }
         }
         combination

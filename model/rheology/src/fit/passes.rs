@@ -1,7 +1,7 @@
 //! Passes over the samples: every record as a triangle of its columns, and all of them stacked.
 
 use super::block_sums::{NoiseBlock, NoiseSums};
-use super::columns::{Outer, Point, Slope};
+use super::columns::{OuterPoint, ParameterPoint, Slope};
 use super::design::{LANES, Lane};
 use super::nonnegative::non_negative;
 use super::record::Record;
@@ -24,17 +24,17 @@ pub(super) struct Pass {
     pub records: Vec<RecordFactor>,
 }
 
-/// What the last column of a record's triangle holds.
+/// Content of the last column of a record's triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
     /// The measured force; there are no derivative columns.
     Force,
-    /// What a point leaves of it.
+    /// The measured force minus that of the point.
     Residual,
 }
 
 /// Where an unknown finds its column in a record's triangle.
-pub(super) enum Mapped {
+pub(super) enum UnknownPlace {
     /// As a combination of the linear columns.
     Linear(Vec<f64>),
     /// As one of the derivative columns.
@@ -43,7 +43,7 @@ pub(super) enum Mapped {
     Nowhere,
 }
 
-impl Mapped {
+impl UnknownPlace {
     /// The unknown's entry of a row.
     pub fn of(&self, row: &[f64]) -> f64 {
         match self {
@@ -70,34 +70,41 @@ impl System<'_> {
     /// the point leaves of the force, so that solutions are changes of the point: solving for a
     /// small change wins back the digits that the rounding of the triangle costs (iterative
     /// refinement; Bjorck, "Numerical Methods for Least Squares Problems", section 2.9).
-    pub fn pass(&self, points: &[Point], rows: Rows) -> Option<Pass> {
+    pub fn pass(&self, points: &[ParameterPoint], rows: Rows) -> Option<Pass> {
         let each = points.iter().enumerate();
-        let records: Option<Vec<RecordFactor>> =
-            each.map(|(record, point)| self.record_factor(record, point, rows)).collect();
+        let records: Option<Vec<RecordFactor>> = each
+            .map(|(record, point)| self.record_factor(record, point, rows, Column::Residual))
+            .collect();
         let records = records?;
         let factors = records.iter().map(|record| &record.factor);
         Some(Pass { joint: self.stack(factors, Column::Residual), records })
     }
 
     /// All records triangularised at given outer parameters, without derivatives.
-    pub fn values_pass(&self, outers: &[Outer], rows: Rows) -> Option<Factor> {
+    pub fn values_pass(&self, outers: &[OuterPoint], rows: Rows) -> Option<Factor> {
         let each = outers.iter().enumerate();
-        let factors: Option<Vec<Factor>> =
-            each.map(|(record, outer)| self.values_factor(record, outer, rows)).collect();
+        let factors: Option<Vec<Factor>> = each
+            .map(|(record, outer)| {
+                let at = vec![0.0; self.layout().linear_count()];
+                let point = ParameterPoint { outer: outer.clone(), at };
+                let factor = self.record_factor(record, &point, rows, Column::Force)?.factor;
+                (rows == Rows::Thin || factor.is_finite()).then_some(factor)
+            })
+            .collect();
         Some(self.stack(factors?.iter(), Column::Force))
     }
 
     /// The best coefficients at given outer parameters and the weighted sum of squares left; `None` where these are no
     /// finite numbers.
-    pub fn solved(&self, outers: &[Outer], rows: Rows) -> Option<(Vec<Point>, f64)> {
+    pub fn solved(&self, outers: &[OuterPoint], rows: Rows) -> Option<(Vec<ParameterPoint>, f64)> {
         let (solution, sum) = self.bounded(&self.values_pass(outers, rows)?);
         let is_finite = sum.is_finite() && solution.iter().all(|value| value.is_finite());
         is_finite.then(|| (self.points(outers, &solution), sum))
     }
 
-    /// The weighted sum of squares left at given outer parameters, infinite where the family has no finite force; what
-    /// cannot be told apart there does not matter to it.
-    pub fn sum(&self, outers: &[Outer], rows: Rows) -> f64 {
+    /// The weighted sum of squares left at given outer parameters, infinite where the family has no finite force; parameters
+    /// that are not separable there do not matter to it.
+    pub fn sum(&self, outers: &[OuterPoint], rows: Rows) -> f64 {
         let factor = self.values_pass(outers, rows);
         factor.map_or(f64::INFINITY, |factor| self.bounded(&factor).1)
     }
@@ -110,16 +117,16 @@ impl System<'_> {
         // Few places need it, and those that do are no better than the bounds allow.
         if solution.iter().zip(&bounds).any(is_over) {
             let solution = non_negative(factor, &bounds);
-            let sum = factor.left_by(&solution);
+            let sum = factor.residual_sum_of(&solution);
             return (solution, sum);
         }
         (solution, factor.residual_sum(self.linear))
     }
 
     /// Points at given outer parameters with these linear unknowns.
-    pub fn points(&self, outers: &[Outer], solution: &[f64]) -> Vec<Point> {
+    pub fn points(&self, outers: &[OuterPoint], solution: &[f64]) -> Vec<ParameterPoint> {
         let each = outers.iter().enumerate();
-        each.map(|(record, outer)| Point {
+        each.map(|(record, outer)| ParameterPoint {
             outer: outer.clone(),
             at: self.coefficients(record, solution),
         })
@@ -154,21 +161,21 @@ impl System<'_> {
     }
 
     /// Where each of the first `unknowns` finds its column in a record's triangle.
-    pub fn map(&self, record: usize, unknowns: usize) -> Vec<Mapped> {
+    pub fn map(&self, record: usize, unknowns: usize) -> Vec<UnknownPlace> {
         let layout = self.layout();
         let slopes = self.slopes(record);
         let place = |slope: Slope| slopes.iter().position(|&one| one == slope);
         let place = |slope: Slope| {
-            let place = place(slope).map(|k| Mapped::Slope(layout.linear_count() + k));
-            place.unwrap_or(Mapped::Nowhere)
+            let place = place(slope).map(|k| UnknownPlace::Slope(layout.linear_count() + k));
+            place.unwrap_or(UnknownPlace::Nowhere)
         };
         self.unknowns[..unknowns]
             .iter()
             .map(|unknown| match unknown.parameter {
-                _ if !unknown.is_of(record) => Mapped::Nowhere,
+                _ if !unknown.is_of(record) => UnknownPlace::Nowhere,
                 k if k < layout.outers => place(Slope::Outer(k)),
                 k if k == layout.contact() => place(Slope::Contact),
-                _ => Mapped::Linear(self.column(record, *unknown)),
+                _ => UnknownPlace::Linear(self.column(record, *unknown)),
             })
             .collect()
     }
@@ -178,16 +185,23 @@ impl System<'_> {
         self.records.iter().map(|record| record.force_square).sum()
     }
 
-    fn record_factor(&self, record: usize, point: &Point, rows: Rows) -> Option<RecordFactor> {
+    fn record_factor(
+        &self,
+        record: usize,
+        point: &ParameterPoint,
+        rows: Rows,
+        last_is: Column,
+    ) -> Option<RecordFactor> {
         let Record { samples, thin, .. } = &self.records[record];
-        let slopes = self.slopes(record);
+        let is_residual = last_is == Column::Residual;
+        let slopes = if is_residual { self.slopes(record) } else { Vec::new() };
         let scale = self.scale(&point.outer);
         if rows == Rows::Thin {
             let factor = self.source.thin_factor(&thin.blocks, scale, point, &slopes)?;
-            return Some(RecordFactor { factor: factor.less(&point.at), blocks: Vec::new() });
+            let factor = if is_residual { factor.subtract_explained(&point.at) } else { factor };
+            return Some(RecordFactor { factor, blocks: Vec::new() });
         }
-        let linear = self.layout().linear_count();
-        let width = linear + slopes.len() + 1;
+        let width = self.layout().linear_count() + slopes.len() + 1;
         let mut triangle = Triangle::new(width);
         let mut sums = NoiseSums::new(samples.len(), width);
         let mut lanes = vec![[0.0; LANES]; width];
@@ -197,38 +211,18 @@ impl System<'_> {
                 || {
                     filled.write(&mut lanes, point, &slopes);
                     self.forces(block, &mut lanes);
-                    subtract(&mut lanes, &point.at);
+                    if is_residual {
+                        subtract(&mut lanes, &point.at);
+                    }
                     self.weigh(block, &mut lanes);
-                    sums.add(&lanes, block);
+                    if is_residual {
+                        sums.add(&lanes, block);
+                    }
                     triangle.push_lanes(&mut lanes, block.len());
                 },
             );
         })?;
         Some(RecordFactor { factor: triangle.finish(), blocks: sums.finish() })
-    }
-
-    fn values_factor(&self, record: usize, outer: &Outer, rows: Rows) -> Option<Factor> {
-        let Record { samples, thin, .. } = &self.records[record];
-        let scale = self.scale(outer);
-        let point = Point { outer: outer.clone(), at: vec![0.0; self.layout().linear_count()] };
-        if rows == Rows::Thin {
-            return self.source.thin_factor(&thin.blocks, scale, &point, &[]);
-        }
-        let mut triangle = Triangle::new(point.at.len() + 1);
-        let mut lanes = vec![[0.0; LANES]; point.at.len() + 1];
-        self.source.walk(samples, scale, &point, &[], |block, filled| {
-            wide(
-                #[inline(always)]
-                || {
-                    filled.write(&mut lanes, &point, &[]);
-                    self.forces(block, &mut lanes);
-                    self.weigh(block, &mut lanes);
-                    triangle.push_lanes(&mut lanes, block.len());
-                },
-            );
-        })?;
-        let factor = triangle.finish();
-        factor.is_finite().then_some(factor)
     }
 
     /// Writes the force as the last column.

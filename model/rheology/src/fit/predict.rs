@@ -1,4 +1,4 @@
-//! How a body that is known predicts a record that its fit has not seen.
+//! Prediction of a record by a model fitted to other records.
 
 use super::sample::{FitError, FitSample};
 use super::triangle::Triangle;
@@ -7,29 +7,26 @@ use std::ops::Range;
 
 /// How far a prediction is off, in N, over the samples looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Predicted {
-    /// Root mean square error.
+pub struct ForcePrediction {
     pub rms: f64,
-    /// Largest error.
     pub worst: f64,
     /// The factor on the whole body that fits the record best.
     pub scale: f64,
     /// Root mean square error with that factor.
     pub scaled_rms: f64,
-    /// Samples looked at.
     pub samples: usize,
 }
 
 /// Predicts `score` of a record from rest at its first depth; the body stays as it is, while the record's own offset,
-/// which no other record can tell, is found on `own`.
+/// which no other record determines, is found on `own`.
 ///
-/// The factor of [`Predicted::scale`] is found on `own` too.
+/// The factor of [`ForcePrediction::scale`] is found on `own` too.
 pub fn predict(
     model: &Model,
     samples: &[FitSample],
     own: Range<usize>,
     score: Range<usize>,
-) -> Result<Predicted, FitError> {
+) -> Result<ForcePrediction, FitError> {
     let unsupported =
         |reason: String| FitError::Unsupported { family: model.family.clone(), reason };
     let path = samples.iter().map(|sample| (sample.t, sample.depth));
@@ -52,7 +49,7 @@ pub fn predict(
         taken += 1;
     }
     let mean = |square: f64| (square / taken.max(1) as f64).sqrt();
-    let predicted = Predicted {
+    let predicted = ForcePrediction {
         rms: mean(square),
         worst,
         scale: scaled[1],

@@ -7,23 +7,22 @@
 //! `max over tau of b + d sqrt(T - (S - S_min))`. Between the relaxation times (Chebyshev points) the
 //! three functions are polynomials.
 //!
-//! Over several outer parameters the sum has no such shape: there a parameter is kept at one value after another, and
-//! all others found anew, until the sum has risen by `T`.
+//! Over several outer parameters the sum has no such shape: there a parameter is fixed at one value after another, and
+//! all others are fitted again, until the sum has risen by `T`.
 
-use super::columns::{Outer, Point};
-use super::refine::{GAIN_THIN, Settle, refine};
+use super::columns::{OuterPoint, ParameterPoint};
+use super::refine::{GAIN_THIN, StopRule, refine};
 use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::Fitted;
 use super::system::Rows;
-use super::uncertainty::{Error, Uncertainty};
+use super::uncertainty::{Uncertainty, UncertaintyEstimate};
 use crate::families::OuterRange;
 use serde::{Deserialize, Serialize};
 
 /// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
 /// leave less than a thousandth of an interval.
 const NODES: usize = 7;
-/// And over a wider one.
 const NODES_WIDE: usize = 15;
 const NARROW: f64 = 0.5;
 /// The first range, in half-widths of the symmetric interval.
@@ -43,11 +42,9 @@ const REACH_MAX: f64 = 50.0;
 /// A 95 % interval from the profile likelihood; an end is missing where it is open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProfileInterval {
-    /// The parameter.
     pub name: String,
     /// Lower end, in the parameter's unit.
     pub low: Option<f64>,
-    /// Upper end.
     pub high: Option<f64>,
 }
 
@@ -64,8 +61,8 @@ struct Profile {
 }
 
 impl Fitted<'_> {
-    /// Profile-likelihood 95 % intervals of the free parameters of one record, the memory of the
-    /// residuals allowed for as in the standard errors.
+    /// Profile-likelihood 95 % intervals of the free parameters of one record, widened for
+    /// autocorrelated residuals as the standard errors are.
     pub fn profile(&self, record: usize) -> Result<Vec<ProfileInterval>, FitError> {
         if record >= self.system.records.len() {
             return Ok(Vec::new());
@@ -73,13 +70,13 @@ impl Fitted<'_> {
         let system = &self.system;
         let uncertainty = Uncertainty::of(system, &self.refined);
         let errors = self.errors(&uncertainty, record);
-        let asked: Vec<usize> =
+        let parameters: Vec<usize> =
             (0..system.layout().count()).filter(|&k| system.fixed(record, k).is_none()).collect();
         let scatter = uncertainty.scatter.unwrap_or(0.0);
         // Without an error of its own (at an edge) a parameter is judged as under white noise.
         let rise = |parameter: usize| {
             let (freedom, inflation) = errors[parameter]
-                .map_or((1e9, 1.0), |error: Error| (error.freedom, error.inflation));
+                .map_or((1e9, 1.0), |error: UncertaintyEstimate| (error.freedom, error.inflation));
             (student_t975(freedom) * scatter).powi(2) * inflation
         };
         let named = |parameter: usize, [low, high]: [Option<f64>; 2]| ProfileInterval {
@@ -88,11 +85,12 @@ impl Fitted<'_> {
             high,
         };
         let outer = &system.unknowns[system.linear..];
-        let is_time =
-            |k: usize| k < system.layout().outers && system.source.kind(k) == OuterRange::Time;
+        let is_time = |k: usize| {
+            k < system.layout().outers && system.source.range_kind(k) == OuterRange::Time
+        };
         let has_bounds = system.bounds().contains(&true);
         if outer.len() > 1 || has_bounds || outer.iter().any(|one| !is_time(one.parameter)) {
-            let each = asked.iter().map(|&parameter| {
+            let each = parameters.iter().map(|&parameter| {
                 let error = errors[parameter].map(|error| error.std_error);
                 let ends = [-1.0, 1.0]
                     .map(|side| self.pinned_end(record, parameter, side, error, rise(parameter)));
@@ -100,10 +98,10 @@ impl Fitted<'_> {
             });
             return Ok(each.collect());
         }
-        let highest = asked.iter().map(|&k| rise(k)).fold(0.0, f64::max);
+        let highest = parameters.iter().map(|&k| rise(k)).fold(0.0, f64::max);
         let time = outer.first().map(|one| one.parameter);
-        let profile = self.walk_profile(record, &asked, highest, time)?;
-        let each = asked.iter().enumerate().map(|(index, &parameter)| {
+        let profile = self.walk_profile(record, &parameters, highest, time)?;
+        let each = parameters.iter().enumerate().map(|(index, &parameter)| {
             let ends = if Some(parameter) == time {
                 let tau = self.refined.points[record].outer.values[parameter];
                 profile.reach(rise(parameter)).map(|end| end.map(|offset| tau * offset.exp()))
@@ -126,18 +124,18 @@ impl Fitted<'_> {
         rise: f64,
     ) -> Option<f64> {
         let system = &self.system;
-        let rows = system.thinned();
-        let settle = Settle::Gain(GAIN_THIN);
-        let centre = refine(system, &self.refined.points, rows, settle)?;
+        let rows = system.search_rows();
+        let stop = StopRule::Gain(GAIN_THIN);
+        let centre = refine(system, &self.refined.points, rows, stop)?;
         let (lowest, mut points) = (centre.sum, centre.points);
-        let value = system.physical(record, &points[record])[parameter];
+        let value = system.physical_values(record, &points[record])[parameter];
         let first = student_t975(1e9) * error?;
         let (floor, ceiling) = system.limits(record, parameter);
         // The rise at a value, from where the search before it ended.
-        let risen = |value: f64, points: &mut Vec<Point>| -> Option<f64> {
+        let risen = |value: f64, points: &mut Vec<ParameterPoint>| -> Option<f64> {
             let pinned = system.pinned(record, parameter, value);
             pinned.pin(points, record, parameter, value);
-            let found = refine(&pinned, points, rows, settle)?;
+            let found = refine(&pinned, points, rows, stop)?;
             *points = found.points;
             Some((found.sum - lowest).max(0.0))
         };
@@ -176,13 +174,13 @@ impl Fitted<'_> {
     fn walk_profile(
         &self,
         record: usize,
-        asked: &[usize],
+        parameters: &[usize],
         rise: f64,
         time: Option<usize>,
     ) -> Result<Profile, FitError> {
         let (all, linear) = (self.system.unknowns.len(), self.system.linear);
         let Some(time) = time else {
-            return self.nodes(record, asked, &[0.0], ([true; 2], 0));
+            return self.nodes(record, parameters, &[0.0], ([true; 2], 0));
         };
         let centre = self.refined.points[record].outer.values[time];
         let mut outer = vec![0.0; all];
@@ -195,7 +193,7 @@ impl Fitted<'_> {
         for _ in 0..WIDENINGS {
             let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
             let is_limit = [reach[0] <= limits.0, reach[1] >= limits.1];
-            let profile = self.nodes(record, asked, &chebyshev(ends), (is_limit, time))?;
+            let profile = self.nodes(record, parameters, &chebyshev(ends), (is_limit, time))?;
             let allowed = profile.lowest() + rise;
             let is_high =
                 [profile.sums[0], profile.sums[profile.sums.len() - 1]].map(|sum| sum > allowed);
@@ -209,13 +207,13 @@ impl Fitted<'_> {
             }
         }
         let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
-        self.nodes(record, asked, &chebyshev(ends), ([true; 2], time))
+        self.nodes(record, parameters, &chebyshev(ends), ([true; 2], time))
     }
 
     fn nodes(
         &self,
         record: usize,
-        asked: &[usize],
+        parameters: &[usize],
         offsets: &[f64],
         (is_limit, time): ([bool; 2], usize),
     ) -> Result<Profile, FitError> {
@@ -223,13 +221,13 @@ impl Fitted<'_> {
         let mut profile = Profile {
             offsets: offsets.to_vec(),
             sums: Vec::new(),
-            values: vec![Vec::new(); asked.len()],
-            deviations: vec![Vec::new(); asked.len()],
+            values: vec![Vec::new(); parameters.len()],
+            deviations: vec![Vec::new(); parameters.len()],
             is_limit,
         };
         for offset in offsets {
             let points = self.refined.points.iter();
-            let outers: Vec<Outer> = points
+            let outers: Vec<OuterPoint> = points
                 .map(|point| {
                     let mut outer = point.outer.clone();
                     if let Some(tau) = outer.values.get_mut(time).filter(|_| *offset != 0.0) {
@@ -242,9 +240,9 @@ impl Fitted<'_> {
             let factor = factor.ok_or(FitError::Overflow)?;
             let solution = factor.solve(linear);
             let point = &self.system.points(&outers, &solution)[record];
-            let values = self.system.physical(record, point);
+            let values = self.system.physical_values(record, point);
             profile.sums.push(factor.residual_sum(linear));
-            for (index, &parameter) in asked.iter().enumerate() {
+            for (index, &parameter) in parameters.iter().enumerate() {
                 let combination = self.system.combination(record, parameter, point);
                 profile.values[index].push(values[parameter]);
                 profile.deviations[index].push(factor.deviation(&combination[..linear]));
@@ -312,10 +310,10 @@ impl Profile {
     fn end(&self, index: usize, rise: f64, side: f64) -> Option<f64> {
         let smallest = self.smallest_sum();
         let value = |offset: f64| {
-            let left = rise - (self.at(&self.sums, offset) - smallest);
-            let spread = self.at(&self.deviations[index], offset) * left.max(0.0).sqrt();
+            let spare = rise - (self.at(&self.sums, offset) - smallest);
+            let spread = self.at(&self.deviations[index], offset) * spare.max(0.0).sqrt();
             let value = side * self.at(&self.values[index], offset) + spread;
-            if left < 0.0 { f64::NEG_INFINITY } else { value }
+            if spare < 0.0 { f64::NEG_INFINITY } else { value }
         };
         let last = self.offsets.len() - 1;
         let (from, to) = (self.offsets[0], self.offsets[last]);

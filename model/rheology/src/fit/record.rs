@@ -40,7 +40,7 @@ impl<'a> Record<'a> {
     }
 
     /// Share of the greatest depth before by which the probe comes back while its force counts, at most.
-    pub fn returned(&self) -> f64 {
+    pub fn return_share(&self) -> f64 {
         let (mut deepest, mut share) = (0.0f64, 0.0f64);
         for sample in self.samples {
             deepest = deepest.max(sample.depth.0);

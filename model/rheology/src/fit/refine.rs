@@ -1,6 +1,6 @@
 //! Damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963) on the projected problem (Kaufman, BIT 15 (1975) 49-57).
 
-use super::columns::{Outer, Point, coordinate, stepped};
+use super::columns::{OuterPoint, ParameterPoint, coordinate, step_value};
 use super::passes::Pass;
 use super::system::{Rows, System};
 use super::triangle::{Factor, Triangle};
@@ -33,9 +33,8 @@ pub(super) const GAIN_THIN: f64 = 1e-6;
 /// The same where valleys are compared.
 pub(super) const GAIN_VALLEY: f64 = 1e-4;
 
-/// When the steps end.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Settle {
+pub(super) enum StopRule {
     /// When what is left of them is lost in the noise of the parameters.
     Noise,
     /// When one gains less than this share of the sum of squares.
@@ -44,8 +43,8 @@ pub(super) enum Settle {
 
 /// The end of the iteration.
 #[derive(Clone, Debug)]
-pub(super) struct Refined {
-    pub points: Vec<Point>,
+pub(super) struct RefinedFit {
+    pub points: Vec<ParameterPoint>,
     /// The triangles within one last small step of the end.
     pub pass: Pass,
     /// That step, of all unknowns.
@@ -56,8 +55,8 @@ pub(super) struct Refined {
 }
 
 /// A point with its triangles, and how far the solution of all of them is from it.
-struct Here {
-    points: Vec<Point>,
+struct Iterate {
+    points: Vec<ParameterPoint>,
     pass: Pass,
     sum: f64,
     /// Linear unknowns that may move: all but those at their bound.
@@ -68,7 +67,7 @@ struct Here {
 
 /// A step and what it leads to.
 struct Step {
-    points: Vec<Point>,
+    points: Vec<ParameterPoint>,
     /// Change of the linear unknowns that goes with it to first order.
     change: Vec<f64>,
     /// Change of the outer unknowns, as far as their ranges allow.
@@ -79,36 +78,36 @@ struct Step {
 /// Follows a start to the minimum of the weighted sum of squares; `None` where there is no finite one.
 pub(super) fn refine(
     system: &System<'_>,
-    start: &[Point],
+    start: &[ParameterPoint],
     rows: Rows,
-    settle: Settle,
-) -> Option<Refined> {
-    let mut here = Here::at(system, start.to_vec(), rows, f64::INFINITY)?;
+    stop: StopRule,
+) -> Option<RefinedFit> {
+    let mut here = Iterate::at(system, start.to_vec(), rows, f64::INFINITY)?;
     let force_square = system.force_square();
     let mut damping = 0.0;
     let mut is_converged = false;
     for _ in 1..PASSES_MAX {
         let step = here.step(system, damping);
-        let length = length(&step.taken);
+        let length = largest_component(&step.taken);
         if damping == 0.0
             && step.is_whole
-            && settle == Settle::Noise
+            && stop == StopRule::Noise
             && (length < STEP_MIN || here.is_lost_in_noise(system, &step.taken))
         {
-            return Some(here.ended(system, step));
+            return Some(here.finish(system, step));
         }
         if length < STEP_ZERO {
             is_converged = true;
             break;
         }
         let allowed = here.sum * (1.0 + 1e-10) + ROUNDING * force_square;
-        match Here::at(system, step.points, rows, allowed) {
+        match Iterate::at(system, step.points, rows, allowed) {
             Some(there) => {
                 let gain = 1.0 - there.sum / here.sum;
                 here = there;
                 // A damped step may be short for being damped only.
-                let is_small = matches!(settle, Settle::Gain(least) if gain < least);
-                let is_last = is_small || (settle != Settle::Noise && length < STEP_MIN);
+                let is_small = matches!(stop, StopRule::Gain(least) if gain < least);
+                let is_last = is_small || (stop != StopRule::Noise && length < STEP_MIN);
                 if (is_last && damping < 1e-2) || here.sum == 0.0 {
                     is_converged = true;
                     break;
@@ -128,11 +127,11 @@ pub(super) fn refine(
     let points = here.points.iter().enumerate();
     let mut change = here.change.clone();
     change.resize(system.unknowns.len(), 0.0);
-    Some(Refined {
+    Some(RefinedFit {
         change,
         points: points
-            .map(|(record, point)| Point {
-                at: system.changed(record, &point.at, &here.change),
+            .map(|(record, point)| ParameterPoint {
+                at: system.apply_change(record, &point.at, &here.change),
                 ..point.clone()
             })
             .collect(),
@@ -142,12 +141,17 @@ pub(super) fn refine(
     })
 }
 
-impl Here {
+impl Iterate {
     /// The triangles at points whose sum of squares is at most `allowed`. A family without a kernel has its coefficients
     /// solved first, for its slopes cost several times as much as its columns.
-    fn at(system: &System<'_>, mut points: Vec<Point>, rows: Rows, allowed: f64) -> Option<Self> {
+    fn at(
+        system: &System<'_>,
+        mut points: Vec<ParameterPoint>,
+        rows: Rows,
+        allowed: f64,
+    ) -> Option<Self> {
         if !system.source.is_fast() {
-            let outers: Vec<Outer> = points.iter().map(|point| point.outer.clone()).collect();
+            let outers: Vec<OuterPoint> = points.iter().map(|point| point.outer.clone()).collect();
             let (solved, sum) = system.solved(&outers, rows)?;
             if sum > allowed {
                 return None;
@@ -156,14 +160,14 @@ impl Here {
         }
         let pass = system.pass(&points, rows)?;
         let linear = system.linear;
-        let passive: Vec<usize> = match system.has_zero(&points) {
+        let passive: Vec<usize> = match system.first_zero(&points).is_some() {
             true => system.passive(&points),
             false => (0..linear).collect(),
         };
         let (change, sum) = if passive.len() == linear {
             (pass.joint.solve(linear), pass.joint.residual_sum(linear))
         } else {
-            let factor = pass.joint.keeping(&passive);
+            let factor = pass.joint.select_columns(&passive);
             let mut change = vec![0.0; linear];
             for (&k, value) in passive.iter().zip(factor.solve(passive.len())) {
                 change[k] = value;
@@ -191,7 +195,7 @@ impl Here {
             });
             match over {
                 Some(k) => held[k] = true,
-                None => return self.moved(system, &wanted),
+                None => return self.take_step(system, &wanted),
             }
         }
     }
@@ -208,11 +212,11 @@ impl Here {
                 return solution;
             }
         }
-        let factor = joint.keeping(&columns);
+        let factor = joint.select_columns(&columns);
         let linear = self.passive.len();
         let mut found = factor.solve(columns.len());
         if damping > 0.0 || found.iter().any(|value| !value.is_finite()) {
-            found = damped(&factor, linear, damping.max(DAMPING.0)).solve(columns.len());
+            found = add_damping(&factor, linear, damping.max(DAMPING.0)).solve(columns.len());
         }
         let mut solution = vec![0.0; all];
         if found.iter().all(|value| value.is_finite()) {
@@ -224,7 +228,7 @@ impl Here {
     }
 
     /// The points after a step, which is no longer than allowed and ends within the ranges.
-    fn moved(&self, system: &System<'_>, wanted: &[f64]) -> Step {
+    fn take_step(&self, system: &System<'_>, wanted: &[f64]) -> Step {
         let layout = system.layout();
         let linear = system.linear;
         let mut taken: Vec<f64> = wanted[linear..].to_vec();
@@ -250,7 +254,8 @@ impl Here {
                     outer.contact = end;
                 } else {
                     let value = &mut outer.values[unknown.parameter];
-                    *value = stepped(system.source.kind(unknown.parameter), *value, taken[k]);
+                    *value =
+                        step_value(system.source.range_kind(unknown.parameter), *value, taken[k]);
                 }
             }
         }
@@ -258,12 +263,12 @@ impl Here {
         let change = if is_whole {
             wanted[..linear].to_vec()
         } else if self.passive.len() == linear {
-            self.pass.joint.solve_beside(linear, &taken)
+            self.pass.joint.solve_given(linear, &taken)
         } else {
             self.change.clone()
         };
         for (record, point) in points.iter_mut().enumerate() {
-            point.at = system.changed(record, &point.at, &change);
+            point.at = system.apply_change(record, &point.at, &change);
         }
         Step { points, change, taken, is_whole }
     }
@@ -287,10 +292,10 @@ impl Here {
     }
 
     /// The end, where a step that is the last has been taken whole.
-    fn ended(self, system: &System<'_>, step: Step) -> Refined {
+    fn finish(self, system: &System<'_>, step: Step) -> RefinedFit {
         let is_held = step.taken.contains(&0.0);
         let is_all = !is_held && self.passive.len() == system.linear;
-        Refined {
+        RefinedFit {
             points: step.points,
             change: step.change.into_iter().chain(step.taken).collect(),
             sum: if is_all {
@@ -306,7 +311,7 @@ impl Here {
 
 /// The triangle with the squared steps of the outer unknowns, behind the first `linear` columns, added to the sum. Along a
 /// direction that the linear unknowns make up for nothing is left; the largest of the others still bounds the step.
-fn damped(factor: &Factor, linear: usize, damping: f64) -> Factor {
+fn add_damping(factor: &Factor, linear: usize, damping: f64) -> Factor {
     let last = factor.width() - 1;
     let size = |k: usize| -> f64 { (linear..=last).map(|i| factor.row(i)[k].powi(2)).sum() };
     let sizes: Vec<f64> = (linear..last).map(size).collect();
@@ -323,14 +328,14 @@ fn damped(factor: &Factor, linear: usize, damping: f64) -> Factor {
     triangle.finish()
 }
 
-fn length(step: &[f64]) -> f64 {
+fn largest_component(step: &[f64]) -> f64 {
     step.iter().fold(0.0, |longest, step| longest.max(step.abs()))
 }
 
 /// Search coordinate of an outer parameter or the scaled contact.
-fn coordinate_of(system: &System<'_>, point: &Point, parameter: usize) -> f64 {
+fn coordinate_of(system: &System<'_>, point: &ParameterPoint, parameter: usize) -> f64 {
     match point.outer.values.get(parameter) {
-        Some(value) => coordinate(system.source.kind(parameter), *value),
+        Some(value) => coordinate(system.source.range_kind(parameter), *value),
         None => point.outer.contact,
     }
 }

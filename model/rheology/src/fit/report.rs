@@ -1,13 +1,14 @@
-//! What a fit found.
+//! The report of a fit.
 
-use super::columns::{Outer, Point, Source};
+use super::columns::{ColumnSource, OuterPoint, ParameterPoint};
 use super::design::Scale;
 use super::noise::Memory;
 use super::options::Layout;
 use super::sample::FitSample;
 use super::sentences;
 use super::solve::Fitted;
-use super::uncertainty::{Error, Uncertainty};
+use super::uncertainty::{Uncertainty, UncertaintyEstimate};
+use crate::distinct;
 use crate::families::{Model, ModelParameter, OuterRange, by_key};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -15,21 +16,20 @@ use serde::{Deserialize, Serialize};
 
 pub use palpate_model::estimate::Parameter;
 
-/// What the residuals remember.
+/// Autocorrelation of the residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NoiseFound {
+pub struct NoiseEstimate {
     /// Share of the residual variance that lasts longer than a sample, 0..=1.
     pub slow_share: f64,
-    /// Time in s within which the lasting part forgets all but 1/e; `None` without memory.
+    /// Time in s in which the autocorrelation of the lasting part falls to 1/e; `None` for white noise.
     pub correlation_time_s: Option<f64>,
-    /// How many independent samples would tell as much.
+    /// Number of independent samples that carry the same information.
     pub effective_samples: f64,
 }
 
 /// The result of [`super::fit()`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FitReport {
-    /// The family in words.
     pub model: String,
     /// The family by its key, with the values of the body's parameters.
     #[serde(flatten)]
@@ -41,7 +41,6 @@ pub struct FitReport {
     pub r2: f64,
     /// Root mean square of measured minus modelled force in N, unweighted.
     pub rmse_n: f64,
-    /// Samples used.
     pub samples: usize,
     /// Samples whose force was left out, being censored.
     pub censored: usize,
@@ -50,11 +49,11 @@ pub struct FitReport {
     /// Whether the body is relaxed at the first depth but for the initial force, and not at zero force.
     #[serde(skip)]
     pub is_at_rest: bool,
-    /// What the residuals remember; `None` where the record is too short to tell.
-    pub noise: Option<NoiseFound>,
-    /// What a reader of the numbers must know, one sentence each.
+    /// Autocorrelation of the residuals; `None` where the record is too short to show any.
+    pub noise: Option<NoiseEstimate>,
+    /// Warnings without which the numbers would be misread, one sentence each.
     pub warnings: Vec<String>,
-    /// What the fit found besides numbers, one sentence each: the memory of the noise, depths at
+    /// Findings that are not numbers, one sentence each: autocorrelation of the noise, depths at
     /// which the body is unstable or returns energy.
     pub findings: Vec<String>,
 }
@@ -68,20 +67,18 @@ pub struct JointReport {
     pub records: Vec<NamedReport>,
     /// Samples whose force counts, in all records.
     pub samples: usize,
-    /// Numbers found.
     pub free: usize,
     /// Sum of squared residuals of all records, each over its sigma.
     pub weighted_square: f64,
     /// Root mean square residual of all records in N, unweighted.
     pub rmse_n: f64,
-    /// How many independent samples would tell as much.
+    /// Number of independent samples that carry the same information.
     pub effective_samples: f64,
 }
 
 /// One record's part of a joint fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NamedReport {
-    /// The record.
     pub record: String,
     /// Its parameters, shared ones included.
     pub report: FitReport,
@@ -90,13 +87,7 @@ pub struct NamedReport {
 impl JointReport {
     /// The warnings of all records, each once.
     pub fn warnings(&self) -> Vec<String> {
-        let mut all: Vec<String> = Vec::new();
-        for warning in self.records.iter().flat_map(|one| &one.report.warnings) {
-            if !all.contains(warning) {
-                all.push(warning.clone());
-            }
-        }
-        all
+        distinct(self.records.iter().flat_map(|one| one.report.warnings.clone()))
     }
 }
 
@@ -111,7 +102,6 @@ impl FitReport {
         self.parameter(name).map(|parameter| parameter.value)
     }
 
-    /// A parameter by name.
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
@@ -154,13 +144,13 @@ impl FitReport {
         let family = by_key(&self.body.family).ok()?;
         let layout = Layout::of(&*family);
         let value = |k: usize| self.parameters[k].value;
-        let source = Source::new(family, self.is_at_rest);
+        let source = ColumnSource::new(family, self.is_at_rest);
         // Depth scale 1: scaled and physical coefficients are the same.
         let scale = Scale { depth_mm: 1.0, contact: value(layout.contact()) };
         let bare: Vec<f64> = layout.linear().map(value).collect();
-        let point = Point {
-            outer: Outer { values: self.body.outer.clone(), contact: scale.contact },
-            at: source.basis(&bare),
+        let point = ParameterPoint {
+            outer: OuterPoint { values: self.body.outer.clone(), contact: scale.contact },
+            at: source.to_basis(&bare),
         };
         source.forces(samples, scale, &point)
     }
@@ -177,7 +167,7 @@ impl Fitted<'_> {
         let uncertainty = Uncertainty::of(&self.system, &self.refined);
         let system = &self.system;
         let known = system.known().iter().enumerate();
-        let shared = known.filter(|(k, _)| system.is_shared(*k));
+        let shared = known.filter(|(k, _)| system.shared[*k]);
         let records = (0..system.records.len()).map(|record| NamedReport {
             record: system.records[record].name.to_owned(),
             report: self.record_report(&uncertainty, record),
@@ -191,7 +181,7 @@ impl Fitted<'_> {
             shared: shared.map(|(_, one)| one.name.clone()).collect(),
             samples: system.measured(),
             free: system.unknowns.len(),
-            weighted_square: self.refined.sum / system.sigma_scale().powi(2),
+            weighted_square: self.refined.sum / system.sigma_scale.powi(2),
             rmse_n: (squares.sum::<f64>() / system.measured() as f64).sqrt(),
             effective_samples: effective.sum::<f64>().max(1.0),
             records,
@@ -202,7 +192,7 @@ impl Fitted<'_> {
     pub(super) fn values(&self) -> Vec<f64> {
         let each = self.refined.points.iter().enumerate();
         let values = each.flat_map(|(record, point)| {
-            let own = self.system.physical(record, point);
+            let own = self.system.physical_values(record, point);
             let derived = self.derived(&own).into_iter().map(|one| one.value);
             own.into_iter().chain(derived).collect::<Vec<_>>()
         });
@@ -212,7 +202,7 @@ impl Fitted<'_> {
     /// Names of these of one record.
     pub(super) fn value_names(&self) -> Vec<String> {
         let own = self.system.known().iter().map(|one| one.name.clone());
-        let values = self.system.physical(0, &self.refined.points[0]);
+        let values = self.system.physical_values(0, &self.refined.points[0]);
         let derived = self.derived(&values).into_iter().map(|one| one.name);
         own.chain(derived).collect()
     }
@@ -228,13 +218,13 @@ impl Fitted<'_> {
         let system = &self.system;
         let samples = system.records[record].samples;
         let measured = system.records[record].measured;
-        let residuals = self.residuals(record);
+        let (r2, rmse_n) = self.residuals(record);
         let parameters = self.parameters(uncertainty, record);
         let noise = uncertainty.memory(record).map(|memory| {
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
             let interval = length / (samples.len() - 1) as f64;
             let block = uncertainty.block_length(record);
-            noise_found(&memory, uncertainty.variance(record), interval, block, measured)
+            estimate_noise(&memory, uncertainty.variance(record), interval, block, measured)
         });
         let layout = system.layout();
         let values = |range: std::ops::Range<usize>| {
@@ -249,8 +239,8 @@ impl Fitted<'_> {
                 linear: values(layout.outers..layout.outers + layout.coefficients),
             },
             parameters,
-            r2: residuals.r2,
-            rmse_n: residuals.rmse_n,
+            r2,
+            rmse_n,
             samples: measured,
             censored: samples.len() - measured,
             free: system.unknowns.len(),
@@ -264,9 +254,9 @@ impl Fitted<'_> {
         report
     }
 
-    /// Unweighted residuals of the final model: in one pass, unless all weights are one and the sum
+    /// Share of the variance explained and rms of the unweighted residuals: in one pass, unless all weights are one and the sum
     /// is known already.
-    fn residuals(&self, record: usize) -> Residuals {
+    fn residuals(&self, record: usize) -> (f64, f64) {
         let system = &self.system;
         let (samples, point) = (system.records[record].samples, &self.refined.points[record]);
         let measured = || samples.iter().filter(|sample| sample.is_measured());
@@ -275,20 +265,20 @@ impl Fitted<'_> {
         let total: f64 = measured().map(|sample| (sample.force.0 - mean).powi(2)).sum();
         let is_even = measured().all(|sample| system.weight(sample) == 1.0);
         if is_even && system.records.len() == 1 && self.refined.is_converged {
-            return Residuals::of(self.refined.sum, total, count);
+            return residual_statistics(self.refined.sum, total, count);
         }
         let forces = system.source.forces(samples, system.scale(&point.outer), point);
         let pairs = samples.iter().zip(forces.unwrap_or_default());
         let squares = pairs
             .filter(|(sample, _)| sample.is_measured())
             .map(|(sample, force)| (sample.force.0 - force).powi(2));
-        Residuals::of(squares.sum(), total, count)
+        residual_statistics(squares.sum(), total, count)
     }
 
     /// Values with their errors and intervals.
     fn parameters(&self, uncertainty: &Uncertainty, record: usize) -> Vec<Parameter> {
         let system = &self.system;
-        let values = system.physical(record, &self.refined.points[record]);
+        let values = system.physical_values(record, &self.refined.points[record]);
         let derived = self.derived(&values);
         let known = system.known().iter().zip(&values).enumerate();
         let own = known.map(|(k, (one, value))| {
@@ -312,7 +302,7 @@ impl Fitted<'_> {
 }
 
 /// The 95 % interval of a value.
-fn interval(value: f64, error: Error, range: Option<OuterRange>) -> [f64; 2] {
+fn interval(value: f64, error: UncertaintyEstimate, range: Option<OuterRange>) -> [f64; 2] {
     let half = student_t975(error.freedom) * error.std_error;
     // No relaxation time is negative, and no curvature.
     let lowest = match range {
@@ -322,42 +312,33 @@ fn interval(value: f64, error: Error, range: Option<OuterRange>) -> [f64; 2] {
     [(value - half).max(lowest), value + half]
 }
 
-struct Residuals {
-    r2: f64,
-    rmse_n: f64,
+/// Explained share of the variance and root mean square, from sums of squares left and in all.
+fn residual_statistics(sum: f64, total: f64, count: f64) -> (f64, f64) {
+    (if total > 0.0 { 1.0 - sum / total } else { f64::NAN }, (sum / count).sqrt())
 }
 
-impl Residuals {
-    fn of(sum: f64, total: f64, count: f64) -> Self {
-        Self {
-            r2: if total > 0.0 { 1.0 - sum / total } else { f64::NAN },
-            rmse_n: (sum / count).sqrt(),
-        }
-    }
-}
-
-/// Memory in blocks as time and shares. The lasting part of variance `A` forgets as
+/// Autocorrelation over blocks as time and shares. The lasting part of variance `A` decays as
 /// `exp(-t / theta)`; neighbouring sums of `m` samples then have the covariance
 /// `A m^2 ((1 - e^-r) / r)^2`, `r` being the length of a block over theta.
-fn noise_found(
+fn estimate_noise(
     memory: &Memory,
     white: f64,
     interval: f64,
     block: f64,
     samples: usize,
-) -> NoiseFound {
+) -> NoiseEstimate {
     let effective_samples = (samples as f64 * white / memory.long_run()).clamp(1.0, samples as f64);
     if memory.neighbour <= 0.0 || white <= 0.0 {
-        return NoiseFound {
+        return NoiseEstimate {
             slow_share: 0.0,
             correlation_time_s: None,
             effective_samples: samples as f64,
         };
     }
     let r = -memory.forgetting.ln();
-    let lost = -(-r).exp_m1();
-    let slow = memory.level * memory.neighbour * (r / lost).powi(2) / block;
-    NoiseFound {
+    let decayed = -(-r).exp_m1();
+    let slow = memory.level * memory.neighbour * (r / decayed).powi(2) / block;
+    NoiseEstimate {
         slow_share: (slow / white).min(1.0),
         correlation_time_s: Some(block * interval / r),
         effective_samples,

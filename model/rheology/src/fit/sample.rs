@@ -1,10 +1,10 @@
-//! What a fit is given, and the words in which it refuses.
+//! Samples of a fit, and its errors.
 
 use palpate_model::units::{Depth, Newtons, Seconds};
 use thiserror::Error;
 
 /// A record's name and its samples.
-pub(super) type Named<'a> = (&'a str, &'a [FitSample]);
+pub(super) type NamedSamples<'a> = (&'a str, &'a [FitSample]);
 
 /// One sample of an indentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,6 @@ pub struct FitSample {
     pub t: Seconds,
     /// Depth of the probe. Between samples it is taken to move straight.
     pub depth: Depth,
-    /// Measured force.
     pub force: Newtons,
     /// Standard deviation of this force; the sample weighs `1 / sigma^2`. Infinite for a censored
     /// sample, one whose force is not known (a saturated load cell, a reading distrusted by an
@@ -31,145 +30,50 @@ impl FitSample {
 /// A fit could not be made; the text says what to change.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FitError {
-    /// Fewer samples than free parameters, or none at all.
     #[error(
-        "the record has {samples} sample(s) with a force and the fit {parameters} free parameter(s); record more samples or fix parameters"
+        "the record has {samples} sample(s) with a force and the fit has {parameters} free parameter(s); record more samples or fix parameters"
     )]
-    TooFewSamples {
-        /// Samples whose force counts.
-        samples: usize,
-        /// Parameters left free.
-        parameters: usize,
-    },
-    /// NaN or infinite.
+    TooFewSamples { samples: usize, parameters: usize },
     #[error("sample {index} has a {what} of {value}; remove samples that are not finite numbers")]
-    NotFinite {
-        /// Sample, counted from 0.
-        index: usize,
-        /// Which of its numbers.
-        what: &'static str,
-        /// The number.
-        value: f64,
-    },
-    /// Numbers whose powers are none.
+    NotFinite { index: usize, what: &'static str, value: f64 },
     #[error(
         "the record has a {what} of {value:e} {unit}, out of scale: a fit needs numbers between 1e-50 and 1e50; check its unit"
     )]
-    Scale {
-        /// Largest depth, largest force or force uncertainty.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-    },
-    /// A force uncertainty of zero or less.
+    Scale { what: &'static str, value: f64, unit: &'static str },
     #[error("sample {index} has a force uncertainty of {sigma} N; it must be greater than zero")]
-    SigmaNotPositive {
-        /// Sample, counted from 0.
-        index: usize,
-        /// Its uncertainty in N.
-        sigma: f64,
-    },
-    /// Time stands still or runs backwards.
+    SigmaNotPositive { index: usize, sigma: f64 },
     #[error(
         "sample {index} is at {t} s after {before} s; times must increase, remove repeated samples and sort the record"
     )]
-    TimeNotIncreasing {
-        /// Sample, counted from 0.
-        index: usize,
-        /// Its time in s.
-        t: f64,
-        /// The time before in s.
-        before: f64,
-    },
-    /// The probe never touched.
+    TimeNotIncreasing { index: usize, t: f64, before: f64 },
     #[error(
         "the depth never exceeds {deepest} mm and contact is at {contact} mm, so the probe never enters the tissue; check the contact position"
     )]
-    NeverInTissue {
-        /// Greatest depth in mm.
-        deepest: f64,
-        /// Assumed contact in mm.
-        contact: f64,
-    },
-    /// Different parameters give the same force on this path.
+    NeverInTissue { deepest: f64, contact: f64 },
     #[error("this record cannot separate {}: {advice}", list(.names))]
-    Inseparable {
-        /// The parameters that cannot be told apart.
-        names: Vec<String>,
-        /// Why, and which record could.
-        advice: String,
-    },
-    /// One record of several could not be fitted.
+    Inseparable { names: Vec<String>, advice: String },
     #[error("{reason}, in {record}")]
-    InRecord {
-        /// Its name.
-        record: String,
-        /// Why.
-        reason: Box<FitError>,
-    },
-    /// A parameter that records cannot share.
+    InRecord { record: String, reason: Box<FitError> },
     #[error("{name} belongs to one recording and cannot be shared; share any of {known}")]
-    NotShareable {
-        /// The parameter.
-        name: String,
-        /// Those that can be.
-        known: String,
-    },
-    /// Residuals that remember too long for a bootstrap.
+    NotShareable { name: String, known: String },
     #[error(
-        "the residuals remember so long that the record has {blocks} block(s) to shuffle, and a bootstrap needs {needed}; use the intervals of the fit or of the profile"
+        "the residuals are autocorrelated over so long a time that the record has {blocks} independent block(s), and a bootstrap needs {needed}; use the intervals of the fit or of the profile"
     )]
-    TooFewBlocks {
-        /// Blocks longer than the memory in the record.
-        blocks: usize,
-        /// Blocks needed.
-        needed: usize,
-    },
-    /// A record whose force never changes.
+    TooFewBlocks { blocks: usize, needed: usize },
     #[error(
-        "the force never changes from {force} N, so it says nothing of the tissue; check the load cell and the columns"
+        "the force never changes from {force} N, so it does not depend on the tissue; check the load cell and the columns"
     )]
-    ConstantForce {
-        /// The force in N.
-        force: f64,
-    },
-    /// A record whose depth never changes.
+    ConstantForce { force: f64 },
     #[error(
         "the depth never changes from {depth} mm, so the tissue is not indented; move deeper, or check the columns"
     )]
-    ConstantDepth {
-        /// The depth in mm.
-        depth: f64,
-    },
-    /// A parameter that the model does not have.
-    #[error("the model has no parameter called '{name}'; it has {known}")]
-    UnknownParameter {
-        /// The name given.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
-    /// A fixed value that cannot be.
+    ConstantDepth { depth: f64 },
+    #[error("the model has no parameter '{name}'; it has {known}")]
+    UnknownParameter { name: String, known: String },
     #[error("{name} cannot be fixed at {value}; {reason}")]
-    BadValue {
-        /// The parameter.
-        name: String,
-        /// The value given.
-        value: f64,
-        /// What it must be.
-        reason: &'static str,
-    },
-    /// A family that these records do not hold.
+    BadValue { name: String, value: f64, reason: &'static str },
     #[error("{family}: {reason}")]
-    Unsupported {
-        /// The family.
-        family: String,
-        /// Why not.
-        reason: String,
-    },
-    /// The numbers overflowed.
+    Unsupported { family: String, reason: String },
     #[error(
         "the fit produced numbers that are not finite; check the units of depth (mm) and force (N)"
     )]

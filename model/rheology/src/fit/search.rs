@@ -1,14 +1,14 @@
 //! Where to start: the sum of squares over the outer parameters, searched whole on thinned records.
 //!
-//! Nobody is asked for a starting guess. Given the outer parameters the problem is linear. One relaxation time is
+//! No starting guess is needed. Given the outer parameters the problem is linear. One relaxation time is
 //! scanned: 48 values evenly spaced in log tau over every time the record can show, then Brent's minimiser inside each
 //! of the deepest brackets. Several outer parameters have a grid, with a coarse member of the family where it has one,
 //! and Gauss-Newton steps from its deepest cells; several relaxation times grow from one dense series.
 
-use super::columns::{Outer, Point};
+use super::columns::{OuterPoint, ParameterPoint};
 use super::nonnegative::non_negative;
 use super::options::FitOptions;
-use super::refine::{GAIN_VALLEY, Refined, Settle, refine};
+use super::refine::{GAIN_VALLEY, RefinedFit, StopRule, refine};
 use super::system::{Rows, System};
 use crate::families::{OuterRange, Prony};
 use argmin::core::{CostFunction, Error, Executor, State};
@@ -28,42 +28,42 @@ const CELLS: usize = 4;
 /// The grid for an unknown contact: relaxation times, contact positions.
 const CONTACT_GRID: (usize, usize) = (20, 28);
 /// Relaxation times of the grid from which a Prony series is grown: at least so many, and so many for
-/// each factor of ten, since non-negative sums of neighbours closer than that cannot be told apart.
+/// each factor of ten, since non-negative sums of neighbours closer than that are not separable.
 const GROWN: (usize, f64) = (40, 6.0);
 
 /// The best outer parameters of every record on the thinned records; what all records have in common is searched for all
 /// records together. `None` where the family has no finite force at all.
-pub(super) fn best_outers(system: &System<'_>) -> Option<Vec<Outer>> {
+pub(super) fn best_outers(system: &System<'_>) -> Option<Vec<OuterPoint>> {
     let count = system.records.len();
-    let is_common = |k: usize| system.is_shared(k) || system.fixed(0, k).is_some();
+    let is_common = |k: usize| system.shared[k] || system.fixed(0, k).is_some();
     if count > 1 && (0..system.layout().outers).all(is_common) {
-        let contacts = (0..count).map(|record| contact(&system.alone(record)));
-        return outers(&system.searched(), &contacts.collect::<Option<Vec<f64>>>()?);
+        let contacts = (0..count).map(|record| search_contact(&system.single_record(record)));
+        return search_outers(&system.for_search(), &contacts.collect::<Option<Vec<f64>>>()?);
     }
     let each = (0..count).map(|record| {
-        let alone = system.alone(record);
-        let contact = contact(&alone)?;
-        outers(&alone.searched(), &[contact])?.pop()
+        let alone = system.single_record(record);
+        let contact = search_contact(&alone)?;
+        search_outers(&alone.for_search(), &[contact])?.pop()
     });
-    let mut each: Vec<Outer> = each.collect::<Option<_>>()?;
-    // What only some of them share starts where the first record has it.
+    let mut each: Vec<OuterPoint> = each.collect::<Option<_>>()?;
+    // A parameter that only some of them share starts where the first record has it.
     let first = each[0].values.clone();
     for one in &mut each {
         let shared = one.values.iter_mut().zip(&first).enumerate();
         shared
-            .filter(|(k, _)| count > 1 && system.is_shared(*k))
+            .filter(|(k, _)| count > 1 && system.shared[*k])
             .for_each(|(_, (value, first))| *value = *first);
     }
     Some(each)
 }
 
 /// The best outer parameters, the same in all records, at given contact positions.
-fn outers(system: &System<'_>, contacts: &[f64]) -> Option<Vec<Outer>> {
+fn search_outers(system: &System<'_>, contacts: &[f64]) -> Option<Vec<OuterPoint>> {
     let free: Vec<usize> =
         (0..system.layout().outers).filter(|&k| system.fixed(0, k).is_none()).collect();
-    let is_time = |k: &&usize| system.source.kind(**k) == OuterRange::Time;
+    let is_time = |k: &&usize| system.source.range_kind(**k) == OuterRange::Time;
     let times = free.iter().filter(is_time).count();
-    let at = |z: &[f64]| all_at(system, contacts, &free, z);
+    let at = |z: &[f64]| outers_at(system, contacts, &free, z);
     match (free.as_slice(), times) {
         ([], _) => Some(at(&[])),
         (&[time], 1) => {
@@ -73,8 +73,8 @@ fn outers(system: &System<'_>, contacts: &[f64]) -> Option<Vec<Outer>> {
         }
         _ => {
             let found = match system.source.family.coarse() {
-                Some(coarse) => valley(&system.with_member(coarse), contacts, &free, times)?,
-                None => valley(system, contacts, &free, times)?,
+                Some(coarse) => search_valley(&system.with_member(coarse), contacts, &free, times)?,
+                None => search_valley(system, contacts, &free, times)?,
             };
             Some(found.points.into_iter().map(|point| point.outer).collect())
         }
@@ -82,13 +82,13 @@ fn outers(system: &System<'_>, contacts: &[f64]) -> Option<Vec<Outer>> {
 }
 
 /// The outer parameters of every record with the free ones at these search coordinates.
-fn all_at(system: &System<'_>, contacts: &[f64], free: &[usize], z: &[f64]) -> Vec<Outer> {
+fn outers_at(system: &System<'_>, contacts: &[f64], free: &[usize], z: &[f64]) -> Vec<OuterPoint> {
     let value = |k: usize| match free.iter().position(|&one| one == k) {
         Some(place) => system.outer_value(k, z[place]),
         None => system.fixed(0, k).unwrap_or(f64::NAN),
     };
     let values: Vec<f64> = (0..system.layout().outers).map(value).collect();
-    let each = contacts.iter().map(|&contact| Outer { values: values.clone(), contact });
+    let each = contacts.iter().map(|&contact| OuterPoint { values: values.clone(), contact });
     each.collect()
 }
 
@@ -96,17 +96,17 @@ fn all_at(system: &System<'_>, contacts: &[f64], free: &[usize], z: &[f64]) -> V
 fn best_log_tau(
     system: &System<'_>,
     range: (f64, f64),
-    at: impl Fn(f64) -> Vec<Outer>,
+    at: impl Fn(f64) -> Vec<OuterPoint>,
 ) -> Option<f64> {
     let sum = |log_tau: f64| system.sum(&at(log_tau), Rows::Thin);
-    let nodes = nodes(range, NODES);
+    let nodes = even_nodes(range, NODES);
     let sums: Vec<f64> = nodes.iter().map(|&log_tau| sum(log_tau)).collect();
-    let mut valleys = valleys(NODES, |i| sums[i]);
+    let mut valleys = find_valleys(NODES, |i| sums[i]);
     valleys.sort_by(|&a, &b| sums[a].total_cmp(&sums[b]));
     valleys.truncate(VALLEYS);
     let refined = valleys.into_iter().map(|i| {
         let bracket = (nodes[i.saturating_sub(1)], nodes[(i + 1).min(NODES - 1)]);
-        let log_tau = minimum(bracket, sum).unwrap_or(nodes[i]);
+        let log_tau = minimise(bracket, sum).unwrap_or(nodes[i]);
         (log_tau, sum(log_tau))
     });
     refined
@@ -116,28 +116,33 @@ fn best_log_tau(
 }
 
 /// The deepest valley over several outer parameters, not followed to its very floor.
-fn valley(system: &System<'_>, contacts: &[f64], free: &[usize], times: usize) -> Option<Refined> {
-    let place = |z: &[f64]| system.solved(&all_at(system, contacts, free, z), Rows::Thin);
+fn search_valley(
+    system: &System<'_>,
+    contacts: &[f64],
+    free: &[usize],
+    times: usize,
+) -> Option<RefinedFit> {
+    let place = |z: &[f64]| system.solved(&outers_at(system, contacts, free, z), Rows::Thin);
     // Several relaxation times would need a grid of their own each; they start from one dense series,
     // and evenly spread.
     if times > 1 && times == free.len() {
         let (low, high) = system.ranges[0].outers[free[0]];
         let share = |i: usize| (i as f64 + 0.5) / times as f64;
         let even = (0..times).map(|i| low + (high - low) * share(i)).collect();
-        let starts = grown(system, contacts, (low, high), times).into_iter().chain([even]);
+        let starts = grow_series(system, contacts, (low, high), times).into_iter().chain([even]);
         let starts: Vec<Vec<f64>> = starts.collect();
-        return deepest(system, starts.iter().filter_map(|z| Some(place(z)?.0)));
+        return refine_deepest(system, starts.iter().filter_map(|z| Some(place(z)?.0)));
     }
     let axes: Vec<Vec<f64>> = free
         .iter()
         .map(|&k| {
-            let count = match system.source.kind(k) {
+            let count = match system.source.range_kind(k) {
                 OuterRange::Time => TIMES,
                 OuterRange::PerDepth(..) => OTHERS[0],
                 OuterRange::Ratio(..) => OTHERS[1],
                 OuterRange::Share(..) => OTHERS[2],
             };
-            nodes(system.ranges[0].outers[k], count)
+            even_nodes(system.ranges[0].outers[k], count)
         })
         .collect();
     let cells: usize = axes.iter().map(Vec::len).product();
@@ -151,7 +156,7 @@ fn valley(system: &System<'_>, contacts: &[f64], free: &[usize], times: usize) -
             })
             .collect()
     };
-    let places: Vec<Option<(Vec<Point>, f64)>> = (0..cells)
+    let places: Vec<Option<(Vec<ParameterPoint>, f64)>> = (0..cells)
         .map(|cell| {
             let z = at(cell).into_iter().zip(&axes);
             place(&z.map(|(index, axis)| axis[index]).collect::<Vec<_>>())
@@ -174,22 +179,26 @@ fn valley(system: &System<'_>, contacts: &[f64], free: &[usize], times: usize) -
         .collect();
     valleys.sort_by(|&a, &b| sum(a).total_cmp(&sum(b)));
     let starts = valleys.into_iter().take(CELLS);
-    deepest(system, starts.filter_map(|cell| Some(places[cell].as_ref()?.0.clone())))
+    refine_deepest(system, starts.filter_map(|cell| Some(places[cell].as_ref()?.0.clone())))
 }
 
 /// The deepest floor below these starts; one whose coefficients the family allows, if there is any.
-fn deepest(system: &System<'_>, starts: impl Iterator<Item = Vec<Point>>) -> Option<Refined> {
-    starts.filter_map(|start| refine(system, &start, Rows::Thin, Settle::Gain(GAIN_VALLEY))).min_by(
-        |a, b| {
-            let refused = system.has_zero(&a.points).cmp(&system.has_zero(&b.points));
+fn refine_deepest(
+    system: &System<'_>,
+    starts: impl Iterator<Item = Vec<ParameterPoint>>,
+) -> Option<RefinedFit> {
+    let is_refused = |end: &RefinedFit| system.first_zero(&end.points).is_some();
+    starts
+        .filter_map(|start| refine(system, &start, Rows::Thin, StopRule::Gain(GAIN_VALLEY)))
+        .min_by(|a, b| {
+            let refused = is_refused(a).cmp(&is_refused(b));
             refused.then(a.sum.total_cmp(&b.sum))
-        },
-    )
+        })
 }
 
 /// Where a series of `terms` relaxation times may start, in search coordinates: a non-negative fit over a
 /// dense grid of times, neighbours merged until so many are left.
-fn grown(
+fn grow_series(
     system: &System<'_>,
     contacts: &[f64],
     (low, high): (f64, f64),
@@ -197,18 +206,20 @@ fn grown(
 ) -> Option<Vec<f64>> {
     let decades = (high - low) / std::f64::consts::LN_10;
     let grid = GROWN.0.max((GROWN.1 * decades).ceil() as usize);
-    let log_taus = nodes((low, high), grid);
+    let log_taus = even_nodes((low, high), grid);
     let dense = system.with_family(&FitOptions::of(Arc::new(Prony::dense(grid))).at_rest());
     let taus: Vec<f64> = log_taus.iter().map(|log_tau| log_tau.exp()).collect();
-    let outers = contacts.iter().map(|&contact| Outer { values: taus.clone(), contact });
+    let outers = contacts.iter().map(|&contact| OuterPoint { values: taus.clone(), contact });
     let factor = dense.values_pass(&outers.collect::<Vec<_>>(), Rows::Thin)?;
-    let solution = non_negative(&factor, &dense.all_bounds(grid + 1));
+    // Neither spring nor weight may be negative, whatever the family says.
+    let bounds: Vec<bool> = (0..dense.linear).map(|k| k <= grid).collect();
+    let solution = non_negative(&factor, &bounds);
     // Weight and centre of each run of neighbours.
     let mut groups: Vec<(f64, f64)> = Vec::new();
     let mut is_running = false;
     for (log_tau, &weight) in log_taus.iter().zip(&solution[1..=grid]) {
         match groups.last_mut().filter(|_| is_running && weight > 0.0) {
-            Some(group) => *group = merged(*group, (weight, *log_tau)),
+            Some(group) => *group = merge_groups(*group, (weight, *log_tau)),
             None if weight > 0.0 => groups.push((weight, *log_tau)),
             None => {}
         }
@@ -220,7 +231,7 @@ fn grown(
             a * b / (a + b) * (y - x).powi(2)
         };
         let cheapest = (0..groups.len() - 1).min_by(|&i, &j| cost(i).total_cmp(&cost(j)))?;
-        groups[cheapest] = merged(groups[cheapest], groups[cheapest + 1]);
+        groups[cheapest] = merge_groups(groups[cheapest], groups[cheapest + 1]);
         groups.remove(cheapest + 1);
     }
     let mut log_taus: Vec<f64> = groups.iter().map(|group| group.1).collect();
@@ -243,17 +254,17 @@ fn grown(
     Some(log_taus)
 }
 
-fn merged((a, x): (f64, f64), (b, y): (f64, f64)) -> (f64, f64) {
+fn merge_groups((a, x): (f64, f64), (b, y): (f64, f64)) -> (f64, f64) {
     (a + b, (a * x + b * y) / (a + b))
 }
 
 /// The contact position of a single record: fixed, or the best of a grid, refined between its neighbours. One relaxation
 /// time is searched at each position; several outer parameters are those of the shallowest.
-fn contact(system: &System<'_>) -> Option<f64> {
+fn search_contact(system: &System<'_>) -> Option<f64> {
     if let Some(contact) = system.fixed_contact(0) {
         return Some(contact);
     }
-    let searched = system.searched();
+    let searched = system.for_search();
     let (low, high) = system.ranges[0].contact;
     let free: Vec<usize> =
         (0..system.layout().outers).filter(|&k| system.fixed(0, k).is_none()).collect();
@@ -261,11 +272,11 @@ fn contact(system: &System<'_>) -> Option<f64> {
     let starts: Vec<Vec<f64>> = match free.as_slice() {
         [] => vec![Vec::new()],
         &[time] if system.source.has_one_time() => {
-            let log_taus = nodes(system.ranges[0].outers[time], taus);
+            let log_taus = even_nodes(system.ranges[0].outers[time], taus);
             log_taus.into_iter().map(|log_tau| vec![log_tau]).collect()
         }
         _ => {
-            let outer = outers(&searched, &[low])?.pop()?;
+            let outer = search_outers(&searched, &[low])?.pop()?;
             let z = free.iter().map(|&k| system.coordinate(k, outer.values[k]));
             vec![z.collect()]
         }
@@ -273,7 +284,7 @@ fn contact(system: &System<'_>) -> Option<f64> {
     // Denser near the shallow end, where contacts are.
     let place = |i: usize| low + (high - low) * (i as f64 / (contacts - 1) as f64).powi(2);
     let sum = |z: &[f64], contact: f64| {
-        searched.sum(&all_at(&searched, &[contact], &free, z), Rows::Thin)
+        searched.sum(&outers_at(&searched, &[contact], &free, z), Rows::Thin)
     };
     let profile: Vec<(f64, &Vec<f64>)> = (0..contacts)
         .map(|i| {
@@ -292,20 +303,20 @@ fn contact(system: &System<'_>) -> Option<f64> {
             if let [first, second, ..] = starts.as_slice() {
                 let spacing = second[0] - first[0];
                 let near = (z[0] - spacing, z[0] + spacing);
-                z[0] = minimum(near, |log_tau| sum(&[log_tau], contact)).unwrap_or(z[0]);
+                z[0] = minimise(near, |log_tau| sum(&[log_tau], contact)).unwrap_or(z[0]);
             }
-            contact = minimum(bracket, |contact| sum(&z, contact)).unwrap_or(contact);
+            contact = minimise(bracket, |contact| sum(&z, contact)).unwrap_or(contact);
         }
         (sum(&z, contact), contact)
     };
-    let mut valleys = valleys(contacts, |i| profile[i].0);
+    let mut valleys = find_valleys(contacts, |i| profile[i].0);
     valleys.sort_by(|&a, &b| profile[a].0.total_cmp(&profile[b].0));
     let found = valleys.into_iter().take(VALLEYS).map(around);
     found.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, contact)| contact)
 }
 
 /// Indices that are not above their neighbours.
-fn valleys(count: usize, value: impl Fn(usize) -> f64) -> Vec<usize> {
+fn find_valleys(count: usize, value: impl Fn(usize) -> f64) -> Vec<usize> {
     (0..count)
         .filter(|&i| {
             (i == 0 || value(i) <= value(i - 1)) && (i + 1 == count || value(i) <= value(i + 1))
@@ -313,13 +324,13 @@ fn valleys(count: usize, value: impl Fn(usize) -> f64) -> Vec<usize> {
         .collect()
 }
 
-fn nodes((low, high): (f64, f64), count: usize) -> Vec<f64> {
+fn even_nodes((low, high): (f64, f64), count: usize) -> Vec<f64> {
     (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
 }
 
-struct Cost<F>(F);
+struct SearchCost<F>(F);
 
-impl<F: Fn(f64) -> f64> CostFunction for Cost<F> {
+impl<F: Fn(f64) -> f64> CostFunction for SearchCost<F> {
     type Param = f64;
     type Output = f64;
     fn cost(&self, at: &f64) -> Result<f64, Error> {
@@ -328,9 +339,11 @@ impl<F: Fn(f64) -> f64> CostFunction for Cost<F> {
 }
 
 /// Brent's minimum inside a bracket, as close as comparing values allows.
-fn minimum((low, high): (f64, f64), cost: impl Fn(f64) -> f64) -> Option<f64> {
+fn minimise((low, high): (f64, f64), cost: impl Fn(f64) -> f64) -> Option<f64> {
     let solver = BrentOpt::new(low, high).set_tolerance(1e-8, 1e-6);
-    let result =
-        Executor::new(Cost(cost), solver).configure(|state| state.max_iters(40)).run().ok()?;
+    let result = Executor::new(SearchCost(cost), solver)
+        .configure(|state| state.max_iters(40))
+        .run()
+        .ok()?;
     result.state().get_best_param().copied()
 }

@@ -1,8 +1,8 @@
-//! What a fit says in words; window, command line and files use the same sentences.
+//! Warnings and findings of a fit; window, command line and files use the same sentences.
 
 use super::report::{FitReport, Parameter};
 use super::solve::Fitted;
-use super::uncertainty::End;
+use super::uncertainty::RangeEnd;
 use crate::families::OuterRange;
 use palpate_model::viscoelastic::admissibility;
 
@@ -12,43 +12,43 @@ const MEMORY_LONG: f64 = 1.0;
 const EFFECTIVE_MIN: f64 = 10.0;
 /// Initial forces and offsets beyond this many ranges of the force are not what they are called.
 const LEVEL_LARGE: f64 = 3.0;
-/// Memory this share of the record long is the longest that is looked for.
+/// A correlation time of this share of the record is the longest that is looked for.
 const LONGEST_SHARE: f64 = 0.45;
 /// A relaxation time less certain than this share of its value is hardly known.
 const UNCERTAIN_SHARE: f64 = 0.5;
 
-/// What a reader of the numbers must know.
+/// Warnings without which the numbers would be misread.
 pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut warnings = Vec::new();
     let layout = fitted.system.layout();
     for outer in 0..layout.outers {
         warnings.extend(
             fitted
-                .edge(record, outer)
-                .map(|end| edge(fitted, record, outer, end, &report.parameters[outer])),
+                .range_end(record, outer)
+                .map(|end| edge_warning(fitted, record, outer, end, &report.parameters[outer])),
         );
     }
     if fitted.is_contact_at_start(record) {
         warnings.push(
-            "contact lies at or before the shallowest depth recorded, where it cannot be told \
-             from the elastic coefficients; record the approach as well"
+            "contact lies at or before the shallowest recorded depth, where it is not separable from \
+             the elastic coefficients; record the approach as well"
                 .to_owned(),
         );
     }
     if !fitted.refined.is_converged {
         warnings.push(
-            "the iteration did not settle; the parameters depend on each other too strongly"
+            "the iteration did not converge; the parameters depend on each other too strongly"
                 .to_owned(),
         );
     }
-    if !fitted.blind.is_empty() {
+    if !fitted.inseparable.is_empty() {
         warnings.push(format!(
             "these records hardly separate {}; record a second speed or depth, or a longer hold",
-            fitted.blind.join(", ")
+            fitted.inseparable.join(", ")
         ));
     }
     let times: Vec<&Parameter> = (0..layout.outers)
-        .filter(|&k| fitted.system.source.kind(k) == OuterRange::Time)
+        .filter(|&k| fitted.system.source.range_kind(k) == OuterRange::Time)
         .map(|k| &report.parameters[k])
         .collect();
     for time in &times {
@@ -65,8 +65,8 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
     for parameter in own.map(|k| &report.parameters[k]) {
         if parameter.value.abs() > LEVEL_LARGE * (high - low) {
             warnings.push(format!(
-                "{} is far larger than the force ever changes, so it stands for something the model \
-                 does not know; fix it, or check the record's beginning",
+                "{} is far larger than the range of the force, so it stands for something that the model \
+                 does not contain; fix it, or check the start of the record",
                 parameter.name
             ));
         }
@@ -88,21 +88,21 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
             })
         {
             warnings.push(format!(
-                "the residuals have a long memory: this body does not describe the record to within \
-                 its noise, and intervals from about {} are rough",
-                independent(noise.effective_samples)
+                "lack of fit: the residuals are autocorrelated over a long time, so the model does not \
+                 describe the record to within its noise, and intervals from about {} are rough",
+                independent_words(noise.effective_samples)
             ));
         }
     }
     warnings
 }
 
-/// What the fit found besides numbers.
+/// Findings that are not numbers.
 pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut findings = Vec::new();
     if report.censored > 0 {
         findings.push(format!(
-            "the forces of {} censored samples were left out; their depths count",
+            "the forces of {} censored samples do not count; their depths do",
             report.censored
         ));
     }
@@ -114,12 +114,12 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
     {
         let about = if time > LONGEST_SHARE * length { "at least" } else { "about" };
         findings.push(format!(
-            "the residuals have memory: {} % of their variance lasts {about} {}; {} samples tell as \
-             much as {}, and the intervals allow for it",
-            percent(noise.slow_share),
-            span(time),
+            "autocorrelated residuals: {} % of their variance lasts {about} {}; {} samples carry the \
+             information of {}, and the intervals allow for it",
+            percent_words(noise.slow_share),
+            time_words(time),
             report.samples,
-            independent(noise.effective_samples)
+            independent_words(noise.effective_samples)
         ));
     }
     let (_, deepest) = fitted.system.records[record].depths;
@@ -130,9 +130,15 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
 }
 
 /// That an outer parameter ended where its search does.
-fn edge(fitted: &Fitted<'_>, record: usize, outer: usize, end: End, found: &Parameter) -> String {
+fn edge_warning(
+    fitted: &Fitted<'_>,
+    record: usize,
+    outer: usize,
+    end: RangeEnd,
+    found: &Parameter,
+) -> String {
     let name = &found.name;
-    if fitted.system.source.kind(outer) != OuterRange::Time {
+    if fitted.system.source.range_kind(outer) != OuterRange::Time {
         let (value, unit) = (found.value, &found.unit);
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         return format!(
@@ -140,8 +146,8 @@ fn edge(fitted: &Fitted<'_>, record: usize, outer: usize, end: End, found: &Para
         );
     }
     let end = match end {
-        End::Low => "short",
-        End::High => "long",
+        RangeEnd::Low => "short",
+        RangeEnd::High => "long",
     };
     let (low, high) = fitted.system.ranges[record].outers[outer];
     format!(
@@ -152,7 +158,7 @@ fn edge(fitted: &Fitted<'_>, record: usize, outer: usize, end: End, found: &Para
     )
 }
 
-fn independent(samples: f64) -> String {
+fn independent_words(samples: f64) -> String {
     if samples < 1.5 {
         "one independent sample".to_owned()
     } else {
@@ -161,7 +167,7 @@ fn independent(samples: f64) -> String {
 }
 
 /// A share in percent, two digits of it.
-fn percent(share: f64) -> String {
+fn percent_words(share: f64) -> String {
     let percent = 100.0 * share;
     let decimals = match percent {
         10.0.. => 0,
@@ -173,7 +179,7 @@ fn percent(share: f64) -> String {
 }
 
 /// A time in words of its size.
-fn span(seconds: f64) -> String {
+fn time_words(seconds: f64) -> String {
     if seconds < 0.1 {
         format!("{:.0} ms", 1e3 * seconds)
     } else if seconds < 10.0 {

@@ -1,12 +1,12 @@
 //! Search, refinement, judgement: the fit from end to end.
 
-use super::columns::{Outer, Point};
-use super::identify::{self, Judged};
+use super::columns::{OuterPoint, ParameterPoint};
+use super::identify::{self, JudgedParameters};
 use super::nonnegative::non_negative;
 use super::options::FitOptions;
-use super::refine::{GAIN_THIN, Refined, Settle, refine};
+use super::refine::{GAIN_THIN, RefinedFit, StopRule, refine};
 use super::report::{FitReport, JointReport};
-use super::sample::{FitError, FitSample, Named};
+use super::sample::{FitError, FitSample, NamedSamples};
 use super::search::best_outers;
 use super::system::{Rows, System};
 use crate::families::{Family, Model, ModelError};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// `F + tau_eps F' = mu1 x + mu2 x^2 + mu3 x^3 + tau_sig x x'` with initial force and sensor offset.
 ///
 /// The result depends on nothing but the arguments; no starting guess is needed. Standard errors
-/// and intervals allow for the scatter found and for the memory of the residuals.
+/// and intervals allow for the scatter found and for the autocorrelation of the residuals.
 ///
 /// ```
 /// use palpate_rheology::fit::{FitOptions, FitSample, fit};
@@ -90,7 +90,7 @@ pub fn fit_joint(
 /// [`fit_joint`] and many times cheaper: for fits whose predictions are looked at and whose numbers are not.
 pub fn fit_body(records: &[(&str, &[FitSample])], options: &FitOptions) -> Result<Model, FitError> {
     let system = joint_system(records, options, &options.body_names())?;
-    let points = started(&system)?;
+    let points = search_start(&system)?;
     system.model(&points)
 }
 
@@ -112,7 +112,7 @@ pub fn fit_coefficients(
     let mut options = FitOptions::of(Arc::clone(&family)).at_rest();
     options.fix("f_offset", 0.0)?;
     let system = joint_system(records, &options, &options.body_names())?;
-    let outer = Outer { values: outer.to_vec(), contact: 0.0 };
+    let outer = OuterPoint { values: outer.to_vec(), contact: 0.0 };
     let outers = vec![outer; records.len()];
     let factor = system.values_pass(&outers, Rows::All);
     let factor = factor.ok_or(FitError::Overflow)?;
@@ -153,9 +153,9 @@ pub fn fit_coefficients(
 #[derive(Clone, Debug)]
 pub struct Fitted<'a> {
     pub(super) system: System<'a>,
-    pub(super) refined: Refined,
-    /// What the measured depths may hide but their redrawn path shows: parameters that are hardly told apart.
-    pub(super) blind: Vec<String>,
+    pub(super) refined: RefinedFit,
+    /// Parameters that the redrawn path hardly separates, although the measured depths hide it.
+    pub(super) inseparable: Vec<String>,
 }
 
 impl<'a> Fitted<'a> {
@@ -171,57 +171,58 @@ impl<'a> Fitted<'a> {
         shared: &[&str],
     ) -> Result<Self, FitError> {
         let system = joint_system(records, options, shared)?;
-        let points = started(&system)?;
+        let points = search_start(&system)?;
         Self::refined(system, &points)
     }
 
     /// Fits other records of the same kind that differ little. What takes more than a scan to find is not searched
     /// again.
-    pub(super) fn again<'b>(&self, records: &[Named<'b>]) -> Result<Fitted<'b>, FitError>
+    pub(super) fn refit<'b>(&self, records: &[NamedSamples<'b>]) -> Result<Fitted<'b>, FitError>
     where
         'a: 'b,
     {
         let system = self.system.with_records(records)?;
         if system.source.has_one_time() {
-            let points = started(&system)?;
+            let points = search_start(&system)?;
             return Fitted::refined(system, &points);
         }
         Fitted::refined(system, &self.refined.points)
     }
 
-    fn refined(system: System<'a>, start: &[Point]) -> Result<Self, FitError> {
-        let refined = refine(&system, start, Rows::All, Settle::Noise);
-        let is_number = |point: &Point| {
+    fn refined(system: System<'a>, start: &[ParameterPoint]) -> Result<Self, FitError> {
+        let refined = refine(&system, start, Rows::All, StopRule::Noise);
+        let is_number = |point: &ParameterPoint| {
             let mut values = point.outer.values.iter().chain(&point.at);
             values.all(|value| value.is_finite()) && point.outer.contact.is_finite()
         };
         let Some(refined) = refined.filter(|end| end.points.iter().all(is_number)) else {
             // A blind design divides by nothing; say which parameters rather than that.
-            identify::check(&system, start, Judged::Linear)?;
+            identify::check(&system, start, JudgedParameters::Linear)?;
             return Err(FitError::Overflow);
         };
-        let blind = match identify::check(&system, &refined.points, Judged::WithOuter) {
-            // A search over several outer parameters ends on flat ground; their intervals are as wide as that.
-            Err(FitError::Inseparable { names, .. }) if !system.source.has_one_time() => names,
-            judged => {
-                judged?;
-                Vec::new()
-            }
-        };
+        let inseparable =
+            match identify::check(&system, &refined.points, JudgedParameters::WithOuter) {
+                // A search over several outer parameters ends on flat ground; their intervals are as wide as that.
+                Err(FitError::Inseparable { names, .. }) if !system.source.has_one_time() => names,
+                judged => {
+                    judged?;
+                    Vec::new()
+                }
+            };
         system.model(&refined.points)?;
-        Ok(Self { system, refined, blind })
+        Ok(Self { system, refined, inseparable })
     }
 }
 
 fn joint_system<'a>(
-    records: &[Named<'a>],
+    records: &[NamedSamples<'a>],
     options: &FitOptions,
     shared: &[&str],
 ) -> Result<System<'a>, FitError> {
     let mut is_shared = vec![false; options.names().len()];
     for name in shared {
         let index = options.index_of(name)?;
-        if !options.layout().is_body(index) {
+        if !options.layout.is_body(index) {
             return Err(FitError::NotShareable {
                 name: (*name).to_owned(),
                 known: options.body_names().join(", "),
@@ -235,25 +236,25 @@ fn joint_system<'a>(
     System::new(records, options, is_shared)
 }
 
-/// What the search on the thinned records ends at.
-fn started(system: &System<'_>) -> Result<Vec<Point>, FitError> {
+/// The end of the search on the thinned records.
+fn search_start(system: &System<'_>) -> Result<Vec<ParameterPoint>, FitError> {
     let found = best_outers(system).and_then(|outers| system.solved(&outers, Rows::Thin));
     let Some((points, _)) = found else {
-        identify::check(system, &system.middle_points(), Judged::Linear)?;
+        identify::check(system, &system.middle_points(), JudgedParameters::Linear)?;
         return Err(FitError::Overflow);
     };
     let is_contact_known = (0..points.len()).all(|record| !system.is_contact_free(record));
     // Where bounds keep a coefficient from zero they tell more than a condition does.
     if is_contact_known && !system.bounds().contains(&true) {
-        identify::check(system, &points, Judged::Linear)?;
+        identify::check(system, &points, JudgedParameters::Linear)?;
     }
     if system.source.has_one_time() || system.unknowns.len() == system.linear {
         return Ok(points);
     }
-    let rows = system.thinned();
-    let refined = refine(system, &points, rows, Settle::Gain(GAIN_THIN));
+    let rows = system.search_rows();
+    let refined = refine(system, &points, rows, StopRule::Gain(GAIN_THIN));
     let points = refined.ok_or(FitError::Overflow)?.points;
-    // What the thinned records refuse, all samples would at many times the cost.
+    // All samples would refuse what the thinned records refuse, at many times the cost.
     system.model(&points)?;
     Ok(points)
 }

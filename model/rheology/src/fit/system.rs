@@ -6,11 +6,11 @@
 //! small triangles with its columns mapped to the joint unknowns. So one record is the joint fit
 //! of one, and fixing or sharing a parameter never touches the samples again.
 
-use super::columns::{Point, Source};
-use super::options::{FitOptions, Known, Layout};
+use super::columns::{ColumnSource, ParameterPoint};
+use super::options::{FitOptions, KnownParameter, Layout};
 use super::parameters::union;
 use super::record::{Record, check};
-use super::sample::{FitError, FitSample, Named};
+use super::sample::{FitError, FitSample, NamedSamples};
 use crate::families::Family;
 use std::sync::Arc;
 
@@ -32,16 +32,13 @@ impl Unknown {
 pub(super) struct Ranges {
     /// Of each outer parameter of the family, in its search coordinate.
     pub outers: Vec<(f64, f64)>,
-    /// Scaled.
     pub contact: (f64, f64),
 }
 
-/// Which rows a pass takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rows {
     /// Blocks of samples, for searching.
     Thin,
-    /// Every sample.
     All,
 }
 
@@ -49,7 +46,7 @@ pub(super) enum Rows {
 #[derive(Clone, Debug)]
 pub(super) struct System<'a> {
     pub records: Vec<Record<'a>>,
-    pub source: Source,
+    pub source: ColumnSource,
     pub(super) options: FitOptions,
     /// Depth in mm that counts as one, in every record.
     pub depth_mm: f64,
@@ -65,17 +62,17 @@ pub(super) struct System<'a> {
 
 impl<'a> System<'a> {
     pub fn new(
-        records: &[Named<'a>],
+        records: &[NamedSamples<'a>],
         options: &FitOptions,
         shared: Vec<bool>,
     ) -> Result<Self, FitError> {
         let several = records.len() > 1;
-        let layout = options.layout();
+        let layout = options.layout;
         let named = |name: &str, reason: FitError| match several {
             true => FitError::InRecord { record: name.to_owned(), reason: Box::new(reason) },
             false => reason,
         };
-        let fixed = options.fixed().to_vec();
+        let fixed = options.fixed.clone();
         let is_own = |k: &usize| fixed[*k].is_none() && !(several && shared[*k]);
         let own = (0..layout.count()).filter(is_own).count();
         let mut depth_mm = 0.0f64;
@@ -88,7 +85,7 @@ impl<'a> System<'a> {
             .flat_map(|(_, samples)| samples.iter())
             .find(|sample| sample.is_measured())
             .map_or(1.0, |sample| sample.sigma.0);
-        let source = Source::new(options.shared_family(), options.is_at_rest());
+        let source = ColumnSource::new(Arc::clone(&options.family), options.is_at_rest);
         let mut system = Self {
             records: records
                 .iter()
@@ -110,7 +107,7 @@ impl<'a> System<'a> {
             let all = union(system.ranges.iter().map(|one| one.outers[k]));
             system.ranges.iter_mut().for_each(|one| one.outers[k] = all);
         }
-        let system = system.arranged();
+        let system = system.list_unknowns();
         let measured = system.measured();
         if measured < system.unknowns.len() {
             return Err(FitError::TooFewSamples {
@@ -126,13 +123,12 @@ impl<'a> System<'a> {
         self.source.layout
     }
 
-    /// What is known of every parameter beside its value.
-    pub fn known(&self) -> &[Known] {
-        self.options.known()
+    /// Name, unit and range of every parameter.
+    pub fn known(&self) -> &[KnownParameter] {
+        &self.options.known
     }
 
-    /// With its unknowns counted anew.
-    fn arranged(mut self) -> Self {
+    fn list_unknowns(mut self) -> Self {
         let layout = self.layout();
         let records = self.records.len();
         let parameters = layout.linear().chain(0..layout.outers);
@@ -153,18 +149,18 @@ impl<'a> System<'a> {
     }
 
     /// One of the records alone, with all its parameters its own.
-    pub fn alone(&self, record: usize) -> Self {
+    pub fn single_record(&self, record: usize) -> Self {
         Self {
             records: vec![self.records[record].clone()],
             fixed: vec![self.fixed[record].clone()],
             ranges: vec![self.range(record)],
             ..self.clone()
         }
-        .arranged()
+        .list_unknowns()
     }
 
     /// The same with outer parameters the same in all records, and contact where each point has it.
-    pub fn searched(&self) -> Self {
+    pub fn for_search(&self) -> Self {
         let mut system = self.clone();
         let outers = self.layout().outers;
         for k in 0..outers {
@@ -176,7 +172,7 @@ impl<'a> System<'a> {
         for fixed in &mut system.fixed {
             fixed[contact].get_or_insert(0.0);
         }
-        system.arranged()
+        system.list_unknowns()
     }
 
     /// The same with another member of the family, of the same parameters.
@@ -188,21 +184,21 @@ impl<'a> System<'a> {
 
     /// The same records with another family, its body the same in all.
     pub fn with_family(&self, options: &FitOptions) -> Self {
-        let (own, layout) = (self.layout(), options.layout());
+        let (own, layout) = (self.layout(), options.layout);
         let fixed = self.fixed.iter().map(|before| {
-            let mut fixed = options.fixed().to_vec();
+            let mut fixed = options.fixed.clone();
             fixed[layout.offset()] = before[own.offset()];
             fixed
         });
         let is_body = |k| layout.is_body(k);
         Self {
             fixed: fixed.collect(),
-            source: Source::new(options.shared_family(), true),
+            source: ColumnSource::new(Arc::clone(&options.family), true),
             options: options.clone(),
             shared: (0..layout.count()).map(is_body).collect(),
             ..self.clone()
         }
-        .arranged()
+        .list_unknowns()
     }
 
     /// The same with a parameter of one record kept at a value, in all records where they share it.
@@ -213,11 +209,11 @@ impl<'a> System<'a> {
                 fixed[parameter] = Some(value);
             }
         }
-        system.arranged()
+        system.list_unknowns()
     }
 
     /// Other records with the same choice of parameters.
-    pub fn with_records<'b>(&self, records: &[Named<'b>]) -> Result<System<'b>, FitError>
+    pub fn with_records<'b>(&self, records: &[NamedSamples<'b>]) -> Result<System<'b>, FitError>
     where
         'a: 'b,
     {
@@ -246,11 +242,6 @@ impl<'a> System<'a> {
         self.fixed[record][parameter]
     }
 
-    /// Whether a free parameter is the same in every record.
-    pub fn is_shared(&self, parameter: usize) -> bool {
-        self.shared[parameter]
-    }
-
     /// Whether a record's contact position is found.
     pub fn is_contact_free(&self, record: usize) -> bool {
         self.fixed(record, self.layout().contact()).is_none()
@@ -270,22 +261,17 @@ impl<'a> System<'a> {
 
     /// The rows from which a solution is found many times cheaper, and a small share of a standard error from it; all of
     /// them where these cost as little.
-    pub fn thinned(&self) -> Rows {
+    pub fn search_rows(&self) -> Rows {
         match self.source.is_fast() {
             true => Rows::All,
             false => Rows::Thin,
         }
     }
 
-    /// Whether a coefficient that must not be negative is at zero: what the records do not hold ends there.
-    pub fn has_zero(&self, points: &[Point]) -> bool {
-        self.zero(points).is_some()
-    }
-
-    /// The first such parameter.
-    pub fn zero(&self, points: &[Point]) -> Option<usize> {
+    /// The first coefficient that must not be negative and is at zero: what the records do not hold ends there.
+    pub fn first_zero(&self, points: &[ParameterPoint]) -> Option<usize> {
         let layout = self.layout();
-        let is_zero = |record: usize, point: &Point, k: usize| {
+        let is_zero = |record: usize, point: &ParameterPoint, k: usize| {
             let parameter = layout.outers + k;
             let is_free = self.fixed(record, parameter).is_none();
             is_free && self.known()[parameter].is_bound && point.at[k] <= 0.0
@@ -299,7 +285,7 @@ impl<'a> System<'a> {
     }
 
     /// The linear unknowns that are not at a bound of theirs.
-    pub fn passive(&self, points: &[Point]) -> Vec<usize> {
+    pub fn passive(&self, points: &[ParameterPoint]) -> Vec<usize> {
         let outers = self.layout().outers;
         let is_passive = |k: &usize| {
             let unknown = self.unknowns[*k];
@@ -307,16 +293,6 @@ impl<'a> System<'a> {
             !self.known()[unknown.parameter].is_bound || at[unknown.parameter - outers] > 0.0
         };
         (0..self.linear).filter(is_passive).collect()
-    }
-
-    /// Which linear unknowns must not be negative when the first so many coefficients must not, whatever the family says.
-    pub fn all_bounds(&self, coefficients: usize) -> Vec<bool> {
-        (0..self.linear).map(|k| k < coefficients).collect()
-    }
-
-    /// The sigma that weighs one.
-    pub fn sigma_scale(&self) -> f64 {
-        self.sigma_scale
     }
 
     /// Weight of a sample relative to the first.

@@ -28,7 +28,6 @@ const MOVES: usize = 4000;
 /// Samples that are taken together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Block {
-    /// How many.
     pub count: usize,
     /// Time from the sample before the block to its last sample, in s.
     pub dt: f64,
@@ -112,9 +111,7 @@ fn block(
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Knot {
     pub index: usize,
-    /// In s.
     pub t: f64,
-    /// In mm.
     pub depth: f64,
 }
 

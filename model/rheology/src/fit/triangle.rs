@@ -13,12 +13,12 @@ pub(crate) const CONDITION_MAX: f64 = 1e6;
 /// Parameters with at least this share of the largest entry belong to a combination that a design is blind to.
 const NAMED_SHARE: f64 = 0.2;
 
-/// Places of the parameters that make up a combination.
-pub(crate) fn heaviest(combination: &[f64]) -> Vec<usize> {
+/// Positions of the parameters that make up a combination.
+pub(crate) fn dominant_entries(combination: &[f64]) -> Vec<usize> {
     let sizes = || combination.iter().map(|value| value.abs());
     let least = NAMED_SHARE * sizes().fold(0.0, f64::max);
-    let kept = sizes().enumerate().filter(|(_, size)| *size >= least);
-    kept.map(|(place, _)| place).collect()
+    let dominant = sizes().enumerate().filter(|(_, size)| *size >= least);
+    dominant.map(|(place, _)| place).collect()
 }
 
 /// The upper triangle of all rows so far.
@@ -160,27 +160,26 @@ impl Factor {
     }
 
     /// Sum of squares that any `solution` of all columns but the last leaves of the last.
-    pub fn left_by(&self, solution: &[f64]) -> f64 {
-        let left = |i: usize| {
+    pub fn residual_sum_of(&self, solution: &[f64]) -> f64 {
+        let residual = |i: usize| {
             let row = self.row(i);
             let fitted: f64 = row.iter().zip(solution).map(|(a, b)| a * b).sum();
             row[solution.len()] - fitted
         };
-        (0..self.width()).map(|i| left(i).powi(2)).sum()
+        (0..self.width()).map(|i| residual(i).powi(2)).sum()
     }
 
     /// Coefficients of the first `columns` columns that fit the last column best.
     pub fn solve(&self, columns: usize) -> Vec<f64> {
-        self.solve_beside(columns, &[])
+        self.solve_given(columns, &[])
     }
 
-    /// Whether all its numbers are.
     pub fn is_finite(&self) -> bool {
         self.r.iter().all(|value| value.is_finite())
     }
 
-    /// With what the first columns explain taken from the last; rows stay an upper triangle but for the last column.
-    pub fn less(mut self, explained: &[f64]) -> Self {
+    /// Subtracts what the first columns explain from the last; rows stay an upper triangle but for the last column.
+    pub fn subtract_explained(mut self, explained: &[f64]) -> Self {
         for row in self.r.chunks_mut(self.width) {
             let known: f64 = row.iter().zip(explained).map(|(a, b)| a * b).sum();
             row[self.width - 1] -= known;
@@ -189,7 +188,7 @@ impl Factor {
     }
 
     /// The triangle of some of the columns and the last.
-    pub fn keeping(&self, columns: &[usize]) -> Self {
+    pub fn select_columns(&self, columns: &[usize]) -> Self {
         let mut triangle = Triangle::new(columns.len() + 1);
         let mut chosen = vec![0.0; columns.len() + 1];
         for i in 0..self.width {
@@ -205,7 +204,7 @@ impl Factor {
 
     /// Coefficients of the first `columns` columns that fit the last column best, those behind them having the values
     /// of `others`.
-    pub fn solve_beside(&self, columns: usize, others: &[f64]) -> Vec<f64> {
+    pub fn solve_given(&self, columns: usize, others: &[f64]) -> Vec<f64> {
         let mut solution = vec![0.0; columns];
         solution.extend_from_slice(others);
         for i in (0..columns).rev() {
@@ -246,12 +245,12 @@ impl Factor {
         y
     }
 
-    /// Which of the first `columns` columns cannot be told apart; `None` where all can.
-    pub fn blind(&self, columns: usize) -> Option<Vec<usize>> {
+    /// Which of the first `columns` columns are not separable; `None` where all are.
+    pub fn inseparable_columns(&self, columns: usize) -> Option<Vec<usize>> {
         let (condition, combination) = self.condition(columns);
-        // NaN tells nothing apart.
-        let is_told = condition < CONDITION_MAX;
-        (!is_told).then(|| heaviest(&combination))
+        // A condition of NaN is not separable.
+        let is_separable = condition < CONDITION_MAX;
+        (!is_separable).then(|| dominant_entries(&combination))
     }
 
     /// Singular values of the first `columns` columns, each scaled to unit length, with the right
@@ -346,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn names_the_combination_that_is_blind() {
+    fn inseparable_combination_is_named() {
         let mut triangle = Triangle::new(4);
         for i in 0..300 {
             let x = f64::from(i) * 0.01;

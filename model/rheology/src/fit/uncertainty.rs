@@ -1,8 +1,8 @@
-//! Standard errors that allow for the memory of the residuals.
+//! Standard errors that allow for autocorrelated residuals.
 
 use super::noise::{self, Blocks, Memory};
-use super::passes::{Mapped, RecordFactor};
-use super::refine::Refined;
+use super::passes::{RecordFactor, UnknownPlace};
+use super::refine::RefinedFit;
 use super::solve::Fitted;
 use super::system::System;
 use super::triangle::Factor;
@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-24;
 /// Share of a parameter over which what is derived from it is differenced.
 const DIFFERENCE: f64 = 1e-6;
 
-/// What the residuals of all records say.
+/// Scatter and autocorrelation of the residuals of all records.
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
@@ -29,7 +29,7 @@ pub(super) struct Uncertainty {
 
 /// One parameter's uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Error {
+pub(super) struct UncertaintyEstimate {
     pub std_error: f64,
     /// Variance over that of independent noise.
     pub inflation: f64,
@@ -38,7 +38,7 @@ pub(super) struct Error {
 }
 
 impl Uncertainty {
-    pub fn of(system: &System<'_>, refined: &Refined) -> Self {
+    pub fn of(system: &System<'_>, refined: &RefinedFit) -> Self {
         let unknowns = system.unknowns.len();
         let spare = system.measured() - unknowns;
         let scatter = (spare > 0).then(|| (refined.sum / spare as f64).sqrt());
@@ -50,12 +50,12 @@ impl Uncertainty {
             .enumerate()
             .map(|(record, factor)| {
                 let map = system.map(record, unknowns);
-                blocks(factor, &map, change)
+                residual_blocks(factor, &map, change)
             })
             .collect();
         let white = scatter.unwrap_or(0.0).powi(2);
         let forces = system.force_square() / system.measured() as f64;
-        // What is left of a record without noise is rounding, whose memory means nothing.
+        // The residual of a record without noise is rounding, whose autocorrelation means nothing.
         let is_rounding = white <= ROUNDING * forces;
         let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
         let alone: Vec<bool> = (0..unknowns).map(|k| is_of_one(&blocks, k)).collect();
@@ -85,12 +85,12 @@ impl Uncertainty {
         self.records[record].2
     }
 
-    /// What the residuals of a record remember; `None` where it is too short to tell.
+    /// Autocorrelation of the residuals of a record; `None` where it is too short to show any.
     pub fn memory(&self, record: usize) -> Option<Memory> {
         self.records[record].1
     }
 
-    /// How many independent samples of a record would tell as much as these.
+    /// Number of independent samples that carry the information of this record.
     pub fn effective_samples(&self, record: usize, samples: usize) -> f64 {
         let samples = samples as f64;
         match self.memory(record) {
@@ -102,7 +102,12 @@ impl Uncertainty {
     }
 
     /// The uncertainty of a combination of unknowns; `None` where there is nothing to judge it by.
-    pub fn error(&self, refined: &Refined, combination: &[f64], spare: f64) -> Option<Error> {
+    pub fn error(
+        &self,
+        refined: &RefinedFit,
+        combination: &[f64],
+        spare: f64,
+    ) -> Option<UncertaintyEstimate> {
         let scatter = self.scatter?;
         let independent = scatter * refined.pass.joint.deviation(combination);
         let white = scatter * scatter;
@@ -110,7 +115,7 @@ impl Uncertainty {
             noise::inflation(&self.records, &self.block_factor, combination, white);
         let std_error = independent * inflation.sqrt();
         let freedom = if uncertainty > 0.0 { spare.min(2.0 / uncertainty) } else { spare };
-        std_error.is_finite().then_some(Error { std_error, inflation, freedom })
+        std_error.is_finite().then_some(UncertaintyEstimate { std_error, inflation, freedom })
     }
 }
 
@@ -122,7 +127,7 @@ fn is_of_one(blocks: &[Blocks], unknown: usize) -> bool {
 
 /// Variance of the weighted residuals of one of several records; `None` for the only one, where
 /// it is the joint one, and for one without spare samples.
-fn own_variance(system: &System<'_>, refined: &Refined, record: usize) -> Option<f64> {
+fn own_variance(system: &System<'_>, refined: &RefinedFit, record: usize) -> Option<f64> {
     if system.records.len() == 1 {
         return None;
     }
@@ -130,23 +135,23 @@ fn own_variance(system: &System<'_>, refined: &Refined, record: usize) -> Option
     let measured = system.records[record].measured as f64;
     let all = system.measured() as f64;
     let spare = measured * (1.0 - system.unknowns.len() as f64 / all);
-    (spare > 0.0).then(|| square(system, refined, record) / spare)
+    (spare > 0.0).then(|| residual_square(system, refined, record) / spare)
 }
 
 /// Sum of squared weighted residuals of a record.
-fn square(system: &System<'_>, refined: &Refined, record: usize) -> f64 {
+fn residual_square(system: &System<'_>, refined: &RefinedFit, record: usize) -> f64 {
     let factor = &refined.pass.records[record].factor;
     let map = system.map(record, refined.change.len());
-    let left = |i: usize| {
+    let residual = |i: usize| {
         let row = factor.row(i);
         let pairs = map.iter().zip(&refined.change);
         let explained: f64 = pairs.map(|(column, value)| column.of(row) * value).sum();
         row[factor.width() - 1] - explained
     };
-    (0..factor.width()).map(|i| left(i).powi(2)).sum()
+    (0..factor.width()).map(|i| residual(i).powi(2)).sum()
 }
 
-fn blocks(record: &RecordFactor, map: &[Mapped], solution: &[f64]) -> Blocks {
+fn residual_blocks(record: &RecordFactor, map: &[UnknownPlace], solution: &[f64]) -> Blocks {
     let (sums, last) = (&record.blocks, record.factor.width() - 1);
     let mut blocks = Blocks {
         residuals: Vec::with_capacity(sums.len()),
@@ -169,21 +174,21 @@ fn blocks(record: &RecordFactor, map: &[Mapped], solution: &[f64]) -> Blocks {
 
 /// An end of a searched range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum RangeEnd {
     Low,
     High,
 }
 
 impl Fitted<'_> {
     /// Which end of its searched range an outer parameter of a record lies at.
-    pub(super) fn edge(&self, record: usize, outer: usize) -> Option<End> {
+    pub(super) fn range_end(&self, record: usize, outer: usize) -> Option<RangeEnd> {
         let (low, high) = self.system.ranges[record].outers[outer];
         let value = self.refined.points[record].outer.values[outer];
         let z = self.system.coordinate(outer, value);
         match self.system.fixed(record, outer) {
             Some(_) => None,
-            None if z < low + EDGE => Some(End::Low),
-            None if z > high - EDGE => Some(End::High),
+            None if z < low + EDGE => Some(RangeEnd::Low),
+            None if z > high - EDGE => Some(RangeEnd::High),
             None => None,
         }
     }
@@ -197,12 +202,16 @@ impl Fitted<'_> {
 
     /// The uncertainty of every parameter of a record, `None` where fixed or not determined; then that of what is
     /// derived from them, to first order.
-    pub(super) fn errors(&self, uncertainty: &Uncertainty, record: usize) -> Vec<Option<Error>> {
+    pub(super) fn errors(
+        &self,
+        uncertainty: &Uncertainty,
+        record: usize,
+    ) -> Vec<Option<UncertaintyEstimate>> {
         let layout = self.system.layout();
         let spare = (self.system.measured() - self.system.unknowns.len()) as f64;
         let point = &self.refined.points[record];
         let is_stopped = |parameter: usize| match parameter {
-            k if k < layout.outers => self.edge(record, k).is_some(),
+            k if k < layout.outers => self.range_end(record, k).is_some(),
             k => k == layout.contact() && self.is_contact_at_start(record),
         };
         let of = |parameter: usize| self.system.combination(record, parameter, point);
@@ -229,7 +238,7 @@ impl Fitted<'_> {
     /// Derivatives of what is derived from a record's body by its parameters, those that are free.
     fn gradients(&self, record: usize) -> Vec<Vec<f64>> {
         let layout = self.system.layout();
-        let values = self.system.physical(record, &self.refined.points[record]);
+        let values = self.system.physical_values(record, &self.refined.points[record]);
         let body = &values[..layout.outers + layout.coefficients];
         let derived = |body: &[f64]| {
             let (outer, linear) = body.split_at(layout.outers);

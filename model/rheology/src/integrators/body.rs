@@ -1,11 +1,12 @@
 //! The modified Kelvin body with an elastic part of one to five terms.
 
-use crate::families::{Drive, POWER_MAX, Relaxation};
+use crate::families::{DepthDrive, POWER_MAX, RelaxationTerm};
 use palpate_model::viscoelastic::{BodyError, ModifiedKelvin};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// `F + tau_eps F' = mu1 x + .. + muN x^N + tau_sig x x'`, `N` from 1 to 5.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "[f64; N]: Serialize", deserialize = "[f64; N]: Deserialize<'de>"))]
 pub struct SeriesBody<const N: usize> {
     /// Relaxation time in s.
     pub tau_eps: f64,
@@ -46,36 +47,14 @@ impl<const N: usize> SeriesBody<N> {
     }
 
     /// As the one relaxation term it is.
-    pub fn term(&self) -> Relaxation {
-        let mut elastic = Drive::default();
+    pub fn term(&self) -> RelaxationTerm {
+        let mut elastic = DepthDrive::default();
         elastic.powers[..N].copy_from_slice(&self.mu);
-        Relaxation {
+        RelaxationTerm {
             tau: self.tau_eps,
             elastic,
             // x x' is the rate of x^2 / 2.
-            rate: Drive::power(2, 0.5 * self.tau_sig),
+            rate: DepthDrive::power(2, 0.5 * self.tau_sig),
         }
-    }
-}
-
-/// A padded body as it is stored; arrays of a generic length are not.
-#[derive(Serialize, Deserialize)]
-struct Stored {
-    tau_eps: f64,
-    mu: [f64; POWER_MAX],
-    tau_sig: f64,
-}
-
-impl Serialize for SeriesBody<POWER_MAX> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let Self { tau_eps, mu, tau_sig } = *self;
-        Stored { tau_eps, mu, tau_sig }.serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for SeriesBody<POWER_MAX> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Stored { tau_eps, mu, tau_sig } = Stored::deserialize(deserializer)?;
-        Ok(Self { tau_eps, mu, tau_sig })
     }
 }

@@ -1,4 +1,4 @@
-//! What drives the body at the two ends of a step.
+//! Forcing of the body at the two ends of a step.
 
 use super::body::SeriesBody;
 use super::real::Real;
@@ -8,17 +8,17 @@ use super::real::Real;
 /// The speed over a step is the difference quotient of its two depths: a sampled path has no other,
 /// and on a path that is straight between samples it is the true speed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Drive<R, const N: usize> {
+pub(super) struct SeriesDrive<R, const N: usize> {
     mu: [R; N],
     tau_sig: R,
     dt: f64,
     per_dt: R,
-    at: Place<R>,
+    at: DrivePoint<R>,
 }
 
 /// A depth, at least zero, and the elastic force it settles at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place<R> {
+pub(super) struct DrivePoint<R> {
     x: R,
     elastic: R,
 }
@@ -26,15 +26,13 @@ pub(super) struct Place<R> {
 /// The forcing over one step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Forcing<R> {
-    /// At its start.
     pub left: R,
-    /// At its end.
     pub right: R,
-    to: Place<R>,
+    to: DrivePoint<R>,
     speed: R,
 }
 
-impl<R: Real, const N: usize> Drive<R, N> {
+impl<R: Real, const N: usize> SeriesDrive<R, N> {
     /// A probe that rests at `depth`, and steps of `dt` seconds.
     pub fn new(body: &SeriesBody<N>, dt: f64, depth: R) -> Self {
         let mut drive = Self {
@@ -42,7 +40,7 @@ impl<R: Real, const N: usize> Drive<R, N> {
             tau_sig: R::of(body.tau_sig),
             dt,
             per_dt: R::of(1.0 / dt),
-            at: Place { x: R::ZERO, elastic: R::ZERO },
+            at: DrivePoint { x: R::ZERO, elastic: R::ZERO },
         };
         drive.at = drive.place(depth);
         drive
@@ -64,10 +62,10 @@ impl<R: Real, const N: usize> Drive<R, N> {
     }
 
     #[inline]
-    fn place(&self, depth: R) -> Place<R> {
+    fn place(&self, depth: R) -> DrivePoint<R> {
         let x = if depth < R::ZERO { R::ZERO } else { depth };
         let inner = self.mu.iter().rev().fold(R::ZERO, |sum, &mu| sum * x + mu);
-        Place { x, elastic: inner * x }
+        DrivePoint { x, elastic: inner * x }
     }
 
     /// The forcing of a straight move to `depth`.
@@ -91,7 +89,6 @@ impl<R: Real, const N: usize> Drive<R, N> {
         middle.elastic + self.tau_sig * forcing.speed * middle.x
     }
 
-    /// Completes the move.
     #[inline]
     pub fn arrive(&mut self, forcing: &Forcing<R>) {
         self.at = forcing.to;

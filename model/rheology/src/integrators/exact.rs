@@ -3,8 +3,8 @@
 //! the psi functions of the step.
 
 use super::body::SeriesBody;
-use super::real::{Real, Running};
-use super::{Integrator, Start, finished};
+use super::real::{CompensatedForce, Real};
+use super::{Integrator, Start, check_finite};
 use crate::families::{POWER_MAX, StepError};
 use palpate_model::viscoelastic::{Pieces, psi_first};
 
@@ -15,10 +15,10 @@ pub struct Exact<R, const N: usize> {
     dt: f64,
     table: Table<R, N>,
     depth: R,
-    force: Running<R>,
+    force: CompensatedForce<R>,
 }
 
-/// What one step length does.
+/// Coefficients for one step length.
 #[derive(Clone, Copy, Debug)]
 struct Table<R, const N: usize> {
     psi_0: R,
@@ -73,9 +73,9 @@ impl<R: Real, const N: usize> Table<R, N> {
 fn across<R: Real, const N: usize>(
     body: SeriesBody<N>,
     dt: f64,
-    mut force: Running<R>,
+    mut force: CompensatedForce<R>,
     pieces: [(R, R, f64); 2],
-) -> Running<R> {
+) -> CompensatedForce<R> {
     for (x, d, share) in pieces {
         if share > 0.0 {
             let table: Table<R, N> = Table::new(&body, dt * share);
@@ -87,13 +87,13 @@ fn across<R: Real, const N: usize>(
 
 impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
     fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self {
-        let settled = super::drive::Drive::new(body, dt, start.depth).settled();
+        let settled = super::drive::SeriesDrive::new(body, dt, start.depth).settled();
         Self {
             body: *body,
             dt,
             table: Table::new(body, dt),
             depth: start.depth,
-            force: Running::new(start.force.unwrap_or(settled)),
+            force: CompensatedForce::new(start.force.unwrap_or(settled)),
         }
     }
 
@@ -116,7 +116,7 @@ impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
                 Pieces::Outside | Pieces::Inside => self.force.relaxed(R::ZERO, self.table.psi_0),
             }
         };
-        self.force = finished(force, [from, depth], self.dt)?;
+        self.force = check_finite(force, [from, depth], self.dt)?;
         self.depth = depth;
         Ok(force.value)
     }

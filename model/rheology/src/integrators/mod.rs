@@ -24,29 +24,20 @@
 mod body;
 mod drive;
 mod exact;
-mod explicit_euler;
-mod exponential_first_order;
-mod exponential_left;
-mod implicit_euler;
 mod real;
 mod rule;
-mod runge_kutta;
-mod trapezoid;
 
 pub use body::SeriesBody;
 pub use exact::Exact;
-pub use explicit_euler::ExplicitEuler;
-pub use exponential_first_order::ExponentialFirstOrder;
-pub use exponential_left::ExponentialLeft;
-pub use implicit_euler::ImplicitEuler;
 pub use real::Real;
-pub use rule::{Rule, Stepped, Weights};
-pub use runge_kutta::RungeKutta;
-pub use trapezoid::Trapezoid;
+pub use rule::{
+    ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Rule, RungeKutta,
+    Stepped, Trapezoid, Weights,
+};
 
 use crate::families::StepError;
 use palpate_model::viscoelastic::BodyError;
-use real::Running;
+use real::CompensatedForce;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -81,23 +72,15 @@ palpate_model::named! {
 }
 
 palpate_model::named! {
-    /// The integrators by name.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Scheme {
-        /// [`ExplicitEuler`].
         ExplicitEuler = "explicit Euler",
-        /// [`ImplicitEuler`].
         ImplicitEuler = "implicit Euler",
-        /// [`Trapezoid`].
         Trapezoid = "trapezoid",
-        /// [`ExponentialLeft`].
         ExponentialLeft = "exponential, forcing held",
-        /// [`ExponentialFirstOrder`].
         ExponentialFirstOrder = "exponential, forcing straight",
-        /// [`Exact`].
         Exact = "exact, depth straight",
-        /// [`RungeKutta`].
         RungeKutta = "Runge-Kutta 4",
     }
 }
@@ -105,29 +88,16 @@ palpate_model::named! {
 /// A body cannot be integrated so.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum IntegratorError {
-    /// No body.
     #[error(transparent)]
     Body(#[from] BodyError),
-    /// A step has no force.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// No step length.
     #[error("steps of {0} s are not possible; a constant step is a finite time above zero")]
     Time(f64),
-    /// Errors would grow from step to step.
     #[error(
         "{name} is unstable at steps of {dt} s, {h:.3} relaxation times; it is stable below {limit:.3}"
     )]
-    Unstable {
-        /// Name of the integrator.
-        name: &'static str,
-        /// Step in s.
-        dt: f64,
-        /// Step over relaxation time.
-        h: f64,
-        /// Where it stops being stable.
-        limit: f64,
-    },
+    Unstable { name: &'static str, dt: f64, h: f64, limit: f64 },
 }
 
 /// Where the fourth-order polynomial of Runge-Kutta reaches one: the real root of
@@ -156,7 +126,7 @@ impl Scheme {
         }
     }
 
-    /// What a step of `h` relaxation times makes of the force and of the forcing at its start, middle and
+    /// Weights, in a step of `h` relaxation times, of the force and of the forcing at its start, middle and
     /// end. The exact step of a linear forcing is the exponential one with the forcing straight.
     #[must_use]
     pub fn weights(self, h: f64) -> Weights {
@@ -235,7 +205,7 @@ fn run<R: Real, const N: usize, I: Integrator<R, N>>(
     let start = Start { depth, force: None };
     let mut integrator = I::at_any_step(body, dt, start);
     // A step of no movement from rest changes nothing; the first force is where the body rests.
-    forces.push(drive::Drive::new(body, dt, depth).settled());
+    forces.push(drive::SeriesDrive::new(body, dt, depth).settled());
     for &depth in rest {
         forces.push(integrator.step(depth)?);
     }
@@ -244,16 +214,20 @@ fn run<R: Real, const N: usize, I: Integrator<R, N>>(
 
 /// The new force if it is a number, else why it is none.
 #[inline]
-fn finished<R: Real>(force: Running<R>, ends: [R; 2], dt: f64) -> Result<Running<R>, StepError> {
+fn check_finite<R: Real>(
+    force: CompensatedForce<R>,
+    ends: [R; 2],
+    dt: f64,
+) -> Result<CompensatedForce<R>, StepError> {
     if force.value.is_finite() && ends[1].is_finite() {
         Ok(force)
     } else {
-        Err(unfinished(ends.map(R::to_f64), dt))
+        Err(step_error(ends.map(R::to_f64), dt))
     }
 }
 
 #[cold]
-fn unfinished([from, to]: [f64; 2], dt: f64) -> StepError {
+fn step_error([from, to]: [f64; 2], dt: f64) -> StepError {
     if to.is_finite() { StepError::Overflow { from, to, dt } } else { StepError::Depth(to) }
 }
 

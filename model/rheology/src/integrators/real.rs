@@ -16,77 +16,60 @@ pub trait Real:
     + Neg<Output = Self>
     + sealed::Sealed
 {
-    /// Zero.
     const ZERO: Self;
     /// Far below the last digit of any force, far above the subnormal numbers, which are slow.
     const NEGLIGIBLE: Self;
     /// The nearest number to a double.
     fn of(value: f64) -> Self;
-    /// As a double, exactly.
     fn to_f64(self) -> f64;
     /// Whether it is neither infinite nor NaN.
     fn is_finite(self) -> bool;
-    /// Its size.
     fn abs(self) -> Self;
 }
 
 mod sealed {
     pub trait Sealed {}
-    impl Sealed for f64 {}
-    impl Sealed for f32 {}
 }
 
-impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const NEGLIGIBLE: Self = palpate_model::viscoelastic::NEGLIGIBLE;
-    #[inline]
-    fn of(value: f64) -> Self {
-        value
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        self
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    #[inline]
-    fn abs(self) -> Self {
-        self.abs()
-    }
+macro_rules! real {
+    ($real:ty, $negligible:expr) => {
+        impl sealed::Sealed for $real {}
+
+        impl Real for $real {
+            const ZERO: Self = 0.0;
+            const NEGLIGIBLE: Self = $negligible;
+            #[inline]
+            fn of(value: f64) -> Self {
+                value as $real
+            }
+            #[inline]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline]
+            fn is_finite(self) -> bool {
+                self.is_finite()
+            }
+            #[inline]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+        }
+    };
 }
 
-impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const NEGLIGIBLE: Self = 1e-30;
-    #[inline]
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-    #[inline]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-    #[inline]
-    fn is_finite(self) -> bool {
-        self.is_finite()
-    }
-    #[inline]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-}
+real!(f64, palpate_model::viscoelastic::NEGLIGIBLE);
+real!(f32, 1e-30);
 
 /// The force with its rounding error carried along, as in the exact step of the families: at small
 /// steps an increment is below the last digit of the force long before the force has settled.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Running<R> {
+pub(super) struct CompensatedForce<R> {
     pub value: R,
     carry: R,
 }
 
-impl<R: Real> Running<R> {
+impl<R: Real> CompensatedForce<R> {
     pub fn new(value: R) -> Self {
         Self { value, carry: R::ZERO }
     }

@@ -53,16 +53,16 @@ fn textbook<const N: usize>(
     };
     let slope = |share: f64, force: f64| (u(share) - force) / tau;
     let h = dt / tau;
-    let kept = (-h).exp();
+    let decay = (-h).exp();
     match scheme {
         Scheme::ExplicitEuler => force + dt * slope(0.0, force),
         // Solved for F(+).
         Scheme::ImplicitEuler => (force + h * u(1.0)) / (1.0 + h),
         Scheme::Trapezoid => ((2.0 - h) * force + h * (u(0.0) + u(1.0))) / (2.0 + h),
-        Scheme::ExponentialLeft => kept * force + (1.0 - kept) * u(0.0),
+        Scheme::ExponentialLeft => decay * force + (1.0 - decay) * u(0.0),
         Scheme::ExponentialFirstOrder => {
-            let psi_1 = 1.0 - (1.0 - kept) / h;
-            kept * force + (1.0 - kept) * u(0.0) + psi_1 * (u(1.0) - u(0.0))
+            let psi_1 = 1.0 - (1.0 - decay) / h;
+            decay * force + (1.0 - decay) * u(0.0) + psi_1 * (u(1.0) - u(0.0))
         }
         Scheme::RungeKutta => {
             let k1 = slope(0.0, force);
@@ -80,7 +80,7 @@ fn textbook<const N: usize>(
                 h * (-h * (1.0 - s)).exp() * u(s)
             };
             let inner: f64 = (1..parts).map(|i| if i % 2 == 1 { 4.0 } else { 2.0 } * at(i)).sum();
-            kept * force + (at(0) + inner + at(parts)) / (3.0 * f64::from(parts))
+            decay * force + (at(0) + inner + at(parts)) / (3.0 * f64::from(parts))
         }
     }
 }
@@ -179,10 +179,10 @@ fn each_is_stable_as_far_as_it_says() {
         };
         println!("{}: stable below {measured:?}", scheme.name());
         match (measured, scheme.stability_limit()) {
-            (Some(measured), Some(said)) => {
-                assert!((measured / said - 1.0).abs() < 1e-10, "{scheme:?}: {measured} {said}");
+            (Some(measured), Some(stated)) => {
+                assert!((measured / stated - 1.0).abs() < 1e-10, "{scheme:?}: {measured} {stated}");
             }
-            (measured, said) => assert_eq!(measured, said, "{scheme:?}"),
+            (measured, stated) => assert_eq!(measured, stated, "{scheme:?}"),
         }
     }
 }
@@ -223,7 +223,7 @@ fn small_steps_do_not_wear_single_precision_out() {
 }
 
 #[test]
-fn what_cannot_be_stepped_is_refused() {
+fn impossible_steps_are_refused() {
     let body = SeriesBody::from(THESIS);
     let mut forces = vec![1.0];
     let mut refusal = |scheme: Scheme, body: &SeriesBody<3>, dt: f64, depths: &[f64]| {

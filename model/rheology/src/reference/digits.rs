@@ -18,7 +18,6 @@ impl Digits {
         Self { bits: digits * 3322 / 1000 + 1 }
     }
 
-    /// Binary digits.
     pub fn bits(self) -> usize {
         self.bits
     }
@@ -30,12 +29,10 @@ impl Digits {
         value.with_precision(self.bits).value()
     }
 
-    /// A whole number.
     pub fn whole(self, value: usize) -> Big {
         Big::from(value).with_precision(self.bits).value()
     }
 
-    /// Zero.
     pub fn zero(self) -> Big {
         self.whole(0)
     }

@@ -9,7 +9,7 @@ mod digits;
 mod psi;
 mod rule;
 
-use crate::families::{Drive, POWER_MAX, Relaxation, StepError};
+use crate::families::{DepthDrive, POWER_MAX, RelaxationTerm, StepError};
 use digits::{Big, Digits, is_negative, is_zero, nearest};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use psi::Weights;
@@ -23,16 +23,13 @@ pub const REFERENCE_DIGITS: usize = 75;
 /// Exponents of e beyond this are refused: doubles end at 710.
 const EXPONENT_MAX: f64 = 1e5;
 
-/// What the reference does not know.
+/// A force that the reference does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
-    /// Too few or too many digits.
     #[error("a reference has 20 to 1000 digits, not {0}")]
     Digits(usize),
-    /// An exponential beyond all numbers.
     #[error("the force at rest at that depth is beyond the largest number")]
     Overflow,
-    /// A parameter that is no number, or a negative time.
     #[error(
         "a term with a relaxation time below zero or a coefficient that is not finite has no force"
     )]
@@ -73,13 +70,13 @@ struct Function {
 
 impl Reference {
     /// Terms relaxed with the probe at `depth`, in [`REFERENCE_DIGITS`].
-    pub fn new(terms: &[Relaxation], depth: Depth) -> Result<Self, ReferenceError> {
+    pub fn new(terms: &[RelaxationTerm], depth: Depth) -> Result<Self, ReferenceError> {
         Self::with_digits(terms, depth, REFERENCE_DIGITS)
     }
 
     /// Terms relaxed with the probe at `depth`, in at least so many decimal digits, 20 to 1000.
     pub fn with_digits(
-        terms: &[Relaxation],
+        terms: &[RelaxationTerm],
         depth: Depth,
         digits: usize,
     ) -> Result<Self, ReferenceError> {
@@ -202,8 +199,8 @@ impl Reference {
 }
 
 impl Term {
-    fn new(digits: Digits, term: &Relaxation, depth: Depth) -> Result<Self, ReferenceError> {
-        let Relaxation { tau, elastic, rate } = term;
+    fn new(digits: Digits, term: &RelaxationTerm, depth: Depth) -> Result<Self, ReferenceError> {
+        let RelaxationTerm { tau, elastic, rate } = term;
         let numbers = [elastic, rate].into_iter().flat_map(|drive| {
             let (amplitude, b) = drive.exponential.unwrap_or_default();
             let powers = drive.powers.into_iter().chain(drive.softening);
@@ -234,7 +231,7 @@ impl Term {
         self.elastic.is_beyond(depth) || self.rate.is_beyond(depth)
     }
 
-    /// What a move in no time adds to `tau` times the value.
+    /// Change of `tau` times the value by a move in no time.
     fn impulse(&self, [x0, x1]: &[Big; 2], [m0, m1]: [Option<&Big>; 2]) -> Big {
         self.rate.at(x1, m1) - self.rate.at(x0, m0)
     }
@@ -253,7 +250,7 @@ impl Term {
             _ => Weights::new(digits, dt, &self.tau, self.degree + 1),
         };
         let speed = d / dt;
-        let mut sum = &self.value * &weights.kept;
+        let mut sum = &self.value * &weights.decay;
         // The drive by power of depth, then about x0 by binomials, then by powers of d.
         let zero = digits.zero();
         let mut c = vec![zero; self.degree + 1];
@@ -281,7 +278,7 @@ impl Term {
         }
         if let Some((amplitude, b)) = &self.elastic.exponential {
             let chi = chi(&(b * d), &weights);
-            // What the probe rests on and what it adds, each without the difference of large numbers.
+            // The part at rest and the part of the move, each without the difference of large numbers.
             let rest = (b * x0).exp_m1() * &weights.psi[0];
             sum += amplitude * (rest + (b * x0).exp() * (chi - &weights.psi[0]));
         }
@@ -304,13 +301,13 @@ fn chi(b: &Big, weights: &Weights) -> Big {
     }
     let sum = b + r;
     if is_zero(&sum) {
-        return r * &weights.kept;
+        return r * &weights.decay;
     }
-    r * (b.exp() - &weights.kept) / sum
+    r * (b.exp() - &weights.decay) / sum
 }
 
 impl Function {
-    fn new(digits: Digits, drive: &Drive) -> Self {
+    fn new(digits: Digits, drive: &DepthDrive) -> Self {
         let powers = drive.powers.iter().map(|&value| digits.exact(value));
         let exponential = drive.exponential;
         Self {

@@ -2,16 +2,16 @@
 
 use super::digits::{Big, Digits};
 
-/// Beyond this `r`, `e^-r` times any double is below the smallest double: nothing is remembered.
+/// Beyond this `r`, `e^-r` times any double is below the smallest double: nothing is left of the past.
 pub(super) const FORGOTTEN: usize = 2000;
 
-/// What a step of `r = dt / tau` does to a filter.
+/// Weights of a step of `r = dt / tau` of a filter.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
     /// `r`; `None` where it is endless.
     pub r: Option<Big>,
     /// `e^-r`.
-    pub kept: Big,
+    pub decay: Big,
     /// `psi_0`, `psi_1` and so on.
     pub psi: Vec<Big>,
 }
@@ -21,21 +21,21 @@ impl Weights {
     pub fn new(digits: Digits, dt: &Big, tau: &Big, count: usize) -> Self {
         let one = digits.whole(1);
         if *tau == Big::ZERO {
-            return Self { r: None, kept: digits.zero(), psi: vec![one; count] };
+            return Self { r: None, decay: digits.zero(), psi: vec![one; count] };
         }
         let r = dt / tau;
-        let kept = if r > digits.whole(FORGOTTEN) { digits.zero() } else { (-&r).exp() };
+        let decay = if r > digits.whole(FORGOTTEN) { digits.zero() } else { (-&r).exp() };
         let psi = if r < one {
             (0..count).map(|j| series(digits, j, &r)).collect()
         } else {
-            let mut all = vec![&one - &kept];
+            let mut all = vec![&one - &decay];
             for j in 1..count {
                 let before = all[j - 1].clone();
                 all.push(&one - digits.whole(j) / &r * before);
             }
             all
         };
-        Self { r: Some(r), kept, psi }
+        Self { r: Some(r), decay, psi }
     }
 }
 

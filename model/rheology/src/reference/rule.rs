@@ -1,4 +1,4 @@
-//! What an approximate integrator should give: its own textbook step, stages and all, in many digits.
+//! The textbook step of an approximate integrator, with all its stages, in many digits.
 
 use super::REFERENCE_DIGITS;
 use super::digits::{Big, Digits, nearest};
@@ -68,8 +68,8 @@ impl RuleReference {
             Scheme::ImplicitEuler => (force + &h * &right) / (&one + &h),
             Scheme::Trapezoid => ((&two - &h) * force + &h * (&left + &right)) / (&two + &h),
             Scheme::ExponentialLeft | Scheme::ExponentialFirstOrder => {
-                let Weights { kept, psi, .. } = Weights::new(self.digits, &span, &self.tau, 2);
-                let held = kept * force + &psi[0] * &left;
+                let Weights { decay, psi, .. } = Weights::new(self.digits, &span, &self.tau, 2);
+                let held = decay * force + &psi[0] * &left;
                 match self.scheme {
                     Scheme::ExponentialLeft => held,
                     _ => held + &psi[1] * (&right - &left),

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 const DIGITS: Digits = Digits::decimal(REFERENCE_DIGITS);
 
-fn thesis(tau: f64) -> (Model, Vec<Relaxation>) {
+fn thesis(tau: f64) -> (Model, Vec<RelaxationTerm>) {
     let family = families::by_key("series-3").unwrap();
     let model = family.model(&[tau], &[0.05333, -0.0086, 0.000_434_5, 0.06]).unwrap();
     let terms = model.terms().unwrap();
@@ -145,12 +145,16 @@ fn splitting_changes_nothing_and_what_has_no_force_is_refused() {
     assert_eq!(whole.force(), force);
     assert!(Reference::with_digits(&terms, Depth(0.0), 5).is_err());
     // 0.1 x (1 - x / x_max) of a spring: nothing on first loading, 0.1 * 3 * (1 - 3/8) coming back.
-    let softens = Relaxation::spring(Drive::softening(1, 0.1));
+    let softens = RelaxationTerm::spring(DepthDrive::softening(1, 0.1));
     let mut softens = Reference::new(&[softens], Depth(0.0)).unwrap();
     assert_eq!(softens.step(Depth(8.0), Seconds(1.0)).unwrap().0, 0.0);
     let back = softens.step(Depth(3.0), Seconds(1.0)).unwrap().0;
     assert!((back - 0.1875).abs() < 1e-16, "{back}");
-    let dashpot = Relaxation { tau: 0.0, elastic: Drive::default(), rate: Drive::power(1, 1.0) };
+    let dashpot = RelaxationTerm {
+        tau: 0.0,
+        elastic: DepthDrive::default(),
+        rate: DepthDrive::power(1, 1.0),
+    };
     let mut dashpot = Reference::new(&[dashpot], Depth(0.0)).unwrap();
     assert!(dashpot.step(Depth(1.0), Seconds(0.0)).is_err());
 }

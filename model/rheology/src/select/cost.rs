@@ -1,6 +1,6 @@
-//! What one evaluation of a model costs, counted from its terms: the same number on every machine.
+//! Cost of one evaluation of a model, counted from its terms: the same number on every machine.
 
-use crate::families::{Drive, Relaxation};
+use crate::families::{DepthDrive, RelaxationTerm};
 use serde::Serialize;
 
 /// Additions and multiplications that one exponential takes: argument reduction and a polynomial of
@@ -9,19 +9,19 @@ const EXPONENTIAL: usize = 20;
 
 /// Cost of one exact step of constant length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Cost {
+pub struct StepCost {
     /// Additions and multiplications, an exponential counted as twenty.
     pub operations: usize,
-    /// Numbers remembered from step to step.
+    /// State variables: numbers carried from step to step.
     pub states: usize,
     /// Functions of depth evaluated: powers and exponentials.
     pub drives: usize,
 }
 
-impl Cost {
+impl StepCost {
     /// Cost of a model of these terms.
     #[must_use]
-    pub fn of(terms: &[Relaxation]) -> Self {
+    pub fn of(terms: &[RelaxationTerm]) -> Self {
         let one = terms.iter().map(|term| Self {
             operations: operations(term),
             states: usize::from(term.tau > 0.0),
@@ -35,21 +35,21 @@ impl Cost {
     }
 }
 
-fn powers(drive: &Drive) -> usize {
+fn powers(drive: &DepthDrive) -> usize {
     drive.powers.iter().filter(|value| **value != 0.0).count()
 }
 
-fn softenings(drive: &Drive) -> usize {
+fn softenings(drive: &DepthDrive) -> usize {
     drive.softening.iter().filter(|value| **value != 0.0).count()
 }
 
-fn drives(drive: &Drive) -> usize {
+fn drives(drive: &DepthDrive) -> usize {
     powers(drive) + softenings(drive) + usize::from(drive.exponential.is_some())
 }
 
 /// The steps of a relaxation term one by one, the decay of its constant step length known.
-fn operations(term: &Relaxation) -> usize {
-    let Relaxation { elastic, rate, .. } = term;
+fn operations(term: &RelaxationTerm) -> usize {
+    let RelaxationTerm { elastic, rate, .. } = term;
     // Each coefficient of the drive along the piece: elastic ones added, those of a rate times the
     // speed first, those of a softening with the greatest depth.
     let coefficients =
@@ -72,9 +72,9 @@ mod tests {
     use super::*;
     use crate::families::{all, by_key};
 
-    fn cost(key: &str, outer: &[f64], linear: &[f64]) -> Cost {
+    fn cost(key: &str, outer: &[f64], linear: &[f64]) -> StepCost {
         let model = by_key(key).unwrap().model(outer, linear).unwrap();
-        Cost::of(&model.terms().unwrap())
+        StepCost::of(&model.terms().unwrap())
     }
 
     #[test]

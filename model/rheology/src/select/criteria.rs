@@ -1,14 +1,14 @@
 //! Information criteria on the effective number of samples.
 //!
 //! With the variance of the noise unknown, `-2 ln L = n ln(S / n)` up to a constant, for `n`
-//! independent samples and the weighted sum of squares `S`. Residuals that remember are worth fewer
+//! independent samples and the weighted sum of squares `S`. Autocorrelated residuals carry the information of fewer
 //! samples than there are; the count, one for all families or they could not be compared, is that of
 //! the family with the smallest sum, whose residuals come closest to the noise.
 //!
 //! AICc: Hurvich & Tsai, Biometrika 76 (1989) 297-307. BIC: Schwarz, Ann. Statist. 6 (1978) 461-464.
 
-/// `(AICc, BIC)` for a mean square, so many independent samples and numbers found besides the variance
-/// of the noise. AICc is `None` where there are too few samples for its correction.
+/// `(AICc, BIC)` for a mean square, so many independent samples and parameters, the variance of the noise
+/// not counted. AICc is `None` where there are too few samples for its correction.
 pub(super) fn criteria(mean_square: f64, effective: f64, free: usize) -> (Option<f64>, f64) {
     let k = (free + 1) as f64;
     let deviance = effective * mean_square.max(f64::MIN_POSITIVE).ln();

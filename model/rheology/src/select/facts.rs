@@ -1,10 +1,10 @@
-//! What a record is, from its path: how deep, how fast.
+//! Depth, speed and force of a record, from its samples.
 
 use crate::fit::FitSample;
 use serde::Serialize;
 
 /// Two records differ in depth or in speed if one is this many times the other: more than rigs and
-/// specimens vary when the same was asked of them.
+/// specimens vary under the same protocol.
 const UNLIKE: f64 = 1.1;
 /// Depth within this share of the stroke of the peak is the peak.
 const AT_PEAK: f64 = 0.005;
@@ -12,7 +12,6 @@ const AT_PEAK: f64 = 0.005;
 /// One record in a few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordFacts {
-    /// Its name.
     pub record: String,
     /// The specimen pressed, where it is known.
     pub specimen: Option<String>,
@@ -56,14 +55,14 @@ impl RecordFacts {
             } else {
                 0.0
             },
-            peak_n: peak(samples, 0.0),
+            peak_n: peak_force(samples, 0.0),
             arrival: first(deepest - AT_PEAK * stroke),
         }
     }
 }
 
 /// Largest size of the measured force above `offset`, in N.
-pub(super) fn peak(samples: &[FitSample], offset: f64) -> f64 {
+pub(super) fn peak_force(samples: &[FitSample], offset: f64) -> f64 {
     let forces = samples.iter().filter(|one| one.is_measured());
     forces.fold(0.0, |all, one| all.max((one.force.0 - offset).abs()))
 }
@@ -79,7 +78,7 @@ mod tests {
     use palpate_model::units::{Depth, Newtons, Seconds};
 
     #[test]
-    fn a_ramp_and_hold_after_a_wait() {
+    fn facts_of_a_ramp_and_hold_after_a_wait_are_right() {
         let samples: Vec<FitSample> = (0..200)
             .map(|i| {
                 let t = 0.1 * f64::from(i);

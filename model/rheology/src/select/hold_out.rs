@@ -2,7 +2,7 @@
 //! of the same record.
 //!
 //! The body is fitted to the other records alone. What the held-out record has of its own, its sensor
-//! offset, is found on that record, because no other can tell it; the body is not.
+//! offset, is found on that record, because no other determines it; the body is not.
 
 use super::facts::{RecordFacts, are_unlike};
 use crate::families::Model;
@@ -17,7 +17,6 @@ const REST_MIN: usize = 10;
 const SEEN: f64 = 1.0 / 3.0;
 
 palpate_model::named! {
-    /// What is held out.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum HoldOut {
         /// Each record in turn; of a single record its last part.
@@ -29,35 +28,23 @@ palpate_model::named! {
         Depth = "depth",
         /// Each record in turn, taken for a specimen of its own.
         Specimen = "specimen",
-        /// Nothing.
         None = "none",
     }
 }
 
-/// What cannot be held out, and why.
+/// Nothing can be held out as asked.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum HoldOutError {
-    /// No such word.
     #[error("'{0}' cannot be held out; choose auto, speed, depth, specimen or none")]
     Unknown(String),
-    /// Records do not differ in it.
     #[error(
         "no {what} can be held out, because the {records} record(s) have one {what} only; add records of another, or hold out 'auto'"
     )]
-    AllAlike {
-        /// Speed, depth or specimen.
-        what: &'static str,
-        /// Records given.
-        records: usize,
-    },
-    /// Nobody knows whose a record is.
+    AllAlike { what: &'static str, records: usize },
     #[error(
-        "no specimen can be held out, because {record} does not say which it is of; name one for each source, or hold out 'auto'"
+        "no specimen can be held out, because {record} does not name its specimen; name one for each source, or hold out 'auto'"
     )]
-    NoSpecimen {
-        /// The record.
-        record: String,
-    },
+    NoSpecimen { record: String },
 }
 
 impl FromStr for HoldOut {
@@ -70,15 +57,12 @@ impl FromStr for HoldOut {
 }
 
 palpate_model::named! {
-    /// What is new to the body in a record held out.
+    /// Difference of a held-out record from the fitted ones.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Unseen {
-        /// Its speed.
         Speed = "an unseen speed",
-        /// Its depth.
         Depth = "an unseen depth",
-        /// Both.
         SpeedAndDepth = "an unseen speed and depth",
         /// Neither speed nor depth: another specimen, or a repetition.
         Specimen = "another specimen or a repetition",
@@ -89,7 +73,7 @@ palpate_model::named! {
 
 /// Error of a family over everything held out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Prediction {
+pub struct HoldOutPrediction {
     /// Root mean square over records, each counting the same, in N; the noise of the records is in it.
     pub rms_n: f64,
     /// Standard error of the mean over records, in N; null for one record.
@@ -99,16 +83,12 @@ pub struct Prediction {
     /// As `rms_n`, with one factor on the whole body for each record: what is left where the level is the
     /// specimen's own.
     pub scaled_rms_n: f64,
-    /// Record by record.
-    pub records: Vec<PredictionOf>,
+    pub records: Vec<RecordPrediction>,
 }
 
-/// Error over one record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PredictionOf {
-    /// The record.
+pub struct RecordPrediction {
     pub record: String,
-    /// What was new in it.
     pub unseen: Unseen,
     /// Root mean square error in N.
     pub rms_n: f64,
@@ -128,7 +108,7 @@ pub(super) struct Fold {
     pub cut: Option<usize>,
 }
 
-/// What is left out in turn; empty where nothing can be.
+/// Records left out in turn; empty where none can be.
 pub(super) fn folds(
     hold_out: HoldOut,
     facts: &[RecordFacts],
@@ -146,8 +126,10 @@ pub(super) fn folds(
         }
         HoldOut::Auto => return Ok(each()),
         HoldOut::Specimen => (by_specimen(facts)?, "specimen"),
-        HoldOut::Speed => (alike(facts.iter().map(|one| one.speed_mm_per_s).collect()), "speed"),
-        HoldOut::Depth => (alike(facts.iter().map(|one| one.depth_mm).collect()), "depth"),
+        HoldOut::Speed => {
+            (group_alike(facts.iter().map(|one| one.speed_mm_per_s).collect()), "speed")
+        }
+        HoldOut::Depth => (group_alike(facts.iter().map(|one| one.depth_mm).collect()), "depth"),
     };
     if groups.len() < 2 {
         return Err(HoldOutError::AllAlike { what, records: facts.len() });
@@ -171,7 +153,7 @@ fn by_specimen(facts: &[RecordFacts]) -> Result<Vec<Fold>, HoldOutError> {
 }
 
 /// Records whose numbers are alike, together.
-fn alike(values: Vec<f64>) -> Vec<Fold> {
+fn group_alike(values: Vec<f64>) -> Vec<Fold> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut groups: Vec<Fold> = Vec::new();
@@ -196,8 +178,8 @@ fn cut(facts: &RecordFacts, samples: &[FitSample]) -> Option<usize> {
     (counted(seen) >= REST_MIN && counted(rest) >= REST_MIN).then_some(cut)
 }
 
-/// What is new in a record to a body fitted to others.
-fn unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> Unseen {
+/// Difference of a record from those that a fold leaves.
+fn classify_unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> Unseen {
     let train = || (0..facts.len()).filter(|index| !test.contains(index));
     let one = &facts[record];
     let is_new = |value: fn(&RecordFacts) -> f64| {
@@ -217,12 +199,13 @@ pub(super) fn predict_fold(
     records: &[(&str, &[FitSample])],
     facts: &[RecordFacts],
     fold: &Fold,
-) -> Result<Vec<PredictionOf>, FitError> {
+) -> Result<Vec<RecordPrediction>, FitError> {
     let train: Vec<(&str, &[FitSample])> = match fold.cut {
         Some(cut) => vec![(records[0].0, &records[0].1[..cut])],
         None => {
-            let kept = records.iter().enumerate();
-            kept.filter(|(index, _)| !fold.test.contains(index))
+            let training = records.iter().enumerate();
+            training
+                .filter(|(index, _)| !fold.test.contains(index))
                 .map(|(_, record)| *record)
                 .collect()
         }
@@ -236,11 +219,11 @@ pub(super) fn predict_fold(
             None => (all.clone(), all),
         };
         let predicted = predict(&body, samples, own, score)?;
-        Ok(PredictionOf {
+        Ok(RecordPrediction {
             record: name.to_owned(),
             unseen: match fold.cut {
                 Some(_) => Unseen::Rest,
-                None => unseen(facts, index, &fold.test),
+                None => classify_unseen(facts, index, &fold.test),
             },
             rms_n: predicted.rms,
             worst_n: predicted.worst,
@@ -251,14 +234,14 @@ pub(super) fn predict_fold(
     fold.test.iter().map(one).collect()
 }
 
-impl Prediction {
+impl HoldOutPrediction {
     /// Records together; `None` without any.
-    pub(super) fn of(records: Vec<PredictionOf>) -> Option<Self> {
+    pub(super) fn of(records: Vec<RecordPrediction>) -> Option<Self> {
         if records.is_empty() {
             return None;
         }
         let count = records.len() as f64;
-        let root_mean = |value: fn(&PredictionOf) -> f64| {
+        let root_mean = |value: fn(&RecordPrediction) -> f64| {
             (records.iter().map(|one| value(one).powi(2)).sum::<f64>() / count).sqrt()
         };
         let errors: Vec<f64> = records.iter().map(|one| one.rms_n).collect();
@@ -305,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_new_in_a_record() {
+    fn held_out_kind_follows_speed_and_depth() {
         let mut facts = [facts(1.0, 10.0), facts(1.02, 20.0), facts(5.0, 20.5), facts(1.0, 20.0)];
         for (one, specimen) in facts.iter_mut().zip(["A", "B", "A", "B"]) {
             one.specimen = Some(specimen.into());
         }
-        assert_eq!(unseen(&facts, 0, &[0]), Unseen::Depth);
-        assert_eq!(unseen(&facts, 1, &[1]), Unseen::Specimen);
-        assert_eq!(unseen(&facts, 2, &[2]), Unseen::Speed);
+        assert_eq!(classify_unseen(&facts, 0, &[0]), Unseen::Depth);
+        assert_eq!(classify_unseen(&facts, 1, &[1]), Unseen::Specimen);
+        assert_eq!(classify_unseen(&facts, 2, &[2]), Unseen::Speed);
         let tests = |hold_out| -> Vec<Vec<usize>> {
             let folds = folds(hold_out, &facts, &[&[] as &[FitSample]; 4]).unwrap();
             folds.into_iter().map(|fold| fold.test).collect()
@@ -332,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn the_standard_error_of_a_mean() {
+    fn standard_error_of_a_mean_is_exact() {
         assert_eq!(std_error(&[1.0]), None);
         // Variance 1 of 1, 2, 3; its mean errs by 1 over the root of 3.
         assert!((std_error(&[1.0, 2.0, 3.0]).unwrap() - 3f64.sqrt().recip()).abs() < 1e-15);

@@ -1,20 +1,15 @@
-//! What each extra term buys and what it costs.
+//! Gain and cost of each extra term.
 
-use super::cost::Cost;
+use super::cost::StepCost;
 use super::run::Candidate;
 use crate::families::by_key;
 use serde::Serialize;
 
-/// One extra term.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Step {
-    /// Family without it.
+pub struct LadderStep {
     pub from: String,
-    /// Family with it.
     pub to: String,
-    /// What is added, in words.
     pub adds: &'static str,
-    /// Numbers more to find.
     pub free_more: i64,
     /// Root mean square of the fit before and after, in N.
     pub rms_n: [f64; 2],
@@ -23,11 +18,11 @@ pub struct Step {
     /// Change of BIC: below zero the term is worth its numbers.
     pub bic_change: f64,
     /// Cost of an evaluation before and after.
-    pub cost: [Cost; 2],
+    pub cost: [StepCost; 2],
 }
 
 /// The steps between families that were fitted, in the order of those they lead to.
-pub(super) fn steps(candidates: &[Candidate]) -> Vec<Step> {
+pub(super) fn steps(candidates: &[Candidate]) -> Vec<LadderStep> {
     let rungs = candidates.iter().flat_map(|after| {
         let simpler = by_key(&after.family).map_or(Vec::new(), |family| family.adds_to());
         simpler.into_iter().map(move |(key, adds)| (key, adds, after))
@@ -35,7 +30,7 @@ pub(super) fn steps(candidates: &[Candidate]) -> Vec<Step> {
     let step = |(key, adds, after): (String, &'static str, &Candidate)| {
         let before = candidates.iter().find(|one| one.family == key)?;
         let predictions = before.prediction.as_ref().zip(after.prediction.as_ref());
-        Some(Step {
+        Some(LadderStep {
             from: before.family.clone(),
             to: after.family.clone(),
             adds,

@@ -13,9 +13,11 @@ mod ladder;
 mod run;
 mod verdict;
 
-pub use cost::Cost;
+pub use cost::StepCost;
 pub use facts::RecordFacts;
-pub use hold_out::{HoldOut, HoldOutError, Prediction, PredictionOf, Unseen};
-pub use ladder::Step;
-pub use run::{Candidate, Progress, Refused, SelectError, SelectOptions, Selection, select};
-pub use verdict::{Outcome, Verdict};
+pub use hold_out::{HoldOut, HoldOutError, HoldOutPrediction, RecordPrediction, Unseen};
+pub use ladder::LadderStep;
+pub use run::{
+    Candidate, RefusedFamily, SelectError, SelectOptions, SelectProgress, Selection, select,
+};
+pub use verdict::{Outcome, SelectionVerdict};

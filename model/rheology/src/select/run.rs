@@ -1,11 +1,11 @@
 //! The selection itself: fits, criteria, predictions, costs, verdict.
 
-use super::cost::Cost;
+use super::cost::StepCost;
 use super::criteria::criteria;
-use super::facts::{RecordFacts, peak};
-use super::hold_out::{Fold, HoldOut, HoldOutError, Prediction, folds, predict_fold};
-use super::ladder::{Step, steps};
-use super::verdict::{Counts, Verdict, verdict};
+use super::facts::{RecordFacts, peak_force};
+use super::hold_out::{Fold, HoldOut, HoldOutError, HoldOutPrediction, folds, predict_fold};
+use super::ladder::{LadderStep, steps};
+use super::verdict::{SampleCounts, SelectionVerdict, decide};
 use crate::families::{Family, Model, all};
 use crate::fit::{FitError, FitOptions, FitSample, JointReport, fit_joint};
 use crate::tolerance::Tolerance;
@@ -15,14 +15,12 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// What is compared, and how.
+/// Families to compare, and the criterion.
 #[derive(Debug)]
 pub struct SelectOptions {
-    /// Families compared.
     pub families: Vec<Arc<dyn Family>>,
     /// Error of force that does not matter; without it information criteria alone decide.
     pub tolerance: Option<Tolerance>,
-    /// What is held out.
     pub hold_out: HoldOut,
     /// The specimen of each record, in their order; fewer where the others are not known.
     pub specimens: Vec<Option<String>>,
@@ -34,45 +32,33 @@ impl Default for SelectOptions {
     }
 }
 
-/// How far a selection is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Fits done.
+pub struct SelectProgress {
     pub done: usize,
-    /// Fits in all.
     pub total: usize,
-    /// Family under way.
     pub family: String,
 }
 
 /// Nothing could be compared.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SelectError {
-    /// No record.
     #[error("there is no record to compare models on; name a session or a table")]
     NoRecords,
-    /// No family.
     #[error("there is no family to compare; name at least one")]
     NoFamilies,
-    /// Nothing to hold out.
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),
-    /// The records themselves cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// The caller ended it.
-    #[error("the comparison was ended before it was done")]
+    #[error("the comparison was cancelled")]
     Ended,
 }
 
 /// A family fitted to all records, and judged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Candidate {
-    /// Key of the family.
     pub family: String,
-    /// Its name in words.
     pub name: String,
-    /// Parameters of the body.
     pub parameters: usize,
     /// Numbers the fit found: parameters, and what each record has of its own.
     pub free: usize,
@@ -82,23 +68,19 @@ pub struct Candidate {
     pub worst_n: f64,
     /// Corrected Akaike criterion above the lowest; null where there are too few samples for it.
     pub aicc_above: Option<f64>,
-    /// Bayesian criterion.
     pub bic: f64,
     /// Bayesian criterion above the lowest.
     pub bic_above: f64,
     /// Error over what was held out; null where nothing was or its fit was refused.
-    pub prediction: Option<Prediction>,
+    pub prediction: Option<HoldOutPrediction>,
     /// Why there is no prediction, if something was held out.
     pub prediction_refused: Option<String>,
-    /// Cost of one evaluation.
-    pub cost: Cost,
+    pub cost: StepCost,
     /// Whether its error, of prediction where there is one, is within the tolerance; null without one.
     pub is_within: Option<bool>,
     /// Independent samples that its residuals are worth.
     pub effective_samples: f64,
-    /// The fitted model.
     pub model: Model,
-    /// What to know of the fit.
     pub warnings: Vec<String>,
 }
 
@@ -111,17 +93,13 @@ impl Candidate {
 
 /// A family that the records do not hold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Refused {
-    /// Key of the family.
+pub struct RefusedFamily {
     pub family: String,
-    /// Why.
     pub reason: String,
 }
 
-/// All families compared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Selection {
-    /// The records.
     pub records: Vec<RecordFacts>,
     /// Samples whose force counts.
     pub samples: usize,
@@ -134,16 +112,16 @@ pub struct Selection {
     /// Families in the order given.
     pub candidates: Vec<Candidate>,
     /// Families that the records do not hold.
-    pub refused: Vec<Refused>,
-    /// What each extra term buys.
-    pub steps: Vec<Step>,
+    pub refused: Vec<RefusedFamily>,
+    /// Gain of each extra term.
+    pub steps: Vec<LadderStep>,
     /// The choice, or why there is none.
-    pub verdict: Verdict,
+    pub verdict: SelectionVerdict,
 }
 
 /// Fits every family to all records together, predicts what is held out, and judges.
 ///
-/// `progress` is told before each fit and may end the whole.
+/// `progress` is called before each fit and may cancel the comparison.
 ///
 /// ```
 /// use palpate_rheology::families::{Kelvin, Maxwell, Model, PowerSeries};
@@ -181,7 +159,7 @@ pub struct Selection {
 pub fn select(
     records: &[(&str, &[FitSample])],
     options: &SelectOptions,
-    progress: &dyn Fn(&Progress) -> ControlFlow<()>,
+    progress: &dyn Fn(&SelectProgress) -> ControlFlow<()>,
 ) -> Result<Selection, SelectError> {
     if records.is_empty() {
         return Err(SelectError::NoRecords);
@@ -209,7 +187,7 @@ pub fn select(
     // The force of the tissue: a sensor offset is no part of it.
     if let Some(best) = best {
         for ((facts, own), (_, samples)) in facts.iter_mut().zip(&best.1.records).zip(records) {
-            facts.peak_n = peak(samples, own.report.value("f_offset").unwrap_or(0.0));
+            facts.peak_n = peak_force(samples, own.report.value("f_offset").unwrap_or(0.0));
         }
     }
     let mut candidates: Vec<Candidate> = fitted
@@ -220,8 +198,8 @@ pub fn select(
     let tolerance_n = options.tolerance.map(|one| one.in_newtons(Newtons(peak)).0);
     let is_predicted = candidates.iter().any(|one| one.prediction.is_some());
     compare(&mut candidates, tolerance_n, is_predicted);
-    let counts = Counts { records: records.len(), samples, effective };
-    let verdict = verdict(&candidates, tolerance_n, is_predicted, counts);
+    let counts = SampleCounts { records: records.len(), samples, effective };
+    let verdict = decide(&candidates, tolerance_n, is_predicted, counts);
     Ok(Selection {
         steps: steps(&candidates),
         verdict,
@@ -233,13 +211,13 @@ pub fn select(
         candidates,
         refused: refused
             .into_iter()
-            .map(|(family, reason)| Refused { family, reason: reason.to_string() })
+            .map(|(family, reason)| RefusedFamily { family, reason: reason.to_string() })
             .collect(),
     })
 }
 
 /// A family with its fit to all records, and its predictions of what was held out or why there are none.
-type FamilyFit<'a> = (&'a dyn Family, JointReport, Result<Vec<super::PredictionOf>, String>);
+type FamilyFit<'a> = (&'a dyn Family, JointReport, Result<Vec<super::RecordPrediction>, String>);
 /// Families that the records do not hold, by key.
 type Refusals = Vec<(String, FitError)>;
 
@@ -248,13 +226,16 @@ fn fit_families<'a>(
     records: &[(&str, &[FitSample])],
     options: &'a SelectOptions,
     (facts, folds): (&[RecordFacts], &[Fold]),
-    progress: &dyn Fn(&Progress) -> ControlFlow<()>,
+    progress: &dyn Fn(&SelectProgress) -> ControlFlow<()>,
 ) -> Result<(Vec<FamilyFit<'a>>, Refusals), SelectError> {
     let per_family = 1 + folds.len();
     let begin = |done: usize, family: &dyn Family| {
-        let news =
-            Progress { done, total: options.families.len() * per_family, family: family.key() };
-        match progress(&news) {
+        let state = SelectProgress {
+            done,
+            total: options.families.len() * per_family,
+            family: family.key(),
+        };
+        match progress(&state) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(SelectError::Ended),
         }
@@ -318,7 +299,7 @@ fn candidate(
     family: &dyn Family,
     records: &[(&str, &[FitSample])],
     fit: JointReport,
-    predicted: Result<Vec<super::PredictionOf>, String>,
+    predicted: Result<Vec<super::RecordPrediction>, String>,
     effective: f64,
 ) -> Result<Candidate, FitError> {
     let first = fit.records.first().ok_or(FitError::Overflow)?;
@@ -327,7 +308,7 @@ fn candidate(
     let mean = fit.weighted_square / fit.samples as f64;
     let (aicc, bic) = criteria(mean, effective, fit.free);
     let (prediction, prediction_refused) = match predicted {
-        Ok(records) => (Prediction::of(records), None),
+        Ok(records) => (HoldOutPrediction::of(records), None),
         Err(reason) => (None, Some(reason)),
     };
     let pairs = fit.records.iter().zip(records);
@@ -344,7 +325,7 @@ fn candidate(
         bic_above: 0.0,
         prediction,
         prediction_refused,
-        cost: Cost::of(&terms),
+        cost: StepCost::of(&terms),
         is_within: None,
         effective_samples: fit.effective_samples,
         model,

@@ -1,4 +1,4 @@
-//! The choice, or why there is none.
+//! The choice of a family, or the reason why there is none.
 
 use super::run::Candidate;
 use serde::Serialize;
@@ -14,7 +14,6 @@ const PIECES: usize = 100;
 /// See [`PIECES`].
 const WHITE_SHARE: f64 = 0.5;
 
-/// What came of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
@@ -28,29 +27,25 @@ pub enum Outcome {
     NoneAdequate,
 }
 
-/// The choice in words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// What came of it.
+pub struct SelectionVerdict {
     pub outcome: Outcome,
     /// The family to use; null where none is within the tolerance or adequate.
     pub family: Option<String>,
-    /// The families that cannot be told from it, itself included; or the nearest where none will do.
+    /// The families that are as good, itself included; or the nearest where none is good enough.
     pub among: Vec<String>,
     /// Sentences, the choice first.
     pub sentences: Vec<String>,
 }
 
-/// What the criteria count.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Counts {
+pub(super) struct SampleCounts {
     pub records: usize,
     pub samples: usize,
-    /// Independent samples.
     pub effective: f64,
 }
 
-impl Counts {
+impl SampleCounts {
     /// Whether what the best fit leaves is a curve rather than noise.
     fn is_curve(self) -> bool {
         let pieces = (PIECES * self.records) as f64;
@@ -58,15 +53,15 @@ impl Counts {
     }
 }
 
-pub(super) fn verdict(
+pub(super) fn decide(
     candidates: &[Candidate],
     tolerance_n: Option<f64>,
     is_predicted: bool,
-    counts: Counts,
-) -> Verdict {
+    counts: SampleCounts,
+) -> SelectionVerdict {
     match tolerance_n {
-        Some(tolerance) => within(candidates, tolerance, is_predicted),
-        None => by_criterion(candidates, counts),
+        Some(tolerance) => choose_within(candidates, tolerance, is_predicted),
+        None => choose_by_criterion(candidates, counts),
     }
 }
 
@@ -77,7 +72,7 @@ fn simplest<'a>(candidates: &[&'a Candidate]) -> Option<&'a Candidate> {
 }
 
 /// The lowest BIC, if no other family comes near it and it describes the records.
-fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
+fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> SelectionVerdict {
     let near: Vec<&Candidate> =
         candidates.iter().filter(|one| one.bic_above < BARE_MENTION).collect();
     let among: Vec<String> = near.iter().map(|one| one.family.clone()).collect();
@@ -85,13 +80,13 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
     let (outcome, sentence) = match chosen {
         Some(_) if counts.is_curve() => {
             let closest = candidates.iter().min_by(|a, b| a.rms_n.total_cmp(&b.rms_n));
-            let left = closest.map_or(String::new(), |one| {
-                format!("what even {} leaves, {} rms,", one.family, newtons(one.rms_n))
+            let residuals = closest.map_or("the residuals".to_owned(), |one| {
+                format!("the residuals of {}, {} rms,", one.family, newtons(one.rms_n))
             });
             (
                 Outcome::NoneAdequate,
                 format!(
-                    "no winner: no family describes these records to their noise; {left} wanders like a curve (its {} residuals are worth {:.0} independent ones), so the lowest criterion proves nothing: state a tolerance, the error that does not matter",
+                    "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} of them carry the information of {:.0} independent ones), so the lowest criterion proves nothing; state a tolerance, the error that does not matter",
                     counts.samples, counts.effective
                 ),
             )
@@ -123,7 +118,7 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
         ),
     };
     let is_chosen = matches!(outcome, Outcome::Recommended | Outcome::NoWinner);
-    Verdict {
+    SelectionVerdict {
         outcome,
         family: chosen.filter(|_| is_chosen).map(|one| one.family.clone()),
         among,
@@ -132,7 +127,7 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
 }
 
 /// The cheapest within the tolerance.
-fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdict {
+fn choose_within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> SelectionVerdict {
     let error = |one: &Candidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
     let what = if is_predicted { "predicts what was held out" } else { "describes the records" };
     let good: Vec<&Candidate> = candidates.iter().filter(|one| error(one) <= tolerance).collect();
@@ -151,7 +146,7 @@ fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdi
                 "no winner: no family could be fitted to what was not held out; add records".into()
             }
         };
-        return Verdict {
+        return SelectionVerdict {
             outcome: Outcome::NoneWithin,
             family: None,
             among: nearest.map(|one| one.family.clone()).into_iter().collect(),
@@ -184,7 +179,7 @@ fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdi
         format!("use {first}")
     }];
     sentences.extend(remarks(candidates, chosen, tolerance, is_predicted));
-    Verdict {
+    SelectionVerdict {
         outcome: if equals.len() > 1 { Outcome::NoWinner } else { Outcome::Recommended },
         family: Some(chosen.family.clone()),
         among,
@@ -192,7 +187,7 @@ fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdi
     }
 }
 
-/// Whether nothing tells two families apart: their predictions over records, or else their BIC.
+/// Whether two families do equally well: by their predictions over records, or else by their BIC.
 fn are_equal(one: &Candidate, other: &Candidate) -> bool {
     let by_records = one
         .prediction
@@ -212,7 +207,6 @@ fn worst(one: &Candidate, is_predicted: bool) -> f64 {
     }
 }
 
-/// What to know beside the choice.
 fn remarks(
     candidates: &[Candidate],
     chosen: &Candidate,
@@ -223,14 +217,14 @@ fn remarks(
     let error = |one: &Candidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
     if worst(chosen, is_predicted) > tolerance {
         remarks.push(format!(
-            "the tolerance holds on average, not everywhere: single samples are off by up to {}",
+            "the tolerance holds on average, not everywhere; the error of single samples is up to {}",
             newtons(worst(chosen, is_predicted))
         ));
     }
     let spread = chosen.prediction.as_ref().and_then(|one| one.std_error_n);
     if let Some(spread) = spread.filter(|spread| error(chosen) + spread > tolerance) {
         remarks.push(format!(
-            "between records its error varies by {} (standard error), more than what is left to the tolerance: another record may lie outside",
+            "its error varies between records by {} (standard error), more than the margin to the tolerance; another record may lie outside it",
             newtons(spread)
         ));
     }
@@ -239,7 +233,7 @@ fn remarks(
         && best.family != chosen.family
     {
         remarks.push(format!(
-            "{} would bring the error down to {} for {} operations",
+            "{} reduces the error to {} for {} operations",
             best.family,
             newtons(lowest),
             best.cost.operations
@@ -277,8 +271,8 @@ mod tests {
     }
 
     #[test]
-    fn noise_with_a_short_memory_is_no_curve() {
-        let counts = |samples, effective| Counts { records: 2, samples, effective };
+    fn noise_with_short_correlation_is_not_lack_of_fit() {
+        let counts = |samples, effective| SampleCounts { records: 2, samples, effective };
         // A filter's memory of fifty samples in a minute at 1 kHz; a short record of white noise.
         assert!(!counts(60_000, 1200.0).is_curve());
         assert!(!counts(100, 90.0).is_curve());

@@ -1,6 +1,7 @@
-//! What to use for a tolerance and a rate.
+//! The cheapest setting for a tolerance and a rate.
 
 use super::{FamilyRow, TradeCurves};
+use crate::distinct;
 use crate::tolerance::Tolerance;
 use palpate_model::units::Newtons;
 use serde::Serialize;
@@ -8,10 +9,8 @@ use serde::Serialize;
 /// Times repeat to this share on a quiet machine.
 const REPEATABLE: f64 = 0.1;
 
-/// A setting that does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Choice {
-    /// What, in words.
+pub struct AdvisedSetting {
     pub setting: String,
     /// Its error as a share of the largest force.
     pub error_of_peak: f64,
@@ -21,20 +20,18 @@ pub struct Choice {
     pub cost_ns: f64,
 }
 
-/// A setting, or why there is none.
+/// A setting, or the reason why there is none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Advice {
-    /// The cheapest that does.
-    Use(Choice),
+    Use(AdvisedSetting),
     /// Why none does, in a sentence.
     None(String),
 }
 
-/// What to use for one tolerance and one rate.
+/// The cheapest settings for one tolerance and one rate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Recommendation {
-    /// The tolerance in words.
     pub tolerance: String,
     /// Updates per second wanted.
     pub rate_hz: f64,
@@ -56,14 +53,8 @@ impl TradeCurves {
     /// second, takes no more than `share` (0 to 1) of each period. An integrator may take several steps
     /// a period and never takes one longer than the period. The fit has no rate to keep up with.
     pub fn recommend(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Recommendation {
-        let targets = self.families.iter().map(|row| row.target.as_str());
-        let mut names: Vec<&str> = Vec::new();
-        for target in targets {
-            if !names.contains(&target) {
-                names.push(target);
-            }
-        }
-        let families = names.into_iter().map(|target| {
+        let targets = distinct(self.families.iter().map(|row| row.target.as_str()));
+        let families = targets.into_iter().map(|target| {
             let rows = self.families.iter().filter(|row| row.target == target);
             let advice = family(&rows.collect::<Vec<_>>(), tolerance, rate_hz, share);
             (target.to_owned(), advice)
@@ -84,7 +75,7 @@ impl TradeCurves {
         let allowed = tolerance.in_newtons(peak).0 / peak.0;
         let candidates = self.live.iter().filter_map(|row| {
             let error = row.tau_error?;
-            let choice = Choice {
+            let choice = AdvisedSetting {
                 setting: format!("{} relaxation times", row.nodes),
                 error_of_peak: error,
                 share_of_period: Some(row.cost.ns * 1e-9 * rate_hz),
@@ -101,7 +92,7 @@ impl TradeCurves {
         let fitting = self.integrators.iter().filter(|row| row.step_s <= period * (1.0 + 1e-9));
         let candidates = fitting.filter_map(|row| {
             let error = row.error?;
-            let choice = Choice {
+            let choice = AdvisedSetting {
                 setting: format!(
                     "{} in {}, a step every {} ms",
                     row.scheme.name(),
@@ -120,7 +111,7 @@ impl TradeCurves {
     fn thinning(&self, tolerance: Tolerance) -> Advice {
         let peak = self.peak.ramp_hold_n;
         let candidates = self.fit.iter().map(|row| {
-            let choice = Choice {
+            let choice = AdvisedSetting {
                 setting: format!("{} samples a second, {} in all", row.rate_hz, row.samples),
                 error_of_peak: row.error_n / peak,
                 share_of_period: None,
@@ -134,7 +125,7 @@ impl TradeCurves {
 
 fn family(rows: &[&FamilyRow], tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
     let candidates = rows.iter().map(|row| {
-        let choice = Choice {
+        let choice = AdvisedSetting {
             setting: row.family.clone(),
             error_of_peak: row.error_n / row.peak_n,
             share_of_period: Some(row.cost.ns * 1e-9 * rate_hz),
@@ -147,23 +138,21 @@ fn family(rows: &[&FamilyRow], tolerance: Tolerance, rate_hz: f64, share: f64) -
 }
 
 /// The cheapest of those exact enough, if it is cheap enough.
-fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64, f64)>) -> Advice {
-    let mut exact: Vec<&Choice> = Vec::new();
-    let mut nearest: Option<&Choice> = None;
-    for (choice, is_exact) in &candidates {
-        if *is_exact {
-            exact.push(choice);
-        }
-        if nearest.is_none_or(|known| choice.error_of_peak < known.error_of_peak) {
-            nearest = Some(choice);
-        }
-    }
-    let least = |choices: &[&Choice]| {
+fn best(
+    candidates: Vec<(AdvisedSetting, bool)>,
+    tolerance: Tolerance,
+    pace: Option<(f64, f64)>,
+) -> Advice {
+    let all = candidates.iter().map(|(choice, _)| choice);
+    let nearest = all.min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
+    let exact = candidates.iter().filter(|(_, is_exact)| *is_exact).map(|(choice, _)| choice);
+    let exact: Vec<&AdvisedSetting> = exact.collect();
+    let least = |choices: &[&AdvisedSetting]| {
         let costs = choices.iter().map(|choice| choice.cost_ns);
         costs.fold(f64::INFINITY, f64::min)
     };
-    // What keeps pace, or else the cheapest, to say by how much it does not.
-    let in_time: Vec<&Choice> = exact
+    // Those that keep pace, or else the cheapest, to state by how much it does not.
+    let in_time: Vec<&AdvisedSetting> = exact
         .iter()
         .filter(|choice| {
             pace.is_none_or(|(_, share)| choice.share_of_period.is_none_or(|used| used <= share))
@@ -171,7 +160,7 @@ fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64
         .copied()
         .collect();
     let (known, slack) = match in_time.is_empty() {
-        // Of those that cost the same as far as times can be told apart, the most exact.
+        // Of those whose times do not differ by more than their repeatability, the most exact.
         false => (in_time, REPEATABLE),
         true => (exact, 0.0),
     };

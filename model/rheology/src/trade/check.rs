@@ -1,41 +1,23 @@
-//! Whether curves can be what was measured.
+//! Validity of stored curves.
 
-use super::{Cost, TRADE_FORMAT, TradeCurves};
+use super::{Cost, FamilyRow, IntegratorRow, TRADE_FORMAT, TradeCurves};
 use crate::integrators::Precision;
 use thiserror::Error;
 
-/// Curves that are none.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CurveError {
-    /// Another version of the stored form.
     #[error("these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again")]
     Format(u32),
-    /// A number out of its range.
-    #[error("the curves say {what} = {value}, which nothing can be; measure again")]
-    Number {
-        /// Which.
-        what: String,
-        /// Its value.
-        value: f64,
-    },
-    /// Two numbers that contradict each other.
+    #[error("the curves state {what} of {value}, which is not possible; measure again")]
+    Number { what: String, value: f64 },
     #[error(
         "the curves contradict themselves at {0}: they were changed after they were measured; measure again"
     )]
     Contradiction(String),
-    /// Errors that this program does not find.
     #[error(
-        "{what}: the curves say an error of {stored:e} and this palpate finds {found:e}; measure again"
+        "{what}: the curves state an error of {stored:e} and this palpate finds {found:e}; measure again"
     )]
-    Error {
-        /// Which row.
-        what: String,
-        /// What is stored.
-        stored: f64,
-        /// What is computed now.
-        found: f64,
-    },
-    /// Other rows.
+    Error { what: String, stored: f64, found: f64 },
     #[error("the curves have no row {0}; measure again")]
     Missing(String),
 }
@@ -121,26 +103,22 @@ impl TradeCurves {
         same("the poke", peak.poke_n, now.peak.poke_n, LAST_DIGITS)?;
         self.integrators_agree(now)?;
         for row in &now.families {
-            let stored = self
-                .families
-                .iter()
-                .find(|stored| (&stored.family, &stored.target) == (&row.family, &row.target));
             let name = format!("{} for {}", row.family, row.target);
-            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            let is_same =
+                |one: &FamilyRow| (&one.family, &one.target) == (&row.family, &row.target);
+            let stored = find(&self.families, &name, is_same)?;
             same(&name, stored.peak_n, row.peak_n, LAST_DIGITS)?;
             alike(&name, stored.error_n, row.error_n, row.peak_n)?;
         }
         for row in &now.fit {
             let name = format!("the fit at {} Hz", row.rate_hz);
-            let stored = self.fit.iter().find(|stored| stored.rate_hz == row.rate_hz);
-            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            let stored = find(&self.fit, &name, |one| one.rate_hz == row.rate_hz)?;
             alike(&name, stored.tau_error, row.tau_error, 1.0)?;
             alike(&name, stored.error_n, row.error_n, peak.ramp_hold_n)?;
         }
         for row in &now.live {
             let name = format!("the live fit with {} relaxation times", row.nodes);
-            let stored = self.live.iter().find(|stored| stored.nodes == row.nodes);
-            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            let stored = find(&self.live, &name, |one| one.nodes == row.nodes)?;
             match (stored.tau_error, row.tau_error) {
                 (Some(stored), Some(found)) => alike(&name, stored, found, 1.0)?,
                 (None, None) => {}
@@ -155,23 +133,28 @@ impl TradeCurves {
         for row in &now.integrators {
             let name =
                 format!("{} at {} s in {}", row.scheme.name(), row.step_s, row.precision.name());
-            let stored = self.integrators.iter().find(|stored| {
-                (stored.scheme, stored.precision, stored.step_s)
-                    == (row.scheme, row.precision, row.step_s)
-            });
-            match (stored.map(|stored| stored.error), row.error) {
-                (None, _) => return Err(CurveError::Missing(name)),
-                (Some(None), None) => {}
-                (Some(Some(stored)), Some(found)) => {
+            let key = |one: &IntegratorRow| (one.scheme, one.precision, one.step_s);
+            let stored = find(&self.integrators, &name, |one| key(one) == key(row))?;
+            match (stored.error, row.error) {
+                (None, None) => {}
+                (Some(stored), Some(found)) => {
                     let share = last_digits(row.precision);
                     same(&name, stored.ramp_hold_n, found.ramp_hold_n, share * peak.ramp_hold_n)?;
                     same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
                 }
-                (Some(_), _) => return Err(CurveError::Contradiction(name)),
+                _ => return Err(CurveError::Contradiction(name)),
             }
         }
         Ok(())
     }
+}
+
+fn find<'a, T>(
+    rows: &'a [T],
+    name: &str,
+    is_same: impl Fn(&T) -> bool,
+) -> Result<&'a T, CurveError> {
+    rows.iter().find(|row| is_same(row)).ok_or_else(|| CurveError::Missing(name.to_owned()))
 }
 
 fn within(

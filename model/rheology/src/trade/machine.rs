@@ -1,4 +1,4 @@
-//! Where and when curves were measured, and whether that still says anything here and now.
+//! Machine and date of a measurement, and whether it still holds here and now.
 
 use super::TradeCurves;
 use serde::{Deserialize, Serialize};
@@ -11,16 +11,13 @@ pub const STALE_DAYS: f64 = 90.0;
 pub struct Machine {
     /// Processor, by its own name where the system tells it, else its architecture.
     pub cpu: String,
-    /// Operating system.
     pub os: String,
-    /// Logical cores.
     pub cores: usize,
     /// How palpate was built: `debug` or `release`.
     pub profile: String,
 }
 
 impl Machine {
-    /// In words.
     pub fn words(&self) -> String {
         let Self { cpu, os, cores, profile } = self;
         format!("{cpu}, {cores} logical cores, {os}, {profile} build")
@@ -35,14 +32,14 @@ impl Machine {
 }
 
 impl TradeCurves {
-    /// What speaks against planning from these curves here and now, a sentence each: measured on
+    /// Reasons not to plan from these curves here and now, a sentence each: measured on
     /// another machine, by another build or version, too long ago (`age_days`), or in haste.
     pub fn doubts(&self, here: &Machine, version: &str, age_days: f64) -> Vec<String> {
         let mut doubts = Vec::new();
         let there = &self.machine;
         if (&there.cpu, &there.os, there.cores) != (&here.cpu, &here.os, here.cores) {
             doubts.push(format!(
-                "these curves are foreign: measured on {}, this is {}; measure here",
+                "these curves were measured on another computer ({}), and this is {}; measure here",
                 there.words(),
                 here.words()
             ));

@@ -9,7 +9,7 @@ mod check;
 mod machine;
 mod pareto;
 
-pub use advice::{Advice, Choice, Recommendation};
+pub use advice::{Advice, AdvisedSetting, Recommendation};
 pub use check::{CurveError, last_digits};
 pub use machine::{Machine, STALE_DAYS};
 pub use pareto::{front, pareto};
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// Version of the stored form; another one is not read.
 pub const TRADE_FORMAT: u32 = 1;
 
-/// What something cost, and how sure that is.
+/// A measured time and its repeatability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Time of one in ns: the least over all rounds, since other work on the machine only adds.
@@ -44,17 +44,13 @@ pub struct ForceError {
 /// One integrator at one step in one precision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IntegratorRow {
-    /// Which.
     pub scheme: Scheme,
-    /// In which numbers.
     pub precision: Precision,
     /// Step in s.
     pub step_s: f64,
     /// Its error; null where it has none.
     pub error: Option<ForceError>,
-    /// Why it has none.
     pub refused: Option<String>,
-    /// Cost of a step.
     pub cost: Cost,
     /// Cost of a second of simulated time, in ns.
     pub second_ns: f64,
@@ -62,12 +58,10 @@ pub struct IntegratorRow {
     pub front: bool,
 }
 
-/// One model family.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FamilyRow {
-    /// Its key.
     pub family: String,
-    /// What it stands for: rows of one target compete.
+    /// Rows of one target compete.
     pub target: String,
     /// Largest force of the target, in N.
     pub peak_n: f64,
@@ -84,13 +78,11 @@ pub struct FamilyRow {
 pub struct FitRow {
     /// Samples per second that are left.
     pub rate_hz: f64,
-    /// Samples fitted.
     pub samples: usize,
     /// Root mean square error of the relaxation time over the seeds, as a share of it.
     pub tau_error: f64,
     /// Root mean square over the seeds of the largest error of the fitted force, in N.
     pub error_n: f64,
-    /// Cost of a fit.
     pub cost: Cost,
     /// Whether nothing is both cheaper and more exact.
     pub front: bool,
@@ -99,12 +91,10 @@ pub struct FitRow {
 /// The live fit with so many relaxation times in its bank.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LiveRow {
-    /// How many.
     pub nodes: usize,
     /// How far its last answer is from the fit of record on a noiseless recording, as a share of the
     /// relaxation time; null where it has no answer.
     pub tau_error: Option<f64>,
-    /// Cost of a sample.
     pub cost: Cost,
     /// Whether nothing is both cheaper and more exact.
     pub front: bool,
@@ -113,11 +103,9 @@ pub struct LiveRow {
 /// Everything measured in one go on one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TradeCurves {
-    /// [`TRADE_FORMAT`].
     pub format: u32,
     /// Version of palpate that measured.
     pub version: String,
-    /// Where.
     pub machine: Machine,
     /// When, RFC 3339 in UTC.
     pub measured_at: String,
@@ -129,7 +117,6 @@ pub struct TradeCurves {
     pub seeds: [u64; 2],
     /// Integrators by step and precision.
     pub integrators: Vec<IntegratorRow>,
-    /// Families by terms.
     pub families: Vec<FamilyRow>,
     /// The fit by sampling rate.
     pub fit: Vec<FitRow>,
@@ -175,7 +162,6 @@ impl TradeCurves {
         self.live.iter_mut().zip(pareto(&points)).for_each(|(row, front)| row.front = front);
     }
 
-    /// All costs measured.
     pub fn costs(&self) -> impl Iterator<Item = &Cost> {
         let integrators = self.integrators.iter().map(|row| &row.cost);
         let families = self.families.iter().map(|row| &row.cost);

@@ -148,7 +148,7 @@ fn the_cheapest_that_does_is_recommended() {
 }
 
 #[test]
-fn none_is_said_with_its_reason() {
+fn missing_advice_states_its_reason() {
     let curves = curves();
     let one = Tolerance::PercentOfPeak(1.0);
     let fast = curves.recommend(one, 1e6, 0.1);
@@ -173,7 +173,7 @@ fn stale_and_foreign_curves_are_noticed() {
     assert!(doubt(&here(), "1.3.0", 1.0).contains("palpate 1.2.3"));
     assert!(doubt(&here(), "1.2.3", -2.0).contains("future"));
     let other = Machine { cores: 4, ..here() };
-    assert!(doubt(&other, "1.2.3", 1.0).contains("foreign"));
+    assert!(doubt(&other, "1.2.3", 1.0).contains("another computer"));
     let debug = Machine { profile: "debug".into(), ..here() };
     assert!(doubt(&debug, "1.2.3", 1.0).contains("debug"));
     assert_eq!(here().file_stem(), "example-r-cpu-3-ghz-8-logical-cores-linux-release-build");

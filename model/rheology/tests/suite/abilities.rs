@@ -244,7 +244,7 @@ fn bootstraps_of_every_family_spread_like_their_standard_errors() {
 }
 
 #[test]
-fn every_family_tells_what_a_badly_known_compliance_does() {
+fn every_family_reports_the_systematic_error_of_the_compliance() {
     for model in bodies() {
         let samples = record(&model, 2.0, 0.0, 0.0, 1);
         let traced = |error| Traced {
@@ -268,7 +268,7 @@ fn every_family_tells_what_a_badly_known_compliance_does() {
 }
 
 #[test]
-fn every_family_says_that_it_does_not_describe_a_record() {
+fn every_family_warns_of_lack_of_fit() {
     for model in bodies() {
         let mut samples = record(&model, 2.0, 0.0, NOISE, 7);
         let clean = fit(&samples, &options(&model)).unwrap();

@@ -43,7 +43,7 @@ fn covered(clean: &[FitSample], noise: (f64, f64, f64), seeds: std::ops::Range<u
 }
 
 #[test]
-fn intervals_cover_under_white_and_remembering_noise() {
+fn intervals_cover_under_white_and_autocorrelated_noise() {
     let clean = respond(&ModifiedKelvin::THESIS, &ramp_hold(0.75, 50.0, 1e-3));
     let draws = draws();
     for (name, noise) in NOISES {

@@ -3,8 +3,8 @@
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 use palpate_rheology::expected::{
-    Expected, ExpectedError, Family, Memory, Noise, Protocol, Rig, Target, Unknowns, intervals,
-    shortest,
+    ExpectedError, ExpectedPrecision, Family, Memory, Noise, ProtocolPath, Rig, Target, Unknowns,
+    intervals, shortest,
 };
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_test_support::record;
@@ -18,24 +18,24 @@ fn slow(white: f64, sd: f64, time: f64) -> Noise {
 }
 
 /// Relative standard deviations in percent.
-fn percents(protocol: &Protocol, noise: &Noise, unknowns: Unknowns) -> [f64; 5] {
+fn percents(protocol: &ProtocolPath, noise: &Noise, unknowns: Unknowns) -> [f64; 5] {
     relative(&intervals(&BODY, protocol, noise, unknowns).unwrap())
 }
 
-fn relative(expected: &Expected) -> [f64; 5] {
+fn relative(expected: &ExpectedPrecision) -> [f64; 5] {
     expected.parameters.map(|parameter| 100.0 * parameter.std_error / parameter.value.abs())
 }
 
-fn thesis_protocol(rate: f64) -> Protocol {
-    Protocol::ramp_hold(MmPerS(0.75), DEPTH, Seconds(50.0), rate)
+fn thesis_protocol(rate: f64) -> ProtocolPath {
+    ProtocolPath::ramp_hold(MmPerS(0.75), DEPTH, Seconds(50.0), rate)
 }
 
 #[test]
-fn published_figures() {
+fn published_figures_are_reproduced() {
     let one = thesis_protocol(1e3);
     let speeds = [MmPerS(0.75), MmPerS(1.5)];
-    let two = Protocol::two_speeds(speeds, DEPTH, Seconds(50.0), Seconds(10.0), 1e3);
-    let triangle = Protocol::triangle(MmPerS(0.75), DEPTH, 1, 1e3);
+    let two = ProtocolPath::two_speeds(speeds, DEPTH, Seconds(50.0), Seconds(10.0), 1e3);
+    let triangle = ProtocolPath::cycles(MmPerS(0.75), [Depth(0.0), DEPTH], 1, 1e3);
     let cases = [
         (&one, WITHOUT_OFFSET, [0.158, 0.111, 0.073, 0.036, 0.068]),
         (&one, Unknowns::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
@@ -52,7 +52,7 @@ fn published_figures() {
 }
 
 /// A press as (time, depth) at its corners, the first at rest.
-fn corners(protocol: &Protocol) -> Vec<(f64, f64)> {
+fn corners(protocol: &ProtocolPath) -> Vec<(f64, f64)> {
     let mut at = (0.0, 0.0);
     let mut corners = vec![at];
     for piece in &protocol.presses[0] {
@@ -63,7 +63,7 @@ fn corners(protocol: &Protocol) -> Vec<(f64, f64)> {
 }
 
 /// The path of the one press of a protocol, sample by sample.
-fn path(protocol: &Protocol) -> Vec<(f64, f64)> {
+fn path(protocol: &ProtocolPath) -> Vec<(f64, f64)> {
     let corners = corners(protocol);
     let count = (protocol.duration().0 * protocol.sample_rate_hz).round() as u32;
     (0..=count)
@@ -105,7 +105,7 @@ fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 /// The same intervals the long way: derivatives by finite differences of simulated forces, every
 /// pair of samples, normal equations.
-fn brute_force(protocol: &Protocol, noise: &Noise) -> [f64; 5] {
+fn brute_force(protocol: &ProtocolPath, noise: &Noise) -> [f64; 5] {
     let path = path(protocol);
     let force = |body: &ModifiedKelvin| -> Vec<f64> {
         let samples = record::respond(body, &path);
@@ -163,9 +163,9 @@ fn quadrature_and_recursions_agree_with_every_pair_of_samples() {
     // below the sampling interval, at tau and far above it.
     let protocols = [
         thesis_protocol(20.0),
-        Protocol::cycles(MmPerS(1.5), [Depth(15.0), DEPTH], 6, 15.0),
+        ProtocolPath::cycles(MmPerS(1.5), [Depth(15.0), DEPTH], 6, 15.0),
         thesis_protocol(10.0),
-        Protocol::triangle(MmPerS(6.0), DEPTH, 7, 10.0),
+        ProtocolPath::cycles(MmPerS(6.0), [Depth(0.0), DEPTH], 7, 10.0),
     ];
     for (protocol, time) in
         protocols.iter().flat_map(|protocol| [0.01, 0.5, 1.023, 8.0].map(|time| (protocol, time)))
@@ -194,7 +194,7 @@ fn a_single_ramp_is_refused_by_name() {
         (3.0, 50.0, Unknowns::default()),
         (0.03, 7.0, WITHOUT_OFFSET),
     ] {
-        let ramp = Protocol::ramp_hold(MmPerS(speed), DEPTH, Seconds(0.0), rate);
+        let ramp = ProtocolPath::ramp_hold(MmPerS(speed), DEPTH, Seconds(0.0), rate);
         let refusal = intervals(&BODY, &ramp, &noise, unknowns).unwrap_err();
         assert!(
             matches!(&refusal, ExpectedError::Inseparable { names } if names == "mu1 from tau_sig"),
@@ -205,7 +205,7 @@ fn a_single_ramp_is_refused_by_name() {
 
 #[test]
 fn a_record_shorter_than_its_unknowns_is_refused() {
-    let protocol = Protocol::ramp_hold(MmPerS(10.0), DEPTH, Seconds(2.0), 1.0);
+    let protocol = ProtocolPath::ramp_hold(MmPerS(10.0), DEPTH, Seconds(2.0), 1.0);
     let noise = Noise::white(Newtons(0.02));
     assert!(intervals(&BODY, &protocol, &noise, Unknowns::default()).is_err());
 }
@@ -222,7 +222,8 @@ fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
     let (slow, quick) = (BODY, 0.01);
     let scaled =
         ModifiedKelvin { tau_eps: slow.tau_eps * quick, tau_sig: slow.tau_sig * quick, ..slow };
-    let fast = Protocol::ramp_hold(MmPerS(0.75 / quick), DEPTH, Seconds(50.0 * quick), 1e3 / quick);
+    let fast =
+        ProtocolPath::ramp_hold(MmPerS(0.75 / quick), DEPTH, Seconds(50.0 * quick), 1e3 / quick);
     let one = intervals(&scaled, &fast, &noise, Unknowns::default()).unwrap();
     for (one, other) in
         relative(&one).into_iter().zip(percents(&thesis_protocol(1e3), &noise, Unknowns::default()))
@@ -293,7 +294,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
         let unknowns = Unknowns::default();
         let proposals = shortest(&BODY, &noise, unknowns, &[target], &rig()).unwrap();
         assert!(matches!(proposals[0].family, Family::RampHold { .. }));
-        let reached = |protocol: &Protocol| {
+        let reached = |protocol: &ProtocolPath| {
             let expected = intervals(&BODY, protocol, &noise, unknowns).ok()?;
             let mut all = expected.parameters.iter();
             all.find(|one| one.name == target.parameter)?.percent
@@ -311,7 +312,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
         for multiple in (20..=70).step_by(2) {
             let speed = MmPerS(0.03 * f64::from(multiple));
             let spare = 0.95 * best - DEPTH.0 / speed.0;
-            let shorter = Protocol::ramp_hold(speed, DEPTH, Seconds(spare.max(1e-3)), 1e3);
+            let shorter = ProtocolPath::ramp_hold(speed, DEPTH, Seconds(spare.max(1e-3)), 1e3);
             let is_gentle = intervals(&BODY, &shorter, &noise, unknowns)
                 .is_ok_and(|expected| expected.force_max.0 <= 8.1);
             assert!(
@@ -323,7 +324,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
 }
 
 #[test]
-fn impossible_wishes_are_refused_in_words() {
+fn impossible_targets_are_refused_in_words() {
     let noise = Noise::white(Newtons(0.02));
     let ask = |name: &str, percent: f64, rig: Rig| {
         let targets = [Target::new(name, percent).unwrap()];

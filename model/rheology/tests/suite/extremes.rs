@@ -2,9 +2,10 @@
 
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::extremes::{
-    Answer, Expected, Extent, FamilyBody, PathCase, Subject, Verdict, judge, member, parts,
+    ExpectedAnswer, Extent, ExtremesSubject, FamilyBody, PathCase, SubjectAnswer, Verdict, judge,
+    make_member, parts,
 };
-use palpate_rheology::families::{self, Family, Model, Outer, Relaxation};
+use palpate_rheology::families::{self, Family, Model, OuterParameter, RelaxationTerm};
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -51,12 +52,12 @@ struct Spoilt {
     spoil: fn(Forces) -> Forces,
 }
 
-impl Subject for Spoilt {
+impl ExtremesSubject for Spoilt {
     fn name(&self) -> String {
         "spoilt".into()
     }
 
-    fn terms(&self) -> Result<Vec<Relaxation>, String> {
+    fn terms(&self) -> Result<Vec<RelaxationTerm>, String> {
         self.right.terms()
     }
 
@@ -75,14 +76,14 @@ fn poke(depth: f64) -> PathCase {
 }
 
 fn kelvin() -> Model {
-    member(&families::Kelvin, 1.0, 20.0, 2.0)
+    make_member(&families::Kelvin, 1.0, 20.0, 2.0)
 }
 
 #[test]
 fn a_broken_step_is_judged_wrong() {
     let verdict = |spoil, path: &PathCase| {
         let right = FamilyBody(kelvin());
-        path.put_to(&Spoilt { right, spoil }).verdict
+        path.run_on(&Spoilt { right, spoil }).verdict
     };
     let good = poke(10.0);
     assert_eq!(verdict(|forces| forces, &good), Verdict::Right);
@@ -120,13 +121,13 @@ fn a_broken_step_is_judged_wrong() {
 fn a_broken_weight_is_judged_wrong() {
     // The step of another body. The slowest time of six terms moves this force by a millionth of its own
     // change, which is to be seen.
-    struct Other(FamilyBody, FamilyBody);
-    impl Subject for Other {
+    struct OtherFamily(FamilyBody, FamilyBody);
+    impl ExtremesSubject for OtherFamily {
         fn name(&self) -> String {
             "other".into()
         }
 
-        fn terms(&self) -> Result<Vec<Relaxation>, String> {
+        fn terms(&self) -> Result<Vec<RelaxationTerm>, String> {
             self.0.terms()
         }
 
@@ -135,14 +136,14 @@ fn a_broken_weight_is_judged_wrong() {
         }
     }
     for family in families::all() {
-        let right = member(&*family, 1.0, 20.0, 2.0);
+        let right = make_member(&*family, 1.0, 20.0, 2.0);
         for index in 0..right.outer.len() + right.linear.len() {
             let mut other = right.clone();
             match other.outer.get_mut(index) {
                 Some(outer) => *outer *= 1.0 + 1e-5,
                 None => other.linear[index - right.outer.len()] *= 1.0 + 1e-5,
             }
-            let row = poke(10.0).put_to(&Other(FamilyBody(right.clone()), FamilyBody(other)));
+            let row = poke(10.0).run_on(&OtherFamily(FamilyBody(right.clone()), FamilyBody(other)));
             assert_eq!(row.verdict, Verdict::Wrong, "{} {index}: {row:?}", family.key());
         }
     }
@@ -152,24 +153,24 @@ fn a_broken_weight_is_judged_wrong() {
 fn a_fit_is_judged_by_its_parameters_and_warnings() {
     let verdict = |expected, error, warnings: &[&str]| {
         let warnings = warnings.iter().map(|&text| text.to_owned()).collect();
-        let answer = Answer::Number { error, warnings };
-        judge(["test", "case"], "fit", expected, 1e-6, answer).verdict
+        let answer = SubjectAnswer::Number { error, warnings };
+        judge("test", "case", "fit", expected, 1e-6, answer).verdict
     };
-    assert_eq!(verdict(Expected::Number, 1e-7, &["slow"]), Verdict::Right);
-    assert_eq!(verdict(Expected::Number, 1e-5, &["slow"]), Verdict::Flagged);
-    assert_eq!(verdict(Expected::Number, 1e-5, &[]), Verdict::Wrong);
-    assert_eq!(verdict(Expected::Either, f64::NAN, &["slow"]), Verdict::Wrong);
-    assert_eq!(verdict(Expected::Refusal, 0.0, &["slow"]), Verdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-7, &["slow"]), Verdict::Right);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &["slow"]), Verdict::Flagged);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &[]), Verdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Either, f64::NAN, &["slow"]), Verdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Refusal, 0.0, &["slow"]), Verdict::Wrong);
 }
 
 /// A family that counts how often a fit asks for its columns.
 #[derive(Debug)]
-struct Counted {
+struct CountingFamily {
     family: Arc<dyn Family>,
-    asked: AtomicUsize,
+    calls: AtomicUsize,
 }
 
-impl Family for Counted {
+impl Family for CountingFamily {
     fn key(&self) -> String {
         self.family.key()
     }
@@ -182,14 +183,14 @@ impl Family for Counted {
     fn cannot_represent(&self) -> &'static str {
         self.family.cannot_represent()
     }
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         self.family.outer()
     }
     fn linear(&self) -> Vec<(String, &'static str)> {
         self.family.linear()
     }
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        self.asked.fetch_add(1, Ordering::Relaxed);
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
         self.family.columns(outer)
     }
     fn is_non_negative(&self, coefficient: usize) -> bool {
@@ -201,7 +202,7 @@ impl Family for Counted {
 }
 
 /// Columns a fit may ask for: a grid of 392 cells, then four valleys and the whole record, each 80 steps
-/// that ask once for a trial and twice for every outer parameter, and little besides.
+/// that ask once for a trial and twice for every outer parameter, and little else.
 fn bound(outers: usize) -> usize {
     500 + 5 * 80 * (2 + 2 * outers)
 }
@@ -217,7 +218,7 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
         |i, _| f64::from(i).powi(5) * if i % 2 == 0 { 1.0 } else { -1.0 },
     ];
     for family in families::all() {
-        let counted = Arc::new(Counted { family, asked: AtomicUsize::new(0) });
+        let counted = Arc::new(CountingFamily { family, calls: AtomicUsize::new(0) });
         let options = FitOptions::of(counted.clone());
         let limit = bound(counted.outer().len());
         for (number, force) in records.iter().enumerate() {
@@ -229,10 +230,10 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
                     sigma: Newtons(0.02),
                 })
                 .collect();
-            counted.asked.store(0, Ordering::Relaxed);
+            counted.calls.store(0, Ordering::Relaxed);
             let fit = fit(&samples, &options);
-            let asked = counted.asked.load(Ordering::Relaxed);
-            assert!(asked < limit, "{} {number}: {asked}", counted.key());
+            let calls = counted.calls.load(Ordering::Relaxed);
+            assert!(calls < limit, "{} {number}: {calls}", counted.key());
             match fit {
                 Ok(fit) => {
                     let values = fit.parameters.iter().map(|one| one.value);

@@ -3,7 +3,7 @@
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{self, Model, PowerSeries};
-use palpate_rheology::families::{Family, Outer, Relaxation};
+use palpate_rheology::families::{Family, OuterParameter, RelaxationTerm};
 use palpate_rheology::fit::fit_joint;
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::sync::Arc;
@@ -111,7 +111,7 @@ fn unloading_is_not_fitted_where_nothing_unloads() {
     let fit = |samples: &[FitSample]| fit(samples, &options);
     let held = record(&model, &ramp_hold(0.8, 20.0, 20.0, 0.05));
     let refusal = fit(&held).unwrap_err().to_string();
-    assert!(refusal.contains("comes back by 0 %"), "{refusal}");
+    assert!(refusal.contains("retracts by 0 %"), "{refusal}");
     // A way back whose force is not known says nothing either.
     let mut whole = record(&model, &ramp_hold_unload(0.8, 20.0, 20.0, 0.05));
     let loops = fit(&whole).unwrap();
@@ -119,7 +119,7 @@ fn unloading_is_not_fitted_where_nothing_unloads() {
         sample.sigma = Newtons(f64::INFINITY);
     }
     let refusal = fit(&whole).unwrap_err().to_string();
-    assert!(refusal.contains("comes back by 2 %"), "{refusal}");
+    assert!(refusal.contains("retracts by 2 %"), "{refusal}");
     // What was not lost is found to be nothing.
     for (name, found) in ["s1", "s2", "s3"].iter().zip(&loops.body.linear[4..]) {
         assert!(found.abs() < 1e-10, "{name} {found}");
@@ -175,13 +175,13 @@ impl Family for WithoutKernel {
     fn cannot_represent(&self) -> &'static str {
         self.0.cannot_represent()
     }
-    fn outer(&self) -> Vec<Outer> {
+    fn outer(&self) -> Vec<OuterParameter> {
         self.0.outer()
     }
     fn linear(&self) -> Vec<(String, &'static str)> {
         self.0.linear()
     }
-    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<RelaxationTerm>> {
         self.0.columns(outer)
     }
     fn fading(&self, outer: &[f64]) -> Option<f64> {

@@ -171,7 +171,7 @@ fn any_parameter_may_be_fixed() {
 }
 
 #[test]
-fn initial_force_and_offset_are_told_apart() {
+fn initial_force_and_offset_are_separated() {
     let record: Vec<FitSample> = thesis_record(1e-2)
         .into_iter()
         .map(|sample| FitSample {

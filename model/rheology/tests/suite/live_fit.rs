@@ -122,7 +122,7 @@ fn uneven_times_and_gaps_are_no_obstacle() {
 }
 
 #[test]
-fn says_during_the_ramp_what_it_cannot_know_and_after_it_knows_all() {
+fn ramp_reports_unidentified_parameters_and_hold_identifies_all() {
     let clean = thesis_record();
     let mut noise = record::Noise::seeded(7);
     let stairs: Vec<FitSample> = clean
@@ -158,7 +158,7 @@ fn says_during_the_ramp_what_it_cannot_know_and_after_it_knows_all() {
 }
 
 #[test]
-fn says_nothing_before_there_is_something_to_say() {
+fn live_fit_has_no_estimate_before_enough_samples() {
     let mut live = LiveFit::new(Depth(30.0));
     assert_eq!(live.estimate(), None);
     for i in 0..1000 {

@@ -112,7 +112,7 @@ fn given_times_leave_a_linear_problem_with_bounds() {
 }
 
 #[test]
-fn times_that_are_none_are_refused() {
+fn invalid_times_are_refused() {
     let samples = relaxation((1..9).map(|i| (f64::from(i), 1.0 / f64::from(i))));
     for bad in [0.0, -1.0, f64::NAN] {
         let refused =

@@ -20,7 +20,7 @@ fn what_a_fit_refuses_is_worded() {
         FitError::Inseparable { names: vec!["mu1".into(), "tau_sig".into()], advice: "hold longer".into() } => ["mu1", "tau_sig", "hold longer"],
         FitError::InRecord { record: "slow.csv".into(), reason: Box::new(FitError::Overflow) } => ["slow.csv", "not finite"],
         FitError::NotShareable { name: name(), known: "mu2".into() } => ["mu1", "mu2"],
-        FitError::TooFewBlocks { blocks: 3, needed: 20 } => ["3 block", "20"],
+        FitError::TooFewBlocks { blocks: 3, needed: 20 } => ["3 independent block", "20"],
         FitError::ConstantForce { force: 3.0 } => ["3 N"],
         FitError::ConstantDepth { depth: 5.0 } => ["5 mm"],
         FitError::UnknownParameter { name: name(), known: "mu2".into() } => ["'mu1'", "mu2"],

@@ -17,7 +17,6 @@ const MOST: f64 = 1e-11;
 /// Share of the bodies that reach [`MOST`]: the claim of the README.
 const MOST_SHARE: f64 = 0.99;
 
-/// The body of a seed.
 fn body(seed: u64) -> ModifiedKelvin {
     let mut noise = Noise::seeded(seed);
     let mut around = |value: f64| value * 10f64.powf(2.0 * noise.uniform() - 1.0);

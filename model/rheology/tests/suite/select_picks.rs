@@ -22,7 +22,6 @@ const INDISTINCT: f64 = 4.0;
 const PICKED_SHARE: f64 = 0.95;
 /// Families drawn when nothing is asked for: one of each kind.
 const FEW: &str = "maxwell,kelvin,series-3,exponential,prony-2,fung";
-/// Noise over peak force.
 const NOISE: f64 = 0.01;
 
 /// A body of each family whose force over 20 mm is a few newtons; relaxation times a decade apart.
@@ -57,7 +56,6 @@ fn members() -> Vec<Model> {
     ]
 }
 
-/// The member of a seed.
 fn drawn(member: &Model, noise: &mut Noise) -> Model {
     let mut around =
         |value: &f64, share: f64| value * (1.0 + share * (2.0 * noise.uniform() - 1.0));
@@ -167,9 +165,9 @@ fn the_family_that_made_the_records_is_picked() {
             for (slot, good) in by_aicc.iter_mut().zip(is_good(&aicc)) {
                 *slot += usize::from(good);
             }
-            let said = found.verdict.family.clone().unwrap_or_else(|| "none".into());
-            by_verdict += usize::from(said != "none" && is_good(&said)[1]);
-            if said == "none" {
+            let chosen = found.verdict.family.clone().unwrap_or_else(|| "none".into());
+            by_verdict += usize::from(chosen != "none" && is_good(&chosen)[1]);
+            if chosen == "none" {
                 misses.push(format!("{seed}: {}", found.verdict.sentences.join("; ")));
             }
             if !is_good(&bic)[1] {

@@ -55,7 +55,7 @@ fn mean([x0, x1]: [f64; 2], [before, after]: [&[f64; 6]; 2], block: &Block, tau:
 }
 
 /// Visits the ends of blocks on the redrawn path with bare columns and the slope by `log tau`.
-pub(in super::super) fn redrawn(
+pub(in super::super) fn visit_redrawn(
     blocks: &[Block],
     scale: Scale,
     tau: f64,

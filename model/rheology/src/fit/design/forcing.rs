@@ -1,4 +1,4 @@
-//! What drives the columns over a block of even steps.
+//! Forcing of the columns over a block of even steps.
 
 use super::rows::{LANES, Lane};
 use palpate_model::viscoelastic::PSI_COUNT;
@@ -13,13 +13,13 @@ pub(super) struct Forcing {
 }
 
 impl Forcing {
-    /// Straight moves from `from` to `x` in about `kept` s each, for psi and its slopes there.
+    /// Straight moves from `from` to `x` in about `nominal` s each, for psi and its slopes there.
     #[inline(always)]
     pub fn new<const SLOPES: bool>(
         from: &Lane,
         x: &Lane,
         dt: &Lane,
-        (kept, r, tau): (f64, f64, f64),
+        (nominal, r, tau): (f64, f64, f64),
         psi: &[f64; PSI_COUNT],
         slope: &[f64; 4],
     ) -> Self {
@@ -30,7 +30,7 @@ impl Forcing {
         for i in 0..LANES {
             let (x0, d) = (from[i], x[i] - from[i]);
             let speed = d / dt[i];
-            let delta = (dt[i] - kept) / tau;
+            let delta = (dt[i] - nominal) / tau;
             let p0 = psi[0] + delta * slope[0];
             let p1 = psi[1] + delta * slope[1];
             let p2 = psi[2] + delta * slope[2];

@@ -238,17 +238,17 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         }
         let tau = self.table.tau;
         let weights = self.table.near(dt[0]);
-        let StepWeights { dt: kept, r, psi } = weights.step;
+        let StepWeights { dt: nominal, r, psi } = weights.step;
         let slope = weights.slope;
-        let uneven = dt.iter().fold(0.0f64, |uneven, dt| uneven.max((dt - kept).abs()));
-        if shallowest < 0.0 || uneven > SAME_STEP * kept {
+        let uneven = dt.iter().fold(0.0f64, |uneven, dt| uneven.max((dt - nominal).abs()));
+        if shallowest < 0.0 || uneven > SAME_STEP * nominal {
             return None;
         }
         let mut from = [self.depth; LANES];
         from[1..].copy_from_slice(&x[..LANES - 1]);
         Some(wide(
             #[inline(always)]
-            || Forcing::new::<SLOPES>(&from, &x, &dt, (kept, r, tau), &psi, &slope),
+            || Forcing::new::<SLOPES>(&from, &x, &dt, (nominal, r, tau), &psi, &slope),
         ))
     }
 }
@@ -258,7 +258,6 @@ impl<const SLOPES: bool> Columns<SLOPES> {
 pub(super) struct Scale {
     /// Depth in mm that counts as one.
     pub depth_mm: f64,
-    /// Scaled contact position.
     pub contact: f64,
 }
 

@@ -33,7 +33,6 @@ impl Rows {
         }
     }
 
-    /// Writes the six columns.
     #[inline(always)]
     pub fn values(&self, columns: &mut [Lane]) {
         let [c1, c2, c3, c4, c5, c6, ..] = columns else {
@@ -91,7 +90,7 @@ pub(in super::super) fn six(at: &[f64]) -> Coefficients {
     std::array::from_fn(|k| at[k])
 }
 
-/// What to divide scaled coefficients of powers by for N/mm, N/mm^2, N/mm^3, N*s/mm^2, N, N.
+/// Divisors that turn scaled coefficients of powers into N/mm, N/mm^2, N/mm^3, N*s/mm^2, N, N.
 pub(in super::super) fn linear_units(depth_mm: f64) -> Coefficients {
     let x = depth_mm;
     [x, x * x, x * x * x, x * x, 1.0, 1.0]

@@ -6,7 +6,7 @@ use palpate_model::viscoelastic::{StepWeights, psi_derivatives};
 /// relative error is the square of this.
 pub(super) const SAME_STEP: f64 = 1e-8;
 /// Distinct step lengths remembered at a time: every block length of a thinned record.
-const STEPS_KEPT: usize = 16;
+const STEPS_MAX: usize = 16;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights {
@@ -19,19 +19,19 @@ pub(super) struct Weights {
 #[derive(Clone, Debug)]
 pub(super) struct StepTable {
     pub tau: f64,
-    kept: Vec<Weights>,
+    steps: Vec<Weights>,
     newest: usize,
     replaced: usize,
 }
 
 impl StepTable {
     pub fn new(tau: f64) -> Self {
-        Self { tau, kept: Vec::with_capacity(STEPS_KEPT), newest: 0, replaced: 0 }
+        Self { tau, steps: Vec::with_capacity(STEPS_MAX), newest: 0, replaced: 0 }
     }
 
     /// The weights last asked for.
     pub fn newest(&self) -> &Weights {
-        &self.kept[self.newest]
+        &self.steps[self.newest]
     }
 
     pub fn fresh(&self, dt: f64) -> Weights {
@@ -43,25 +43,25 @@ impl StepTable {
     /// The remembered weights of a step of about `dt`.
     #[inline]
     pub fn near(&mut self, dt: f64) -> &Weights {
-        let is_same = |kept: &Weights| (dt - kept.step.dt).abs() <= SAME_STEP * kept.step.dt;
-        if !self.kept.get(self.newest).is_some_and(is_same) {
-            self.newest = match self.kept.iter().position(is_same) {
+        let is_same = |known: &Weights| (dt - known.step.dt).abs() <= SAME_STEP * known.step.dt;
+        if !self.steps.get(self.newest).is_some_and(is_same) {
+            self.newest = match self.steps.iter().position(is_same) {
                 Some(index) => index,
-                None => self.keep(dt),
+                None => self.store(dt),
             };
         }
         self.newest()
     }
 
     #[cold]
-    fn keep(&mut self, dt: f64) -> usize {
+    fn store(&mut self, dt: f64) -> usize {
         let weights = self.fresh(dt);
-        if self.kept.len() < STEPS_KEPT {
-            self.kept.push(weights);
-            return self.kept.len() - 1;
+        if self.steps.len() < STEPS_MAX {
+            self.steps.push(weights);
+            return self.steps.len() - 1;
         }
-        self.replaced = (self.replaced + 1) % STEPS_KEPT;
-        self.kept[self.replaced] = weights;
+        self.replaced = (self.replaced + 1) % STEPS_MAX;
+        self.steps[self.replaced] = weights;
         self.replaced
     }
 

@@ -22,7 +22,6 @@ pub(super) const FILTERED: usize = COLUMNS - 1;
 /// Samples taken together. Their rows and sums of one chunk stay in a first-level cache.
 pub(super) const BATCH: usize = 16;
 
-/// Nodes side by side.
 const WIDTH: usize = 8;
 /// Products of filtered columns with each other.
 const PAIRS: usize = FILTERED * (FILTERED + 1) / 2;
@@ -38,7 +37,6 @@ struct Piece {
     viscous: [f64; 2],
     /// Root of the weight; zero if the piece ends without a force.
     root: f64,
-    /// Force times that root.
     root_force: f64,
 }
 
@@ -143,15 +141,15 @@ impl Bank {
     /// Moves straight from scaled depth `from` to `to` within `dt` seconds.
     pub fn advance(&mut self, from: f64, to: f64, dt: f64) {
         match Pieces::of(from, to) {
-            Pieces::Inside => self.piece(from, to - from, dt),
-            Pieces::Outside => self.piece(0.0, 0.0, dt),
+            Pieces::Inside => self.push_piece(from, to - from, dt),
+            Pieces::Outside => self.push_piece(0.0, 0.0, dt),
             Pieces::Entering([outside, inside]) => {
-                self.piece(0.0, 0.0, dt * outside);
-                self.piece(0.0, to, dt * inside);
+                self.push_piece(0.0, 0.0, dt * outside);
+                self.push_piece(0.0, to, dt * inside);
             }
             Pieces::Leaving([inside, outside]) => {
-                self.piece(from, -from, dt * inside);
-                self.piece(0.0, 0.0, dt * outside);
+                self.push_piece(from, -from, dt * inside);
+                self.push_piece(0.0, 0.0, dt * outside);
             }
         }
     }
@@ -172,7 +170,7 @@ impl Bank {
         *seconds += weight * force * force;
     }
 
-    fn piece(&mut self, from: f64, d: f64, dt: f64) {
+    fn push_piece(&mut self, from: f64, d: f64, dt: f64) {
         // Times are multiples of a tick rounded to doubles; a billionth of the interval is that.
         if (self.dt - dt).abs() > 1e-9 * dt {
             self.flush();
@@ -202,7 +200,7 @@ impl Bank {
             #[inline(always)]
             || {
                 for chunk in chunks.iter_mut() {
-                    chunk.take(waiting);
+                    chunk.consume(waiting);
                 }
             },
         );
@@ -240,7 +238,6 @@ impl Bank {
         chunks.flat_map(|chunk| (0..WIDTH).map(move |lane| node(chunk, lane))).collect()
     }
 
-    /// Its relaxation times.
     pub fn grid(&self) -> Grid {
         self.grid
     }
@@ -253,7 +250,7 @@ impl Bank {
 
 impl Chunk {
     #[inline(always)]
-    fn take(&mut self, pieces: &[Piece]) {
+    fn consume(&mut self, pieces: &[Piece]) {
         let mut rows = [[[0.0; WIDTH]; BATCH]; FILTERED];
         for (slot, piece) in pieces.iter().enumerate() {
             self.step(piece);

@@ -1,4 +1,4 @@
-//! A thinned memory of the run: sums up to the ends of equally long blocks of samples.
+//! A thinned history of the run: sums up to the ends of equally long blocks of samples.
 //!
 //! Differences of neighbouring marks are exact block sums of force and of every column at every
 //! node, whatever path the probe took. When there are too many blocks every second mark goes,
@@ -6,7 +6,6 @@
 
 use super::bank::{Bank, FILTERED};
 
-/// Blocks kept at most.
 pub(super) const BLOCKS_MAX: usize = 512;
 /// Samples of a block at first: a batch of the bank, so that marks cost no extra work.
 const BLOCK_FIRST: u64 = super::bank::BATCH as u64;
@@ -22,12 +21,10 @@ pub(super) struct Mark {
     pub sums: Vec<[f64; FILTERED]>,
 }
 
-/// The marks so far.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Blocks {
     /// The state before the first sample, then the end of each block.
     pub marks: Vec<Mark>,
-    /// Samples of a block.
     pub length: u64,
     since: u64,
 }

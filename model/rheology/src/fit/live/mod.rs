@@ -7,11 +7,11 @@
 
 mod bank;
 mod blocks;
+mod identifiability;
 mod node;
 mod path;
 mod residual_blocks;
 mod stencil;
-mod verdict;
 
 use super::design::linear_units;
 use super::noise;
@@ -19,22 +19,22 @@ use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU
 use super::report::{Parameter, student_t975};
 use bank::{Bank, COLUMNS, Grid, NODES};
 use blocks::Blocks;
-use node::{Solution, Used};
+use identifiability::BlindParameters;
+use node::{Solution, UsedColumns};
 use palpate_model::estimate::{Identifiability, LiveEstimate};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use path::Path;
 use stencil::{STENCIL_MAX, Stencil};
-use verdict::Blind;
 
 pub use residual_blocks::ResidualBlocks;
 
 /// A parameter counts as identified when its standard error is below this share of its value.
 const IDENTIFIED_SHARE: f64 = 0.5;
 
-/// Blocks in which the memory of the residuals is judged: coarser than in the fit of record, since
-/// it is judged again with every answer.
+/// Blocks in which the autocorrelation of the residuals is estimated: coarser than in the fit of record,
+/// since it is estimated again with every answer.
 const NOISE_BLOCKS: usize = 256;
-/// Residuals this small beside the forces are rounding of sums of products.
+/// Residuals this small relative to the forces are rounding of sums of products.
 const ROUNDING: f64 = 1e-6;
 
 /// The fit in progress: memory and cost of a sample do not grow with the run.
@@ -56,26 +56,25 @@ struct Minimum {
     stencil: Stencil,
     /// Of the nodes of the stencil.
     solutions: Vec<Solution>,
-    /// Counted in nodes.
     place: f64,
-    used: Used,
+    used: UsedColumns,
 }
 
 impl LiveFit {
     /// For indentations down to about `depth_max`, which scales the columns.
     #[must_use]
     pub fn new(depth_max: Depth) -> Self {
-        Self::on(depth_max, Grid { nodes: NODES })
+        Self::with_grid(depth_max, Grid { nodes: NODES })
     }
 
     /// The same with another number of relaxation times in the bank: a multiple of eight from 16 to
     /// 512, or there is none. `palpate trade` measures what they buy.
     #[must_use]
     pub fn with_relaxation_times(depth_max: Depth, count: usize) -> Option<Self> {
-        Grid::of(count).map(|grid| Self::on(depth_max, grid))
+        Grid::of(count).map(|grid| Self::with_grid(depth_max, grid))
     }
 
-    fn on(depth_max: Depth, grid: Grid) -> Self {
+    fn with_grid(depth_max: Depth, grid: Grid) -> Self {
         Self {
             depth_max: if depth_max.0 > 0.0 { depth_max.0 } else { 1.0 },
             bank: Bank::new(grid),
@@ -120,14 +119,14 @@ impl LiveFit {
         let mut bank = self.bank.clone();
         bank.flush();
         let grams: Vec<_> = (0..bank.grid().nodes).map(|node| bank.gram(node)).collect();
-        // What the probe did while no force counted identifies nothing.
+        // Movement while no force counts identifies nothing.
         let corners = path::until(self.path.corners(), self.measured_until);
         let judge = |minimum: &Minimum| {
             let jet = minimum.stencil.jet(minimum.place);
             let values = self.maps().map(|map| minimum.value(&jet, &map));
             let units = linear_units(self.depth_max);
             let scaled = std::array::from_fn(|k| values[k] * units[k]);
-            Blind::of(&corners, bank.grid().tau_at(minimum.place), &scaled)
+            BlindParameters::of(&corners, bank.grid().tau_at(minimum.place), &scaled)
         };
         let minimum = Minimum::find(&grams, [true; COLUMNS])?;
         let blind = judge(&minimum);
@@ -148,7 +147,12 @@ impl LiveFit {
         self.report(&minimum, &blind, bank.shared()[0])
     }
 
-    fn report(&self, minimum: &Minimum, blind: &Blind, weight: f64) -> Option<LiveEstimate> {
+    fn report(
+        &self,
+        minimum: &Minimum,
+        blind: &BlindParameters,
+        weight: f64,
+    ) -> Option<LiveEstimate> {
         let Minimum { stencil, place, used, .. } = minimum;
         let jet = stencil.jet(*place);
         let freedom = self.samples as f64 - 1.0 - used.iter().filter(|&&used| used).count() as f64;
@@ -178,7 +182,7 @@ impl LiveFit {
         for (index, (value, error)) in values.into_iter().enumerate() {
             let (inflation, uncertainty) = inflations[index];
             let error = error * inflation.sqrt();
-            let reason = blind.reason(index).or_else(|| uncertain(index, value, error));
+            let reason = blind.reason(index).or_else(|| uncertainty_reason(index, value, error));
             let quantile = student_t975(freedom.min(2.0 / uncertainty));
             let known = reason.is_none().then_some((error, quantile));
             parameters.push(parameter(index, value, known));
@@ -196,7 +200,7 @@ impl LiveFit {
         })
     }
 
-    /// By how much the memory of the residuals multiplies the variance of each parameter, and the
+    /// By how much autocorrelated residuals multiply the variance of each parameter, and the
     /// variance of the logarithm of that, as in the fit of record but from coarser blocks.
     fn inflations(&self, values: &[(f64, f64)], is_seen: &[bool], white: f64) -> Vec<(f64, f64)> {
         let mut inflations = vec![(1.0, 0.0); values.len()];
@@ -262,7 +266,7 @@ impl LiveFit {
 impl Minimum {
     /// Solves every node, with those of the `allowed` columns that do not depend on others at the
     /// best one, and refines between nodes.
-    fn find(grams: &[[[f64; COLUMNS + 1]; COLUMNS + 1]], allowed: Used) -> Option<Self> {
+    fn find(grams: &[[[f64; COLUMNS + 1]; COLUMNS + 1]], allowed: UsedColumns) -> Option<Self> {
         let (best, free) = grams
             .iter()
             .enumerate()
@@ -295,7 +299,7 @@ impl Minimum {
 }
 
 /// Why a parameter that the path can show is still too uncertain to be of use.
-fn uncertain(index: usize, value: f64, error: f64) -> Option<String> {
+fn uncertainty_reason(index: usize, value: f64, error: f64) -> Option<String> {
     // Initial force and offset are near zero by design; their size says nothing of identification.
     let is_level = index >= LINEAR + LINEAR_COUNT - 2;
     if is_level || error < IDENTIFIED_SHARE * value.abs() {
@@ -305,7 +309,7 @@ fn uncertain(index: usize, value: f64, error: f64) -> Option<String> {
     Some(if index == TAU {
         format!("{name} is uncertain by more than half its value so far; hold longer")
     } else {
-        format!("{name} cannot yet be told from zero; go on, or press deeper")
+        format!("{name} cannot yet be distinguished from zero; continue, or press deeper")
     })
 }
 

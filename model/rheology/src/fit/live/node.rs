@@ -8,25 +8,22 @@ const PIVOT_MIN: f64 = 1e-10;
 const WIDTH: usize = COLUMNS + 1;
 
 /// Which columns take part; one that depends on those before it is left out.
-pub(super) type Used = [bool; COLUMNS];
+pub(super) type UsedColumns = [bool; COLUMNS];
 
-/// One node's solution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solution {
     /// Coefficients of the columns; zero for one left out.
     coefficients: [f64; COLUMNS],
-    /// Residual sum of squares.
     pub residual: f64,
     scale: [f64; WIDTH],
     factor: [[f64; WIDTH]; WIDTH],
-    /// Which columns took part.
-    pub used: Used,
+    pub used: UsedColumns,
 }
 
 impl Solution {
     /// Cholesky on columns scaled to unit length. A column that depends on those before it is left
     /// out; if `needs_all`, there is then no solution.
-    pub fn of(gram: &[[f64; WIDTH]; WIDTH], wanted: &Used, needs_all: bool) -> Option<Self> {
+    pub fn of(gram: &[[f64; WIDTH]; WIDTH], wanted: &UsedColumns, needs_all: bool) -> Option<Self> {
         let scale: [f64; WIDTH] = std::array::from_fn(|i| gram[i][i].sqrt());
         let mut used = *wanted;
         let mut factor = [[0.0; WIDTH]; WIDTH];

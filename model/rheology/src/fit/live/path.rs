@@ -11,7 +11,6 @@ const TOLERANCE_STEPS: f64 = 4.0;
 /// Pieces kept. What the first ones identify, the later ones cannot undo.
 const PIECES_MAX: usize = 256;
 
-/// A path in scaled depth.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Path {
     /// Ends of the finished pieces as (s, scaled depth).

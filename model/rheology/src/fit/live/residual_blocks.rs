@@ -1,5 +1,5 @@
-//! Block means of the residuals and of the model's derivatives, for whoever asks how long the
-//! memory of the noise is.
+//! Block means of the residuals and of the model's derivatives, from which the correlation time of
+//! the noise is estimated.
 
 use super::LiveFit;
 use super::bank::FILTERED;
@@ -10,7 +10,6 @@ use palpate_model::units::Seconds;
 /// Means over equally long blocks of samples, oldest first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResidualBlocks {
-    /// Samples of a block.
     pub samples_per_block: u64,
     /// From the end of one block to the end of the next, in s.
     pub seconds_per_block: Seconds,

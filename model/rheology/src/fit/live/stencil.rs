@@ -17,7 +17,7 @@ pub(super) struct Stencil {
     pub count: usize,
 }
 
-/// What to multiply the values at the nodes of a stencil with, to have value, slope and curvature
+/// Weights of the values at the nodes of a stencil that give value, slope and curvature
 /// of their polynomial at one place; per node spacing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jet {

@@ -1,33 +1,32 @@
-//! What errors of the calibration and of the rig's compliance do to fitted parameters. They are the same in every
-//! sample, so residuals do not show them and no repeat takes them away: they are told beside the statistical error,
-//! not in it.
+//! Systematic uncertainty of fitted parameters from the calibration and the machine compliance. These errors are the
+//! same in every sample, so residuals do not show them and repeats do not reduce them: they are reported next to the
+//! statistical error, not in it.
 //!
 //! Every independent error is moved by one standard uncertainty, all forces or depths read with it are read again,
 //! and the fit is made again; the root of the sum of squared changes is the systematic standard uncertainty
 //! (JCGM 100:2008, section 5.1, with the derivatives as differences). Records read with one calibration move together.
 
 use super::options::FitOptions;
-use super::sample::{FitError, FitSample, Named};
+use super::sample::{FitError, FitSample, NamedSamples};
 use super::solve::Fitted;
+use crate::distinct;
 use palpate_model::calibration::{ForceUncertainty, Term};
 use palpate_model::units::{Depth, Newtons};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+mod sentence;
 #[cfg(test)]
 mod tests;
-mod told;
 
-/// More samples of a record than this tell the change no better: it is no matter of noise, for the same samples
-/// are fitted before and after. Longer records are taken at every second, third, ... sample.
+/// More samples of a record than this do not make the change more exact: noise cancels, since the same samples are
+/// fitted before and after. Longer records are taken at every second, third, ... sample.
 const SAMPLES_MAX: usize = 4000;
 
 /// A record and what its forces and depths were read with.
 #[derive(Clone, Copy, Debug)]
 pub struct Traced<'a> {
-    /// Its name.
     pub name: &'a str,
-    /// What is fitted.
     pub samples: &'a [FitSample],
     /// The calibration by name, and its uncertainty; `None` where it is not known, as of a table.
     pub calibration: Option<(&'a str, &'a ForceUncertainty)>,
@@ -35,11 +34,10 @@ pub struct Traced<'a> {
     pub compliance: Option<(&'a str, f64)>,
 }
 
-/// What calibration and compliance add to the uncertainty of a fit.
+/// Uncertainty of a fit from calibration and machine compliance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Systematic {
-    /// The calibrations.
-    pub calibrations: Vec<Stated>,
+    pub calibrations: Vec<StatedTerms>,
     /// Names of the compliances that were taken from the depths.
     pub compliances: Vec<String>,
     /// Every parameter; empty where nothing is stated of any error.
@@ -48,18 +46,16 @@ pub struct Systematic {
     pub is_extrapolated: bool,
 }
 
-/// What one calibration states of its errors.
+/// Error terms that one calibration states and does not state.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Stated {
-    /// Its name.
+pub struct StatedTerms {
     pub name: String,
     /// Terms whose errors were moved.
     pub terms: Vec<Term>,
-    /// Terms it does not state.
     pub not_stated: Vec<Term>,
 }
 
-impl Stated {
+impl StatedTerms {
     fn of((name, own): (&str, &ForceUncertainty)) -> Self {
         Self {
             name: name.to_owned(),
@@ -72,7 +68,6 @@ impl Stated {
 /// The systematic standard uncertainty of one parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SystematicError {
-    /// The parameter.
     pub name: String,
     /// Everything together, in its unit.
     pub error: f64,
@@ -83,10 +78,8 @@ pub struct SystematicError {
     pub compliance: Option<f64>,
 }
 
-/// The part of one term.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TermError {
-    /// Where it comes from.
     pub term: Term,
     /// Its standard uncertainty.
     pub error: f64,
@@ -113,16 +106,19 @@ pub fn systematic_joint(
     let calibrations = records.iter().filter_map(|one| one.calibration);
     let is_stated = calibrations.into_iter().any(|(_, one)| one.is_stated());
     if is_stated || records.iter().any(|one| one.compliance.is_some()) {
-        let fitted = Fitted::joint(&named(records, &taken), options, shared)?;
+        let fitted = Fitted::joint(&name_samples(records, &taken), options, shared)?;
         names = fitted.value_names();
         spread = Spread::of(records, &taken, &fitted)?;
     }
     let each = 0..records.len();
-    Ok(each.map(|record| spread.told(records, &names, record * names.len())).collect())
+    Ok(each.map(|record| spread.summarise(records, &names, record * names.len())).collect())
 }
 
 /// Samples under the names of their records.
-fn named<'a>(records: &[Traced<'a>], samples: &'a [Vec<FitSample>]) -> Vec<Named<'a>> {
+fn name_samples<'a>(
+    records: &[Traced<'a>],
+    samples: &'a [Vec<FitSample>],
+) -> Vec<NamedSamples<'a>> {
     let names = records.iter().map(|one| one.name);
     names.zip(samples.iter().map(Vec::as_slice)).collect()
 }
@@ -148,7 +144,7 @@ impl Spread {
         let add = |sums: &mut Vec<f64>, moved: &[Vec<FitSample>]| {
             sums.resize(before.len(), 0.0);
             if moved != taken {
-                let after = fitted.again(&named(records, moved))?.values();
+                let after = fitted.refit(&name_samples(records, moved))?.values();
                 for (sum, (after, before)) in sums.iter_mut().zip(after.iter().zip(&before)) {
                     *sum += (after - before).powi(2);
                 }
@@ -162,7 +158,7 @@ impl Spread {
                     let force = Newtons(one.force.0 + shift.0);
                     if one.is_measured() { FitSample { force, ..*one } } else { *one }
                 };
-                let moved = moved(
+                let moved = reread_records(
                     records,
                     taken,
                     |one| one.calibration == Some(*own),
@@ -172,11 +168,11 @@ impl Spread {
             }
         }
         for own in &compliances {
-            let moved = moved(
+            let moved = reread_records(
                 records,
                 taken,
                 |one| one.compliance == Some(*own),
-                |samples| bent(samples, own.1),
+                |samples| add_compliance(samples, own.1),
             );
             add(spread.compliance.get_or_insert_default(), &moved)?;
         }
@@ -184,13 +180,13 @@ impl Spread {
     }
 
     /// The values from `first` on, by name.
-    fn told(&self, records: &[Traced<'_>], names: &[String], first: usize) -> Systematic {
+    fn summarise(&self, records: &[Traced<'_>], names: &[String], first: usize) -> Systematic {
         let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
         let compliances = distinct(records.iter().filter_map(|one| one.compliance));
-        let is_told = self.compliance.is_some() || !self.terms.is_empty();
-        let parameters = names.iter().zip(first..).filter(|_| is_told);
+        let is_stated = self.compliance.is_some() || !self.terms.is_empty();
+        let parameters = names.iter().zip(first..).filter(|_| is_stated);
         Systematic {
-            calibrations: calibrations.iter().copied().map(Stated::of).collect(),
+            calibrations: calibrations.iter().copied().map(StatedTerms::of).collect(),
             compliances: compliances.iter().map(|(name, _)| (*name).to_owned()).collect(),
             is_extrapolated: records.iter().any(|one| {
                 one.calibration.is_some_and(|(_, uncertainty)| {
@@ -223,19 +219,8 @@ fn thinned(samples: &[FitSample]) -> Vec<FitSample> {
     samples.iter().step_by(stride).copied().collect()
 }
 
-/// Each once, in the order of their coming.
-fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for one in all {
-        if !found.contains(&one) {
-            found.push(one);
-        }
-    }
-    found
-}
-
 /// The samples taken, those of the chosen records as another calibration or compliance would have read them.
-fn moved(
+fn reread_records(
     records: &[Traced<'_>],
     taken: &[Vec<FitSample>],
     is_chosen: impl Fn(&Traced<'_>) -> bool,
@@ -251,7 +236,7 @@ fn moved(
 }
 
 /// Depths with so much more of the force, in mm/N, taken from them. Where no force is known, the last one bends.
-fn bent(samples: &[FitSample], mm_per_newton: f64) -> Vec<FitSample> {
+fn add_compliance(samples: &[FitSample], mm_per_newton: f64) -> Vec<FitSample> {
     let mut force = 0.0;
     let each = samples.iter().map(|one| {
         if one.is_measured() {

@@ -37,7 +37,7 @@ fn calibration() -> Calibration {
 }
 
 #[test]
-fn it_is_what_draws_of_whole_calibrations_scatter() {
+fn systematic_error_equals_the_scatter_of_drawn_calibrations() {
     let (samples, options) = (record(5.0), FitOptions::default());
     let calibration = calibration();
     let uncertainty = ForceUncertainty::of(&calibration).unwrap();
@@ -47,7 +47,7 @@ fn it_is_what_draws_of_whole_calibrations_scatter() {
     let mut random = SplitMix::seeded(5);
     let values = |samples: &[FitSample]| {
         let fitted = Fitted::of(samples, &options).unwrap();
-        fitted.system.physical(0, &fitted.refined.points[0])
+        fitted.system.physical_values(0, &fitted.refined.points[0])
     };
     let before = values(&samples);
     let mut squares = [0.0; 8];
@@ -85,7 +85,7 @@ fn it_is_what_draws_of_whole_calibrations_scatter() {
 }
 
 #[test]
-fn fewer_samples_tell_the_same() {
+fn systematic_error_does_not_depend_on_thinning() {
     let options = FitOptions::default();
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let of = |samples: &[FitSample]| {
@@ -148,7 +148,7 @@ fn records_of_one_calibration_move_together_and_of_two_apart() {
 }
 
 #[test]
-fn of_two_calibrations_it_is_told_which_states_what() {
+fn sentence_names_what_each_of_two_calibrations_states() {
     let (one, options) = (record(5.0), FitOptions::default());
     let drifting = Calibration {
         zero_before: Some(Volts(1.28)),
@@ -156,23 +156,23 @@ fn of_two_calibrations_it_is_told_which_states_what() {
         ..calibration()
     };
     let straight = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0));
-    let told = |second: &Calibration| {
+    let uncertainty = |second: &Calibration| {
         let both = [&calibration(), second].map(|one| ForceUncertainty::of(one).unwrap());
         let records = [traced(&one, "a", &both[0]), traced(&one, "b", &both[1])];
         systematic_joint(&records, &options, &options.body_names()).unwrap()[0].clone()
     };
-    let found = told(&drifting);
-    // Each of them is named, and what the second alone states is told once as stated and once as not.
+    let found = uncertainty(&drifting);
+    // Each of them is named, and what the second alone states stands once as stated and once as not.
     let sentence = found.sentence();
     assert!(sentence.contains("\"a\"") && sentence.contains("\"b\""), "{sentence}");
     assert_eq!(sentence.matches(Term::ZeroDrift.name()).count(), 2, "{sentence}");
     assert!(found.calibrations[1].terms.contains(&Term::ZeroDrift));
     assert!(found.calibrations[0].not_stated.contains(&Term::ZeroDrift));
-    assert_eq!(told(&straight).calibrations[1].terms, []);
+    assert_eq!(uncertainty(&straight).calibrations[1].terms, []);
 }
 
 #[test]
-fn every_family_tells_what_the_calibration_adds() {
+fn every_family_reports_the_systematic_error_of_the_calibration() {
     let samples = record(5.0);
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let traced = traced(&samples, "thesis", &uncertainty);
@@ -187,8 +187,8 @@ fn every_family_tells_what_the_calibration_adds() {
         // The sensor offset moves with the zero, whatever the body is.
         let [own, other] = [&found, &known].map(|one| of("f_offset", one).unwrap());
         assert!(own > 0.1 * other && own < 30.0 * other, "{key}: {own} {other}");
-        let told = super::super::fit(&samples, &options).unwrap();
-        for one in &told.with_systematic(&found).parameters {
+        let uncertainty = super::super::fit(&samples, &options).unwrap();
+        for one in &uncertainty.with_systematic(&found).parameters {
             let is_known = one.std_error.is_some();
             assert_eq!(one.systematic_error.is_some(), is_known, "{key} {one:?}");
         }
@@ -196,7 +196,7 @@ fn every_family_tells_what_the_calibration_adds() {
 }
 
 #[test]
-fn a_compliance_known_badly_makes_stiffness_known_badly() {
+fn uncertain_compliance_makes_stiffness_uncertain() {
     let (samples, options) = (record(5.0), FitOptions::default());
     let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
     let uncertainty = ForceUncertainty::of(&line).unwrap();

@@ -1,10 +1,10 @@
-//! Systematic errors in a sentence, and beside the statistical ones of a report.
+//! Systematic errors in a sentence, and in a report next to the statistical ones.
 
 use super::super::report::{FitReport, JointReport};
-use super::{Stated, Systematic};
+use super::{StatedTerms, Systematic};
 use palpate_model::calibration::Term;
 
-impl Stated {
+impl StatedTerms {
     /// Its own part of a sentence.
     fn words(&self) -> String {
         let name = &self.name;
@@ -18,7 +18,6 @@ impl Stated {
     }
 }
 
-/// Terms in words.
 fn words(terms: &[Term]) -> String {
     let words: Vec<&str> = terms.iter().map(|term| term.name()).collect();
     words.join(", ")
@@ -31,7 +30,7 @@ impl Systematic {
         let calibrations = calibrations.map(|one| format!("the calibration \"{}\"", one.name));
         let compliances = self.compliances.iter();
         let names: Vec<String> = calibrations
-            .chain(compliances.map(|name| format!("the rig's compliance {name}")))
+            .chain(compliances.map(|name| format!("the machine compliance {name}")))
             .collect();
         let is_one = names.len() == 1;
         let names = names.join(" and ");
@@ -40,10 +39,10 @@ impl Systematic {
                 true => "states nothing of its",
                 false => "state nothing of their",
             };
-            return format!("{names} {states} own errors, so a systematic part is not told");
+            return format!("{names} {states} own errors, so the systematic error is not known");
         };
-        let bends = first.compliance.map(|_| "what the rig gives way".to_owned());
-        let is_alike = |pair: &[Stated]| {
+        let bends = first.compliance.map(|_| "machine compliance".to_owned());
+        let is_alike = |pair: &[StatedTerms]| {
             (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
         };
         let parts = if self.calibrations.windows(2).all(is_alike) {
@@ -56,7 +55,7 @@ impl Systematic {
             }
         } else {
             // What one states and another does not would read as a contradiction.
-            let each = self.calibrations.iter().map(Stated::words);
+            let each = self.calibrations.iter().map(StatedTerms::words);
             each.chain(bends).collect::<Vec<_>>().join("; ")
         };
         let beyond = match self.is_extrapolated {
@@ -79,7 +78,7 @@ impl Systematic {
 }
 
 impl FitReport {
-    /// This report with the systematic errors beside the statistical ones, and the sentence on them.
+    /// This report with the systematic errors next to the statistical ones, and the sentence on them.
     #[must_use]
     pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
         self.add_systematic(systematic);
@@ -96,7 +95,7 @@ impl FitReport {
 }
 
 impl JointReport {
-    /// This report with the systematic errors of every record beside the statistical ones.
+    /// This report with the systematic errors of every record next to the statistical ones.
     #[must_use]
     pub fn with_systematic(mut self, systematic: &[Systematic]) -> Self {
         for (record, own) in self.records.iter_mut().zip(systematic) {

@@ -1,4 +1,4 @@
-//! Whether the path so far can tell the parameters apart, in words.
+//! Whether the path so far separates the parameters, in words.
 
 use super::super::design::{Columns, legendre_from_powers};
 use super::super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
@@ -11,41 +11,40 @@ const ROWS_PIECE_MAX: usize = 48;
 /// Parameters judged: six linear ones, then the relaxation time.
 const JUDGED: usize = LINEAR_COUNT + 1;
 
-/// What a path cannot show.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Blind {
+pub(super) struct BlindParameters {
     /// Combinations that leave the force as it is, as positions in [`PARAMETER_NAMES`].
     pub groups: Vec<Vec<usize>>,
 }
 
-impl Blind {
+impl BlindParameters {
     /// Judges a path of corners (s, scaled depth) at a relaxation time in s and the scaled
     /// coefficients of [`Columns`].
     pub fn of(corners: &[(f64, f64)], tau: f64, coefficients: &[f64; LINEAR_COUNT]) -> Self {
         let rows = rows(corners, tau, coefficients);
-        let mut kept: Vec<usize> = (0..JUDGED).collect();
+        let mut remaining: Vec<usize> = (0..JUDGED).collect();
         let mut groups = Vec::new();
-        while !kept.is_empty() {
-            let mut triangle = Triangle::new(kept.len() + 1);
+        while !remaining.is_empty() {
+            let mut triangle = Triangle::new(remaining.len() + 1);
             let mut chosen = [0.0; JUDGED + 1];
             for (row, weight) in &rows {
-                for (slot, &k) in chosen.iter_mut().zip(&kept) {
+                for (slot, &k) in chosen.iter_mut().zip(&remaining) {
                     *slot = row[k];
                 }
-                chosen[kept.len()] = 0.0;
-                triangle.push(&chosen[..=kept.len()], *weight);
+                chosen[remaining.len()] = 0.0;
+                triangle.push(&chosen[..=remaining.len()], *weight);
             }
-            let Some(blind) = triangle.finish().blind(kept.len()) else {
+            let Some(blind) = triangle.finish().inseparable_columns(remaining.len()) else {
                 break;
             };
-            let group: Vec<usize> = blind.into_iter().map(|place| kept[place]).collect();
-            // Without one of them the others may still be told apart; the viscous coefficient and
+            let group: Vec<usize> = blind.into_iter().map(|place| remaining[place]).collect();
+            // Without one of them the others may still be separable; the viscous coefficient and
             // the levels go first, since a display can do without them.
             let Some(&dropped) = group.iter().max_by_key(|&&k| if k == 6 { 0 } else { k + 1 })
             else {
                 break;
             };
-            kept.retain(|&k| k != dropped);
+            remaining.retain(|&k| k != dropped);
             let position = |k: &usize| if *k == LINEAR_COUNT { TAU } else { LINEAR + k };
             groups.push(group.iter().map(position).collect());
         }
@@ -94,7 +93,7 @@ fn rows(
     let count = (ROWS / pieces).clamp(ROWS_PIECE_MIN, ROWS_PIECE_MAX);
     let mut columns = Columns::<true>::new(tau, depth);
     let mut rows = Vec::with_capacity(count * pieces + 1);
-    let mut keep = |columns: &Columns<true>, weight: f64| {
+    let mut push_row = |columns: &Columns<true>, weight: f64| {
         let mut row = [0.0; JUDGED];
         row[..LINEAR_COUNT].copy_from_slice(&columns.row());
         row[LINEAR_COUNT] = columns.tau_slope(&legendre_from_powers(coefficients));
@@ -104,7 +103,7 @@ fn rows(
         let ((from_t, from), (to_t, to)) = (pair[0], pair[1]);
         let span = to_t - from_t;
         if t <= from_t {
-            keep(&columns, (span / count as f64).sqrt());
+            push_row(&columns, (span / count as f64).sqrt());
         }
         // Steps grow geometrically from about an eighth of tau.
         let growth = (8.0 * span / (count as f64 * tau)).ln_1p();
@@ -121,7 +120,7 @@ fn rows(
                 continue;
             }
             columns.advance(from + (to - from) * (next - from_t) / span, next - t);
-            keep(&columns, (next - t).sqrt());
+            push_row(&columns, (next - t).sqrt());
             t = next;
         }
     }
@@ -136,21 +135,21 @@ mod tests {
     const SCALED: [f64; 6] = [1.6, -7.74, 11.7315, 54.0, 0.0, 0.0];
 
     fn groups(corners: &[(f64, f64)]) -> Vec<Vec<&'static str>> {
-        let blind = Blind::of(corners, 1.023, &SCALED);
+        let blind = BlindParameters::of(corners, 1.023, &SCALED);
         let name = |index: &usize| PARAMETER_NAMES[*index];
         let named = |group: &Vec<usize>| group.iter().map(name).collect();
         blind.groups.iter().map(named).collect()
     }
 
     #[test]
-    fn one_ramp_is_blind_for_one_pair() {
+    fn one_ramp_does_not_separate_one_pair() {
         assert_eq!(groups(&[(0.0, 0.0), (40.0, 1.0)]), [["mu1", "tau_sig"]]);
         // Also where the ramp starts above the surface.
         assert_eq!(groups(&[(0.0, -0.1), (44.0, 1.0)]), [["mu1", "tau_sig"]]);
     }
 
     #[test]
-    fn a_hold_or_a_second_speed_sees_everything() {
+    fn hold_or_second_speed_separates_all_parameters() {
         let none: Vec<Vec<&str>> = Vec::new();
         assert_eq!(groups(&[(0.0, 0.0), (40.0, 1.0), (45.0, 1.0)]), none);
         assert_eq!(groups(&[(0.0, 0.0), (20.0, 0.5), (30.0, 1.0)]), none);
@@ -158,12 +157,12 @@ mod tests {
     }
 
     #[test]
-    fn says_so_in_words() {
-        let blind = Blind::of(&[(0.0, 0.0), (40.0, 1.0)], 1.023, &SCALED);
+    fn reasons_name_the_parameters_and_the_remedy() {
+        let blind = BlindParameters::of(&[(0.0, 0.0), (40.0, 1.0)], 1.023, &SCALED);
         let reason = blind.reason(1).unwrap();
         assert!(reason.contains("mu1") && reason.contains("tau_sig"), "{reason}");
         assert_eq!(blind.reason(2), None);
-        let still = Blind::of(&[(0.0, 0.0), (40.0, 0.0)], 1.023, &SCALED);
+        let still = BlindParameters::of(&[(0.0, 0.0), (40.0, 0.0)], 1.023, &SCALED);
         assert!(still.reason(3).unwrap().contains("deeper"), "{still:?}");
     }
 }
