@@ -9,7 +9,7 @@ const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
 
 /// What a board told last.
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastStamp {
     ticks: u32,
     /// The same without wraps and restarts.
     time: Nanos,
@@ -34,7 +34,7 @@ pub enum BoardTime {
 #[derive(Clone, Copy, Debug)]
 pub struct BoardClock {
     nanos_per_tick: u64,
-    last: Option<Last>,
+    last: Option<LastStamp>,
 }
 
 impl BoardClock {
@@ -49,7 +49,7 @@ impl BoardClock {
         let Some(last) = self.last else {
             // The first count of the board is its time; whatever came before is nobody's business.
             let time = Nanos(u64::from(ticks) * self.nanos_per_tick);
-            self.last = Some(Last { ticks, time, at: now, from: (time, now) });
+            self.last = Some(LastStamp { ticks, time, at: now, from: (time, now) });
             return BoardTime::At(time);
         };
         let step = ticks.wrapping_sub(last.ticks);
@@ -62,7 +62,7 @@ impl BoardClock {
         if run > host * (1.0 + FAST_MAX) + AHEAD_MAX.0 as f64 {
             return BoardTime::Restarted(self.restart(now, ticks));
         }
-        self.last = Some(Last { ticks, time, at: now, ..last });
+        self.last = Some(LastStamp { ticks, time, at: now, ..last });
         BoardTime::At(time)
     }
 
@@ -72,7 +72,7 @@ impl BoardClock {
             return Nanos::ZERO;
         };
         let time = Nanos(last.time.0 + now.since(last.at).0.max(1));
-        *last = Last { ticks, time, at: now, from: (time, now) };
+        *last = LastStamp { ticks, time, at: now, from: (time, now) };
         time
     }
 }

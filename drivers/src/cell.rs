@@ -92,7 +92,7 @@ pub struct CellReports {
 
 impl CellReports {
     /// One more value. Where there is no room left the oldest goes.
-    pub fn sample(&mut self, sample: CellSample) {
+    pub fn push_sample(&mut self, sample: CellSample) {
         self.newest = sample.at;
         if self.samples.len() >= SAMPLES_MAX {
             self.samples.pop_front();
@@ -101,7 +101,7 @@ impl CellReports {
     }
 
     /// Something that the operator has to hear.
-    pub fn trouble(&mut self, words: &str) {
+    pub fn push_trouble(&mut self, words: &str) {
         if self.troubles.len() < TROUBLES_MAX {
             self.troubles.push_back(words.to_owned());
         }
@@ -119,7 +119,7 @@ pub struct LineCell<P> {
 impl<P: CellProtocol> LineCell<P> {
     /// Goes on with a cell from `now`.
     #[must_use]
-    pub fn on(protocol: P, now: Nanos) -> Self {
+    pub fn start(protocol: P, now: Nanos) -> Self {
         Self {
             protocol,
             lines: Lines::default(),

@@ -4,7 +4,7 @@ use crate::galil::GalilOpenError;
 use crate::grbl::GrblOpenError;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LinkStats, WireError};
+use crate::wire::{CallerTime, HaltHandle, HostClock, LinkStats, LinkThread, WireError};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -51,7 +51,7 @@ pub struct Opened {
     /// The link as it was measured, in words.
     pub link: Option<String>,
     /// One for each device. The first is that of the axis, to which commands go.
-    pub lines: Vec<Line>,
+    pub lines: Vec<LinkThread>,
     /// What was exchanged before the threads had the links, by the host's clock.
     pub raw: Vec<RawBytes>,
 }
@@ -102,7 +102,7 @@ impl<D: RigDevice> DeviceRig<D> {
 
     /// The time that [`Rig::take_raw`] tells, now.
     pub fn now(&self) -> Nanos {
-        self.time.of((self.clock)())
+        self.time.caller_time((self.clock)())
     }
 
     /// The oldest of what has come from the lines until `end` on the host's clock; of equal ones that of the axis.
@@ -140,7 +140,7 @@ impl<D: RigDevice> DeviceRig<D> {
     /// What was exchanged since this was last asked, at the host's time.
     fn take_raw_of_host(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.opened.raw);
-        raw.extend(self.opened.lines.iter().flat_map(Line::take_raw));
+        raw.extend(self.opened.lines.iter().flat_map(LinkThread::take_raw));
         raw.sort_by_key(|piece| piece.at);
         raw
     }
@@ -166,20 +166,20 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let (now, end) = self.time.asked(until);
+        let (now, end) = self.time.window(until);
         if let Some(fault) = self.refused.pop_front() {
-            let at = self.time.told(now, until);
+            let at = self.time.event_time(now, until);
             return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
         }
         let event = self.next(end)?;
-        let at = self.time.told(event.at, until);
+        let at = self.time.event_time(event.at, until);
         let body = self.device.complete((self.clock)(), event.body);
         Some(RigEvent::new(at, body))
     }
 
     fn reconnect(&mut self) -> Result<(), RigError> {
         // The old links say farewell and are closed, or their ports would be busy with them.
-        let closed = self.opened.lines.drain(..).flat_map(Line::close);
+        let closed = self.opened.lines.drain(..).flat_map(LinkThread::close);
         self.opened.raw.extend(closed);
         self.pending.clear();
         self.refused.clear();
@@ -208,7 +208,7 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = self.take_raw_of_host();
         for piece in &mut raw {
-            piece.at = self.time.of(piece.at);
+            piece.at = self.time.caller_time(piece.at);
         }
         raw
     }

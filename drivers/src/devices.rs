@@ -58,18 +58,18 @@ pub struct LineEmulation {
 impl DeviceKind {
     /// Which device has said whole lines, if one is recognised, and the line that gave it away.
     #[must_use]
-    pub fn of_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
+    pub fn recognise_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
         DEVICES.iter().find_map(|kind| Some((kind, (kind.recognise)(lines)?)))
     }
 }
 
 /// The lines of a text, without their ends and empty ones.
-pub(crate) fn lines_of(text: &str) -> Vec<&str> {
+pub(crate) fn split_lines(text: &str) -> Vec<&str> {
     let lines = text.split(['\r', '\n']).map(str::trim);
     lines.filter(|line| !line.is_empty()).collect()
 }
 
 /// The first line that a test holds for.
-pub(crate) fn first<'a>(lines: &[&'a str], is_it: impl Fn(&str) -> bool) -> Option<&'a str> {
+pub(crate) fn find_line<'a>(lines: &[&'a str], is_it: impl Fn(&str) -> bool) -> Option<&'a str> {
     lines.iter().copied().find(|line| is_it(line))
 }

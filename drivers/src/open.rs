@@ -129,15 +129,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("bench.toml").display().to_string();
         assert!(is_rig_file(&file) && !is_rig_file("sim"));
-        let said = |file: &str| match open_wired(file, &clock) {
+        let message = |file: &str| match open_wired(file, &clock) {
             Ok(_) => panic!("{file} was opened"),
             Err(err) => err.to_string(),
         };
-        assert!(said(&file).contains("cannot be read"));
+        assert!(message(&file).contains("cannot be read"));
         std::fs::write(&file, b"\xff").unwrap();
-        assert!(said(&file).contains("no text"));
+        assert!(message(&file).contains("no text"));
         std::fs::write(&file, "device = \"marlin\"").unwrap();
-        assert!(said(&file).contains("bench.toml, line 1: device"));
+        assert!(message(&file).contains("bench.toml, line 1: device"));
         let text = "device = \"galil\"\nport = \"/dev/there-is-no-such-port\"\nmm_per_pulse = 0.015\n\
             travel_mm = 150\nspeed_max_mm_s = 20\nacceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n";
         std::fs::write(&file, text).unwrap();

@@ -8,7 +8,7 @@
 
 use crate::board_clock::{BoardClock, BoardTime};
 use crate::cell::{CellDescription, CellDevice, CellProtocol, CellReports, CellSample, LineCell};
-use crate::devices::{DeviceKind, LineEmulation, Role, lines_of};
+use crate::devices::{DeviceKind, LineEmulation, Role, split_lines};
 use crate::mark10::protocol::ForceUnit;
 use crate::rig_file::Fields;
 use crate::text::{Decimal, DeviceError, OpenedCell, TextConsole};
@@ -210,7 +210,7 @@ impl PlainNumbers {
             };
         };
         let heard = String::from_utf8_lossy(&console.heard);
-        let other = DeviceKind::of_lines(&lines_of(&heard));
+        let other = DeviceKind::recognise_lines(&split_lines(&heard));
         if let Some((kind, _)) = other.filter(|(kind, _)| kind.word != KIND.word) {
             return DeviceError::Other { device: DEVICE, found: kind.title.into() };
         }
@@ -269,7 +269,7 @@ impl CellDevice for PlainNumbers {
             delay: Nanos::ZERO,
             newtons_per_volt: matches!(self.unit, Unit::Force(_)).then_some(1.0),
         };
-        let numbers = Numbers {
+        let numbers = PlainNumberReader {
             cell: self.clone(),
             decimals: like.decimals,
             counts_max: counts_max as i32,
@@ -281,7 +281,7 @@ impl CellDevice for PlainNumbers {
         };
         Ok(OpenedCell {
             description,
-            dialogue: Box::new(LineCell::on(numbers, console.now())),
+            dialogue: Box::new(LineCell::start(numbers, console.now())),
             raw: console.link.raw,
             farewell: Vec::new(),
         })
@@ -289,7 +289,7 @@ impl CellDevice for PlainNumbers {
 }
 
 /// Numbers of a cell that was opened.
-struct Numbers {
+struct PlainNumberReader {
     cell: PlainNumbers,
     decimals: u8,
     counts_max: i32,
@@ -301,7 +301,7 @@ struct Numbers {
     is_beyond: bool,
 }
 
-impl CellProtocol for Numbers {
+impl CellProtocol for PlainNumberReader {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         if !std::mem::replace(&mut self.is_begun, true) {
             return true;
@@ -318,19 +318,19 @@ impl CellProtocol for Numbers {
             Some(BoardTime::At(time)) => Some(time),
             Some(BoardTime::Repeated) => return false,
             Some(BoardTime::Restarted(time)) => {
-                reports.trouble("the board has started anew; check its supply");
+                reports.push_trouble("the board has started anew; check its supply");
                 Some(time)
             }
         };
         let is_beyond = number.digits.saturating_abs() >= self.counts_max;
         if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
-            reports.trouble(
+            reports.push_trouble(
                 "its number is at the end of its range or beyond; take the load off, or correct cell.full_scale of the rig file",
             );
         }
         self.is_beyond = is_beyond;
         let counts = if self.cell.is_reversed { -number.digits } else { number.digits };
-        reports.sample(CellSample {
+        reports.push_sample(CellSample {
             at: now,
             device_time,
             counts,
@@ -352,5 +352,4 @@ fn unfit(detail: String) -> DeviceError {
 }
 
 #[cfg(test)]
-#[path = "plain_numbers_tests.rs"]
 mod tests;

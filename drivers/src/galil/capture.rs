@@ -1,10 +1,10 @@
 //! How samples are taken: the link is measured, and record arrays are set up where they are worth it.
 
-use super::console::{ANSWER_MAX, Console};
+use super::console::{ANSWER_MAX, GalilConsole};
 use super::model::GalilOpenError;
-use super::recording::{self, ARRAYS, Look, Plan};
+use super::recording::{self, ARRAYS, RecordingPlan, RecordingStatus};
 use super::sampling::Sampler;
-use super::session::Pace;
+use super::session::PollPace;
 use super::settings::{GalilSettings, Sampling};
 use crate::wire::LinkStats;
 use palpate_model::Nanos;
@@ -38,7 +38,7 @@ const AGE_MAX: Nanos = Nanos::from_millis(15);
 
 /// What the link does.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured {
+pub struct LinkMeasurement {
     /// Round trips.
     pub stats: LinkStats,
     /// The usual one, of which as many are longer as shorter.
@@ -51,16 +51,16 @@ pub struct Measured {
 
 /// How long an answer takes alone, and how fast answers come in a row.
 pub fn measure(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
-) -> Result<Measured, GalilOpenError> {
+) -> Result<LinkMeasurement, GalilOpenError> {
     let question = Sampler::question(settings);
     let mut stats = LinkStats::default();
     let mut trips = Vec::with_capacity(SINGLE);
     for _ in 0..SINGLE {
-        let asked = console.now();
+        let start = console.now();
         console.ask(&question)?;
-        let trip = console.now().since(asked);
+        let trip = console.now().since(start);
         stats.push(trip);
         trips.push(trip);
     }
@@ -78,7 +78,7 @@ pub fn measure(
         apart = apart.min(Nanos((row.since(trip).0 / (ROW as u64 - 1)).max(1)));
         bytes = replies.iter().map(|reply| reply.bytes.len() + 3).sum();
     }
-    Ok(Measured {
+    Ok(LinkMeasurement {
         stats,
         trip,
         apart,
@@ -87,17 +87,17 @@ pub fn measure(
     })
 }
 
-impl Measured {
+impl LinkMeasurement {
     /// How to ask for samples one by one.
-    pub fn polling(&self, tick: Nanos) -> Pace {
+    pub fn polling(&self, tick: Nanos) -> PollPace {
         // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
         let every = self.apart.max(Nanos(tick.0 * 6 / 10));
         let in_flight = (self.trip.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
-        Pace { every, in_flight, tick }
+        PollPace { every, in_flight, tick }
     }
 
     /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
-    fn fetching(&self, tick: Nanos, n: u32) -> Option<(Pace, Nanos)> {
+    fn fetching(&self, tick: Nanos, n: u32) -> Option<(PollPace, Nanos)> {
         let bytes_per_ns = self.bytes / self.apart.0 as f64;
         let interval = (tick.0 << n) as f64;
         let left = LOAD_MAX * bytes_per_ns - ELEMENT_BYTES / interval;
@@ -108,17 +108,17 @@ impl Measured {
             Nanos((FETCH_BYTES / left) as u64).max(FETCH_EVERY).max(Nanos(self.trip.0 * 5 / 4));
         let transfer = (every.0 as f64 / interval * ELEMENT_BYTES + FETCH_BYTES) / bytes_per_ns;
         let age = Nanos(every.0 + 2 * self.trip.0 + transfer as u64);
-        let pace = Pace { every, in_flight: 1, tick };
+        let pace = PollPace { every, in_flight: 1, tick };
         Some((pace, age))
     }
 }
 
 /// How samples are taken from now on, in words too.
-pub struct Capture {
+pub struct SamplingSetup {
     /// How to ask.
-    pub pace: Pace,
+    pub pace: PollPace,
     /// The recording, if there is one.
-    pub plan: Option<Plan>,
+    pub plan: Option<RecordingPlan>,
     /// What is the same whenever the same controller is opened over the same link, for the rig's identity.
     pub words: String,
     /// What was measured, for the operator.
@@ -127,16 +127,16 @@ pub struct Capture {
 
 /// Chooses and starts it.
 pub fn set_up(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
-    measured: &Measured,
+    measured: &LinkMeasurement,
     tick: Nanos,
-) -> Result<Capture, GalilOpenError> {
+) -> Result<SamplingSetup, GalilOpenError> {
     let ms = |span: Nanos| span.0 as f64 * 1e-6;
     let polled = |why: &str| {
         let pace = measured.polling(tick);
         let rate = 1e9 / pace.every.max(tick).0 as f64;
-        Capture {
+        SamplingSetup {
             pace,
             plan: None,
             words: "samples polled".to_owned(),
@@ -160,7 +160,7 @@ pub fn set_up(
         return Ok(polled(", because recorded samples would be old when they come over this link"));
     };
     match start(console, settings, n, tick)? {
-        Ok(plan) => Ok(Capture {
+        Ok(plan) => Ok(SamplingSetup {
             pace,
             plan: Some(plan),
             words: format!("{:.0} samples/s recorded", 1e9 / (tick.0 << n) as f64),
@@ -179,11 +179,11 @@ const INPUTS: [char; 8] = ['X', 'Y', 'Z', 'W', 'E', 'F', 'G', 'H'];
 
 /// Starts a recording every 2^n samples; in words why there is none.
 fn start(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
     n: u32,
     tick: Nanos,
-) -> Result<Result<Plan, String>, GalilOpenError> {
+) -> Result<Result<RecordingPlan, String>, GalilOpenError> {
     for name in ARRAYS {
         // Those of another ring, if palpate was here before.
         console.try_ask(&format!("DA {name}[]"))?;
@@ -225,11 +225,11 @@ fn start(
 /// Which sample each element is of: the earliest `TIME` at which an element is the newest is that at which it was
 /// written.
 fn anchor(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
     (interval, tick): (i64, Nanos),
     ring: i64,
-) -> Result<Result<Plan, String>, GalilOpenError> {
+) -> Result<Result<RecordingPlan, String>, GalilOpenError> {
     let question = recording::question(settings);
     let mut rough: Option<i64> = None;
     let (mut least, mut most, mut count) = (i64::MAX, i64::MIN, 0);
@@ -239,25 +239,25 @@ fn anchor(
             console.number("TIME")?;
         }
         let reply = console.ask(&question)?;
-        let Some(look) = reply.numbers().as_deref().and_then(Look::read) else {
+        let Some(status) = reply.numbers().as_deref().and_then(RecordingStatus::read) else {
             return Ok(Err("its answers have other numbers than were asked for".into()));
         };
         count += 1;
-        if rough.is_none() && look.next == 0 {
+        if rough.is_none() && status.next == 0 {
             continue;
         }
-        let rough = *rough.get_or_insert(look.time - (look.next - 1) * interval);
-        let linear = (look.time - rough).div_euclid(interval);
+        let rough = *rough.get_or_insert(status.time - (status.next - 1) * interval);
+        let linear = (status.time - rough).div_euclid(interval);
         let half = ring / 2;
-        let off = (look.next - 1 - linear + half).rem_euclid(ring) - half;
+        let off = (status.next - 1 - linear + half).rem_euclid(ring) - half;
         if off.abs() > 2 {
             return Ok(Err("it does not record as often as it was told".into()));
         }
         let newest = linear + off;
-        let base = look.time - newest * interval;
+        let base = status.time - newest * interval;
         (least, most) = (least.min(base), most.max(base));
         if count >= ANCHORS.start && most - least >= interval - 1 {
-            return Ok(Ok(Plan { interval, ring, base: least, first: newest + 1, tick }));
+            return Ok(Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick }));
         }
     }
     Ok(Err("its clock and its recording do not fit".into()))

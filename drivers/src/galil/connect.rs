@@ -1,13 +1,13 @@
 //! What happens once when a controller is opened: who it is, whether it is the right one, its settings, a limit to
 //! everything before anything can move, and how fast the link is.
 
-use super::capture::{self, Capture};
-use super::console::Console;
+use super::capture::{self, SamplingSetup};
+use super::console::GalilConsole;
 use super::model::{GalilBoard, GalilOpenError};
 use super::order::{limit_commands, software_limits};
-use super::recording::Plan;
+use super::recording::RecordingPlan;
 use super::sampling::signed;
-use super::session::Pace;
+use super::session::PollPace;
 use super::settings::GalilSettings;
 use super::watchdog;
 use crate::wire::{HostClock, Link, LinkStats};
@@ -41,13 +41,13 @@ pub struct Connected {
     /// What it makes of the rig.
     pub description: RigDescription,
     /// How to ask for samples.
-    pub pace: Pace,
+    pub pace: PollPace,
     /// The link as it was measured.
     pub stats: LinkStats,
     /// The same in words: latency, jitter, and what was made of it.
     pub link: String,
     /// The recording that was started, if one was.
-    pub plan: Option<Plan>,
+    pub plan: Option<RecordingPlan>,
     /// Whether the watchdog's program runs.
     pub has_watchdog: bool,
     /// How far the axis goes at most when palpate falls silent, in mm; the whole travel without a watchdog.
@@ -63,9 +63,9 @@ pub fn connect(
     settings: &GalilSettings,
     device: &Arc<str>,
 ) -> Result<Connected, GalilOpenError> {
-    let mut console = Console::new(link, clock, device);
+    let mut console = GalilConsole::new(link, clock, device);
     let board = identify(&mut console, settings)?;
-    quieten(&mut console, settings)?;
+    silence_controller(&mut console, settings)?;
     let acceleration = set_up_axis(&mut console, settings)?;
     set_up_input(&mut console, settings)?;
     let has_watchdog = settings.has_watchdog && start_watchdog(&mut console, settings)?;
@@ -77,7 +77,7 @@ pub fn connect(
     // From here on only the signal has decimals, and its form is said with it: short answers are fast ones.
     console.try_ask("VF 10.0")?;
     let measured = capture::measure(&mut console, settings)?;
-    let Capture { pace, plan, words, measured: how } =
+    let SamplingSetup { pace, plan, words, measured: how } =
         capture::set_up(&mut console, settings, &measured, tick)?;
     let stats = LinkStats { in_flight: pace.in_flight, ..measured.stats };
     let worst_case_mm = if has_watchdog {
@@ -112,7 +112,7 @@ pub fn connect(
 }
 
 fn identify(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<GalilBoard, GalilOpenError> {
     // Half a line, or half a download, of whoever was here before is ended; echo is off from here on.
@@ -151,7 +151,10 @@ fn identify(
 }
 
 /// Programs halted, the axis stopped, unsolicited text marked, numbers in a form that has all their digits.
-fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
+fn silence_controller(
+    console: &mut GalilConsole<'_>,
+    settings: &GalilSettings,
+) -> Result<(), GalilOpenError> {
     let a = settings.axis;
     console.ask("HX")?;
     console.ask(&format!("ST{a}"))?;
@@ -178,7 +181,7 @@ fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), Ga
 
 /// Pulses, rates, switches and software limits. Gives the acceleration that was set.
 fn set_up_axis(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<MmPerS2, GalilOpenError> {
     let a = settings.axis;
@@ -237,7 +240,7 @@ fn set_up_axis(
 
 /// Compares what a command has set, where the firmware has the operands that tell it.
 fn read_back(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     command: String,
     operands: &str,
     wanted: &[f64],
@@ -253,7 +256,10 @@ fn read_back(
     Ok(())
 }
 
-fn set_up_input(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
+fn set_up_input(
+    console: &mut GalilConsole<'_>,
+    settings: &GalilSettings,
+) -> Result<(), GalilOpenError> {
     let (input, range) = (settings.input, settings.range.code());
     // A controller that has one range only does not know the command; then it must be the usual +-10 V.
     let reply = console.try_ask(&format!("AQ {input},{range}"))?;
@@ -273,7 +279,7 @@ fn set_up_input(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(
 
 /// Downloads and starts the watchdog's program; `false` when the controller runs none.
 fn start_watchdog(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<bool, GalilOpenError> {
     console.ask(&format!("{}=1", watchdog::VARIABLE))?;
@@ -302,7 +308,7 @@ fn describe(
     settings: &GalilSettings,
     board: &GalilBoard,
     acceleration: MmPerS2,
-    (pace, plan): (Pace, Option<Plan>),
+    (pace, plan): (PollPace, Option<RecordingPlan>),
     words: &str,
     tm: f64,
 ) -> RigDescription {

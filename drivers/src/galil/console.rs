@@ -1,7 +1,7 @@
 //! Question and answer, one at a time, while a controller is set up.
 
 use super::model::GalilOpenError;
-use super::protocol::{Incoming, Parser, Reply, error_of};
+use super::protocol::{GalilMessage, GalilParser, GalilReply, parse_error};
 use crate::wire::{HostClock, Link, TappedLink};
 use palpate_model::Nanos;
 use std::io;
@@ -10,16 +10,16 @@ use std::sync::Arc;
 /// An answer takes longer only after a download.
 pub const ANSWER_MAX: Nanos = Nanos::from_millis(1_000);
 /// A link to a controller with nothing else going on.
-pub struct Console<'a> {
+pub struct GalilConsole<'a> {
     /// The link and what was exchanged over it.
     pub link: TappedLink<'a>,
-    parser: Parser,
+    parser: GalilParser,
 }
 
-impl<'a> Console<'a> {
+impl<'a> GalilConsole<'a> {
     /// On a link.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
-        Self { link: TappedLink::new(link, clock, device), parser: Parser::default() }
+        Self { link: TappedLink::new(link, clock, device), parser: GalilParser::default() }
     }
 
     /// The host's clock.
@@ -48,12 +48,16 @@ impl<'a> Console<'a> {
     }
 
     /// Reads so many replies, as many as come until `within` is over.
-    pub fn replies(&mut self, count: usize, within: Nanos) -> Result<Vec<Reply>, GalilOpenError> {
+    pub fn replies(
+        &mut self,
+        count: usize,
+        within: Nanos,
+    ) -> Result<Vec<GalilReply>, GalilOpenError> {
         let start = self.now();
         let mut all = Vec::new();
         while all.len() < count && self.now().since(start) < within {
             for byte in self.read()? {
-                if let Some(Incoming::Reply(reply)) = self.parser.take(byte) {
+                if let Some(GalilMessage::Reply(reply)) = self.parser.take(byte) {
                     all.push(reply);
                 }
             }
@@ -62,13 +66,13 @@ impl<'a> Console<'a> {
     }
 
     /// Asks one command and gives its answer, whether accepted or not.
-    pub fn try_ask(&mut self, command: &str) -> Result<Reply, GalilOpenError> {
+    pub fn try_ask(&mut self, command: &str) -> Result<GalilReply, GalilOpenError> {
         self.write(&format!("{command}\r"))?;
         self.replies(1, ANSWER_MAX)?.pop().ok_or(GalilOpenError::Silent)
     }
 
     /// Asks one command that must be accepted.
-    pub fn ask(&mut self, command: &str) -> Result<Reply, GalilOpenError> {
+    pub fn ask(&mut self, command: &str) -> Result<GalilReply, GalilOpenError> {
         let reply = self.try_ask(command)?;
         if reply.is_accepted {
             return Ok(reply);
@@ -76,7 +80,7 @@ impl<'a> Console<'a> {
         let why = self.try_ask("TC1")?;
         Err(GalilOpenError::Refused {
             command: command.to_owned(),
-            error: error_of(&why).unwrap_or(super::GalilError { code: 0, words: String::new() }),
+            error: parse_error(&why).unwrap_or(super::GalilError { code: 0, words: String::new() }),
         })
     }
 

@@ -5,6 +5,7 @@
 //! controller is opened. [`GalilRig`] puts a session on a link.
 
 mod capture;
+mod clock_alignment;
 mod codes;
 mod connect;
 mod console;
@@ -18,10 +19,9 @@ mod sampling;
 mod session;
 mod settings;
 mod sine;
-mod timing;
 mod watchdog;
 
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 
 pub use codes::ErrorCode;
 pub use connect::{Connected, connect};
@@ -36,5 +36,5 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     title: "a Galil controller",
     introduction: "Galil controller, ",
     role: Role::Axis(crate::rig_file::galil),
-    recognise: |lines| first(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
+    recognise: |lines| find_line(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
 };

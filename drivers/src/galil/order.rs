@@ -1,9 +1,9 @@
 //! One command of palpate as commands of the controller: what is sent, what must come back.
 
-use super::protocol::Reply;
+use super::protocol::GalilReply;
 use super::sampling::signed;
 use super::settings::GalilSettings;
-use super::sine::Feed;
+use super::sine::SineFeed;
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, Oscillation, RigCommand, Sine};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
@@ -23,7 +23,7 @@ enum Stage {
 
 /// What to do next with a command.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Next {
+pub enum OrderStep {
     /// Answers are still to come.
     Wait,
     /// Send these, each answered by a prompt.
@@ -33,14 +33,14 @@ pub enum Next {
     /// It is done, with what was set.
     Done(RigCommand),
     /// The controller refused a part of it: ask why.
-    AskWhy,
+    ReadReason,
     /// It cannot be done, in words.
     Refused(String),
 }
 
 /// A command under way.
 #[derive(Clone, Debug)]
-pub struct Order {
+pub struct GalilOrder {
     /// As it was asked for.
     pub command: RigCommand,
     stage: Stage,
@@ -53,10 +53,10 @@ pub struct Order {
     pub is_begun: bool,
     tick: Nanos,
     /// Of a sine that was set: what goes on after its begin.
-    pub feed: Option<Feed>,
+    pub feed: Option<SineFeed>,
 }
 
-impl Order {
+impl GalilOrder {
     /// A command that was not begun, for samples of this length.
     #[must_use]
     pub const fn new(command: RigCommand, tick: Nanos) -> Self {
@@ -73,7 +73,7 @@ impl Order {
     }
 
     /// How it begins.
-    pub fn begin(&mut self, settings: &GalilSettings) -> Next {
+    pub fn begin(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let commands = match self.command {
             RigCommand::EnableMotor => {
@@ -84,7 +84,7 @@ impl Order {
                 let (speed, rate) =
                     (settings.counts(wanted.speed), settings.counts2(wanted.acceleration));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "a speed of {} is beyond the {} of the rig file",
                         wanted.speed, settings.speed_max
                     ));
@@ -106,21 +106,21 @@ impl Order {
                 let length = Seconds(self.tick.seconds().0);
                 let path = Sine::new(Position(0.0), &wanted, settings.mm_per_pulse, length);
                 if let Err(why) = path.check(settings.speed_max, wanted.acceleration) {
-                    return Next::Refused(why);
+                    return OrderStep::Refused(why);
                 }
                 let rate = settings.counts2(wanted.acceleration);
                 vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
             }
             RigCommand::Stop | RigCommand::Halt => {
-                return Next::Refused("a stop does not wait in a queue".into());
+                return OrderStep::Refused("a stop does not wait in a queue".into());
             }
         };
         self.open = commands.len();
-        Next::Send(commands)
+        OrderStep::Send(commands)
     }
 
     /// Takes the answer to one of its commands.
-    pub fn take(&mut self, reply: &Reply, settings: &GalilSettings) -> Next {
+    pub fn take(&mut self, reply: &GalilReply, settings: &GalilSettings) -> OrderStep {
         self.open = self.open.saturating_sub(1);
         if reply.is_accepted {
             self.numbers.extend(reply.numbers().unwrap_or_default());
@@ -128,26 +128,26 @@ impl Order {
             self.is_refused = true;
         }
         if self.open > 0 {
-            return Next::Wait;
+            return OrderStep::Wait;
         }
         if self.is_refused {
-            return Next::AskWhy;
+            return OrderStep::ReadReason;
         }
         match self.stage {
-            Stage::Setting => self.do_it(settings),
+            Stage::Setting => self.send_main_part(settings),
             Stage::Doing(made) => self.done(made),
         }
     }
 
     /// All is set: is it what was asked, and how does it go on?
-    fn do_it(&mut self, settings: &GalilSettings) -> Next {
+    fn send_main_part(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let numbers = std::mem::take(&mut self.numbers);
         let (made, commands) = match (self.command, numbers.as_slice()) {
             (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
                 let target = signed(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "it reads back another target than {} pulses",
                         wanted.target_pulses
                     ));
@@ -156,7 +156,7 @@ impl Order {
                 let speed_asked = settings.counts(wanted.speed) as f64;
                 let ac_asked = settings.counts2(wanted.acceleration) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts, where \
                          {speed_asked} and {ac_asked} were asked for"
                     ));
@@ -171,7 +171,7 @@ impl Order {
             (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
                 let wanted = software_limits(settings, 0, settings.travel.0);
                 if (signed(forward), signed(reverse)) != (Some(wanted.0), Some(wanted.1)) {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "it reads back software limits {forward} and {reverse} where {} and {} were set",
                         wanted.0, wanted.1
                     ));
@@ -182,30 +182,34 @@ impl Order {
             (RigCommand::Oscillate(wanted), &[ac, dc]) => {
                 let ac_asked = settings.counts2(wanted.acceleration) as f64;
                 if ac != dc || ac <= 0.0 || ac > ac_asked {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "it reads back acceleration {ac} and deceleration {dc} in counts, where {ac_asked} was asked for"
                     ));
                 }
                 let made =
                     Oscillation { acceleration: MmPerS2(ac * settings.mm_per_pulse), ..wanted };
-                let feed = self.feed.insert(Feed::new(&made, settings, self.tick));
+                let feed = self.feed.insert(SineFeed::new(&made, settings, self.tick));
                 (RigCommand::Oscillate(made), feed.begin())
             }
-            _ => return Next::Refused("its answer has other numbers than were asked for".into()),
+            _ => {
+                return OrderStep::Refused(
+                    "its answer has other numbers than were asked for".into(),
+                );
+            }
         };
         self.stage = Stage::Doing(made);
         self.open = commands.len();
-        Next::SendAndSample(commands)
+        OrderStep::SendAndSample(commands)
     }
 
-    fn done(&self, made: RigCommand) -> Next {
+    fn done(&self, made: RigCommand) -> OrderStep {
         match (self.command, self.numbers.as_slice()) {
             // The number is `_MO`: 1 while the motor is off.
-            (RigCommand::EnableMotor, &[0.0]) => Next::Done(made),
-            (RigCommand::EnableMotor, _) => Next::Refused(
+            (RigCommand::EnableMotor, &[0.0]) => OrderStep::Done(made),
+            (RigCommand::EnableMotor, _) => OrderStep::Refused(
                 "the motor stays off after SH; check the amplifier and its enable input".into(),
             ),
-            _ => Next::Done(made),
+            _ => OrderStep::Done(made),
         }
     }
 }
@@ -236,17 +240,17 @@ mod tests {
     use crate::galil::settings::tests::thesis;
 
     /// What becomes of an order whose numbers are read back so.
-    fn read_back(command: RigCommand, told: &[&str]) -> Next {
+    fn read_back(command: RigCommand, readback: &[&str]) -> OrderStep {
         let settings = thesis();
-        let mut order = Order::new(command, Nanos(976_563));
-        let Next::Send(commands) = order.begin(&settings) else {
+        let mut order = GalilOrder::new(command, Nanos(976_563));
+        let OrderStep::Send(commands) = order.begin(&settings) else {
             panic!("it is not set");
         };
-        let first = commands.len() - told.len();
-        let answers = std::iter::repeat_n("", first).chain(told.iter().copied());
-        let mut next = Next::Wait;
+        let first = commands.len() - readback.len();
+        let answers = std::iter::repeat_n("", first).chain(readback.iter().copied());
+        let mut next = OrderStep::Wait;
         for text in answers {
-            let reply = Reply { is_accepted: true, bytes: text.into() };
+            let reply = GalilReply { is_accepted: true, bytes: text.into() };
             next = order.take(&reply, &settings);
         }
         next
@@ -256,16 +260,16 @@ mod tests {
     fn nothing_faster_than_asked_for_is_begun() {
         let wanted =
             MoveTo { target_pulses: 1000, speed: MmPerS(0.75), acceleration: MmPerS2(61.44) };
-        for (told, is_begun) in [
+        for (readback, is_begun) in [
             (" 50 4096 4096", true),
             (" 48 3072 3072", true),
             (" 52 4096 4096", false),
             (" 500 4096 4096", false),
             (" 50 5120 5120", false),
         ] {
-            let next = read_back(RigCommand::MoveTo(wanted), &[told, " 1000"]);
-            let begins = matches!(next, Next::SendAndSample(_));
-            assert_eq!(begins, is_begun, "{told}: {next:?}");
+            let next = read_back(RigCommand::MoveTo(wanted), &[readback, " 1000"]);
+            let begins = matches!(next, OrderStep::SendAndSample(_));
+            assert_eq!(begins, is_begun, "{readback}: {next:?}");
         }
     }
 }

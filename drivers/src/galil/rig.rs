@@ -4,7 +4,7 @@ use super::connect::connect;
 use super::session::Session;
 use super::settings::GalilSettings;
 use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
-use crate::wire::{HostClock, Line, LineSettings, Place};
+use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place};
 use std::sync::Arc;
 
 /// A Galil controller with slide and load cell.
@@ -40,7 +40,7 @@ impl RigDevice for GalilDevice {
         self.settings.serial_number = connected.board.serial_number;
         self.worst_case_mm = connected.worst_case_mm;
         let session = Session::new(self.settings.clone(), &connected, clock());
-        let line_settings = LineSettings {
+        let line_settings = LinkThreadSettings {
             device,
             // The recording ends too: whoever comes next finds a controller that does nothing.
             farewell: format!("ST{};RC 0\r", self.settings.axis).into_bytes(),
@@ -49,7 +49,7 @@ impl RigDevice for GalilDevice {
             description: connected.description,
             newtons_per_volt: None,
             link: Some(connected.link),
-            lines: vec![Line::start(link, session, clock, line_settings)?],
+            lines: vec![LinkThread::start(link, session, clock, line_settings)?],
             raw: connected.raw,
         })
     }

@@ -26,7 +26,7 @@ pub const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
 
 /// What became of a poll's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sampled {
+pub enum SampleOutcome {
     /// A new sample.
     Reading(Reading),
     /// The same sample again: two polls fell between two of them.
@@ -85,21 +85,21 @@ impl Sampler {
 
     /// Takes an answer; `None` when it is none. `is_begun` says that a motion was begun just before this was asked:
     /// the axis moves, whatever its first sample shows.
-    pub fn take(&mut self, numbers: &[f64], is_begun: bool) -> Option<Sampled> {
-        let &[volts, given, commanded, switches, stop_code, time] = numbers else {
+    pub fn take(&mut self, numbers: &[f64], is_begun: bool) -> Option<SampleOutcome> {
+        let &[volts, pulses_given, commanded, switches, stop_code, time] = numbers else {
             return None;
         };
         let (switches, stop_code) = (whole(switches)? as u32, whole(stop_code)? as u32);
-        let (given, commanded) = (signed(given)?, signed(commanded)?);
+        let (pulses_given, commanded) = (signed(pulses_given)?, signed(commanded)?);
         let time = whole(time)?;
         if !(volts.abs() <= 100.0 && switches < 256 && stop_code < 256) {
             return None;
         }
         if self.doubts(time) {
-            return Some(Sampled::Doubtful);
+            return Some(SampleOutcome::Doubtful);
         }
         match self.time {
-            Some(last) if time == last && !is_begun => return Some(Sampled::Same),
+            Some(last) if time == last && !is_begun => return Some(SampleOutcome::Same),
             Some(last) if time < last => {
                 // Either it wrapped or it began anew; what it counted stays counted.
                 let is_wrapped = is_wrapped(last, time);
@@ -108,22 +108,22 @@ impl Sampler {
                     self.time = Some(time);
                     self.doubtful = None;
                     self.was_moving = false;
-                    return Some(Sampled::Reset);
+                    return Some(SampleOutcome::Reset);
                 }
             }
-            Some(last) if time == last => return Some(Sampled::Same),
+            Some(last) if time == last => return Some(SampleOutcome::Same),
             _ => {}
         }
         self.time = Some(time);
-        let status = self.status(switches, stop_code, commanded != given || is_begun);
+        let status = self.status(switches, stop_code, commanded != pulses_given || is_begun);
         self.was_moving = status.has(AxisStatus::MOVING);
         let counts = volts / self.settings.volts_per_count();
-        Some(Sampled::Reading(Reading {
+        Some(SampleOutcome::Reading(Reading {
             tick: time + self.offset,
             // Volts are within 100 and a converter has 24 bits at most.
             counts: Some(counts.round() as i32),
             volts: Volts(volts),
-            pulses: self.settings.sign() * given,
+            pulses: self.settings.sign() * pulses_given,
             status,
             age: None,
         }))
@@ -170,5 +170,4 @@ pub fn signed(value: f64) -> Option<i64> {
 }
 
 #[cfg(test)]
-#[path = "sampling_tests.rs"]
 mod tests;

@@ -21,7 +21,7 @@ const FIRST: usize = 2;
 
 /// Increments of one sine.
 #[derive(Clone, Debug)]
-pub struct Feed {
+pub struct SineFeed {
     path: Sine,
     axis: char,
     /// Counts of a millimetre, signed.
@@ -38,7 +38,7 @@ pub struct Feed {
     is_over: bool,
 }
 
-impl Feed {
+impl SineFeed {
     /// Of a command that was checked.
     #[must_use]
     pub fn new(command: &Oscillation, settings: &GalilSettings, tick: Nanos) -> Self {
@@ -69,7 +69,7 @@ impl Feed {
     }
 
     /// They were written now.
-    pub fn begun(&mut self, now: Nanos) {
+    pub fn mark_begun(&mut self, now: Nanos) {
         self.begun_at = now;
     }
 
@@ -137,14 +137,14 @@ mod tests {
     use crate::galil::settings::tests::thesis;
     use palpate_model::units::MmPerS2;
 
-    fn feed(period_ticks: u32, cycles: u32) -> Feed {
+    fn feed(period_ticks: u32, cycles: u32) -> SineFeed {
         let command = Oscillation {
             amplitude_pulses: 50,
             period_ticks,
             cycles,
             acceleration: MmPerS2(61.44),
         };
-        Feed::new(&command, &thesis(), Nanos(976_563))
+        SineFeed::new(&command, &thesis(), Nanos(976_563))
     }
 
     #[test]
@@ -185,7 +185,7 @@ mod tests {
     fn no_more_is_sent_than_the_lead() {
         let mut feed = feed(4096, 1);
         feed.begin();
-        feed.begun(Nanos(0));
+        feed.mark_begun(Nanos(0));
         while feed.take(Nanos(0)).is_some() {}
         assert!(feed.lead(Nanos(0)) < LEAD.0 as i64 + 100_000_000);
         assert!(!feed.is_dry(LEAD) && feed.is_dry(Nanos(2 * LEAD.0)));

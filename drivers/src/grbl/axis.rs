@@ -5,8 +5,8 @@ use super::protocol::JOG_CANCEL;
 use super::session::Session;
 use super::settings::GrblSettings;
 use crate::device::OpenError;
-use crate::parts::{Axis, Track};
-use crate::wire::{HostClock, Line, LineSettings, Link};
+use crate::parts::{OpenedAxis, Track};
+use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings};
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{MmPerS, Seconds, Volts};
 use std::collections::BTreeMap;
@@ -22,14 +22,14 @@ pub fn open(
     mut link: Box<dyn Link>,
     settings: &GrblSettings,
     clock: &HostClock,
-) -> Result<(RigDescription, Axis), OpenError> {
+) -> Result<(RigDescription, OpenedAxis), OpenError> {
     let device: Arc<str> = "grbl".into();
     let Connected { identity, facts, stats, raw, .. } =
         connect(link.as_mut(), clock, settings, &device)?;
     let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * facts.steps)));
     let session = Session::new(settings.clone(), facts, Arc::clone(&track), stats, clock());
-    let line_settings = LineSettings { device, farewell: vec![JOG_CANCEL] };
-    let line = Line::start(link, session, clock, line_settings)?;
+    let line_settings = LinkThreadSettings { device, farewell: vec![JOG_CANCEL] };
+    let line = LinkThread::start(link, session, clock, line_settings)?;
     let description = RigDescription {
         name: settings.name.clone(),
         identity,
@@ -48,5 +48,5 @@ pub fn open(
         pulse_lag: LAG,
         cell_delay: Seconds(0.0),
     };
-    Ok((description, Axis { line, track, raw }))
+    Ok((description, OpenedAxis { line, track, raw }))
 }

@@ -5,8 +5,8 @@ use super::console::Console;
 use super::error::GrblOpenError;
 use super::fitness::{check, read_settings, value};
 use super::motion::worst_case_mm;
-use super::protocol::{self, CYCLE_START, Incoming, JOG_CANCEL, State, Status};
-use super::settings::{Facts, GrblSettings, HomeSwitch};
+use super::protocol::{self, CYCLE_START, GrblState, GrblStatus, Incoming, JOG_CANCEL};
+use super::settings::{BoardParameters, GrblSettings, HomeSwitch};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
@@ -34,7 +34,7 @@ pub struct Connected {
     /// Version, text of `$I=`, safety, for the operator and the log.
     pub identity: String,
     /// What its settings make of it.
-    pub facts: Facts,
+    pub facts: BoardParameters,
     /// The link as it was measured.
     pub stats: LinkStats,
     /// How far the axis goes at most when palpate falls silent, in mm.
@@ -51,8 +51,8 @@ pub fn connect(
     device: &Arc<str>,
 ) -> Result<Connected, GrblOpenError> {
     let mut console = Console::new(link, clock, device);
-    let said = wake(&mut console)?;
-    let version = identify(&mut console, settings, said.as_deref())?;
+    let welcome_version = wake(&mut console)?;
+    let version = identify(&mut console, settings, welcome_version.as_deref())?;
     let status = to_rest(&mut console)?;
     // Whatever is on that pin opens and closes it while the slide leaves the switch, and each change is an alarm
     // (limits.c, the pin's interrupt).
@@ -63,7 +63,7 @@ pub fn connect(
     let values = read_settings(&mut console)?;
     let steps_per_mm = check(settings, &values)?;
     let status = to_rest(&mut console)?;
-    if status.state != State::Idle {
+    if status.state != GrblState::Idle {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
     let is_shared = settings.home == HomeSwitch::Limit && !settings.is_closed_home;
@@ -81,9 +81,9 @@ pub fn connect(
     };
     let mut stats = LinkStats::default();
     for _ in 0..PINGS {
-        let asked = console.now();
+        let start = console.now();
         console.ask("")?;
-        stats.push(console.now().since(asked));
+        stats.push(console.now().since(start));
     }
     stats.in_flight = 1;
     let worst_case_mm = worst_case_mm(settings.speed_max, settings.acceleration);
@@ -94,7 +94,7 @@ pub fn connect(
             settings.axis,
             (worst_case_mm * 10.0).ceil() / 10.0
         ),
-        facts: Facts {
+        facts: BoardParameters {
             steps_per_mm,
             steps: (place * steps_per_mm).round() as i64,
             round_trip: stats.round_trip_min,
@@ -109,12 +109,12 @@ pub fn connect(
 fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
     let start = console.now();
     let mut found = None;
-    let (mut has_heard, mut has_reset) = (false, false);
+    let (mut has_received, mut has_reset) = (false, false);
     while console.now().since(start) < START_MAX {
         console.write(&[JOG_CANCEL, protocol::QUERY])?;
         let until = console.now() + ASK_AGAIN;
         while let Some(incoming) = console.next(until)? {
-            has_heard = true;
+            has_received = true;
             match incoming {
                 Incoming::Hello(version) => {
                     found = Some(version);
@@ -142,7 +142,7 @@ fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
         if found.is_some() {
             return Ok(found);
         }
-        if !has_heard && !has_reset && console.now().since(start) >= RESET_AFTER {
+        if !has_received && !has_reset && console.now().since(start) >= RESET_AFTER {
             has_reset = true;
             console.write(&[protocol::RESET])?;
         }
@@ -154,7 +154,7 @@ fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
 fn identify(
     console: &mut Console<'_>,
     settings: &GrblSettings,
-    said: Option<&str>,
+    welcome_version: Option<&str>,
 ) -> Result<String, GrblOpenError> {
     // `error:7` of a memory that was never written is no answer to anything; neither is half a line's. A dollar alone asks
     // for help; at the end of half a motion it makes an error of it, where an end of line would begin it.
@@ -162,7 +162,7 @@ fn identify(
     let is_answered = has_ok(console)?;
     // In motion it tells nothing about itself; held, asleep or behind an open door it takes no line at all.
     let status = to_rest(console)?;
-    if !matches!(status.state, State::Idle | State::Alarm) {
+    if !matches!(status.state, GrblState::Idle | GrblState::Alarm) {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
     if !is_answered {
@@ -180,8 +180,9 @@ fn identify(
             own.clone_into(&mut text);
         }
     }
-    let version =
-        version.or_else(|| said.map(str::to_owned)).unwrap_or_else(|| "of unknown version".into());
+    let version = version
+        .or_else(|| welcome_version.map(str::to_owned))
+        .unwrap_or_else(|| "of unknown version".into());
     if !version.starts_with("1.1") {
         return Err(GrblOpenError::OtherVersion { version });
     }
@@ -205,11 +206,11 @@ fn has_ok(console: &mut Console<'_>) -> Result<bool, GrblOpenError> {
 }
 
 /// Ends a jog that is under way.
-fn to_rest(console: &mut Console<'_>) -> Result<Status, GrblOpenError> {
+fn to_rest(console: &mut Console<'_>) -> Result<GrblStatus, GrblOpenError> {
     let start = console.now();
     loop {
         let status = console.status()?;
-        if status.state != State::Jog {
+        if status.state != GrblState::Jog {
             return Ok(status);
         }
         if console.now().since(start) > REST_MAX {
@@ -222,12 +223,12 @@ fn to_rest(console: &mut Console<'_>) -> Result<Status, GrblOpenError> {
 fn unlock(
     console: &mut Console<'_>,
     settings: &GrblSettings,
-    status: &Status,
+    status: &GrblStatus,
 ) -> Result<(), GrblOpenError> {
     match status.state {
-        State::Idle => Ok(()),
-        State::Alarm if settings.is_unlocking => console.ask("$X").map(|_| ()),
-        State::Alarm => {
+        GrblState::Idle => Ok(()),
+        GrblState::Alarm if settings.is_unlocking => console.ask("$X").map(|_| ()),
+        GrblState::Alarm => {
             let reason = if status.has_pin(settings.axis) {
                 "its limit switch is closed"
             } else {

@@ -2,7 +2,7 @@
 
 use super::connect::{ANSWER_MAX, ASK_AGAIN};
 use super::error::GrblOpenError;
-use super::protocol::{self, Incoming, Parser, Status};
+use super::protocol::{self, GrblStatus, Incoming, Parser};
 use crate::wire::{HostClock, Link, TappedLink};
 use palpate_model::Nanos;
 use std::collections::VecDeque;
@@ -52,7 +52,7 @@ impl<'a> Console<'a> {
     }
 
     /// Asks for a status until one comes.
-    pub fn status(&mut self) -> Result<Status, GrblOpenError> {
+    pub fn status(&mut self) -> Result<GrblStatus, GrblOpenError> {
         let end = self.now() + ANSWER_MAX;
         while self.now() < end {
             self.write(&[protocol::QUERY])?;

@@ -7,16 +7,16 @@ mod axis;
 mod connect;
 mod console;
 mod error;
+mod feed_correction;
 mod fitness;
 mod motion;
-mod pace;
 mod pins;
 pub mod protocol;
 mod session;
 mod settings;
 mod times;
 
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use protocol::Incoming;
 
 pub use axis::open;
@@ -25,14 +25,14 @@ pub use error::{Alarm, GrblOpenError, Refusal};
 pub use fitness::MM_PER_STEP_MIN;
 pub use motion::worst_case_mm;
 pub use session::{Session, SharedTrack};
-pub use settings::{Facts, GrblSettings, HomeSwitch};
+pub use settings::{BoardParameters, GrblSettings, HomeSwitch};
 
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "grbl",
     title: "a Grbl controller",
     introduction: "Grbl, ",
     role: Role::Axis(crate::rig_file::grbl),
-    recognise: |lines| first(lines, is_of_grbl),
+    recognise: |lines| find_line(lines, is_of_grbl),
 };
 
 /// Its banner, a status report, an error, an alarm or a message.

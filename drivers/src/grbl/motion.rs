@@ -16,7 +16,7 @@ const KNOWN: Seconds = Seconds(0.05);
 
 /// A motion under way.
 #[derive(Clone, Debug)]
-pub struct Motion {
+pub struct JogMotion {
     /// As it was asked for.
     pub wanted: MoveTo,
     /// Its number, until it is acknowledged.
@@ -43,7 +43,7 @@ pub struct Motion {
     sent: i64,
 }
 
-impl Motion {
+impl JogMotion {
     /// Over steps of the board.
     #[must_use]
     pub fn new(
@@ -175,7 +175,7 @@ mod tests {
         for (speed, way) in long.into_iter().chain(short) {
             let wanted =
                 MoveTo { target_pulses: way, speed: MmPerS(speed), acceleration: MmPerS2(60.0) };
-            let mut motion = Motion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
+            let mut motion = JogMotion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
             let worst = worst_case_mm(wanted.speed, wanted.acceleration);
             let mut sent = motion.next_chunk(Nanos::ZERO, 0.0025).unwrap();
             assert!(sent.abs() as f64 * 0.0025 <= worst, "{speed}: {sent} first");

@@ -21,7 +21,7 @@ pub const CYCLE_START: u8 = b'~';
 
 /// Machine states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum GrblState {
     /// At rest, ready.
     Idle,
     /// G-code moves.
@@ -42,7 +42,7 @@ pub enum State {
     Sleep,
 }
 
-impl State {
+impl GrblState {
     /// Whether the axis moves in it.
     #[must_use]
     pub const fn is_moving(self) -> bool {
@@ -68,9 +68,9 @@ impl State {
 
 /// A status report. Units are those of `$13`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Status {
+pub struct GrblStatus {
     /// What it does.
-    pub state: State,
+    pub state: GrblState,
     /// Machine position of each axis, where it is told.
     pub machine: Option<Vec<f64>>,
     /// Work position of each axis, where it is told instead.
@@ -83,13 +83,13 @@ pub struct Status {
     pub free: Option<(u32, u32)>,
 }
 
-impl Status {
+impl GrblStatus {
     /// Reads what is between `<` and `>`.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut fields = text.split('|');
         let mut status = Self {
-            state: State::parse(fields.next()?)?,
+            state: GrblState::parse(fields.next()?)?,
             machine: None,
             work: None,
             offset: None,
@@ -149,7 +149,7 @@ pub enum Incoming {
     /// The machine is locked.
     Alarm(Alarm),
     /// An answer to [`QUERY`].
-    Status(Status),
+    Status(GrblStatus),
     /// It has started: the version.
     Hello(String),
     /// A numbered setting.
@@ -179,7 +179,7 @@ impl Incoming {
         }
         if let Some(inner) = line.strip_prefix('<') {
             let inner = inner.strip_suffix('>');
-            return inner.and_then(Status::parse).map_or_else(other, Self::Status);
+            return inner.and_then(GrblStatus::parse).map_or_else(other, Self::Status);
         }
         if let Some(inner) = line.strip_prefix('[') {
             let inner = inner.strip_suffix(']');
@@ -247,5 +247,4 @@ pub fn jog(axis: char, mm: f64, mm_per_min: f64) -> String {
 }
 
 #[cfg(test)]
-#[path = "protocol_tests.rs"]
 mod tests;

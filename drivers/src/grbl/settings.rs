@@ -58,7 +58,7 @@ impl GrblSettings {
 
 /// What the board's own settings make of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facts {
+pub struct BoardParameters {
     /// `$100` to `$102`.
     pub steps_per_mm: f64,
     /// Where the axis rests, in steps of the board.

@@ -13,10 +13,10 @@ const NANOS_PER_TICK: u64 = 1_000;
 const RESTARTED: &str = "the HX711 board has started anew; check its supply";
 
 /// A board that sends values.
-pub type Hx711Dialogue = LineCell<Hx711Lines>;
+pub type Hx711Dialogue = LineCell<Hx711LineReader>;
 
 /// What its lines mean.
-pub struct Hx711Lines {
+pub struct Hx711LineReader {
     header: Header,
     volts_per_count: f64,
     clock: BoardClock,
@@ -29,7 +29,7 @@ impl Hx711Dialogue {
     /// Goes on with the board of a header from `now`.
     #[must_use]
     pub fn new(header: Header, volts_per_count: f64, now: Nanos) -> Self {
-        let lines = Hx711Lines {
+        let lines = Hx711LineReader {
             header,
             volts_per_count,
             clock: BoardClock::new(NANOS_PER_TICK),
@@ -37,11 +37,11 @@ impl Hx711Dialogue {
             is_missing: false,
             other: None,
         };
-        Self::on(lines, now)
+        Self::start(lines, now)
     }
 }
 
-impl Hx711Lines {
+impl Hx711LineReader {
     /// `false` for a value that was there already.
     fn value(&mut self, now: Nanos, micros: u32, count: i32, reports: &mut CellReports) -> bool {
         let time = match self.clock.take(now, micros) {
@@ -49,19 +49,19 @@ impl Hx711Lines {
             BoardTime::At(time) => time,
             BoardTime::Restarted(time) => {
                 // The line that would have told it was lost.
-                reports.trouble(RESTARTED);
+                reports.push_trouble(RESTARTED);
                 time
             }
         };
         self.is_missing = false;
         let is_beyond = count == COUNT_MIN || count == COUNT_MAX;
         if is_beyond && !self.is_beyond {
-            reports.trouble(
+            reports.push_trouble(
                 "the bridge's signal is beyond the HX711's range; check the cell's wires, or set gain 64 in the sketch",
             );
         }
         self.is_beyond = is_beyond;
-        reports.sample(CellSample {
+        reports.push_sample(CellSample {
             at: now,
             device_time: Some(time),
             counts: count,
@@ -80,21 +80,21 @@ impl Hx711Lines {
     }
 }
 
-impl CellProtocol for Hx711Lines {
+impl CellProtocol for Hx711LineReader {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         match parse(line) {
             Some(Message::Value { micros, count }) => {
                 return self.value(now, micros, count, reports);
             }
             Some(Message::Started { micros, header }) => {
-                reports.trouble(RESTARTED);
+                reports.push_trouble(RESTARTED);
                 self.clock.restart(now, micros);
                 self.check(header);
             }
             Some(Message::Header { header, .. }) => self.check(header),
             Some(Message::Missing { .. }) => {
                 if !std::mem::replace(&mut self.is_missing, true) {
-                    reports.trouble(
+                    reports.push_trouble(
                         "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply",
                     );
                 }

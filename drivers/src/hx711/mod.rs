@@ -18,7 +18,7 @@ pub mod protocol;
 pub use dialogue::Hx711Dialogue;
 
 use crate::cell::CellDevice;
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file::Fields;
 use palpate_model::units::Volts;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     introduction: "load cell on an HX711, ",
     role: Role::Cell { read, emulation: None },
     recognise: |lines| {
-        first(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
+        find_line(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
     },
 };
 

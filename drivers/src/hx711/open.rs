@@ -4,7 +4,7 @@ use super::Hx711Settings;
 use super::dialogue::Hx711Dialogue;
 use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
 use crate::cell::{CellDescription, CellDevice};
-use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
+use crate::text::{DeviceError, OpenedCell, TextConsole, describe_unknown_device};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
@@ -96,7 +96,7 @@ fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
             "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
         ));
     }
-    Err(DeviceError::Other { device: DEVICE, found: stranger(&console.heard) })
+    Err(DeviceError::Other { device: DEVICE, found: describe_unknown_device(&console.heard) })
 }
 
 /// Values a second by the board's clock.

@@ -59,7 +59,7 @@ impl ForceUnit {
 
 /// A reading: compression positive, tension negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading {
+pub struct GaugeReading {
     /// The number.
     pub number: Decimal,
     /// Its unit.
@@ -95,7 +95,7 @@ pub struct GaugeList {
 #[derive(Clone, Debug, PartialEq)]
 pub enum GaugeLine {
     /// A reading with its unit.
-    Reading(Reading),
+    Reading(GaugeReading),
     /// A reading beyond the gauge's range.
     Overload,
     /// The last command was refused.
@@ -142,7 +142,7 @@ impl GaugeLine {
             && let (Some(number), Some(unit)) =
                 (Decimal::parse(number), ForceUnit::parse(unit.trim_start()))
         {
-            return Self::Reading(Reading { number, unit });
+            return Self::Reading(GaugeReading { number, unit });
         }
         // A guess: the guides tell what the display shows, not what is sent then.
         if line.to_ascii_uppercase().starts_with("OVER") {
@@ -188,7 +188,7 @@ mod tests {
 
     fn reading(line: &str) -> Option<(i32, u8, ForceUnit)> {
         match GaugeLine::parse(line) {
-            GaugeLine::Reading(Reading { number, unit }) => {
+            GaugeLine::Reading(GaugeReading { number, unit }) => {
                 Some((number.digits, number.decimals, unit))
             }
             _ => None,

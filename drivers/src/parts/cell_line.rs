@@ -80,9 +80,9 @@ impl CellLine {
     /// When a sample was sent that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
     /// before it a period apart, or closer where there is less time since the last one.
     fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
-        let told = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
+        let newest = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
         // The samples that are left share what is left of the time.
-        let apart = self.period.min(Nanos(at.since(told).0 / (newer + 1)));
+        let apart = self.period.min(Nanos(at.since(newest).0 / (newer + 1)));
         Nanos(at.0 - apart.0 * newer)
     }
 
@@ -233,7 +233,7 @@ mod tests {
         let ms = Nanos::from_millis;
         let track = Arc::new(Mutex::new(Track::at_rest(0)));
         let mut line = CellLine::new(Box::<Bytes>::default(), (250.0, ms(0)), track, ms(1_000));
-        let mut told = Vec::new();
+        let mut ticks = Vec::new();
         // One, four that a converter has held back, then two that come closer than the rate.
         for (at, bytes) in [(1_010, &[0][..]), (1_026, &[0, 0, 0, 0]), (1_028, &[0, 0])] {
             line.received(ms(at), bytes);
@@ -241,9 +241,9 @@ mod tests {
                 let age = reading.age.expect("it is known");
                 assert_eq!(age.within, ms(3));
                 assert_eq!(now.since(ms(1_000 + reading.tick)), age.by);
-                told.push(reading.tick);
+                ticks.push(reading.tick);
             }
         }
-        assert_eq!(told, [10, 14, 18, 22, 26, 27, 28]);
+        assert_eq!(ticks, [10, 14, 18, 22, 26, 27, 28]);
     }
 }

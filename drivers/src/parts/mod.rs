@@ -11,5 +11,5 @@ mod track;
 
 pub use cell_clock::CellClock;
 pub use cell_line::{CellLine, TICK};
-pub use rig::{Axis, Parts, PartsRig};
-pub use track::{Placed, Track};
+pub use rig::{OpenedAxis, PartsRig, SplitRigDevices};
+pub use track::{AxisState, Track};

@@ -7,15 +7,15 @@ use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::grbl::{self, GrblSettings};
 use crate::rig::RigEventBody;
 use crate::text::OpenedCell;
-use crate::wire::{HostClock, Line, LineSettings, Place};
+use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, RawBytes, RigCommand};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// An axis in progress, and what it writes its deeds into.
-pub struct Axis {
+pub struct OpenedAxis {
     /// Its thread.
-    pub line: Line,
+    pub line: LinkThread,
     /// Where it was when.
     pub track: Arc<Mutex<Track>>,
     /// Bytes of the time before the thread had the link.
@@ -23,11 +23,11 @@ pub struct Axis {
 }
 
 /// An axis and a load cell.
-pub type PartsRig = DeviceRig<Parts>;
+pub type PartsRig = DeviceRig<SplitRigDevices>;
 
 /// An axis and a load cell to be opened.
 #[derive(Clone)]
-pub struct Parts {
+pub struct SplitRigDevices {
     axis: (Place, GrblSettings),
     cell: (Place, Arc<dyn CellDevice>),
     /// Of what was opened last.
@@ -40,7 +40,7 @@ pub struct Parts {
     motions_shown: u64,
 }
 
-impl Parts {
+impl SplitRigDevices {
     /// A Grbl board and a load cell, each with its place.
     #[must_use]
     pub fn new(axis: (Place, GrblSettings), cell: (Place, Arc<dyn CellDevice>)) -> Self {
@@ -55,7 +55,7 @@ impl Parts {
     }
 }
 
-impl RigDevice for Parts {
+impl RigDevice for SplitRigDevices {
     fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
         let ((axis_place, settings), (cell_place, cell)) = (&self.axis, &self.cell);
         let device: Arc<str> = "cell".into();
@@ -68,8 +68,8 @@ impl RigDevice for Parts {
         (self.zero, self.motions_shown) = (0, 0);
         let line =
             CellLine::new(dialogue, (cell.rate, cell.delay), Arc::clone(&self.track), self.start);
-        let line_settings = LineSettings { device, farewell };
-        let cell_line = Line::start(link, line, clock, line_settings)?;
+        let line_settings = LinkThreadSettings { device, farewell };
+        let cell_line = LinkThread::start(link, line, clock, line_settings)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
         description.tick_nanos = TICK.0;
         description.adc = Some(cell.adc);

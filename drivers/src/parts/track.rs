@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 const PIECES_MAX: usize = 256;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Piece {
+struct TrackPiece {
     from: Nanos,
     /// Pulses where it begins.
     pulses: f64,
@@ -26,7 +26,7 @@ struct Piece {
 /// What an axis did.
 #[derive(Clone, Debug)]
 pub struct Track {
-    pieces: VecDeque<Piece>,
+    pieces: VecDeque<TrackPiece>,
     inputs: VecDeque<(Nanos, AxisStatus)>,
     motion: u64,
     /// Something else of the rig has failed: the axis is to stop.
@@ -35,7 +35,7 @@ pub struct Track {
 
 /// An axis at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct AxisState {
     /// Pulses of its own counter.
     pub pulses: f64,
     /// Motion, switches, motor.
@@ -54,11 +54,11 @@ impl Track {
             motion: 0,
             is_stop_wanted: false,
         };
-        track.rest(Nanos::ZERO, pulses);
+        track.begin_rest(Nanos::ZERO, pulses);
         track
     }
 
-    fn push(&mut self, piece: Piece) {
+    fn push(&mut self, piece: TrackPiece) {
         if self.pieces.len() >= PIECES_MAX {
             self.pieces.pop_front();
         }
@@ -66,8 +66,8 @@ impl Track {
     }
 
     /// It rests here from then on.
-    pub fn rest(&mut self, from: Nanos, pulses: i64) {
-        self.push(Piece {
+    pub fn begin_rest(&mut self, from: Nanos, pulses: i64) {
+        self.push(TrackPiece {
             from,
             pulses: pulses as f64,
             course: None,
@@ -77,9 +77,9 @@ impl Track {
     }
 
     /// It moves from then on: a profile in mm from zero, and how many pulses a mm of it is.
-    pub fn moves(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
+    pub fn begin_motion(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
         self.motion += 1;
-        self.push(Piece {
+        self.push(TrackPiece {
             from,
             pulses,
             course: Some((profile, pulses_per_mm)),
@@ -89,7 +89,7 @@ impl Track {
     }
 
     /// From then on the motion under way is braked.
-    pub fn brakes(&mut self, from: Nanos) {
+    pub fn begin_braking(&mut self, from: Nanos) {
         let Some(last) = self.pieces.back().copied() else {
             return;
         };
@@ -99,7 +99,7 @@ impl Track {
         let since = seconds(from, last.from);
         let end = profile.stopped_at(since);
         let here = profile.position(since).0 * pulses_per_mm;
-        self.push(Piece {
+        self.push(TrackPiece {
             from,
             // The braking begins where the profile is by then.
             pulses: last.pulses,
@@ -112,14 +112,14 @@ impl Track {
 
     /// The motion under way ends earlier than was told, at the end of this profile, such as when the way behind it was
     /// never given.
-    pub fn shortened(&mut self, profile: Profile) {
-        if let Some(Piece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
+    pub fn shorten_motion(&mut self, profile: Profile) {
+        if let Some(TrackPiece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
             *course = profile;
         }
     }
 
     /// Nobody watches the axis any more: it rests where and when its motion ends.
-    pub fn ends(&mut self) {
+    pub fn finish_motion(&mut self) {
         let Some(last) = self.pieces.back().copied() else {
             return;
         };
@@ -128,11 +128,11 @@ impl Track {
         };
         let end = last.pulses + profile.end().0 * pulses_per_mm;
         let after = Nanos((profile.duration().0 * 1e9) as u64);
-        self.rest(last.from + after, end.round() as i64);
+        self.begin_rest(last.from + after, end.round() as i64);
     }
 
     /// Switches and motor from then on.
-    pub fn inputs(&mut self, from: Nanos, status: AxisStatus) {
+    pub fn set_inputs(&mut self, from: Nanos, status: AxisStatus) {
         if self.inputs.back().is_some_and(|(_, last)| *last == status) {
             return;
         }
@@ -143,10 +143,10 @@ impl Track {
     }
 
     /// At a time.
-    pub fn at(&self, time: Nanos) -> Placed {
+    pub fn at(&self, time: Nanos) -> AxisState {
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
         // Before all that is remembered: as it was first.
-        let piece = piece.or(self.pieces.front()).copied().unwrap_or(Piece {
+        let piece = piece.or(self.pieces.front()).copied().unwrap_or(TrackPiece {
             from: Nanos::ZERO,
             pulses: 0.0,
             course: None,
@@ -158,7 +158,11 @@ impl Track {
         });
         let inputs = self.inputs.iter().rev().find(|(from, _)| *from <= time);
         let inputs = inputs.map_or(AxisStatus(0), |(_, status)| *status);
-        Placed { pulses: piece.pulses + way, status: piece.status | inputs, motion: piece.motion }
+        AxisState {
+            pulses: piece.pulses + way,
+            status: piece.status | inputs,
+            motion: piece.motion,
+        }
     }
 }
 
@@ -176,10 +180,10 @@ mod tests {
         let mut track = Track::at_rest(100);
         let ms = Nanos::from_millis;
         let profile = Profile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
-        track.inputs(ms(500), AxisStatus::MOTOR_ON);
-        track.moves(ms(1_000), 100.0, profile, -400.0);
-        track.brakes(ms(2_000));
-        track.rest(ms(2_500), -700);
+        track.set_inputs(ms(500), AxisStatus::MOTOR_ON);
+        track.begin_motion(ms(1_000), 100.0, profile, -400.0);
+        track.begin_braking(ms(2_000));
+        track.begin_rest(ms(2_500), -700);
         assert_eq!(track.at(ms(400)).pulses, 100.0);
         assert_eq!(track.at(ms(400)).status, AxisStatus(0));
         let moving = track.at(ms(1_500));
@@ -200,19 +204,19 @@ mod tests {
         let ms = Nanos::from_millis;
         let speed = (MmPerS(2.0), MmPerS2(20.0));
         let profile = |to| Profile::to_rest(Position(0.0), Position(to), speed.0, speed.1);
-        track.ends();
+        track.finish_motion();
         assert_eq!(track.at(ms(500)).pulses, 100.0);
-        track.moves(ms(1_000), 100.0, profile(10.0), -400.0);
-        track.shortened(profile(1.0));
-        track.ends();
+        track.begin_motion(ms(1_000), 100.0, profile(10.0), -400.0);
+        track.shorten_motion(profile(1.0));
+        track.finish_motion();
         assert!(track.at(ms(1_300)).status.has(AxisStatus::MOVING));
         let rest = track.at(ms(2_000));
         assert_eq!((rest.pulses, rest.motion), (-300.0, 1));
         assert!(!rest.status.has(AxisStatus::MOVING));
         // A motion that is being braked ends there.
-        track.moves(ms(3_000), -300.0, profile(10.0), 400.0);
-        track.brakes(ms(4_000));
-        track.ends();
+        track.begin_motion(ms(3_000), -300.0, profile(10.0), 400.0);
+        track.begin_braking(ms(4_000));
+        track.finish_motion();
         let rest = track.at(ms(9_000));
         assert!(!rest.status.has(AxisStatus::MOVING));
         // 0.1 mm while it gains speed, 0.9 s at 2 mm/s, 0.1 mm while it brakes.

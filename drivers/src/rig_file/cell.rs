@@ -1,7 +1,7 @@
 //! The keys of a load cell on a wire of its own, in the table `[cell]`.
 
+use super::address::read_address;
 use super::fields::Fields;
-use super::place::place;
 use crate::cell::CellDevice;
 use crate::devices::{DEVICES, Role};
 use crate::mark10::GaugeSettings;
@@ -17,7 +17,7 @@ pub(super) fn read(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> 
         Role::Axis(_) => None,
     });
     let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
-    let place = place(fields, "cell.");
+    let place = read_address(fields, "cell.");
     let cell = cell?(fields)?;
     Some((place?, cell))
 }

@@ -1,8 +1,8 @@
 //! The keys of a Galil controller.
 
 use super::RigFile;
+use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
-use super::place::place;
 use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
 use palpate_model::units::Volts;
@@ -16,7 +16,7 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
 
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
-    let place = place(fields, "");
+    let place = read_address(fields, "");
     let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {

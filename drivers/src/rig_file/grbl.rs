@@ -1,8 +1,8 @@
 //! The keys of a Grbl board.
 
 use super::RigFile;
+use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
-use super::place::place;
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
 use crate::parts::Parts;
 use crate::wire::Place;
@@ -23,7 +23,7 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
 /// Where the board is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
-    let place = place(fields, "");
+    let place = read_address(fields, "");
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);

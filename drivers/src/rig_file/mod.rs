@@ -3,11 +3,11 @@
 //! Text in, a [`RigFile`] or every mistake with its line out; [`RigFile::open`] then opens the devices. The keys are
 //! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
 
+mod address;
 mod cell;
 pub mod fields;
 mod galil;
 mod grbl;
-mod place;
 mod stand;
 
 pub(crate) use cell::gauge;

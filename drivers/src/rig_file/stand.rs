@@ -1,9 +1,9 @@
 //! The keys of a Mark-10 stand with its gauge.
 
 use super::RigFile;
+use super::address::read_address;
 use super::cell::gauge;
 use super::fields::Fields;
-use super::place::place;
 use crate::mark10::{StandDevice, StandSettings};
 use crate::wire::Place;
 
@@ -16,7 +16,7 @@ pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
 
 /// Where the stand is, and what it is.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
-    let place = place(fields, "");
+    let place = read_address(fields, "");
     let limits = fields.limits();
     let is_upwards = fields.choice("direction", &[("down", false), ("up", true)], Some(false));
     let gauge = gauge(fields);

@@ -20,7 +20,7 @@ const SOLVE_STEPS_MAX: usize = 60;
 
 /// What the probe and the cell feel at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
+pub struct BenchForces {
     /// True position of the probe's tip.
     pub probe: Position,
     /// Force on the probe.
@@ -88,11 +88,11 @@ impl Bench {
     }
 
     /// The axis has moved straight to a true position in a time step.
-    pub fn advance(&mut self, axis: Position, dt: Seconds) -> Felt {
+    pub fn advance(&mut self, axis: Position, dt: Seconds) -> BenchForces {
         let compliance = self.settings.compliance.mm_per_newton();
         self.probe = if compliance > 0.0 { self.balanced(axis, dt, compliance) } else { axis };
         let on_probe = self.push(self.probe, dt);
-        Felt { probe: self.probe, on_probe, on_cell: on_probe + self.weights }
+        BenchForces { probe: self.probe, on_probe, on_cell: on_probe + self.weights }
     }
 
     /// Where the force that bends the rig is the force that tissue and base have there:

@@ -109,8 +109,8 @@ impl LoadCell {
         let noise = self.noise.normal();
         match &mut self.error {
             CellError::Ideal { noise: rms } => {
-                let felt = Newtons(force.0 + rms.0 * noise);
-                self.curve.volts_from_newtons(felt)
+                let noisy = Newtons(force.0 + rms.0 * noise);
+                self.curve.volts_from_newtons(noisy)
             }
             CellError::Lab { drift, drift_per_tick, wander_step, wander, ticks } => {
                 *ticks += 1;

@@ -189,14 +189,14 @@ impl SimRig {
             self.report(at, answer);
         }
         let axis = self.slider.end_tick(tick);
-        let felt = self.bench.advance(axis.position, self.tick);
-        let (counts, volts) = self.load_cell.read(felt.on_cell);
+        let forces = self.bench.advance(axis.position, self.tick);
+        let (counts, volts) = self.load_cell.read(forces.on_cell);
         self.truth = Truth {
             tick,
-            position: felt.probe,
+            position: forces.probe,
             surface: self.bench.surface(),
             counter_zero: self.slider.counter_zero(),
-            force: felt.on_probe,
+            force: forces.on_probe,
             ..self.truth
         };
         let reading =

@@ -33,7 +33,7 @@ const FREE: f64 = 1e-9;
 
 /// How far the surface has receded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Set {
+pub(super) struct SurfaceRecession {
     share: f64,
     /// Greatest depth so far behind where the surface was at first, in mm.
     depth_max: f64,
@@ -43,7 +43,7 @@ pub(super) struct Set {
     set: f64,
 }
 
-impl Set {
+impl SurfaceRecession {
     /// Nothing has pressed the specimen yet.
     pub fn new(preconditioning: SimPreconditioning) -> Self {
         Self { share: preconditioning.share(), depth_max: 0.0, depth: 0.0, set: 0.0 }

@@ -15,20 +15,20 @@ const HEATING_SECS: f64 = 120.0;
 const VALUES_PER_DEGREE: f64 = 20.0;
 
 /// A sensor is told when it has changed, and once in this time in any case.
-const TELL_EVERY: Nanos = Nanos::from_millis(1000);
+const REPORT_EVERY: Nanos = Nanos::from_millis(1000);
 
 /// What is told of them, by the rig's time.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     bath: SimBath,
     input: SimInput,
-    told: Vec<(Nanos, SensorReading)>,
+    last_reported: Vec<(Nanos, SensorReading)>,
 }
 
 impl Sensors {
     /// The sensors that settings ask for.
     pub fn new(settings: &SimSettings) -> Self {
-        Self { bath: settings.bath, input: settings.input, told: Vec::new() }
+        Self { bath: settings.bath, input: settings.input, last_reported: Vec::new() }
     }
 
     /// Which there are.
@@ -51,16 +51,20 @@ impl Sensors {
             let is_high = secs >= closes;
             SensorReading::DigitalInput { number: 1, is_high }
         });
-        let mut news = Vec::new();
+        let mut changed = Vec::new();
         for (index, reading) in bath.into_iter().chain(input).enumerate() {
-            match self.told.get_mut(index) {
-                Some((at, told)) if *told == reading && now.since(*at) < TELL_EVERY => continue,
-                Some(told) => *told = (now, reading),
-                None => self.told.push((now, reading)),
+            match self.last_reported.get_mut(index) {
+                Some((at, last_reported))
+                    if *last_reported == reading && now.since(*at) < REPORT_EVERY =>
+                {
+                    continue;
+                }
+                Some(last_reported) => *last_reported = (now, reading),
+                None => self.last_reported.push((now, reading)),
             }
-            news.push(reading);
+            changed.push(reading);
         }
-        news
+        changed
     }
 }
 

@@ -1,6 +1,6 @@
 //! Why a device that speaks in lines cannot be used, in words.
 
-use crate::devices::{DeviceKind, lines_of};
+use crate::devices::{DeviceKind, split_lines};
 use crate::galil;
 use std::io;
 use thiserror::Error;
@@ -66,9 +66,9 @@ const QUOTE_MAX: usize = 60;
 
 /// What a device is that answered otherwise than expected: by its name where its words give it away.
 #[must_use]
-pub fn stranger(said: &[u8]) -> String {
-    let text = String::from_utf8_lossy(said);
-    let known = DeviceKind::of_lines(&lines_of(&text)).map(|(kind, _)| kind.title);
+pub fn describe_unknown_device(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let known = DeviceKind::recognise_lines(&split_lines(&text)).map(|(kind, _)| kind.title);
     let known = known.or_else(|| is_prompts(&text).then_some(galil::KIND.title));
     known.map_or_else(
         || {
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn strangers_are_called_by_their_names() {
-        for (said, name) in [
+        for (bytes, name) in [
             ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
             ("error:8\r\n", "Grbl"),
             ("?:", "Galil"),
@@ -100,9 +100,9 @@ mod tests {
             ("-18.78 lbF\r\n", "Mark-10 gauge"),
             ("H,100,palpate-hx711,1,80,128,a*1234\r\n", "HX711"),
         ] {
-            assert!(stranger(said.as_bytes()).contains(name), "{said:?}");
+            assert!(describe_unknown_device(bytes.as_bytes()).contains(name), "{bytes:?}");
         }
-        let other = stranger(b"\x00\xffhello\r\n");
+        let other = describe_unknown_device(b"\x00\xffhello\r\n");
         assert!(other.contains("hello") && !other.contains('\0'), "{other}");
     }
 }

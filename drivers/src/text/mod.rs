@@ -8,6 +8,6 @@ mod opened;
 
 pub use console::TextConsole;
 pub use decimal::Decimal;
-pub use error::{DeviceError, stranger};
+pub use error::{DeviceError, describe_unknown_device};
 pub use lines::{Lines, Taken};
 pub use opened::OpenedCell;

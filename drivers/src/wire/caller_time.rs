@@ -23,7 +23,7 @@ impl CallerTime {
     }
 
     /// The caller asks for what comes until a time of its own: the host's time now, and of that end.
-    pub fn asked(&mut self, until: Nanos) -> (Nanos, Nanos) {
+    pub fn window(&mut self, until: Nanos) -> (Nanos, Nanos) {
         let now = (self.clock)();
         let begun = Nanos(now.0.saturating_sub(until.0));
         // A caller whose time stood still, as while the computer slept, begins anew.
@@ -36,14 +36,14 @@ impl CallerTime {
     }
 
     /// The caller's time of a moment of the host's clock; never before what was told already.
-    pub fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
+    pub fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
         let origin = self.origin.unwrap_or(at);
         self.newest = at.since(origin).max(self.newest).min(until);
         self.newest
     }
 
     /// The same without an order: of bytes that were exchanged.
-    pub fn of(&self, at: Nanos) -> Nanos {
+    pub fn caller_time(&self, at: Nanos) -> Nanos {
         at.since(self.origin.unwrap_or(Nanos::ZERO))
     }
 }

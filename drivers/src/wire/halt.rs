@@ -1,6 +1,6 @@
 //! The immediate stop around whoever holds a rig: for a program that panics.
 
-use super::line::Numbered;
+use super::link_thread::NumberedCommand;
 use palpate_model::rig::RigCommand;
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ const LOOK_EVERY: Duration = Duration::from_micros(200);
 
 /// Stops of a link, counted.
 #[derive(Debug, Default)]
-pub(super) struct Standing {
+pub(super) struct StopCounters {
     /// Handed to the link's thread.
     pub sent: AtomicU64,
     /// The newest of which every byte is written.
@@ -24,15 +24,15 @@ pub(super) struct Standing {
 /// Sends the immediate stop over a link from any thread, without a lock and without the rig.
 #[derive(Clone, Debug)]
 pub struct HaltHandle {
-    stops: SyncSender<Numbered>,
-    standing: Arc<Standing>,
+    stops: SyncSender<NumberedCommand>,
+    standing: Arc<StopCounters>,
     owner: ThreadId,
 }
 
 impl HaltHandle {
     pub(super) fn new(
-        stops: SyncSender<Numbered>,
-        standing: Arc<Standing>,
+        stops: SyncSender<NumberedCommand>,
+        standing: Arc<StopCounters>,
         owner: ThreadId,
     ) -> Self {
         Self { stops, standing, owner }
@@ -73,11 +73,11 @@ impl HaltHandle {
 }
 
 /// What is left to be done when a link's thread has panicked.
-type Deferred = Box<dyn FnOnce()>;
+type DeferredWork = Box<dyn FnOnce()>;
 
 thread_local! {
     static OWNS_LINK: Cell<bool> = const { Cell::new(false) };
-    static DEFERRED: RefCell<Option<Deferred>> = const { RefCell::new(None) };
+    static DEFERRED: RefCell<Option<DeferredWork>> = const { RefCell::new(None) };
 }
 
 /// This thread is the only one that has a link.

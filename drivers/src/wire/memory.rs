@@ -10,12 +10,12 @@ use std::time::Duration;
 const BYTES_MAX: usize = 4096;
 
 #[derive(Default)]
-struct Way {
+struct Pipe {
     bytes: VecDeque<u8>,
     is_closed: bool,
 }
 
-type Shared = Arc<(Mutex<Way>, Condvar)>;
+type Shared = Arc<(Mutex<Pipe>, Condvar)>;
 
 /// One end; dropped it is unplugged.
 pub struct MemoryLink {
@@ -34,31 +34,31 @@ pub fn pair() -> (MemoryLink, MemoryLink) {
 
 impl Link for MemoryLink {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
-        let (way, came) = &*self.incoming;
-        let way = way.lock().unwrap_or_else(PoisonError::into_inner);
-        let (mut way, _) = came
-            .wait_timeout_while(way, wait, |way| way.bytes.is_empty() && !way.is_closed)
+        let (pipe, came) = &*self.incoming;
+        let pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
+        let (mut pipe, _) = came
+            .wait_timeout_while(pipe, wait, |pipe| pipe.bytes.is_empty() && !pipe.is_closed)
             .unwrap_or_else(PoisonError::into_inner);
-        if way.bytes.is_empty() && way.is_closed {
+        if pipe.bytes.is_empty() && pipe.is_closed {
             return Err(ErrorKind::UnexpectedEof.into());
         }
-        let count = way.bytes.len().min(buffer.len());
-        for (place, byte) in buffer.iter_mut().zip(way.bytes.drain(..count)) {
+        let count = pipe.bytes.len().min(buffer.len());
+        for (place, byte) in buffer.iter_mut().zip(pipe.bytes.drain(..count)) {
             *place = byte;
         }
         Ok(count)
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let (way, came) = &*self.outgoing;
-        let mut way = way.lock().unwrap_or_else(PoisonError::into_inner);
-        if way.is_closed {
+        let (pipe, came) = &*self.outgoing;
+        let mut pipe = pipe.lock().unwrap_or_else(PoisonError::into_inner);
+        if pipe.is_closed {
             return Err(ErrorKind::BrokenPipe.into());
         }
-        if way.bytes.len() + bytes.len() > BYTES_MAX {
+        if pipe.bytes.len() + bytes.len() > BYTES_MAX {
             return Err(ErrorKind::TimedOut.into());
         }
-        way.bytes.extend(bytes);
+        pipe.bytes.extend(bytes);
         came.notify_all();
         Ok(())
     }
@@ -67,8 +67,8 @@ impl Link for MemoryLink {
 impl Drop for MemoryLink {
     fn drop(&mut self) {
         for shared in [&self.incoming, &self.outgoing] {
-            let (way, came) = &**shared;
-            way.lock().unwrap_or_else(PoisonError::into_inner).is_closed = true;
+            let (pipe, came) = &**shared;
+            pipe.lock().unwrap_or_else(PoisonError::into_inner).is_closed = true;
             came.notify_all();
         }
     }

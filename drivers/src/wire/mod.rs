@@ -1,26 +1,26 @@
 //! Bytes to a device and back: links, and the thread that owns one.
 //!
 //! Nothing here knows what the bytes mean: that is a [`Dialogue`], a state machine with the time handed in, so that
-//! every protocol can be tested without a port, a thread or a clock. [`Line`] runs one on a link.
+//! every protocol can be tested without a port, a thread or a clock. [`LinkThread`] runs one on a link.
 
-mod answers;
+mod address;
+mod answer_queue;
 mod caller_time;
 mod dialogue;
 mod halt;
-mod line;
 mod link;
+mod link_thread;
 mod memory;
-mod place;
 mod tapped;
 
-pub use answers::Answers;
+pub use address::{Place, WireError};
+pub use answer_queue::AnswerQueue;
 pub use caller_time::CallerTime;
 pub use dialogue::{Dialogue, LinkStats};
 pub use halt::{HaltHandle, after_farewell};
-pub use line::{Line, LineSettings};
 pub use link::{Link, SerialLink, TcpLink};
+pub use link_thread::{LinkThread, LinkThreadSettings};
 pub use memory::{MemoryLink, pair};
-pub use place::{Place, WireError};
 pub use tapped::TappedLink;
 
 use palpate_model::Nanos;

@@ -2,22 +2,22 @@
 //! stops before everything.
 
 mod answers;
-mod search;
+mod resync;
 mod writing;
 
+use super::clock_alignment::ClockAlignment;
 use super::connect::Connected;
-use super::order::Order;
-use super::protocol::{Incoming, LINE_MAX, Parser};
-use super::recording::{self, Recording};
+use super::order::GalilOrder;
+use super::protocol::{GalilMessage, GalilParser, LINE_MAX};
+use super::recording::{self, ArrayRecording};
 use super::sampling::Sampler;
 use super::settings::GalilSettings;
-use super::sine::Feed;
-use super::timing::Timing;
+use super::sine::SineFeed;
 use crate::rig::RigEventBody;
-use crate::wire::{Answers, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
-use search::{MARKERS_MAX, QUIET, Search};
+use resync::{MARKERS_MAX, QUIET, Resynchronisation};
 use std::collections::VecDeque;
 
 /// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
@@ -32,7 +32,7 @@ const RESET: &str = "the controller was reset; open the rig again";
 
 /// A stop that is sent until the controller has accepted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Halting {
+struct PendingStop {
     /// The command it answers; `None` for a stop that nobody waits for.
     number: Option<u64>,
     command: RigCommand,
@@ -40,14 +40,14 @@ struct Halting {
     refusals: u32,
 }
 
-impl Halting {
+impl PendingStop {
     /// One that nobody waits for.
     const QUIET: Self = Self { number: None, command: RigCommand::Stop, refusals: 0 };
 }
 
 /// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
+enum ExpectedReply {
     /// A sample.
     Sample,
     /// A sample behind a command; `true` behind the begin of a motion.
@@ -61,9 +61,9 @@ enum Asked {
     /// A part of the order under way.
     Part,
     /// A command that stops.
-    Stop(Halting),
+    Stop(PendingStop),
     /// `TC1`, after a refusal of the order under way.
-    Why,
+    RefusalReason,
     /// A number that must come back.
     Marker(u32),
 }
@@ -72,12 +72,12 @@ enum Asked {
 #[derive(Clone, Debug, PartialEq)]
 struct Outgoing {
     pub text: String,
-    pub asked: Vec<Asked>,
+    pub expects: Vec<ExpectedReply>,
 }
 
 /// How fast the link was when the controller was set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub struct PollPace {
     /// Between two questions.
     pub every: Nanos,
     /// Questions that may wait for answers at once.
@@ -90,34 +90,34 @@ pub struct Pace {
 #[derive(Clone, Debug)]
 pub struct Session {
     settings: GalilSettings,
-    pace: Pace,
+    pace: PollPace,
     has_watchdog: bool,
     question: String,
-    parser: Parser,
+    parser: GalilParser,
     sampler: Sampler,
-    recording: Option<Recording>,
-    sine: Option<Feed>,
-    timing: Timing,
-    expected: VecDeque<(Asked, Nanos)>,
+    recording: Option<ArrayRecording>,
+    sine: Option<SineFeed>,
+    timing: ClockAlignment,
+    expected: VecDeque<(ExpectedReply, Nanos)>,
     urgent: VecDeque<Outgoing>,
     lines: VecDeque<Outgoing>,
     fetches: VecDeque<Outgoing>,
     /// The part of an order that begins something, and when it may go out.
     beginning: Option<(Outgoing, Nanos)>,
     orders: VecDeque<(u64, RigCommand)>,
-    order: Option<(u64, Order)>,
-    answers: Answers,
+    order: Option<(u64, GalilOrder)>,
+    answers: AnswerQueue,
     is_motion_begun: bool,
-    search: Option<Search>,
+    resync: Option<Resynchronisation>,
     /// Stops whose answers went by while the order was being looked for.
-    unconfirmed: Vec<Halting>,
+    unconfirmed: Vec<PendingStop>,
     /// Why nothing but stops is done any more.
     is_reset: bool,
     /// When somebody took samples last; the beginning counts.
-    attended: Nanos,
+    attended_at: Nanos,
     /// When the axis was stopped last because nobody took samples.
     abandoned_at: Option<Nanos>,
-    asked_at: Option<Nanos>,
+    polled_at: Option<Nanos>,
     renewed_at: Option<Nanos>,
     answered_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -128,7 +128,7 @@ impl Session {
     /// With a controller that was set up just now.
     #[must_use]
     pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
-        let recording = connected.plan.map(Recording::new);
+        let recording = connected.plan.map(ArrayRecording::new);
         let question = match &recording {
             Some(_) => recording::question(&settings),
             None => Sampler::question(&settings),
@@ -138,11 +138,11 @@ impl Session {
             sampler: Sampler::new(settings.clone()),
             recording,
             sine: None,
-            timing: Timing::default(),
+            timing: ClockAlignment::default(),
             settings,
             pace: connected.pace,
             has_watchdog: connected.has_watchdog,
-            parser: Parser::default(),
+            parser: GalilParser::default(),
             expected: VecDeque::new(),
             urgent: VecDeque::new(),
             lines: VecDeque::new(),
@@ -150,14 +150,14 @@ impl Session {
             beginning: None,
             orders: VecDeque::new(),
             order: None,
-            answers: Answers::default(),
+            answers: AnswerQueue::default(),
             is_motion_begun: false,
-            search: None,
+            resync: None,
             unconfirmed: Vec::new(),
             is_reset: false,
-            attended: now,
+            attended_at: now,
             abandoned_at: None,
-            asked_at: None,
+            polled_at: None,
             renewed_at: None,
             answered_at: now,
             events: VecDeque::new(),
@@ -179,15 +179,15 @@ impl Session {
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
         self.answers.acknowledge(number, command);
-        self.tell_answers(now);
+        self.report_answers(now);
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
         self.answers.refuse(number, detail);
-        self.tell_answers(now);
+        self.report_answers(now);
     }
 
-    fn tell_answers(&mut self, now: Nanos) {
+    fn report_answers(&mut self, now: Nanos) {
         while let Some(answer) = self.answers.take() {
             self.report_in_order(now, answer);
         }
@@ -196,7 +196,7 @@ impl Session {
 
 impl Dialogue for Session {
     fn attended(&mut self, at: Nanos) {
-        self.attended = at;
+        self.attended_at = at;
         self.abandoned_at = None;
     }
 
@@ -221,16 +221,16 @@ impl Dialogue for Session {
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        if let Some(search) = self.search.as_mut().filter(|_| !bytes.is_empty()) {
-            search.last_byte = now;
+        if let Some(resync) = self.resync.as_mut().filter(|_| !bytes.is_empty()) {
+            resync.last_byte = now;
         }
         for byte in bytes {
             match self.parser.take(*byte) {
-                Some(Incoming::Reply(reply)) => self.on_reply(now, &reply),
+                Some(GalilMessage::Reply(reply)) => self.on_reply(now, &reply),
                 // What programs of the controller say is in the log of raw bytes.
-                Some(Incoming::Unasked(_)) => {}
-                Some(Incoming::Flood) if self.search.is_none() => self.lose_order(now),
-                Some(Incoming::Flood) | None => {}
+                Some(GalilMessage::Unsolicited(_)) => {}
+                Some(GalilMessage::Flood) if self.resync.is_none() => self.resynchronise(now),
+                Some(GalilMessage::Flood) | None => {}
             }
         }
     }
@@ -238,31 +238,31 @@ impl Dialogue for Session {
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
         let is_overdue =
             self.expected.front().is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
-        if is_overdue && self.search.is_none() {
-            self.lose_order(now);
+        if is_overdue && self.resync.is_none() {
+            self.resynchronise(now);
         }
         let line = self.next_line(now)?;
         debug_assert!(line.text.len() <= LINE_MAX, "{}", line.text);
-        for asked in line.asked {
-            self.expected.push_back((asked, now));
+        for expects in line.expects {
+            self.expected.push_back((expects, now));
         }
         Some(line.text.into_bytes())
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
-        if self.search.is_some() {
+        if self.resync.is_some() {
             // Often enough to see that the line has become quiet.
             return now + Nanos(QUIET.0 / 10);
         }
         // While answers are on their way nothing is due; their bytes end the wait.
         let is_waiting = self.samples_in_flight() >= self.pace.in_flight
-            || self.recording.as_ref().is_some_and(Recording::is_fetching);
+            || self.recording.as_ref().is_some_and(ArrayRecording::is_fetching);
         let due = match &self.beginning {
             Some((_, due)) => *due,
             None if is_waiting => now + QUIET,
-            None => self.asked_at.map_or(now, |at| at + self.pace.every),
+            None => self.polled_at.map_or(now, |at| at + self.pace.every),
         };
-        let feed_due = self.sine.as_ref().and_then(Feed::due);
+        let feed_due = self.sine.as_ref().and_then(SineFeed::due);
         feed_due.map_or(due, |feed| feed.min(due)).max(now)
     }
 
@@ -271,7 +271,7 @@ impl Dialogue for Session {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        self.search?.is_over(now).then(|| {
+        self.resync?.is_over(now).then(|| {
             format!(
                 "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
             )

@@ -8,15 +8,15 @@
 mod answers;
 mod stopping;
 
-use super::motion::Motion;
-use super::pace::Pace;
-use super::pins::Ends;
-use super::protocol::{self, Incoming, Parser, QUERY, State};
-use super::settings::{Facts, GrblSettings};
+use super::feed_correction::FeedCorrection;
+use super::motion::JogMotion;
+use super::pins::EndSwitches;
+use super::protocol::{self, GrblState, Incoming, Parser, QUERY};
+use super::settings::{BoardParameters, GrblSettings};
 use super::times::{POLL, POLL_CLOSELY, REPORT_MAX, RESET_MAX, SILENCE_MAX};
 use crate::parts::Track;
 use crate::rig::RigEventBody;
-use crate::wire::{Answers, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, MoveTo, RigCommand};
 use std::collections::VecDeque;
@@ -34,7 +34,7 @@ const OVERTAKEN: &str = "a stop came first, so it was not begun";
 pub type SharedTrack = Arc<Mutex<Track>>;
 
 /// A reset whose welcome is to come.
-struct Halt {
+struct PendingReset {
     /// The stops that it does.
     owed: Vec<(u64, RigCommand)>,
     begun: Nanos,
@@ -44,34 +44,34 @@ struct Halt {
 /// The dialogue.
 pub struct Session {
     settings: GrblSettings,
-    facts: Facts,
+    facts: BoardParameters,
     track: SharedTrack,
     parser: Parser,
     /// The jog whose `ok` is to come.
     open: Option<Nanos>,
     urgent: VecDeque<Vec<u8>>,
     orders: VecDeque<(u64, RigCommand)>,
-    answers: Answers,
-    motion: Option<Motion>,
-    pace: Pace,
-    ends: Ends,
+    answers: AnswerQueue,
+    motion: Option<JogMotion>,
+    feed_correction: FeedCorrection,
+    ends: EndSwitches,
     /// Where it rests, in steps of the board.
     steps: i64,
     /// What the board's steps, in the direction of the rig, are more than the host's pulses.
     zero: i64,
     is_motor_on: bool,
-    asked: Option<Nanos>,
+    queried_at: Option<Nanos>,
     polled: Option<Nanos>,
-    heard: Nanos,
-    looked: Nanos,
+    heard_at: Nanos,
+    looked_at: Nanos,
     /// Stops that a status after them will confirm.
     stops: Vec<(u64, RigCommand, Nanos)>,
-    halt: Option<Halt>,
+    reset_pending: Option<PendingReset>,
     /// The newest state that is known.
-    state: State,
+    state: GrblState,
     /// Why nothing but stops is done any more.
     locked: Option<String>,
-    attended: Nanos,
+    attended_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
 }
@@ -81,7 +81,7 @@ impl Session {
     #[must_use]
     pub fn new(
         settings: GrblSettings,
-        facts: Facts,
+        facts: BoardParameters,
         track: SharedTrack,
         stats: LinkStats,
         now: Nanos,
@@ -95,21 +95,21 @@ impl Session {
             open: None,
             urgent: VecDeque::new(),
             orders: VecDeque::new(),
-            answers: Answers::default(),
+            answers: AnswerQueue::default(),
             motion: None,
-            pace: Pace::default(),
-            ends: Ends::default(),
+            feed_correction: FeedCorrection::default(),
+            ends: EndSwitches::default(),
             zero: 0,
             is_motor_on: false,
-            asked: None,
+            queried_at: None,
             polled: None,
-            heard: now,
-            looked: now,
+            heard_at: now,
+            looked_at: now,
             stops: Vec::new(),
-            halt: None,
-            state: State::Idle,
+            reset_pending: None,
+            state: GrblState::Idle,
             locked: None,
-            attended: now,
+            attended_at: now,
             events: VecDeque::new(),
             stats,
         }
@@ -130,15 +130,15 @@ impl Session {
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
         self.answers.acknowledge(number, command);
-        self.tell_answers(now);
+        self.report_answers(now);
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
         self.answers.refuse(number, detail);
-        self.tell_answers(now);
+        self.report_answers(now);
     }
 
-    fn tell_answers(&mut self, now: Nanos) {
+    fn report_answers(&mut self, now: Nanos) {
         while let Some(body) = self.answers.take() {
             self.report(now, body);
         }
@@ -199,21 +199,21 @@ impl Session {
         }
         if to == self.steps {
             // Grbl makes nothing of a way that is none; a sample shows it as a motion all the same.
-            let profile = Motion::profile(0.0, &wanted);
+            let profile = JogMotion::profile(0.0, &wanted);
             let here = self.pulses(self.steps) as f64;
-            self.track().moves(now, here, profile, 0.0);
-            self.track().rest(now, here as i64);
+            self.track().begin_motion(now, here, profile, 0.0);
+            self.track().begin_rest(now, here as i64);
             return self.acknowledge(now, number, RigCommand::MoveTo(wanted));
         }
-        self.pace.begin();
+        self.feed_correction.begin();
         let mm_per_pulse = self.settings.mm_per_pulse;
-        let motion = Motion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
-        self.ends.leave(self.is_outwards(&motion));
+        let motion = JogMotion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
+        self.ends.begin_motion(self.is_outwards(&motion));
         self.motion = Some(motion);
     }
 
     /// Into the tissue.
-    fn is_outwards(&self, motion: &Motion) -> bool {
+    fn is_outwards(&self, motion: &JogMotion) -> bool {
         motion.side() * self.settings.sign() as f64 > 0.0
     }
 
@@ -228,12 +228,12 @@ impl Session {
     }
 
     fn take_query(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let is_free = self.asked.is_none_or(|asked| now.since(asked) > REPORT_MAX);
+        let is_free = self.queried_at.is_none_or(|queried_at| now.since(queried_at) > REPORT_MAX);
         let is_due = self.polled.is_none_or(|at| now.since(at) >= self.poll_every(now));
         if !is_free || !is_due {
             return None;
         }
-        self.asked = Some(now);
+        self.queried_at = Some(now);
         self.polled = Some(now);
         Some(vec![QUERY])
     }
@@ -247,7 +247,7 @@ impl Session {
         let steps_per_mm = self.facts.steps_per_mm;
         let motion = self.motion.as_mut().filter(|motion| motion.cancelled.is_none())?;
         let end = motion.next_chunk(now, self.settings.mm_per_pulse)?;
-        let feed = motion.feed * self.pace.feed();
+        let feed = motion.feed * self.feed_correction.feed();
         let line = protocol::jog(axis, end as f64 / steps_per_mm, feed);
         self.open = Some(now);
         Some(line.into_bytes())
@@ -256,7 +256,7 @@ impl Session {
 
 impl Dialogue for Session {
     fn attended(&mut self, at: Nanos) {
-        self.attended = at;
+        self.attended_at = at;
     }
 
     fn command(&mut self, now: Nanos, command: RigCommand) {
@@ -321,8 +321,8 @@ impl Dialogue for Session {
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
         // A board that a limit switch has locked says nothing before it is reset, and nothing moves.
-        if let Some(halt) = &self.halt
-            && now.since(halt.begun) > RESET_MAX
+        if let Some(reset_pending) = &self.reset_pending
+            && now.since(reset_pending.begun) > RESET_MAX
         {
             let silence = RESET_MAX.0 as f64 * 1e-9;
             return Some(format!(
@@ -330,7 +330,7 @@ impl Dialogue for Session {
             ));
         }
         let is_unsure = self.locked.is_none() || self.state.is_moving();
-        let is_silent = now.since(self.heard) > SILENCE_MAX && is_unsure;
+        let is_silent = now.since(self.heard_at) > SILENCE_MAX && is_unsure;
         is_silent.then(|| {
             let silence = SILENCE_MAX.0 as f64 * 1e-9;
             format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
@@ -345,6 +345,6 @@ impl Dialogue for Session {
 impl Drop for Session {
     /// However its thread ends, such as with a port that is gone: what the board was given ends in the track too.
     fn drop(&mut self) {
-        self.leave(self.looked);
+        self.settle_track(self.looked_at);
     }
 }

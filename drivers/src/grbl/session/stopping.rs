@@ -1,7 +1,7 @@
 //! Stops, those that nobody asked for among them, and what becomes of what was under way.
 
-use super::{Halt, OVERTAKEN, Session};
-use crate::grbl::protocol::{JOG_CANCEL, RESET, State};
+use super::{OVERTAKEN, PendingReset, Session};
+use crate::grbl::protocol::{GrblState, JOG_CANCEL, RESET};
 use crate::grbl::times::{ATTENDED_MAX, CANCEL_AGAIN, OK_MAX, PAUSE, RESET_AGAIN, SEGMENTS};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
@@ -40,11 +40,11 @@ impl Session {
             motion.repeated = now;
             if motion.started.is_some() && !std::mem::replace(&mut motion.is_braking, true) {
                 let from = now + Nanos(SEGMENTS.0 + self.facts.round_trip.0 / 2);
-                self.track().brakes(from);
+                self.track().begin_braking(from);
             }
         }
         // Its answer shows what has become of it.
-        self.asked = None;
+        self.queried_at = None;
         self.polled = None;
     }
 
@@ -66,7 +66,7 @@ impl Session {
         self.open = None;
         let here = self.track().at(now).pulses.round() as i64;
         if self.motion.take().is_some() {
-            self.track().rest(now, here);
+            self.track().begin_rest(now, here);
         }
         if self.state.is_moving() {
             // A status that shows it at rest answers them.
@@ -77,7 +77,7 @@ impl Session {
         }
     }
 
-    pub(super) fn lock_with(&mut self, now: Nanos, why: &str) {
+    pub(super) fn lock_and_report(&mut self, now: Nanos, why: &str) {
         if self.locked.is_none() {
             self.lock(now, why);
             self.fault(now, why);
@@ -85,31 +85,32 @@ impl Session {
     }
 
     /// Jogs that the board has are done though no more come: what is known of the way.
-    pub(super) fn leave(&mut self, now: Nanos) {
+    pub(super) fn settle_track(&mut self, now: Nanos) {
         let Some(motion) = self.motion.take() else {
             return;
         };
         let given = motion.given(self.settings.mm_per_pulse);
         let sign = self.settings.sign() as f64;
         match (motion.started, self.open) {
-            (Some(_), _) if !motion.is_braking => self.track().shortened(given),
+            (Some(_), _) if !motion.is_braking => self.track().shorten_motion(given),
             (None, Some(written)) => {
                 let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
                 let from = sign * motion.from as f64;
                 // It may have begun; nobody has said so.
-                self.track().moves(written.min(now), from, given, pulses_per_mm);
+                self.track().begin_motion(written.min(now), from, given, pulses_per_mm);
             }
             _ => {}
         }
-        self.track().ends();
+        self.track().finish_motion();
     }
 
     /// Resets the board, again and again until its welcome.
     fn reset(&mut self, now: Nanos, number: u64, command: RigCommand) {
         self.urgent.push_front(vec![RESET]);
-        self.leave(now);
+        self.settle_track(now);
         self.open = None;
-        self.halt = Some(Halt { owed: vec![(number, command)], begun: now, written: now });
+        self.reset_pending =
+            Some(PendingReset { owed: vec![(number, command)], begun: now, written: now });
         self.locked = Some(
             "it was cut short by a reset and its position is lost; open the rig again and home it"
                 .into(),
@@ -120,13 +121,13 @@ impl Session {
     pub(super) fn stop(&mut self, now: Nanos, command: RigCommand) {
         let number = self.answers.owe();
         self.drop_motions(now, OVERTAKEN);
-        if let Some(halt) = &mut self.halt {
-            halt.owed.push((number, command));
+        if let Some(reset_pending) = &mut self.reset_pending {
+            reset_pending.owed.push((number, command));
             return;
         }
         let is_moving = self.motion.is_some() || self.open.is_some() || self.state.is_moving();
         // What is no jog is not ended by the cancel of a jog.
-        let is_foreign = matches!(self.state, State::Run | State::Home);
+        let is_foreign = matches!(self.state, GrblState::Run | GrblState::Home);
         if is_foreign || command == RigCommand::Halt && is_moving {
             return self.reset(now, number, command);
         }
@@ -140,9 +141,9 @@ impl Session {
 
     /// Reasons to stop that nobody has asked for.
     pub(super) fn watch(&mut self, now: Nanos) {
-        let pause = now.since(std::mem::replace(&mut self.looked, now));
+        let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > PAUSE {
-            self.heard = self.heard + pause;
+            self.heard_at = self.heard_at + pause;
         }
         if self.open.is_some_and(|at| now.since(at) > OK_MAX) {
             self.open = None;
@@ -165,14 +166,14 @@ impl Session {
                 self.cancel(now);
             }
         }
-        if let Some(halt) = &mut self.halt
-            && now.since(halt.written) >= RESET_AGAIN
+        if let Some(reset_pending) = &mut self.reset_pending
+            && now.since(reset_pending.written) >= RESET_AGAIN
         {
-            halt.written = now;
+            reset_pending.written = now;
             self.urgent.push_front(vec![RESET]);
         }
         let is_wanted = std::mem::take(&mut self.track().is_stop_wanted);
-        let is_unattended = now.since(self.attended) > ATTENDED_MAX;
+        let is_unattended = now.since(self.attended_at) > ATTENDED_MAX;
         if is_wanted {
             self.drop_motions(now, "the load cell has failed, so it was not begun");
         } else if is_unattended {

@@ -4,7 +4,7 @@
 //! gauge was opened; a digit lost or changed before the point is not seen here, only as a jump of the force.
 
 use crate::cell::{CellProtocol, CellReports, CellSample, LineCell};
-use crate::mark10::protocol::{ForceUnit, GaugeLine, Reading};
+use crate::mark10::protocol::{ForceUnit, GaugeLine, GaugeReading};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 
@@ -28,7 +28,7 @@ pub struct GaugeScale {
 impl GaugeScale {
     /// That of a gauge that gives such readings.
     #[must_use]
-    pub fn new(like: Reading, capacity: Newtons) -> Self {
+    pub fn new(like: GaugeReading, capacity: Newtons) -> Self {
         let per_count = like.unit.newtons() * like.number.step();
         // Saturates for a capacity beyond all counts.
         let counts_max = (RANGE * capacity.0 / per_count).round() as i32;
@@ -62,14 +62,14 @@ impl GaugeDialogue {
             counts: 0,
             is_beyond: false,
         };
-        Self::on(readings, now)
+        Self::start(readings, now)
     }
 }
 
 impl CellProtocol for GaugeReadings {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         let counts = match GaugeLine::parse(line) {
-            GaugeLine::Reading(Reading { number, unit })
+            GaugeLine::Reading(GaugeReading { number, unit })
                 if unit == self.scale.unit && number.decimals == self.scale.decimals =>
             {
                 number.digits
@@ -82,12 +82,12 @@ impl CellProtocol for GaugeReadings {
         self.counts = counts;
         let is_beyond = counts.saturating_abs() >= self.scale.counts_max;
         if is_beyond && !self.is_beyond {
-            reports.trouble(
+            reports.push_trouble(
                 "the force is beyond the gauge's range; take the load off before it is damaged",
             );
         }
         self.is_beyond = is_beyond;
-        reports.sample(CellSample {
+        reports.push_sample(CellSample {
             at: now,
             device_time: None,
             counts,
@@ -111,7 +111,8 @@ mod tests {
     use crate::mark10::protocol::Decimal;
 
     fn dialogue() -> GaugeDialogue {
-        let like = Reading { number: Decimal::parse("0.000").unwrap(), unit: ForceUnit::Newton };
+        let like =
+            GaugeReading { number: Decimal::parse("0.000").unwrap(), unit: ForceUnit::Newton };
         GaugeDialogue::new(GaugeScale::new(like, Newtons(25.0)), 250.0, Nanos::ZERO)
     }
 
@@ -128,7 +129,8 @@ mod tests {
 
     #[test]
     fn pounds_are_converted() {
-        let like = Reading { number: Decimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
+        let like =
+            GaugeReading { number: Decimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
         let scale = GaugeScale::new(like, Newtons(500.0));
         let mut dialogue = GaugeDialogue::new(scale, 10.0, Nanos::ZERO);
         dialogue.received(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");

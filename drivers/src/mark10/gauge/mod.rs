@@ -7,7 +7,7 @@ pub use dialogue::{GaugeDialogue, GaugeScale};
 pub(crate) use open::{check, check_list, commands, filters};
 
 use super::protocol::GaugeLine;
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file::{Fields, gauge};
 use palpate_model::units::{Newtons, Volts};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
         emulation: None,
     },
     recognise: |lines| {
-        first(lines, |line| {
+        find_line(lines, |line| {
             matches!(
                 GaugeLine::parse(line),
                 GaugeLine::Reading(_) | GaugeLine::List(_) | GaugeLine::Error(_)

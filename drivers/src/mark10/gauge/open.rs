@@ -3,8 +3,8 @@
 use super::dialogue::{GaugeDialogue, GaugeScale};
 use super::{FAREWELL, FILTER_MAX, GaugeSettings, RATES};
 use crate::cell::{CellDescription, CellDevice};
-use crate::mark10::protocol::{GaugeLine, GaugeList, Reading};
-use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
+use crate::mark10::protocol::{GaugeLine, GaugeList, GaugeReading};
+use crate::text::{DeviceError, OpenedCell, TextConsole, describe_unknown_device};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
@@ -116,7 +116,7 @@ fn quieten(console: &mut TextConsole<'_>) -> Result<GaugeList, DeviceError> {
                 .into(),
         ));
     }
-    Err(DeviceError::Other { device: DEVICE, found: stranger(&console.heard) })
+    Err(DeviceError::Other { device: DEVICE, found: describe_unknown_device(&console.heard) })
 }
 
 /// Model and serial number, where it tells them (`RN`, `RM`, `RS`; Series 5 user's guide, page 19).
@@ -125,7 +125,7 @@ fn identify(
     settings: &GaugeSettings,
     found: &GaugeList,
 ) -> Result<String, DeviceError> {
-    let mut told = String::new();
+    let mut identity = String::new();
     let mut serial = None;
     for (command, what) in [("RN", ""), ("RM", ""), ("RS", "serial number ")] {
         console.write(&format!("{command}\r"))?;
@@ -136,7 +136,7 @@ fn identify(
             _ => None,
         })?;
         if let Some(text) = answer.flatten() {
-            told += &format!("{what}{text}, ");
+            identity += &format!("{what}{text}, ");
             if command == "RS" {
                 serial = Some(text);
             }
@@ -151,7 +151,7 @@ fn identify(
             expected: expected.clone(),
         });
     }
-    Ok(told)
+    Ok(identity)
 }
 
 /// Newtons, current readings with units and signs. What was refused shows in the settings read back.
@@ -226,7 +226,7 @@ fn list(console: &mut TextConsole<'_>) -> Result<Option<GaugeList>, DeviceError>
     })
 }
 
-fn reading(console: &mut TextConsole<'_>) -> Result<Option<Reading>, DeviceError> {
+fn reading(console: &mut TextConsole<'_>) -> Result<Option<GaugeReading>, DeviceError> {
     console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
         GaugeLine::Reading(reading) => Some(reading),
         _ => None,
@@ -238,10 +238,10 @@ fn reading(console: &mut TextConsole<'_>) -> Result<Option<Reading>, DeviceError
 fn measure(
     console: &mut TextConsole<'_>,
     scale: GaugeScale,
-    asked: u16,
+    requested: u16,
 ) -> Result<f64, DeviceError> {
-    let asked = f64::from(asked);
-    let enough = MEASURED.max((0.2 * asked) as usize);
+    let requested = f64::from(requested);
+    let enough = MEASURED.max((0.2 * requested) as usize);
     let start = console.now();
     let mut times = Vec::new();
     while times.len() < enough && console.now().since(start) < MEASURE_MAX {
@@ -253,12 +253,14 @@ fn measure(
         }
     }
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
-        return Err(unfit(format!("it sends no readings after AOUT{asked}; check its firmware")));
+        return Err(unfit(format!(
+            "it sends no readings after AOUT{requested}; check its firmware"
+        )));
     };
     let span = last.since(*first).0 as f64 * 1e-9;
     let measured = (times.len() - 1) as f64 / span;
-    let is_other = times.len() >= 3 && (measured / asked - 1.0).abs() > RATE_OFF;
-    Ok(if is_other { measured.round().max(1.0) } else { asked })
+    let is_other = times.len() >= 3 && (measured / requested - 1.0).abs() > RATE_OFF;
+    Ok(if is_other { measured.round().max(1.0) } else { requested })
 }
 
 pub(crate) fn unfit(detail: String) -> DeviceError {

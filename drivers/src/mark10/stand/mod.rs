@@ -23,11 +23,11 @@ mod session;
 
 pub use open::{ConnectedStand, connect};
 pub use rig::{StandDevice, StandRig, open};
-pub use session::{Pace, StandSession};
+pub use session::{StandPace, StandSession};
 
 use super::gauge::GaugeSettings;
 use super::protocol::GaugeLine;
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
@@ -39,8 +39,8 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     // A travel alone may be that of any caliper.
     recognise: |lines| {
         let is_reading = |line: &str| matches!(GaugeLine::parse(line), GaugeLine::Reading(_));
-        first(lines, is_reading)?;
-        first(lines, |line| protocol::travel(line).is_some())
+        find_line(lines, is_reading)?;
+        find_line(lines, |line| protocol::travel(line).is_some())
     },
 };
 

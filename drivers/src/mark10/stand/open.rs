@@ -1,11 +1,11 @@
 //! What happens once when a stand is opened: it is stopped, kept to its travel, its gauge set up. Nothing moves.
 
-use super::protocol::{Force, Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
-use super::session::{Pace, TICK};
+use super::protocol::{GaugeForce, Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
+use super::session::{StandPace, TICK};
 use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, StandSettings};
 use crate::mark10::gauge::{self, GaugeScale};
-use crate::mark10::protocol::{GaugeLine, GaugeList, Reading};
-use crate::text::{DeviceError, TextConsole, stranger};
+use crate::mark10::protocol::{GaugeLine, GaugeList, GaugeReading};
+use crate::text::{DeviceError, TextConsole, describe_unknown_device};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{AdcDescription, RawBytes, RigDescription};
@@ -36,7 +36,7 @@ pub struct ConnectedStand {
     /// How its readings become counts.
     pub scale: GaugeScale,
     /// How to ask it.
-    pub pace: Pace,
+    pub pace: StandPace,
     /// The link as it was measured.
     pub stats: LinkStats,
     /// What was exchanged.
@@ -61,21 +61,21 @@ pub fn connect(
         console.drain(Nanos(QUIET.0 / 3))?;
     }
     if sample(&mut console)?.is_none() {
-        return Err(nobody(&console));
+        return Err(no_answer_error(&console));
     }
     let (list, serial) = set_up_gauge(&mut console, settings)?;
     let has_status = check_status(&mut console)?;
-    let (like, travel) = sample(&mut console)?.ok_or_else(|| nobody(&console))?;
+    let (like, travel) = sample(&mut console)?.ok_or_else(|| no_answer_error(&console))?;
     set_limits(&mut console, settings, travel)?;
     let (stats, pace) = measure(&mut console, has_status)?;
     let scale = GaugeScale::new(like, settings.gauge.capacity);
-    let told = format!(
+    let devices = format!(
         "Mark-10 stand with gauge{serial}, firmware {}{}",
         list.firmware,
         gauge::filters(&list)
     );
     Ok(ConnectedStand {
-        description: describe(settings, scale, pace, &told),
+        description: describe(settings, scale, pace, &devices),
         scale,
         pace,
         stats,
@@ -83,7 +83,7 @@ pub fn connect(
     })
 }
 
-fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, DeviceError> {
+fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, DeviceError> {
     console.write("n")?;
     let mut pair = Pair::default();
     let mut is_over = false;
@@ -91,8 +91,8 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, Devic
     let found = console.find(ANSWER_MAX, |line| {
         is_inches |= line.ends_with(" in");
         match pair.take(line)? {
-            (Force::Reading(reading), travel) => Some((reading, travel)),
-            (Force::Overload, _) => {
+            (GaugeForce::Reading(reading), travel) => Some((reading, travel)),
+            (GaugeForce::Overload, _) => {
                 is_over = true;
                 None
             }
@@ -109,7 +109,7 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, Devic
     Ok(found)
 }
 
-fn nobody(console: &TextConsole<'_>) -> DeviceError {
+fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
     if console.heard.is_empty() {
         return DeviceError::Silent {
             device: DEVICE,
@@ -126,7 +126,7 @@ fn nobody(console: &TextConsole<'_>) -> DeviceError {
             "it does not give force and travel together; check the cable to its gauge and the travel option",
         );
     }
-    DeviceError::Other { device: DEVICE, found: stranger(&console.heard) }
+    DeviceError::Other { device: DEVICE, found: describe_unknown_device(&console.heard) }
 }
 
 /// The gauge's settings and, behind words, its serial number.
@@ -206,26 +206,31 @@ fn set_limits(
 fn measure(
     console: &mut TextConsole<'_>,
     has_status: bool,
-) -> Result<(LinkStats, Pace), DeviceError> {
+) -> Result<(LinkStats, StandPace), DeviceError> {
     let mut stats = LinkStats { in_flight: 1, ..LinkStats::default() };
     for _ in 0..MEASURED {
         let start = console.now();
         if sample(console)?.is_none() {
-            return Err(nobody(console));
+            return Err(no_answer_error(console));
         }
         stats.push(console.now().since(start));
     }
     let every = stats.round_trip_mean.max(EVERY_MIN);
-    Ok((stats, Pace { every, has_status }))
+    Ok((stats, StandPace { every, has_status }))
 }
 
-fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str) -> RigDescription {
+fn describe(
+    settings: &StandSettings,
+    scale: GaugeScale,
+    pace: StandPace,
+    devices: &str,
+) -> RigDescription {
     let step = Volts(scale.volts_per_count());
     let ticks = pace.every.0 as f64 / TICK.0 as f64;
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{told}, {:.0} samples a second; without a watchdog of its own: it stops at the target of the move under way, at most {:.0} mm on; positions within {REST_TOLERANCE_MM} mm and {} s of the commanded course",
+            "{devices}, {:.0} samples a second; without a watchdog of its own: it stops at the target of the move under way, at most {:.0} mm on; positions within {REST_TOLERANCE_MM} mm and {} s of the commanded course",
             1e9 / pace.every.0 as f64,
             settings.travel.0,
             LAG.0

@@ -5,7 +5,7 @@
 //! the reading of the gauge, then the travel, a line each; numbers may have a unit behind them; commands that set
 //! something are silent. Lower and upper limits say that travel grows upwards.
 
-use crate::mark10::protocol::{Decimal, GaugeLine, Reading};
+use crate::mark10::protocol::{Decimal, GaugeLine, GaugeReading};
 
 /// Stop.
 pub const STOP: &str = "s";
@@ -120,14 +120,14 @@ pub fn number(line: &str) -> Option<f64> {
 /// Reads the two lines of `n` out of lines that come one by one.
 #[derive(Clone, Debug, Default)]
 pub struct Pair {
-    force: Option<Force>,
+    force: Option<GaugeForce>,
 }
 
 /// The gauge's part of `n`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Force {
+pub enum GaugeForce {
     /// A reading.
-    Reading(Reading),
+    Reading(GaugeReading),
     /// Beyond the gauge's range.
     Overload,
 }
@@ -135,13 +135,13 @@ pub enum Force {
 impl Pair {
     /// The next line: a force and the travel behind it make a pair. Others are thrown away, as is a force that another
     /// one follows: a gauge that still sends by itself.
-    pub fn take(&mut self, line: &str) -> Option<(Force, i64)> {
+    pub fn take(&mut self, line: &str) -> Option<(GaugeForce, i64)> {
         if let Some(travel) = travel(line) {
             return self.force.take().map(|force| (force, travel));
         }
         self.force = match GaugeLine::parse(line) {
-            GaugeLine::Reading(reading) => Some(Force::Reading(reading)),
-            GaugeLine::Overload => Some(Force::Overload),
+            GaugeLine::Reading(reading) => Some(GaugeForce::Reading(reading)),
+            GaugeLine::Overload => Some(GaugeForce::Overload),
             _ => None,
         };
         None
@@ -207,6 +207,6 @@ mod tests {
         .collect();
         assert_eq!(found, [318, -752]);
         assert_eq!(pair.take("OVER"), None);
-        assert_eq!(pair.take("0.01 mm"), Some((Force::Overload, 1)));
+        assert_eq!(pair.take("0.01 mm"), Some((GaugeForce::Overload, 1)));
     }
 }

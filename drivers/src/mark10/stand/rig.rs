@@ -5,7 +5,7 @@ use super::open::connect;
 use super::protocol::STOP;
 use super::session::StandSession;
 use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
-use crate::wire::{HostClock, Line, LineSettings, Link, Place};
+use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings, Place};
 use std::sync::Arc;
 
 /// A motorised stand with its gauge.
@@ -35,9 +35,9 @@ pub fn open(
     let device: Arc<str> = "stand".into();
     let connected = connect(link.as_mut(), clock, settings, &device)?;
     let session = StandSession::new(settings.clone(), &connected, clock());
-    let line_settings = LineSettings { device, farewell: STOP.into() };
+    let line_settings = LinkThreadSettings { device, farewell: STOP.into() };
     Ok(Opened {
-        lines: vec![Line::start(link, session, clock, line_settings)?],
+        lines: vec![LinkThread::start(link, session, clock, line_settings)?],
         description: connected.description,
         // The gauge tells newtons, each of which counts as a volt.
         newtons_per_volt: Some(1.0),

@@ -44,7 +44,7 @@ const OVERTAKEN: &str = "a stop came first, so it was not begun";
 
 /// How fast the link was when the stand was opened.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub struct StandPace {
     /// Between two questions.
     pub every: Nanos,
     /// Whether the stand answers `p`.
@@ -52,7 +52,7 @@ pub struct Pace {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
+enum StandQuestion {
     Sample,
     Status,
     /// The speed as it was set, in tenths of mm/min.
@@ -63,7 +63,7 @@ enum Asked {
 
 /// A move that is being set up or made.
 #[derive(Clone, Copy, Debug)]
-struct Going {
+struct StandMove {
     command: MoveTo,
     /// In hundredths of mm of the stand's travel.
     target: i64,
@@ -74,12 +74,12 @@ struct Going {
 enum Motion {
     Rest,
     /// Speed, limit and letter that are still to be written.
-    Setting(Going, VecDeque<(String, Option<Asked>)>),
+    Setting(StandMove, VecDeque<(String, Option<StandQuestion>)>),
     /// Let go, and not seen to move.
-    LetGo(Going, Nanos),
+    LetGo(StandMove, Nanos),
     /// Seen to move; the course began with that sample.
     Moving {
-        going: Going,
+        stand_move: StandMove,
         course: Profile,
         start_tick: u64,
         stopped_tick: Option<u64>,
@@ -91,11 +91,11 @@ enum Motion {
 pub struct StandSession {
     settings: StandSettings,
     scale: GaugeScale,
-    pace: Pace,
+    pace: StandPace,
     opened: Nanos,
     lines: Lines,
     pair: Pair,
-    asked: Option<(Asked, Nanos)>,
+    question: Option<(StandQuestion, Nanos)>,
     /// Lines that came since.
     lines_since: usize,
     next_sample: Nanos,
@@ -103,7 +103,7 @@ pub struct StandSession {
     /// No question before this: a late answer may still be coming.
     quiet_until: Option<Nanos>,
     quiet: Nanos,
-    lost: u32,
+    lost_answers: u32,
     stop_due: bool,
     stopped_at: Option<Nanos>,
     /// Stops that the next answer confirms.
@@ -123,7 +123,7 @@ pub struct StandSession {
     counts: i32,
     /// The newest reading was beyond the gauge's range.
     is_beyond: bool,
-    attended: Option<Nanos>,
+    attended_at: Option<Nanos>,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
 }
@@ -140,13 +140,13 @@ impl StandSession {
             opened: now,
             lines: Lines::default(),
             pair: Pair::default(),
-            asked: None,
+            question: None,
             lines_since: 0,
             next_sample: now,
             status_at: now,
             quiet_until: None,
             quiet: QUIET,
-            lost: 0,
+            lost_answers: 0,
             stop_due: false,
             stopped_at: None,
             unconfirmed: Vec::new(),
@@ -161,7 +161,7 @@ impl StandSession {
             uncertainty: Nanos::ZERO,
             counts: 0,
             is_beyond: false,
-            attended: None,
+            attended_at: None,
             events: VecDeque::new(),
             stats: LinkStats { in_flight: 1, ..stats },
         }
@@ -181,7 +181,7 @@ impl StandSession {
     }
 
     /// Pulses as they are told, of a travel of the stand.
-    fn told(&self, travel: i64) -> i64 {
+    fn reported_pulses(&self, travel: i64) -> i64 {
         self.settings.pulses(travel) + self.offset
     }
 
@@ -194,7 +194,7 @@ impl StandSession {
         for order in waiting {
             match order {
                 RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => self.refuse(now, OVERTAKEN),
-                other => self.simple(now, other),
+                other => self.execute_now(now, other),
             }
         }
         self.stop_due = true;
@@ -202,7 +202,7 @@ impl StandSession {
     }
 
     /// A command that is done here.
-    fn simple(&mut self, now: Nanos, command: RigCommand) {
+    fn execute_now(&mut self, now: Nanos, command: RigCommand) {
         if let RigCommand::DefinePosition { pulses } = command {
             if !matches!(self.motion, Motion::Rest) || self.tick.is_none() {
                 return self.refuse(now, "the crosshead moves; a position is defined at rest");
@@ -218,7 +218,7 @@ impl StandSession {
             if matches!(command, RigCommand::Oscillate(_)) {
                 return self.refuse(now, "the stand moves straight only, not on a sine");
             }
-            return self.simple(now, command);
+            return self.execute_now(now, command);
         };
         let target = self.settings.pulses(to.target_pulses - self.offset);
         let tenths = (to.speed.0 * 600.0).round() as i64;
@@ -233,14 +233,14 @@ impl StandSession {
                 ),
             );
         };
-        let going = Going { command: to, target, from: self.travel };
+        let stand_move = StandMove { command: to, target, from: self.travel };
         let letter = if is_upper { "u" } else { "d" };
         let steps = VecDeque::from([
-            (format!("{speed}a"), Some(Asked::Speed(tenths))),
-            (format!("{limit}{}", ask_limit(is_upper)), Some(Asked::Limit(target))),
+            (format!("{speed}a"), Some(StandQuestion::Speed(tenths))),
+            (format!("{limit}{}", ask_limit(is_upper)), Some(StandQuestion::Limit(target))),
             (letter.to_owned(), None),
         ]);
-        self.motion = Motion::Setting(going, steps);
+        self.motion = Motion::Setting(stand_move, steps);
     }
 
     /// A crosshead whose travel grows moves; asking would only cost samples.
@@ -260,8 +260,13 @@ impl StandSession {
     }
 
     /// Asks for an answer.
-    fn ask(&mut self, now: Nanos, text: impl Into<Vec<u8>>, asked: Asked) -> Option<Vec<u8>> {
-        self.asked = Some((asked, now));
+    fn ask(
+        &mut self,
+        now: Nanos,
+        text: impl Into<Vec<u8>>,
+        question: StandQuestion,
+    ) -> Option<Vec<u8>> {
+        self.question = Some((question, now));
         self.lines_since = 0;
         self.pair = Pair::default();
         Some(text.into())
@@ -282,7 +287,7 @@ fn pulses_of(position: Position) -> i64 {
 
 impl Dialogue for StandSession {
     fn attended(&mut self, at: Nanos) {
-        self.attended = Some(at);
+        self.attended_at = Some(at);
     }
 
     fn command(&mut self, now: Nanos, command: RigCommand) {
@@ -312,7 +317,7 @@ impl Dialogue for StandSession {
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let is_unattended = self.attended.is_some_and(|at| now.since(at) > ATTENDED_MAX);
+        let is_unattended = self.attended_at.is_some_and(|at| now.since(at) > ATTENDED_MAX);
         let is_stopped = self.stopped_at.is_some();
         let is_again =
             self.stopped_at.is_some_and(|at| now.since(at) >= STOP_AGAIN && self.is_going());
@@ -322,7 +327,7 @@ impl Dialogue for StandSession {
         if !self.is_going() {
             self.stopped_at = None;
         }
-        if let Some((_, sent)) = self.asked {
+        if let Some((_, sent)) = self.question {
             if now.since(sent) <= ANSWER_MAX {
                 return None;
             }
@@ -348,40 +353,40 @@ impl Dialogue for StandSession {
                 RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => {
                     self.refuse(now, "the crosshead still moves; stop it first");
                 }
-                other => self.simple(now, other),
+                other => self.execute_now(now, other),
             }
         }
-        if let Motion::Setting(going, steps) = &mut self.motion
-            && let Some((text, asked)) = steps.pop_front()
+        if let Motion::Setting(stand_move, steps) = &mut self.motion
+            && let Some((text, question)) = steps.pop_front()
         {
-            if let Some(asked) = asked {
-                return self.ask(now, text, asked);
+            if let Some(question) = question {
+                return self.ask(now, text, question);
             }
-            let going = *going;
-            self.motion = Motion::LetGo(going, now);
+            let stand_move = *stand_move;
+            self.motion = Motion::LetGo(stand_move, now);
             // What it said before the letter is old.
             self.status = None;
             self.stopped_at = None;
             self.travel_changed = now;
             self.next_sample = now;
             self.status_at = now;
-            self.acknowledge(now, RigCommand::MoveTo(going.command));
-            let is_there = going.target == going.from;
+            self.acknowledge(now, RigCommand::MoveTo(stand_move.command));
+            let is_there = stand_move.target == stand_move.from;
             return Some(if is_there { Vec::new() } else { text.into() });
         }
         if self.is_status_due(now) {
             self.status_at = now;
-            return self.ask(now, "p", Asked::Status);
+            return self.ask(now, "p", StandQuestion::Status);
         }
         if now >= self.next_sample {
             self.next_sample = now + self.pace.every;
-            return self.ask(now, "n", Asked::Sample);
+            return self.ask(now, "n", StandQuestion::Sample);
         }
         None
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
-        match self.asked {
+        match self.question {
             Some((_, sent)) => sent + ANSWER_MAX,
             None => self.next_sample.max(now),
         }
@@ -392,7 +397,7 @@ impl Dialogue for StandSession {
     }
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
-        (self.lost >= LOST_MAX && !self.stop_due).then(|| {
+        (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
             "the stand gives no sensible answers any more; it stops at its travel limit; check cable and power"
                 .into()
         })

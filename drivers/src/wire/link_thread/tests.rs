@@ -99,8 +99,8 @@ fn clock() -> HostClock {
     Arc::new(move || Nanos(count.fetch_add(1_000, Ordering::Relaxed)))
 }
 
-fn settings() -> LineSettings {
-    LineSettings { device: "controller".into(), farewell: b"bye".to_vec() }
+fn settings() -> LinkThreadSettings {
+    LinkThreadSettings { device: "controller".into(), farewell: b"bye".to_vec() }
 }
 
 /// Generous: a computer with much else to do.
@@ -125,7 +125,7 @@ fn stops_overtake_what_waits() {
     let notes = Notes::default();
     let heard = Arc::clone(&notes.heard);
     let gate = Gate { inner: here, waits, go_on };
-    let mut line = Line::start(Box::new(gate), notes, &clock(), settings()).unwrap();
+    let mut line = LinkThread::start(Box::new(gate), notes, &clock(), settings()).unwrap();
     waiting.recv().unwrap();
     let define = RigCommand::DefinePosition { pulses: 3 };
     line.send(define).unwrap();
@@ -148,7 +148,8 @@ fn stops_overtake_what_waits() {
 #[test]
 fn a_stop_waits_for_nobody_who_reads_reports() {
     let (here, mut there) = super::super::pair();
-    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line =
+        LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     let reports = Arc::clone(&line.reports);
     let reading = reports.0.lock().unwrap();
     // Something to report comes first, so that the thread has wanted to hand it over.
@@ -165,7 +166,7 @@ fn a_stop_waits_for_nobody_who_reads_reports() {
 #[test]
 fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
     let (here, mut there) = super::super::pair();
-    let line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let line = LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     there.write(b"ab").unwrap();
     let late = Nanos(u64::MAX);
     for _ in 0..2 {
@@ -183,7 +184,7 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
 fn a_driver_that_fails_is_a_lost_link() {
     let (here, mut there) = super::super::pair();
     let notes = Notes { fails_at: Some(b'!'), ..Notes::default() };
-    let line = Line::start(Box::new(here), notes, &clock(), settings()).unwrap();
+    let line = LinkThread::start(Box::new(here), notes, &clock(), settings()).unwrap();
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
     assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
@@ -194,7 +195,8 @@ fn a_driver_that_fails_is_a_lost_link() {
 #[test]
 fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
     let (here, mut there) = super::super::pair();
-    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line =
+        LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     let handle = line.halt_handle().unwrap();
     assert!(handle.halt(WAIT) && handle.written() == 1);
     assert_eq!(read(&mut there, 5), b"Halt\r");
@@ -212,18 +214,18 @@ fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
 #[test]
 fn what_waits_for_a_farewell_comes_after_it() {
     let (here, mut there) = super::super::pair();
-    let (told, order) = sync_channel(2);
-    let said = told.clone();
+    let (events, order) = sync_channel(2);
+    let deferred = events.clone();
     let notes = Notes {
         fails_at: Some(b'!'),
         fails: Box::new(move || {
-            let said = said.clone();
-            super::super::after_farewell(move || said.send("deferred").unwrap());
+            let deferred = deferred.clone();
+            super::super::after_farewell(move || deferred.send("deferred").unwrap());
         }),
         ..Notes::default()
     };
-    struct Told(super::super::MemoryLink, SyncSender<&'static str>);
-    impl Link for Told {
+    struct EventLink(super::super::MemoryLink, SyncSender<&'static str>);
+    impl Link for EventLink {
         fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
             self.0.read(buffer, wait)
         }
@@ -233,7 +235,8 @@ fn what_waits_for_a_farewell_comes_after_it() {
             self.0.write(bytes)
         }
     }
-    let _line = Line::start(Box::new(Told(here, told)), notes, &clock(), settings()).unwrap();
+    let _line =
+        LinkThread::start(Box::new(EventLink(here, events)), notes, &clock(), settings()).unwrap();
     there.write(b"!").unwrap();
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "written");
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "deferred");

@@ -2,7 +2,7 @@
 
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
-use super::halt::{HaltHandle, Standing, farewell_said, owns_link};
+use super::halt::{HaltHandle, StopCounters, farewell_said, owns_link};
 use super::link::Link;
 use crate::device::OpenError;
 use crate::priority::{self, Granted};
@@ -30,7 +30,7 @@ const CHUNK: usize = 4096;
 
 /// What a line is called and when it is closed.
 #[derive(Clone, Debug)]
-pub struct LineSettings {
+pub struct LinkThreadSettings {
     /// The device's name in the log of raw bytes, such as `controller`; the thread is called so too.
     pub device: Arc<str>,
     /// Bytes written when the line is closed, such as a stop.
@@ -38,7 +38,7 @@ pub struct LineSettings {
 }
 
 /// A command with the number of stops that were sent before it.
-pub(super) type Numbered = (u64, RigCommand);
+pub(super) type NumberedCommand = (u64, RigCommand);
 
 #[derive(Default)]
 struct Reports {
@@ -71,25 +71,25 @@ impl Reports {
 type Shared = Arc<(Mutex<Reports>, Condvar)>;
 
 /// A dialogue on a link, in a thread of its own. Dropped it says farewell and closes the link.
-pub struct Line {
+pub struct LinkThread {
     device: Arc<str>,
     /// Stops: looked at before anything that waits.
-    stops: SyncSender<Numbered>,
-    commands: SyncSender<Numbered>,
+    stops: SyncSender<NumberedCommand>,
+    commands: SyncSender<NumberedCommand>,
     /// Stops sent and stops written, shared with those who may have to send one when nobody else can.
-    standing: Arc<Standing>,
+    standing: Arc<StopCounters>,
     reports: Shared,
     is_closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Line {
+impl LinkThread {
     /// Starts the thread.
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,
         clock: &HostClock,
-        settings: LineSettings,
+        settings: LinkThreadSettings,
     ) -> Result<Self, OpenError> {
         let (stops, urgent) = sync_channel(COMMANDS_MAX);
         let (commands, queued) = sync_channel(COMMANDS_MAX);
@@ -103,8 +103,8 @@ impl Line {
         ));
         let is_closing = Arc::new(AtomicBool::new(false));
         let device = Arc::clone(&settings.device);
-        let standing = Arc::new(Standing::default());
-        let mut owner = Owner {
+        let standing = Arc::new(StopCounters::default());
+        let mut owner = LinkOwner {
             link,
             dialogue,
             clock: Arc::clone(clock),
@@ -140,13 +140,13 @@ impl Line {
 
     /// Hands over a command without waiting. One that finds no room is given back.
     pub fn send(&mut self, command: RigCommand) -> Result<(), RigCommand> {
-        let (way, number) = if command.is_stopping() {
+        let (queue, number) = if command.is_stopping() {
             let before = self.standing.sent.fetch_add(1, Ordering::AcqRel);
             (&self.stops, before + 1)
         } else {
             (&self.commands, self.standing.sent.load(Ordering::Acquire))
         };
-        way.try_send((number, command)).map_err(|err| {
+        queue.try_send((number, command)).map_err(|err| {
             let (TrySendError::Full((_, command)) | TrySendError::Disconnected((_, command))) = err;
             command
         })
@@ -189,7 +189,7 @@ impl Line {
     }
 }
 
-impl Line {
+impl LinkThread {
     /// Says farewell, closes the link and gives the bytes that nobody has taken.
     #[must_use]
     pub fn close(mut self) -> Vec<RawBytes> {
@@ -206,24 +206,24 @@ impl Line {
     }
 }
 
-impl Drop for Line {
+impl Drop for LinkThread {
     fn drop(&mut self) {
         self.end();
     }
 }
 
 /// The thread's side.
-struct Owner<D> {
+struct LinkOwner<D> {
     link: Box<dyn Link>,
     dialogue: D,
     clock: HostClock,
-    settings: LineSettings,
-    urgent: Receiver<Numbered>,
-    queued: Receiver<Numbered>,
+    settings: LinkThreadSettings,
+    urgent: Receiver<NumberedCommand>,
+    queued: Receiver<NumberedCommand>,
     /// Taken out of `queued`, not looked at.
-    arrived: VecDeque<Numbered>,
+    arrived: VecDeque<NumberedCommand>,
     is_real_time: bool,
-    standing: Arc<Standing>,
+    standing: Arc<StopCounters>,
     /// The number of the newest stop that the dialogue has.
     stops_taken: u64,
     /// To be handed over.
@@ -233,14 +233,14 @@ struct Owner<D> {
     reports: Shared,
 }
 
-impl<D> Drop for Owner<D> {
+impl<D> Drop for LinkOwner<D> {
     /// However the thread ends, nobody waits for it. If it panics the farewell stops what moves, since nobody else has
     /// the link; what was to be said of the panic is said after that.
     fn drop(&mut self) {
         if std::thread::panicking() {
             let _ = self.link.write(&self.settings.farewell);
             farewell_said();
-            let failed = lost("the driver has failed; open the rig again");
+            let failed = link_lost("the driver has failed; open the rig again");
             self.events.push(RigEvent::new((self.clock)(), failed));
         }
         let (reports, came) = &*self.reports;
@@ -252,7 +252,7 @@ impl<D> Drop for Owner<D> {
 }
 
 /// Why a link failed.
-fn in_words(err: &io::Error) -> String {
+fn describe_error(err: &io::Error) -> String {
     match err.kind() {
         io::ErrorKind::BrokenPipe
         | io::ErrorKind::UnexpectedEof
@@ -264,11 +264,11 @@ fn in_words(err: &io::Error) -> String {
     }
 }
 
-fn lost(detail: impl Into<String>) -> RigEventBody {
+fn link_lost(detail: impl Into<String>) -> RigEventBody {
     RigEventBody::Fault(Fault::LinkLost { detail: detail.into() })
 }
 
-impl<D: Dialogue> Owner<D> {
+impl<D: Dialogue> LinkOwner<D> {
     fn run(&mut self, is_closing: &AtomicBool) {
         let ending = loop {
             if is_closing.load(Ordering::Relaxed) {
@@ -279,14 +279,14 @@ impl<D: Dialogue> Owner<D> {
                 return;
             }
             if let Err(err) = self.turn() {
-                break in_words(&err);
+                break describe_error(&err);
             }
             if let Some(why) = self.dialogue.is_dead((self.clock)()) {
                 break why;
             }
         };
         tracing::warn!("link lost: {ending}");
-        self.events.push(RigEvent::new((self.clock)(), lost(ending)));
+        self.events.push(RigEvent::new((self.clock)(), link_lost(ending)));
     }
 
     /// Commands, lines, bytes: once.
@@ -380,5 +380,4 @@ impl<D: Dialogue> Owner<D> {
 }
 
 #[cfg(test)]
-#[path = "line_tests.rs"]
 mod tests;

@@ -10,7 +10,7 @@ const DRIFT: f64 = 2e-4;
 
 /// How the controller's clock lies to the host's.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Timing {
+pub struct ClockAlignment {
     best: Option<Span>,
     /// How far the middle of a question was from where the controller's clock said, at most.
     pub deviation_max: Nanos,
@@ -19,26 +19,26 @@ pub struct Timing {
 #[derive(Clone, Copy, Debug)]
 struct Span {
     tick: u64,
-    asked: Nanos,
+    sent: Nanos,
     answered: Nanos,
 }
 
 impl Span {
     fn middle(&self) -> f64 {
-        0.5 * (self.asked.0 as f64 + self.answered.0 as f64)
+        0.5 * (self.sent.0 as f64 + self.answered.0 as f64)
     }
 
     /// Half its length, and what the clocks may have drifted until a time.
     fn uncertainty(&self, at: Nanos) -> f64 {
-        let half = 0.5 * (self.answered.0 as f64 - self.asked.0 as f64);
+        let half = 0.5 * (self.answered.0 as f64 - self.sent.0 as f64);
         half + DRIFT * at.since(self.answered).0 as f64
     }
 }
 
-impl Timing {
+impl ClockAlignment {
     /// Takes a question's times and the tick that it told, for ticks of a length.
-    pub fn push(&mut self, tick: u64, length: Nanos, asked: Nanos, answered: Nanos) {
-        let span = Span { tick, asked, answered };
+    pub fn push(&mut self, tick: u64, length: Nanos, sent: Nanos, answered: Nanos) {
+        let span = Span { tick, sent, answered };
         if let Some(at) = self.host_time(tick, length) {
             let off = (span.middle() - at.0 as f64).abs();
             self.deviation_max = self.deviation_max.max(Nanos(off.round() as u64));
@@ -57,7 +57,7 @@ impl Timing {
         Some(Nanos(at.max(0.0).round() as u64))
     }
 
-    /// How far [`Timing::host_time`] may be wrong at a time: a question's half round trip, drift, and the sample itself,
+    /// How far [`ClockAlignment::host_time`] may be wrong at a time: a question's half round trip, drift, and the sample itself,
     /// in which the controller answers.
     pub fn uncertainty(&self, at: Nanos, length: Nanos) -> Option<Nanos> {
         let best = self.best?;
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn the_narrowest_span_counts_until_drift_has_made_it_wider() {
         let tick = Nanos(1_000_000);
-        let mut timing = Timing::default();
+        let mut timing = ClockAlignment::default();
         timing.push(10, tick, Nanos(10_000_000), Nanos(10_400_000));
         timing.push(20, tick, Nanos(19_000_000), Nanos(22_000_000));
         assert_eq!(timing.host_time(20, tick), Some(Nanos(20_200_000)));

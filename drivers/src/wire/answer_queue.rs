@@ -6,12 +6,12 @@ use std::collections::VecDeque;
 
 /// Commands that were not answered for yet.
 #[derive(Clone, Debug, Default)]
-pub struct Answers {
+pub struct AnswerQueue {
     owed: VecDeque<(u64, Option<RigEventBody>)>,
     count: u64,
 }
 
-impl Answers {
+impl AnswerQueue {
     /// Notes a command that wants an answer.
     pub fn owe(&mut self) -> u64 {
         self.count += 1;
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn answers_come_in_the_order_of_the_commands() {
-        let mut answers = Answers::default();
+        let mut answers = AnswerQueue::default();
         let (first, second) = (answers.owe(), answers.owe());
         answers.acknowledge(second, RigCommand::Stop);
         assert_eq!(answers.take(), None);

@@ -9,10 +9,10 @@ fn cell(keys: &str) -> PlainNumbers {
 }
 
 /// After the line that was under way when it was opened.
-fn numbers(keys: &str, decimals: u8) -> LineCell<Numbers> {
+fn numbers(keys: &str, decimals: u8) -> LineCell<PlainNumberReader> {
     let cell = cell(keys);
     let step = 10_f64.powi(-i32::from(decimals));
-    let numbers = Numbers {
+    let numbers = PlainNumberReader {
         decimals,
         counts_max: (cell.full_scale / step).round() as i32,
         per_count: step * cell.volts_per_unit(),
@@ -131,22 +131,22 @@ fn end_of_the_range_is_told_once_and_silence_ends_it() {
 
 #[test]
 fn mistakes_in_the_rig_file_are_told() {
-    let told = |keys: &str| {
+    let found = |keys: &str| {
         let mut fields = Fields::read(&format!("[cell]\n{keys}")).unwrap();
         assert_eq!(PlainNumbers::read(&mut fields), None, "{keys}");
         let mistakes = fields.finish();
         mistakes.iter().map(|it| it.message.clone()).collect::<Vec<_>>().join("; ")
     };
-    assert!(told("full_scale = 1\n").contains("cell.unit"));
-    assert!(told("unit = \"N\"\n").contains("cell.full_scale"));
-    let volts = told("unit = \"N\"\nfull_scale = 25\nfull_scale_v = 5\n");
+    assert!(found("full_scale = 1\n").contains("cell.unit"));
+    assert!(found("unit = \"N\"\n").contains("cell.full_scale"));
+    let volts = found("unit = \"N\"\nfull_scale = 25\nfull_scale_v = 5\n");
     assert!(volts.contains("only counts"), "{volts}");
-    assert!(told("unit = \"N\"\nfull_scale = 25\ntime_column = \"s\"\n").contains("\"us\""));
+    assert!(found("unit = \"N\"\nfull_scale = 25\ntime_column = \"s\"\n").contains("\"us\""));
 }
 
 #[test]
 fn lines_of_numbers_give_it_away_and_one_number_does_not() {
-    let of = |lines: &[&str]| DeviceKind::of_lines(lines).map(|(kind, _)| kind.word);
+    let of = |lines: &[&str]| DeviceKind::recognise_lines(lines).map(|(kind, _)| kind.word);
     assert_eq!(of(&["345", "12345", "12344"]), Some("plain-numbers"));
     assert_eq!(of(&["345", "12345"]), None);
     assert_eq!(of(&["1", "2", "ok"]), None);

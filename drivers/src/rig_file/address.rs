@@ -4,7 +4,7 @@ use super::fields::Fields;
 use crate::wire::Place;
 
 /// Reads `port`, `baud`, `handshake` and `address`, behind a table's name and a dot or nothing.
-pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
+pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
     let key = |name: &str| format!("{table}{name}");
     let port = fields.text(&key("port"));
     let address = fields.text(&key("address"));
