@@ -7,22 +7,18 @@ const FAST_MAX: f64 = 0.02;
 /// Lines of an earlier moment may arrive in one go with that of now.
 const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
 
-/// What a board told last.
 #[derive(Clone, Copy, Debug)]
 struct LastStamp {
     ticks: u32,
     /// The same without wraps and restarts.
     time: Nanos,
-    /// Arrival of that.
     at: Nanos,
     /// Board's time and host's when counting began.
     from: (Nanos, Nanos),
 }
 
-/// What a stamp means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardTime {
-    /// It was told before: a line that came twice.
     Repeated,
     /// The board's time.
     At(Nanos),
@@ -44,7 +40,6 @@ impl BoardClock {
         Self { nanos_per_tick, last: None }
     }
 
-    /// The time of a stamp that has arrived now.
     pub fn take(&mut self, now: Nanos, ticks: u32) -> BoardTime {
         let Some(last) = self.last else {
             // The first count of the board is its time; whatever came before is nobody's business.

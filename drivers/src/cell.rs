@@ -11,10 +11,8 @@ use std::sync::Arc;
 
 /// Values that may wait to be taken: a minute at 80 a second, 15 s at the fastest rate of a gauge.
 const SAMPLES_MAX: usize = 4_800;
-/// Troubles that may wait to be told.
 const TROUBLES_MAX: usize = 16;
 
-/// One value of a load cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellSample {
     /// Arrival of its last byte on the host's clock.
@@ -36,7 +34,6 @@ pub struct CellDescription {
     pub adc: AdcDescription,
     /// Standard deviation of its values at rest, as far as is known.
     pub noise_expected: Volts,
-    /// Values a second.
     pub rate: f64,
     /// How long before it was sent a value was felt: half of the time that its filter looks back.
     pub delay: Nanos,
@@ -57,24 +54,20 @@ pub trait CellDevice: Debug + Send + Sync {
 
 /// A load cell that sends values by itself, in progress. It must neither wait nor read a clock.
 pub trait CellDialogue: Send {
-    /// Bytes have arrived.
     fn received(&mut self, now: Nanos, bytes: &[u8]);
 
-    /// The oldest value not taken yet.
     fn take_sample(&mut self) -> Option<CellSample>;
 
     /// What went wrong since this was last asked, in words: a restart, a value out of range. Garbled lines are counted,
     /// not told one by one.
     fn take_trouble(&mut self) -> Option<String>;
 
-    /// Lines that were no values.
     fn garbled(&self) -> u64;
 
     /// Why the device counts as gone, if it does.
     fn is_dead(&self, now: Nanos) -> Option<String>;
 }
 
-/// What the lines of a load cell mean.
 pub trait CellProtocol: Send {
     /// A whole line. `false` where it means nothing, so that it counts as garbled.
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool;
@@ -100,7 +93,6 @@ impl CellReports {
         self.samples.push_back(sample);
     }
 
-    /// Something that the operator has to hear.
     pub fn push_trouble(&mut self, words: &str) {
         if self.troubles.len() < TROUBLES_MAX {
             self.troubles.push_back(words.to_owned());
@@ -108,7 +100,6 @@ impl CellReports {
     }
 }
 
-/// A load cell that sends lines by itself.
 pub struct LineCell<P> {
     protocol: P,
     lines: Lines,

@@ -15,23 +15,18 @@ use std::time::Duration;
 
 /// A device may be talking already, or starting anew because its port was opened, as an Arduino does for 1.5 s.
 const LISTEN: Nanos = Nanos::from_millis(2_000);
-/// An answer takes longer on no link.
 const ANSWER_MAX: Nanos = Nanos::from_millis(700);
-/// Longest single wait for bytes.
 const READ_MAX: Duration = Duration::from_millis(5);
 /// More than any of these devices says; what comes after it is not looked at.
 const BYTES_MAX: usize = 4096;
-/// So much of what was heard is shown.
 const SHOWN_MAX: usize = 80;
 
-/// What answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
     /// A device that palpate drives: its word in a rig file, its introduction, and what it said of itself.
     Device(&'static str, &'static str, String),
     /// Something that palpate does not know, by what it said.
     Unknown(String),
-    /// Nothing answers.
     Silent,
 }
 

@@ -19,19 +19,14 @@ const TURN: Nanos = Nanos::from_millis(1);
 /// A device that a rig file describes cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum OpenError {
-    /// A Galil controller.
     #[error(transparent)]
     Galil(#[from] GalilOpenError),
-    /// A Grbl board.
     #[error(transparent)]
     Grbl(#[from] GrblOpenError),
-    /// A load cell or a stand.
     #[error(transparent)]
     Text(#[from] DeviceError),
-    /// A port cannot be opened.
     #[error(transparent)]
     Wire(#[from] WireError),
-    /// No thread for it.
     #[error("the operating system gives no thread for a link ({0}); close other programs")]
     Thread(String),
 }
@@ -42,13 +37,10 @@ impl OpenError {
     }
 }
 
-/// What opening the devices of a rig gives.
 pub struct Opened {
-    /// What they make of the rig.
     pub description: RigDescription,
     /// Newtons of a volt, where the load cell itself is calibrated.
     pub newtons_per_volt: Option<f64>,
-    /// The link as it was measured, in words.
     pub link: Option<String>,
     /// One for each device. The first is that of the axis, to which commands go.
     pub lines: Vec<LinkThread>,
@@ -68,7 +60,6 @@ pub trait RigDevice: Send {
     }
 }
 
-/// Devices on wires as a rig.
 pub struct DeviceRig<D> {
     device: D,
     /// Without lines while it is being connected anew, and after that has failed.
@@ -77,7 +68,6 @@ pub struct DeviceRig<D> {
     pending: Vec<Option<RigEvent>>,
     clock: HostClock,
     time: CallerTime,
-    /// Refusals of commands that found no room.
     refused: VecDeque<Fault>,
 }
 
@@ -95,7 +85,6 @@ impl<D: RigDevice> DeviceRig<D> {
         })
     }
 
-    /// What was opened.
     pub const fn device(&self) -> &D {
         &self.device
     }

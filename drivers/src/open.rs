@@ -24,13 +24,11 @@ pub fn open(name: &str, settings: &SimSettings) -> Result<Box<dyn Rig>, RigError
     }
 }
 
-/// Whether a name is that of a rig file.
 #[must_use]
 pub fn is_rig_file(name: &str) -> bool {
     name.ends_with(".toml")
 }
 
-/// Reads a rig file.
 pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
     let unreadable = |detail: String| RigError::File { file: file.to_owned(), detail };
     let mut bytes = Vec::new();

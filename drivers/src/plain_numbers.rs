@@ -55,10 +55,8 @@ const NUMBERS_MISSED: f64 = 5.0;
 const SILENCE_MIN: Nanos = Nanos::from_millis(1_000);
 /// What a range of counts is called in volts: see the same of an HX711 board.
 const FULL_SCALE: Volts = Volts(5.0);
-/// Longest piece of a line that is quoted.
 const QUOTE_MAX: usize = 40;
 
-/// What the numbers are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Unit {
     /// Of a converter; the whole range is called so many volts.
@@ -81,23 +79,19 @@ const UNITS: [(&str, (&str, Unit)); 9] = [
     ("lbF", ("lbF", Unit::Force(ForceUnit::Pound))),
 ];
 
-/// What palpate has to know of such a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainNumbers {
     unit: Unit,
     unit_name: &'static str,
     /// End of the range on both sides, in the unit.
     full_scale: f64,
-    /// Whether pressing makes the numbers fall.
     is_reversed: bool,
     /// Length of a tick of the time before each number, where there is one.
     nanos_per_tick: Option<u64>,
-    /// Standard deviation at rest, in the unit.
     noise: Option<f64>,
 }
 
 impl PlainNumbers {
-    /// Reads the keys of a rig file.
     pub fn read(fields: &mut Fields) -> Option<Self> {
         let unit = fields.choice("cell.unit", &UNITS, None);
         let full_scale = fields.needed("cell.full_scale", 1e-6, 1e8);
@@ -197,7 +191,6 @@ impl PlainNumbers {
         Err(self.nothing(console, wrong))
     }
 
-    /// Why no numbers came.
     fn nothing(&self, console: &TextConsole<'_>, wrong: Option<String>) -> DeviceError {
         let Some(line) = wrong else {
             return if console.heard.is_empty() {
@@ -288,7 +281,6 @@ impl CellDevice for PlainNumbers {
     }
 }
 
-/// Numbers of a cell that was opened.
 struct PlainNumberReader {
     cell: PlainNumbers,
     decimals: u8,

@@ -14,60 +14,43 @@ use thiserror::Error;
 pub struct RigEvent {
     /// Arrival on the host's clock.
     pub at: Nanos,
-    /// What arrived.
     pub body: RigEventBody,
 }
 
 impl RigEvent {
-    /// A report with its arrival.
     #[must_use]
     pub const fn new(at: Nanos, body: RigEventBody) -> Self {
         Self { at, body }
     }
 }
 
-/// What a rig can report.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RigEventBody {
-    /// One sample.
     Reading(Reading),
-    /// A command was accepted.
     Ack(Ack),
-    /// Something went wrong.
     Fault(Fault),
 }
 
-/// A rig could not be opened.
 #[derive(Debug, Error)]
 pub enum RigError {
-    /// The name does not stand for a rig.
     #[error(
         "no rig is called '{name}'; use 'sim', 'sim:NAME' for a shared simulated rig, or a rig file, NAME.toml"
     )]
     Unknown {
-        /// The name given.
         name: String,
     },
-    /// The rig file cannot be read.
     #[error("the rig file {file} cannot be read ({detail}); check its path")]
     File {
-        /// As it was given.
         file: String,
-        /// What the operating system said.
         detail: String,
     },
-    /// The rig file has mistakes.
     #[error(transparent)]
     RigFile(#[from] RigFileError),
-    /// There is no link that could be made again.
     #[error("this rig cannot be connected again; choose it anew")]
     NotAgain,
-    /// What the rig file describes cannot be used.
     #[error("rig {file}: {error}")]
     Device {
-        /// The rig file.
         file: String,
-        /// Why.
         error: OpenError,
     },
 }

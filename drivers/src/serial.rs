@@ -12,15 +12,12 @@ pub struct PortInfo {
     pub description: String,
 }
 
-/// The serial ports cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SerialError {
-    /// The operating system did not list its ports.
     #[error(
         "the serial ports of this computer cannot be listed ({detail}); check the permissions of this account and try again"
     )]
     Listing {
-        /// What the operating system said.
         detail: String,
     },
 }

@@ -36,10 +36,8 @@ const FETCH_EVERY: Nanos = Nanos::from_millis(4);
 /// with much else to do takes.
 const AGE_MAX: Nanos = Nanos::from_millis(15);
 
-/// What the link does.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkMeasurement {
-    /// Round trips.
     pub stats: LinkStats,
     /// The usual one, of which as many are longer as shorter.
     trip: Nanos,
@@ -88,7 +86,6 @@ pub fn measure(
 }
 
 impl LinkMeasurement {
-    /// How to ask for samples one by one.
     pub fn polling(&self, tick: Nanos) -> PollPace {
         // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
         let every = self.apart.max(Nanos(tick.0 * 6 / 10));
@@ -115,17 +112,13 @@ impl LinkMeasurement {
 
 /// How samples are taken from now on, in words too.
 pub struct SamplingSetup {
-    /// How to ask.
     pub pace: PollPace,
-    /// The recording, if there is one.
     pub plan: Option<RecordingPlan>,
     /// What is the same whenever the same controller is opened over the same link, for the rig's identity.
     pub words: String,
-    /// What was measured, for the operator.
     pub measured: String,
 }
 
-/// Chooses and starts it.
 pub fn set_up(
     console: &mut GalilConsole<'_>,
     settings: &GalilSettings,

@@ -33,26 +33,19 @@ const LAG_SAMPLES: f64 = 4.0;
 /// Two samples of the controller may fall between two questions: on average they come further apart by this.
 const BETWEEN: f64 = 1.1;
 
-/// A controller that was set up.
 #[derive(Clone, Debug)]
 pub struct Connected {
-    /// Who it is.
     pub board: GalilBoard,
-    /// What it makes of the rig.
     pub description: RigDescription,
-    /// How to ask for samples.
     pub pace: PollPace,
-    /// The link as it was measured.
     pub stats: LinkStats,
     /// The same in words: latency, jitter, and what was made of it.
     pub link: String,
-    /// The recording that was started, if one was.
     pub plan: Option<RecordingPlan>,
     /// Whether the watchdog's program runs.
     pub has_watchdog: bool,
     /// How far the axis goes at most when palpate falls silent, in mm; the whole travel without a watchdog.
     pub worst_case_mm: f64,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 

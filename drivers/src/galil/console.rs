@@ -11,13 +11,11 @@ use std::sync::Arc;
 pub const ANSWER_MAX: Nanos = Nanos::from_millis(1_000);
 /// A link to a controller with nothing else going on.
 pub struct GalilConsole<'a> {
-    /// The link and what was exchanged over it.
     pub link: TappedLink<'a>,
     parser: GalilParser,
 }
 
 impl<'a> GalilConsole<'a> {
-    /// On a link.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
         Self { link: TappedLink::new(link, clock, device), parser: GalilParser::default() }
     }
@@ -27,7 +25,6 @@ impl<'a> GalilConsole<'a> {
         self.link.now()
     }
 
-    /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), GalilOpenError> {
         self.link.write(text.as_bytes()).map_err(lost)
     }
@@ -71,7 +68,6 @@ impl<'a> GalilConsole<'a> {
         self.replies(1, ANSWER_MAX)?.pop().ok_or(GalilOpenError::Silent)
     }
 
-    /// Asks one command that must be accepted.
     pub fn ask(&mut self, command: &str) -> Result<GalilReply, GalilOpenError> {
         let reply = self.try_ask(command)?;
         if reply.is_accepted {
@@ -94,7 +90,6 @@ impl<'a> GalilConsole<'a> {
         })
     }
 
-    /// The one number that an expression has.
     pub fn number(&mut self, expression: &str) -> Result<f64, GalilOpenError> {
         Ok(self.numbers(expression)?[0])
     }

@@ -9,7 +9,6 @@ use thiserror::Error;
 pub struct GalilBoard {
     /// The whole answer, such as `DMC4143 Rev 1.3a`.
     pub revision: String,
-    /// Number of axes.
     pub axes: usize,
     /// Serial number (`_BN`), where it tells one.
     pub serial_number: Option<u64>,
@@ -58,70 +57,51 @@ impl fmt::Display for GalilBoard {
     }
 }
 
-/// A controller cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GalilOpenError {
     /// The link was lost while the controller was set up.
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
     Lost {
-        /// What the operating system said.
         detail: String,
     },
-    /// Nothing came back.
     #[error(
         "nothing answers like a Galil controller; check that it is on, the cable, and the baud rate of its jumpers"
     )]
     Silent,
-    /// Something else answers.
     #[error(
         "what answers is no Galil controller: it says '{got}'; check which port the rig file names"
     )]
     NoGalil {
-        /// What it said.
         got: String,
     },
-    /// A Galil device that is not driven.
     #[error("{revision} cannot be used: {why}")]
     Unsupported {
-        /// What it says it is.
         revision: String,
-        /// Why not.
         why: &'static str,
     },
-    /// Another one of the same kind.
     #[error(
         "the controller has serial number {found}, the rig file says {expected}; a cable was swapped, or the rig file is of another rig"
     )]
     OtherSerial {
-        /// Its number.
         found: String,
         /// The rig file's.
         expected: u64,
     },
-    /// It has fewer axes.
     #[error("{revision} has {axes} axes and no axis {axis}; correct the axis of the rig file")]
     NoAxis {
-        /// What it says it is.
         revision: String,
-        /// How many it has.
         axes: usize,
         /// The rig file's.
         axis: char,
     },
-    /// It refused a command that sets it up.
     #[error("the controller refuses {command} ({error})")]
     Refused {
-        /// The command.
         command: String,
-        /// Why.
         error: GalilError,
     },
-    /// It set something else.
     #[error("the controller set {found} where {command} was asked; correct the rig file")]
     SetOtherwise {
-        /// The command.
         command: String,
-        /// What it reads back.
         found: String,
     },
     /// The rig file asks for a recording that there cannot be.

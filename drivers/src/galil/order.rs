@@ -12,41 +12,30 @@ use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 /// are within 5 mm, and before its mechanical ends. They stop the axis when both palpate and a switch fail.
 pub const LIMIT_MARGIN_MM: f64 = 5.0;
 
-/// Which part of a command is under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    /// Numbers are set and read back.
     Setting,
     /// The part that counts was sent, for a command as it was set.
     Doing(RigCommand),
 }
 
-/// What to do next with a command.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OrderStep {
-    /// Answers are still to come.
     Wait,
-    /// Send these, each answered by a prompt.
     Send(Vec<String>),
     /// Send these, and behind them ask for a sample.
     SendAndSample(Vec<String>),
-    /// It is done, with what was set.
     Done(RigCommand),
     /// The controller refused a part of it: ask why.
     ReadReason,
-    /// It cannot be done, in words.
     Refused(String),
 }
 
-/// A command under way.
 #[derive(Clone, Debug)]
 pub struct GalilOrder {
-    /// As it was asked for.
     pub command: RigCommand,
     stage: Stage,
-    /// Prompts still to come.
     open: usize,
-    /// Numbers read back so far.
     numbers: Vec<f64>,
     is_refused: bool,
     /// The part that counts was written, so that the axis may already be doing it.
@@ -72,7 +61,6 @@ impl GalilOrder {
         }
     }
 
-    /// How it begins.
     pub fn begin(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let commands = match self.command {
@@ -119,7 +107,6 @@ impl GalilOrder {
         OrderStep::Send(commands)
     }
 
-    /// Takes the answer to one of its commands.
     pub fn take(&mut self, reply: &GalilReply, settings: &GalilSettings) -> OrderStep {
         self.open = self.open.saturating_sub(1);
         if reply.is_accepted {

@@ -15,10 +15,8 @@ const UNSOLICITED_MAX: usize = 1024;
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
 const UPLOAD_END: u8 = 0x1a;
 
-/// What came.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GalilMessage {
-    /// The answer to one command.
     Reply(GalilReply),
     /// A line that a program of the controller wrote, told apart by its top bits (`CW 1`).
     Unsolicited(String),
@@ -26,7 +24,6 @@ pub enum GalilMessage {
     Flood,
 }
 
-/// The answer to one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GalilReply {
     /// Whether it ended with `:`.
@@ -66,17 +63,14 @@ pub struct GalilParser {
 }
 
 impl GalilParser {
-    /// Forgets what has come of a reply.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Bytes of the reply under way.
     pub fn pending(&self) -> usize {
         self.reply.len()
     }
 
-    /// Takes a byte; gives what it completed.
     pub fn take(&mut self, byte: u8) -> Option<GalilMessage> {
         if byte & 0x80 != 0 {
             return self.take_unsolicited(byte & 0x7f);

@@ -31,20 +31,15 @@ const RUNNING: [u32; 5] = [0, 30, 50, 60, 100];
 pub struct RecordingPlan {
     /// Samples from one element to the next: 2^n.
     pub interval: i64,
-    /// Elements of an array.
     pub ring: i64,
     /// `TIME` of element 0, had it been there from the beginning.
     pub base: i64,
-    /// The first element to be fetched.
     pub first: i64,
-    /// Length of a sample of the controller.
     pub tick: Nanos,
 }
 
-/// An answer to the question while recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordingStatus {
-    /// The numbers of a poll.
     pub poll: [f64; 6],
     /// `TIME`.
     pub time: i64,
@@ -85,12 +80,10 @@ pub enum RecordingOutput {
 /// A report or a sample out of line, which waits for the samples before it.
 #[derive(Clone, Debug)]
 struct HeldOutput {
-    /// Not known before the next look.
     time: Option<i64>,
     out: RecordingOutput,
 }
 
-/// Elements that were asked for.
 #[derive(Clone, Debug)]
 struct Chunk {
     first: i64,
@@ -98,20 +91,16 @@ struct Chunk {
     columns: Vec<Vec<f64>>,
 }
 
-/// A look does not fit the recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordingMismatch;
 
-/// A recording that is being fetched.
 #[derive(Clone, Debug)]
 pub struct ArrayRecording {
     plan: RecordingPlan,
     /// The next element to be asked for, and the newest that there is.
     next: i64,
     newest: i64,
-    /// The newest look and the one before.
     status: Option<RecordingStatus>,
-    /// The controller answered it after this.
     status_asked_at: Nanos,
     earlier: Option<RecordingStatus>,
     chunk: Option<Chunk>,
@@ -119,7 +108,6 @@ pub struct ArrayRecording {
     /// Pulses of the newest sample given out, and whether the axis moved.
     pulses_given: Option<f64>,
     is_moving: bool,
-    /// The newest sample given out.
     newest_output: i64,
     /// Elements that were written over before they were fetched.
     pub lost: u64,
@@ -133,7 +121,6 @@ pub fn question(settings: &GalilSettings) -> String {
 }
 
 impl ArrayRecording {
-    /// Of a recording that was started.
     #[must_use]
     pub fn new(plan: RecordingPlan) -> Self {
         Self {
@@ -219,7 +206,6 @@ impl ArrayRecording {
         Some(ARRAYS.map(fetch).into())
     }
 
-    /// Whether elements are on their way.
     pub fn is_fetching(&self) -> bool {
         self.chunk.is_some()
     }
@@ -318,7 +304,6 @@ impl ArrayRecording {
             && self.waiting.iter().any(is_set_now)
     }
 
-    /// The numbers that a poll would have given.
     fn sample(
         &mut self,
         time: i64,

@@ -7,10 +7,8 @@ use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place};
 use std::sync::Arc;
 
-/// A Galil controller with slide and load cell.
 pub type GalilRig = DeviceRig<GalilDevice>;
 
-/// A controller to be opened.
 #[derive(Clone)]
 pub struct GalilDevice {
     place: Place,
@@ -19,7 +17,6 @@ pub struct GalilDevice {
 }
 
 impl GalilDevice {
-    /// The controller at a place.
     #[must_use]
     pub fn new(place: Place, settings: GalilSettings) -> Self {
         Self { worst_case_mm: settings.travel.0, place, settings }

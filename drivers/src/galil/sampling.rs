@@ -27,7 +27,6 @@ pub const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
 /// What became of a poll's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SampleOutcome {
-    /// A new sample.
     Reading(Reading),
     /// The same sample again: two polls fell between two of them.
     Same,
@@ -50,7 +49,6 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// For a rig.
     #[must_use]
     pub fn new(settings: GalilSettings) -> Self {
         Self { settings, time: None, offset: 0, doubtful: None, was_moving: false }
@@ -64,7 +62,6 @@ impl Sampler {
         format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},TIME")
     }
 
-    /// Whether the axis moved in the newest sample.
     pub const fn is_moving(&self) -> bool {
         self.was_moving
     }
@@ -159,7 +156,6 @@ fn is_wrapped(last: u64, time: u64) -> bool {
     last.abs_diff(TIME_WRAPS) < WRAP_NEAR && time < WRAP_NEAR
 }
 
-/// A whole number that is not negative.
 pub fn whole(value: f64) -> Option<u64> {
     (value.fract() == 0.0 && (0.0..=4_294_967_295.0).contains(&value)).then_some(value as u64)
 }

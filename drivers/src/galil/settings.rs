@@ -25,13 +25,9 @@ impl MotorType {
 /// Range of an analog input (`AQ`; RIO-47xxx user manual, page 38).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnalogRange {
-    /// -5 to 5 V.
     Bipolar5,
-    /// -10 to 10 V.
     Bipolar10,
-    /// 0 to 5 V.
     Unipolar5,
-    /// 0 to 10 V.
     Unipolar10,
 }
 
@@ -47,7 +43,6 @@ impl AnalogRange {
         }
     }
 
-    /// Width of the range.
     #[must_use]
     pub const fn span(self) -> Volts {
         Volts(match self {
@@ -64,7 +59,6 @@ impl AnalogRange {
         counts * self.span().0 / 65_536.0
     }
 
-    /// Whether it has two signs.
     #[must_use]
     pub const fn is_bipolar(self) -> bool {
         matches!(self, Self::Bipolar5 | Self::Bipolar10)
@@ -76,7 +70,6 @@ impl AnalogRange {
 pub enum Levels {
     /// The switch pulls its input low, the usual wiring.
     ActiveLow,
-    /// The switch lets its input rise.
     ActiveHigh,
 }
 
@@ -100,7 +93,6 @@ impl Levels {
 /// What palpate has to know to drive a slide with a Galil controller.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GalilSettings {
-    /// Name of the rig, for the operator.
     pub name: String,
     /// Axis the slide is on, `A` to `H`.
     pub axis: char,
@@ -112,17 +104,13 @@ pub struct GalilSettings {
     pub is_reversed: bool,
     /// End of the travel, from home.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration of every move.
     pub acceleration: MmPerS2,
     /// How far the probe may go while no sample comes.
     pub unseen: Position,
     /// How the drive wants its pulses.
     pub motor_type: MotorType,
-    /// Limit switches.
     pub limits: Levels,
-    /// Home switch.
     pub home: Levels,
     /// Range of the load cell's input.
     pub range: AnalogRange,
@@ -137,21 +125,17 @@ pub struct GalilSettings {
     /// Whether a program on the controller may stop the axis when palpate falls silent. It takes the place of a program
     /// that is there, but for one in permanent memory.
     pub has_watchdog: bool,
-    /// How samples are taken.
     pub sampling: Sampling,
     /// Period of the controller's samples as `TM` counts it, in its microseconds; left alone without.
     pub sample_us: Option<u16>,
 }
 
-/// How samples are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
     /// Recorded where that gives no old samples, else asked for.
     #[default]
     Auto,
-    /// Asked for one by one.
     Poll,
-    /// Recorded by the controller and fetched.
     Record,
 }
 

@@ -19,7 +19,6 @@ const ROUNDING: f64 = 1e-6;
 /// Increments that begin a sine; a question has to fit behind them into the line.
 const FIRST: usize = 2;
 
-/// Increments of one sine.
 #[derive(Clone, Debug)]
 pub struct SineFeed {
     path: Sine,
@@ -39,7 +38,6 @@ pub struct SineFeed {
 }
 
 impl SineFeed {
-    /// Of a command that was checked.
     #[must_use]
     pub fn new(command: &Oscillation, settings: &GalilSettings, tick: Nanos) -> Self {
         let length = Seconds(tick.seconds().0);
@@ -59,7 +57,6 @@ impl SineFeed {
         }
     }
 
-    /// The commands that begin it.
     pub fn begin(&mut self) -> Vec<String> {
         let mut commands = vec![format!("CM{}", self.axis)];
         for _ in 0..FIRST {
@@ -68,7 +65,6 @@ impl SineFeed {
         commands
     }
 
-    /// They were written now.
     pub fn mark_begun(&mut self, now: Nanos) {
         self.begun_at = now;
     }
@@ -115,7 +111,6 @@ impl SineFeed {
         (!self.is_over).then(|| Nanos((self.begun_at + sent).0.saturating_sub(LEAD.0)))
     }
 
-    /// A line of increments, if they are due.
     pub fn take(&mut self, now: Nanos) -> Option<Vec<String>> {
         self.due().filter(|due| *due <= now)?;
         let mut commands: Vec<String> = Vec::new();

@@ -17,29 +17,22 @@ const START_MAX: Nanos = Nanos::from_millis(5_000);
 /// After so long without a byte a reset is asked for: a board that a limit has locked hears nothing else (gnea/grbl,
 /// protocol.c, `protocol_exec_rt_system`). Boot loaders of common boards are through by then.
 const RESET_AFTER: Nanos = Nanos::from_millis(2_500);
-/// Between two questions who is there.
 pub(super) const ASK_AGAIN: Nanos = Nanos::from_millis(300);
 /// An answer takes longer only while settings are written, which this never does.
 pub(super) const ANSWER_MAX: Nanos = Nanos::from_millis(1_500);
 /// A reset that has just begun shows itself by then: half a second without a word is no board that starts.
 const SETTLE: Nanos = Nanos::from_millis(60);
-/// The slowest brake that anybody waits for.
 const REST_MAX: Nanos = Nanos::from_millis(5_000);
-/// Empty lines by which the link is measured.
 const PINGS: usize = 10;
 
-/// A board that was set up.
 #[derive(Clone, Debug)]
 pub struct Connected {
     /// Version, text of `$I=`, safety, for the operator and the log.
     pub identity: String,
-    /// What its settings make of it.
     pub facts: BoardParameters,
-    /// The link as it was measured.
     pub stats: LinkStats,
     /// How far the axis goes at most when palpate falls silent, in mm.
     pub worst_case_mm: f64,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 
@@ -205,7 +198,6 @@ fn has_ok(console: &mut Console<'_>) -> Result<bool, GrblOpenError> {
     Ok(false)
 }
 
-/// Ends a jog that is under way.
 fn to_rest(console: &mut Console<'_>) -> Result<GrblStatus, GrblOpenError> {
     let start = console.now();
     loop {

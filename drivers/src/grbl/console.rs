@@ -10,14 +10,12 @@ use std::sync::Arc;
 
 /// A link to a board with nothing else going on.
 pub(super) struct Console<'a> {
-    /// The link and what was exchanged over it.
     pub link: TappedLink<'a>,
     parser: Parser,
     waiting: VecDeque<Incoming>,
 }
 
 impl<'a> Console<'a> {
-    /// On a link.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
         Self {
             link: TappedLink::new(link, clock, device),
@@ -31,12 +29,10 @@ impl<'a> Console<'a> {
         self.link.now()
     }
 
-    /// Writes bytes as they are.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), GrblOpenError> {
         self.link.write(bytes).map_err(lost)
     }
 
-    /// The next line, if one comes in time.
     pub fn next(&mut self, until: Nanos) -> Result<Option<Incoming>, GrblOpenError> {
         loop {
             if let Some(incoming) = self.waiting.pop_front() {
@@ -51,7 +47,6 @@ impl<'a> Console<'a> {
         }
     }
 
-    /// Asks for a status until one comes.
     pub fn status(&mut self) -> Result<GrblStatus, GrblOpenError> {
         let end = self.now() + ANSWER_MAX;
         while self.now() < end {

@@ -3,31 +3,22 @@
 use std::fmt;
 use thiserror::Error;
 
-/// A board cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GrblOpenError {
-    /// It was unplugged.
     #[error("the link was lost while the board was set up ({detail}); check the cable")]
     Lost {
-        /// What the operating system said.
         detail: String,
     },
-    /// Nothing comes.
     #[error("nothing answers like Grbl; check power, port and baud rate (115200 is Grbl's)")]
     Silent,
-    /// Something else answers.
     #[error("what answers is not Grbl ({found}); check the port in the rig file")]
     NotGrbl {
-        /// What it said.
         found: String,
     },
-    /// Too old for jogs.
     #[error("the board runs Grbl {version}, which cannot be driven safely; load Grbl 1.1")]
     OtherVersion {
-        /// What it says it is.
         version: String,
     },
-    /// A swapped cable.
     #[error(
         "the board calls itself '{found}' where the rig file has '{expected}'; check the cables, or the build_info of the rig file"
     )]
@@ -37,12 +28,10 @@ pub enum GrblOpenError {
         /// The rig file's.
         expected: String,
     },
-    /// It does not want to move.
     #[error(
         "the board is locked after its start ({reason}); look whether the axis is free, then let palpate unlock it with unlock = true in the rig file, or switch its homing lock off with $22=0"
     )]
     Locked {
-        /// What it said.
         reason: String,
     },
     /// It is in a state in which nothing can be done.
@@ -53,21 +42,15 @@ pub enum GrblOpenError {
         "the limit pin of axis {axis} is closed, and the board would lock itself again as soon as it opens; move the slide off the switch by hand, then open the rig again"
     )]
     OnALimit {
-        /// The axis.
         axis: char,
     },
-    /// A setting is not that of the rig file.
     #[error(
         "the board has ${number}={found} ({meaning}) where the rig file needs {wanted}; correct the rig file, or send ${number}={wanted} from a terminal"
     )]
     SetOtherwise {
-        /// Number of the setting.
         number: u16,
-        /// What it is.
         meaning: &'static str,
-        /// As the board has it.
         found: f64,
-        /// As it should be.
         wanted: String,
     },
     /// Its steps are shorter than what it tells.
@@ -75,9 +58,7 @@ pub enum GrblOpenError {
         "the board has ${number}={found} (steps a mm), but tells places in thousandths of a mm only, so that more than 1000 cannot be checked; set the drive to coarser microsteps"
     )]
     TooFine {
-        /// Number of the setting.
         number: u16,
-        /// What it is.
         found: f64,
     },
     /// Nobody knows at which end it stands.
@@ -85,15 +66,11 @@ pub enum GrblOpenError {
         "the limit pin of axis {axis} is closed, and home and the far limit look alike on it; move the slide off the switch by hand, or say closed_is_home = true in the rig file if nothing but home can have closed it"
     )]
     OnASwitch {
-        /// The axis.
         axis: char,
     },
-    /// It refuses a question.
     #[error("the board refuses {line} ({detail})")]
     Refused {
-        /// What was asked.
         line: String,
-        /// Why.
         detail: String,
     },
 }
@@ -101,18 +78,14 @@ pub enum GrblOpenError {
 /// `error:N`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
-    /// The number, where there is one.
     pub code: Option<u8>,
-    /// The words of firmware that has words.
     pub words: String,
 }
 
 /// `ALARM:N`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Alarm {
-    /// The number, where there is one.
     pub code: Option<u8>,
-    /// The words of firmware that has words.
     pub words: String,
 }
 

@@ -15,7 +15,6 @@ const GAIN: f64 = 0.5;
 const DRIFT_GAIN: f64 = GAIN * GAIN / 8.0;
 /// Resonators are right to half a percent (Murata Ceralock, CSTCE series); what seems more is something else.
 const DRIFT_MAX: f64 = 0.01;
-/// The most by which a feed is changed.
 const CHANGE_MAX: f64 = 0.02;
 /// Reports that are further apart tell of a pause of the computer.
 const APART_MAX: f64 = 0.5;
@@ -23,7 +22,6 @@ const APART_MAX: f64 = 0.5;
 /// What is known of the board's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FeedCorrection {
-    /// By how much it is too fast.
     drift: f64,
     /// By how many s the motion under way is ahead of its profile, of late.
     ahead: f64,
@@ -31,7 +29,6 @@ pub struct FeedCorrection {
 }
 
 impl FeedCorrection {
-    /// A motion begins.
     pub fn begin(&mut self) {
         (self.ahead, self.last_report) = (0.0, None);
     }
@@ -53,7 +50,6 @@ impl FeedCorrection {
         self.drift = drift.clamp(-DRIFT_MAX, DRIFT_MAX);
     }
 
-    /// What a feed is to be multiplied with.
     pub fn feed(&self) -> f64 {
         1.0 - (self.drift + GAIN * self.ahead).clamp(-CHANGE_MAX, CHANGE_MAX)
     }

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 /// Status reports have three decimals of a mm (report.c): shorter steps cannot be told apart.
 pub const MM_PER_STEP_MIN: f64 = 1e-3;
 
-/// All that the board has stored.
 pub(super) fn read_settings(
     console: &mut Console<'_>,
 ) -> Result<BTreeMap<u16, f64>, GrblOpenError> {

@@ -7,33 +7,26 @@ use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 /// So long the axis may go on at full speed, beside the way of braking, on what it was given: 60 ms for segments that
 /// Grbl makes ahead (five of 10 ms, and one that is being made), a chunk, and the rest for links that are slow.
 const AHEAD: Seconds = Seconds(0.3);
-/// So long a chunk lasts.
 const CHUNK: Seconds = Seconds(0.08);
 /// Chunks that are in the planner at once at most; it takes 15 (planner.h).
 const CHUNKS_MAX: f64 = 8.0;
 /// Where it is, is known to so much: the start to 20 ms, and a clock that is off by half a percent is followed to 30.
 const KNOWN: Seconds = Seconds(0.05);
 
-/// A motion under way.
 #[derive(Clone, Debug)]
 pub struct JogMotion {
-    /// As it was asked for.
     pub wanted: MoveTo,
-    /// Its number, until it is acknowledged.
     pub owed: Option<u64>,
     /// Steps of the board where it begins and ends.
     pub from: i64,
-    /// Where it ends.
     pub to: i64,
     /// mm/min of the board.
     pub feed: f64,
     /// From 0 on, in mm.
     pub profile: Profile,
-    /// When it began.
     pub started: Option<Nanos>,
     /// When it was told to end early.
     pub cancelled: Option<Nanos>,
-    /// When it was last told so.
     pub repeated: Nanos,
     /// Its end was told to the track.
     pub is_braking: bool,
@@ -81,7 +74,6 @@ impl JogMotion {
         if self.to < self.from { -1.0 } else { 1.0 }
     }
 
-    /// Whether nothing more is to be sent.
     pub const fn is_all_sent(&self) -> bool {
         self.sent == self.to
     }
@@ -104,7 +96,6 @@ impl JogMotion {
         is_cruising.then_some(Seconds(phase - since))
     }
 
-    /// From start to rest.
     pub fn duration(&self) -> Nanos {
         Nanos((self.profile.duration().0 * 1e9) as u64)
     }

@@ -8,10 +8,8 @@ use palpate_model::rig::AxisStatus;
 /// switch by 8 mm.
 const NEAR_MM: f64 = 10.0;
 
-/// What is known of the ends of an axis.
 #[derive(Debug, Default)]
 pub struct EndSwitches {
-    /// The last motion led into the tissue.
     is_outwards: bool,
     /// Where home and the far limit were last seen closed, in pulses from the board's zero.
     home: Option<i64>,
@@ -19,7 +17,6 @@ pub struct EndSwitches {
 }
 
 impl EndSwitches {
-    /// A motion begins.
     pub fn begin_motion(&mut self, is_outwards: bool) {
         self.is_outwards = is_outwards;
     }

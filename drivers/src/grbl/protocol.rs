@@ -10,40 +10,29 @@ pub const LINE_MAX: usize = 256;
 
 /// Status query (doc/markdown/commands.md, real-time commands).
 pub const QUERY: u8 = b'?';
-/// Soft reset.
 pub const RESET: u8 = 0x18;
-/// Jog cancel.
 pub const JOG_CANCEL: u8 = 0x85;
 /// Cycle start. A cancel that is heard in a jog and looked at when that has ended leaves Grbl suspended, though it says
 /// `Idle`, and it takes no line until this comes (protocol.c, `protocol_exec_rt_system`; observed with 1.1h). It does
 /// nothing to a board at rest.
 pub const CYCLE_START: u8 = b'~';
 
-/// Machine states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GrblState {
-    /// At rest, ready.
     Idle,
-    /// G-code moves.
     Run,
-    /// A jog moves.
     Jog,
     /// Held, `true` when at rest.
     Hold(bool),
-    /// Locked.
     Alarm,
-    /// The safety door is or was open.
     Door,
-    /// G-code is checked, nothing moves.
     Check,
     /// Looking for home by itself.
     Home,
-    /// Asleep until a reset.
     Sleep,
 }
 
 impl GrblState {
-    /// Whether the axis moves in it.
     #[must_use]
     pub const fn is_moving(self) -> bool {
         matches!(self, Self::Run | Self::Jog | Self::Home)
@@ -69,13 +58,11 @@ impl GrblState {
 /// A status report. Units are those of `$13`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrblStatus {
-    /// What it does.
     pub state: GrblState,
     /// Machine position of each axis, where it is told.
     pub machine: Option<Vec<f64>>,
     /// Work position of each axis, where it is told instead.
     pub work: Option<Vec<f64>>,
-    /// Work coordinate offset, told now and then.
     pub offset: Option<Vec<f64>>,
     /// Pins that are closed: `X`, `Y`, `Z`, `P` and others.
     pub pins: String,
@@ -119,7 +106,6 @@ impl GrblStatus {
         (status.machine.is_some() || status.work.is_some()).then_some(status)
     }
 
-    /// Whether a pin is closed.
     pub fn has_pin(&self, pin: char) -> bool {
         self.pins.contains(pin)
     }
@@ -139,26 +125,18 @@ fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-/// One line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incoming {
-    /// A line was done, or planned.
     Ok,
-    /// A line was refused.
     Refused(Refusal),
-    /// The machine is locked.
     Alarm(Alarm),
     /// An answer to [`QUERY`].
     Status(GrblStatus),
-    /// It has started: the version.
     Hello(String),
-    /// A numbered setting.
     Setting(u16, f64),
     /// What is between `[` and `]`.
     Message(String),
-    /// Anything else, such as a startup line.
     Other(String),
-    /// More than any line of Grbl.
     Flood,
 }
 
@@ -210,7 +188,6 @@ pub struct Parser {
 }
 
 impl Parser {
-    /// Takes one byte.
     pub fn take(&mut self, byte: u8) -> Option<Incoming> {
         match byte {
             b'\r' | b'\n' => {
@@ -233,7 +210,6 @@ impl Parser {
         }
     }
 
-    /// Forgets half a line.
     pub fn clear(&mut self) {
         *self = Self::default();
     }

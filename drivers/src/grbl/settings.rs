@@ -14,19 +14,15 @@ pub enum HomeSwitch {
 /// Everything about the board that only its owner can know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrblSettings {
-    /// What the operator calls the rig.
     pub name: String,
     /// `X`, `Y` or `Z`.
     pub axis: char,
-    /// Way of a step.
     pub mm_per_pulse: f64,
     /// Positive machine coordinates lead away from the tissue.
     pub is_reversed: bool,
     /// End of the travel; home is 0.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration and deceleration.
     pub acceleration: MmPerS2,
     /// How far the probe may go while no sample comes.
     pub unseen: Position,

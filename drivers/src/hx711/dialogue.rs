@@ -12,10 +12,8 @@ const SILENCE_MAX: Nanos = Nanos::from_millis(1_000);
 const NANOS_PER_TICK: u64 = 1_000;
 const RESTARTED: &str = "the HX711 board has started anew; check its supply";
 
-/// A board that sends values.
 pub type Hx711Dialogue = LineCell<Hx711LineReader>;
 
-/// What its lines mean.
 pub struct Hx711LineReader {
     header: Header,
     volts_per_count: f64,

@@ -40,7 +40,6 @@ pub struct Hx711Settings {
     pub board: Option<String>,
     /// What the chip's whole range at gain 128 is called in volts. Calibrations belong to it.
     pub full_scale: Volts,
-    /// Standard deviation of the signal at rest.
     pub noise: Volts,
 }
 

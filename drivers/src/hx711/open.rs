@@ -14,11 +14,9 @@ const DEVICE: &str = "HX711 board";
 /// Opening the port resets an Arduino Uno, whose boot loader then waits up to two seconds; the chip needs another 0.4 s
 /// (data sheet, page 3).
 const START_MAX: Nanos = Nanos::from_millis(5_000);
-/// How often it is asked who it is until then.
 const ASK_EVERY: Nanos = Nanos::from_millis(400);
 /// Conversions that a value is a mean of: after so many the output has settled (data sheet, page 3).
 const SETTLING: f64 = 4.0;
-/// Conversions by which its rate is measured.
 const MEASURED: usize = 9;
 /// So long may they take at 10 a second.
 const MEASURE_MAX: Nanos = Nanos::from_millis(2_500);

@@ -42,7 +42,6 @@ impl ForceUnit {
         Self::ALL.into_iter().find(is_it)
     }
 
-    /// Newtons of one.
     #[must_use]
     pub const fn newtons(self) -> f64 {
         match self {
@@ -60,16 +59,13 @@ impl ForceUnit {
 /// A reading: compression positive, tension negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GaugeReading {
-    /// The number.
     pub number: Decimal,
-    /// Its unit.
     pub unit: ForceUnit,
 }
 
 /// The answer to `LIST`: settings, by the abbreviations that set them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GaugeList {
-    /// Version of the firmware.
     pub firmware: String,
     /// Unit of force; what stands there when it is another unit.
     pub unit: Result<ForceUnit, String>,
@@ -77,32 +73,24 @@ pub struct GaugeList {
     pub mode: String,
     /// Exponent of the filter of displayed readings, 2^n samples.
     pub filter_displayed: Option<u8>,
-    /// Exponent of the filter of current readings.
     pub filter_current: Option<u8>,
     /// Readings that it sends by itself, as `AOUT` sets them.
     pub auto_transmit: Option<u16>,
-    /// Whether units are sent with readings.
     pub has_units: bool,
     /// Whether tension is positive; some firmware does not say.
     pub is_inverted: Option<bool>,
-    /// Whether the sign is left out.
     pub is_unsigned: Option<bool>,
-    /// The whole line.
     pub line: String,
 }
 
-/// A line of a gauge.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GaugeLine {
-    /// A reading with its unit.
     Reading(GaugeReading),
     /// A reading beyond the gauge's range.
     Overload,
-    /// The last command was refused.
     Error(GaugeError),
     /// The answer to `LIST`.
     List(GaugeList),
-    /// Anything else, such as a model number.
     Other(String),
 }
 

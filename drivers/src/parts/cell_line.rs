@@ -19,13 +19,11 @@ const SILENT_MIN: Nanos = Nanos::from_millis(250);
 /// This thread looks every half a millisecond. When it did not for so long, it was not the cell that was silent.
 const PAUSE: Nanos = Nanos::from_millis(20);
 
-/// A load cell in progress.
 pub struct CellLine {
     cell: Box<dyn CellDialogue>,
     track: Arc<Mutex<Track>>,
     clock: CellClock,
     start: Nanos,
-    /// Between two samples.
     period: Nanos,
     /// How long before it was sent a sample was felt.
     delay: Nanos,
@@ -184,7 +182,6 @@ mod tests {
     use crate::cell::CellSample;
     use palpate_model::units::Volts;
 
-    /// A sample for every byte.
     #[derive(Default)]
     struct Bytes(VecDeque<CellSample>);
 

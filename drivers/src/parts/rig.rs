@@ -14,29 +14,23 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// An axis in progress, and what it writes its deeds into.
 pub struct OpenedAxis {
-    /// Its thread.
     pub line: LinkThread,
-    /// Where it was when.
     pub track: Arc<Mutex<Track>>,
     /// Bytes of the time before the thread had the link.
     pub raw: Vec<RawBytes>,
 }
 
-/// An axis and a load cell.
 pub type PartsRig = DeviceRig<SplitRigDevices>;
 
-/// An axis and a load cell to be opened.
 #[derive(Clone)]
 pub struct SplitRigDevices {
     axis: (Place, GrblSettings),
     cell: (Place, Arc<dyn CellDevice>),
-    /// Of what was opened last.
     track: Arc<Mutex<Track>>,
     /// The host's clock where ticks begin.
     start: Nanos,
     /// What the axis' own pulses are more than the caller's.
     zero: i64,
-    /// Motions of which a sample was told.
     motions_shown: u64,
 }
 
@@ -88,7 +82,6 @@ impl RigDevice for SplitRigDevices {
         })
     }
 
-    /// Where the axis was when a sample was taken.
     fn complete(&mut self, now: Nanos, body: RigEventBody) -> RigEventBody {
         let track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
         match body {

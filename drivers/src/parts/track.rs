@@ -23,7 +23,6 @@ struct TrackPiece {
     motion: u64,
 }
 
-/// What an axis did.
 #[derive(Clone, Debug)]
 pub struct Track {
     pieces: VecDeque<TrackPiece>,
@@ -33,19 +32,15 @@ pub struct Track {
     pub is_stop_wanted: bool,
 }
 
-/// An axis at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisState {
     /// Pulses of its own counter.
     pub pulses: f64,
-    /// Motion, switches, motor.
     pub status: AxisStatus,
-    /// How many motions had begun.
     pub motion: u64,
 }
 
 impl Track {
-    /// At rest.
     #[must_use]
     pub fn at_rest(pulses: i64) -> Self {
         let mut track = Self {
@@ -65,7 +60,6 @@ impl Track {
         self.pieces.push_back(piece);
     }
 
-    /// It rests here from then on.
     pub fn begin_rest(&mut self, from: Nanos, pulses: i64) {
         self.push(TrackPiece {
             from,
@@ -88,7 +82,6 @@ impl Track {
         });
     }
 
-    /// From then on the motion under way is braked.
     pub fn begin_braking(&mut self, from: Nanos) {
         let Some(last) = self.pieces.back().copied() else {
             return;
@@ -131,7 +124,6 @@ impl Track {
         self.begin_rest(last.from + after, end.round() as i64);
     }
 
-    /// Switches and motor from then on.
     pub fn set_inputs(&mut self, from: Nanos, status: AxisStatus) {
         if self.inputs.back().is_some_and(|(_, last)| *last == status) {
             return;
@@ -142,7 +134,6 @@ impl Track {
         self.inputs.push_back((from, status));
     }
 
-    /// At a time.
     pub fn at(&self, time: Nanos) -> AxisState {
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
         // Before all that is remembered: as it was first.

@@ -10,7 +10,6 @@ use crate::wire::Place;
 use palpate_model::units::Newtons;
 use std::sync::Arc;
 
-/// Where the cell is, and what it is.
 pub(super) fn read(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
     let cells = DEVICES.iter().filter_map(|kind| match kind.role {
         Role::Cell { read, .. } => Some((kind.word, read)),
@@ -22,7 +21,6 @@ pub(super) fn read(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> 
     Some((place?, cell))
 }
 
-/// A gauge, alone or on a stand.
 pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
     let usual = GaugeSettings::default();
     let capacity = fields.needed("cell.capacity_n", 1e-3, 1e6);

@@ -6,7 +6,6 @@ use palpate_model::units::{MmPerS, MmPerS2, Position};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Something wrong in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// Its line, from 1; 0 for the file as a whole.
@@ -40,13 +39,10 @@ struct Field {
     is_taken: bool,
 }
 
-/// What a slide can do and may do.
 pub(super) struct Limits {
     /// End of the travel from home.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration of every move.
     pub acceleration: MmPerS2,
     /// How far the probe may go while no sample comes.
     pub unseen: Position,
@@ -55,7 +51,6 @@ pub(super) struct Limits {
 /// Words for where positive positions of a drive lead: from home into the tissue, or the other way.
 pub(super) const DIRECTIONS: [(&str, bool); 2] = [("forward", false), ("reverse", true)];
 
-/// The keys of a file.
 pub struct Fields {
     all: Vec<Field>,
     mistakes: Vec<Mistake>,
@@ -110,7 +105,6 @@ impl Fields {
         Some(field.value.clone())
     }
 
-    /// A text, if it is there.
     pub fn text(&mut self, key: &str) -> Option<String> {
         match self.take(key)? {
             Value::Text(text) if !text.trim().is_empty() => Some(text),
@@ -121,7 +115,6 @@ impl Fields {
         }
     }
 
-    /// A flag, if it is there.
     pub fn flag(&mut self, key: &str) -> Option<bool> {
         match self.take(key)? {
             Value::Flag(flag) => Some(flag),
@@ -132,7 +125,6 @@ impl Fields {
         }
     }
 
-    /// A number within bounds, if it is there.
     pub fn number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         match self.take(key)? {
             Value::Number(number) if (least..=most).contains(&number) => Some(number),
@@ -175,7 +167,6 @@ impl Fields {
         })
     }
 
-    /// A number within bounds that must be there.
     pub fn needed(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         if !self.all.iter().any(|field| field.key == key) {
             self.mistake(key, "is missing; nobody but you can know it");

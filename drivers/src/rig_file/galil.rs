@@ -7,7 +7,6 @@ use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, S
 use crate::wire::Place;
 use palpate_model::units::Volts;
 
-/// A rig with the controller of a rig file.
 pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (place, settings) = read(name, fields)?;
     let device = GalilDevice::new(place.clone(), settings);

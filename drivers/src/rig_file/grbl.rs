@@ -20,7 +20,6 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(places, Parts::new(axis, cell)))
 }
 
-/// Where the board is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
     let place = read_address(fields, "");

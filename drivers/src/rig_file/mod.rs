@@ -23,22 +23,17 @@ use crate::wire::{HostClock, Place};
 use std::fmt;
 use thiserror::Error;
 
-/// A longer rig file is something else.
 pub const BYTES_MAX: usize = 64 * 1024;
 
-/// Opens the devices of a rig file.
 type Opener = dyn Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync;
 
-/// A rig as its file describes it.
 pub struct RigFile {
     places: Vec<Place>,
     open: Box<Opener>,
 }
 
-/// A rig file with mistakes, all of them.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub struct RigFileError {
-    /// The file, as it was given.
     pub file: String,
     /// What is wrong with it, in the order of its lines.
     pub mistakes: Vec<Mistake>,

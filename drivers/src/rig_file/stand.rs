@@ -7,14 +7,12 @@ use super::fields::Fields;
 use crate::mark10::{StandDevice, StandSettings};
 use crate::wire::Place;
 
-/// A rig with the stand of a rig file.
 pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (place, settings) = read(name, fields)?;
     let places = vec![place.clone()];
     Some(RigFile::of(places, StandDevice { place, settings }))
 }
 
-/// Where the stand is, and what it is.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
     let place = read_address(fields, "");
     let limits = fields.limits();

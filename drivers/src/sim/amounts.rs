@@ -5,7 +5,6 @@ use palpate_model::Newtons;
 use std::fmt;
 use std::str::FromStr;
 
-/// A whole number of a unit within a range.
 macro_rules! amount {
     ($(#[$doc:meta])* $name:ident, $word:literal, $usual:literal, $range:expr, $choices:literal) => {
         $(#[$doc])*
@@ -80,7 +79,6 @@ amount!(
 const RATES: [u32; 8] = [1000, 2000, 4000, 5000, 8000, 10_000, 16_000, 20_000];
 
 impl SimRate {
-    /// Samples where the usual rig takes one.
     #[must_use]
     pub const fn per_usual_tick(self) -> u64 {
         self.0 as u64 / 1000
@@ -137,7 +135,6 @@ impl SimInput {
 }
 
 impl SimCompliance {
-    /// In mm/N.
     #[must_use]
     pub fn mm_per_newton(self) -> f64 {
         f64::from(self.0) / 1000.0
@@ -158,7 +155,6 @@ const TENTHS_MIN: u32 = 50;
 const TENTHS_MAX: u32 = 2000;
 
 impl SimThickness {
-    /// In mm.
     #[must_use]
     pub fn mm(self) -> f64 {
         f64::from(self.tenths) / 10.0

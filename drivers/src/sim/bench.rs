@@ -23,19 +23,16 @@ const SOLVE_STEPS_MAX: usize = 60;
 pub struct BenchForces {
     /// True position of the probe's tip.
     pub probe: Position,
-    /// Force on the probe.
     pub on_probe: Newtons,
     /// Force on the load cell: the probe's and the weights'.
     pub on_cell: Newtons,
 }
 
-/// The bench of one rig.
 #[derive(Clone, Debug)]
 pub struct Bench {
     settings: SimSettings,
     specimen: Option<Tissue>,
     base: Position,
-    /// Of the specimen clipped in last.
     body: ModifiedKelvin,
     weights: Newtons,
     probe: Position,
@@ -60,12 +57,10 @@ impl Bench {
         self.specimen.as_ref().map_or(self.base, Tissue::surface)
     }
 
-    /// Front of the base.
     pub fn base(&self) -> Position {
         self.base
     }
 
-    /// Parameters of the specimen clipped in last.
     pub fn body(&self) -> ModifiedKelvin {
         self.body
     }
@@ -132,7 +127,6 @@ impl Bench {
         Position(at)
     }
 
-    /// Moves the probe and returns the force on it.
     fn push(&mut self, probe: Position, dt: Seconds) -> Newtons {
         let tissue = match &mut self.specimen {
             Some(tissue) => tissue.advance(probe, dt),

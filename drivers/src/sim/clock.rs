@@ -48,7 +48,6 @@ pub struct ReportLink {
 }
 
 impl ReportLink {
-    /// The link of a rig with this seed.
     pub fn new(seed: u64) -> Self {
         Self { random: Random::new(seed, Cause::Link), newest: None }
     }

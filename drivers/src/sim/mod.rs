@@ -40,7 +40,6 @@ use std::collections::VecDeque;
 
 /// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
 pub const MM_PER_PULSE: f64 = 0.015;
-/// Stroke of the slide.
 pub const TRAVEL: Position = Position(150.0);
 /// 2 counts/s, the resolution of `SP` at a nominal millisecond in Galil's DMC command reference.
 const SPEED_QUANTUM: MmPerS = MmPerS(2.0 * MM_PER_PULSE);
@@ -69,9 +68,7 @@ pub struct Truth {
     pub base: Position,
     /// Where the pulse counter reads zero, in mm from the edge of the home switch.
     pub counter_zero: Position,
-    /// The specimen clipped in last.
     pub body: ModifiedKelvin,
-    /// Force on the probe.
     pub force: Newtons,
 }
 
@@ -87,7 +84,6 @@ impl Truth {
     }
 }
 
-/// The simulated rig.
 #[derive(Clone, Debug)]
 pub struct SimRig {
     description: RigDescription,
@@ -154,7 +150,6 @@ impl SimRig {
         }
     }
 
-    /// The settings that rebuild this rig.
     pub fn settings(&self) -> SimSettings {
         self.settings
     }

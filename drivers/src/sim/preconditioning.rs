@@ -31,7 +31,6 @@ const HEALING: f64 = 600.0;
 /// Forces in N up to here are none: what rounding leaves of a body that has relaxed.
 const FREE: f64 = 1e-9;
 
-/// How far the surface has receded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SurfaceRecession {
     share: f64,
@@ -44,7 +43,6 @@ pub(super) struct SurfaceRecession {
 }
 
 impl SurfaceRecession {
-    /// Nothing has pressed the specimen yet.
     pub fn new(preconditioning: SimPreconditioning) -> Self {
         Self { share: preconditioning.share(), depth_max: 0.0, depth: 0.0, set: 0.0 }
     }
@@ -89,11 +87,9 @@ mod tests {
 
     struct Press {
         tissue: Tissue,
-        /// First surface.
         surface: Position,
     }
 
-    /// What one cycle looked like.
     #[derive(Clone, Copy, Debug)]
     struct Cycle {
         peak: f64,

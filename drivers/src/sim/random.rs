@@ -6,24 +6,17 @@
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// What a generator is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// Where the slider stands at power-on, and the controller's count.
     Machine = 1,
-    /// Surface and stiffness of the tissue.
     Tissue = 2,
-    /// White noise of the load cell.
     Noise = 3,
-    /// Slow drift of the load cell.
     Drift = 4,
-    /// Jitter of the link to the host.
     Link = 5,
-    /// Noise added by a faulty stand-in.
     Fault = 6,
 }
 
-/// The generator of one cause.
 #[derive(Clone, Debug)]
 pub struct Random(Pcg64);
 
@@ -49,7 +42,6 @@ impl Random {
         StandardUniform.sample(&mut self.0)
     }
 
-    /// Uniform between two numbers.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }

@@ -26,12 +26,10 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// The sensors that settings ask for.
     pub fn new(settings: &SimSettings) -> Self {
         Self { bath: settings.bath, input: settings.input, last_reported: Vec::new() }
     }
 
-    /// Which there are.
     pub fn described(settings: &SimSettings) -> RigSensors {
         RigSensors {
             digital_inputs: settings.input.seconds().map_or(0, |_| 1),

@@ -40,32 +40,22 @@ impl SimClock {
     }
 }
 
-/// Everything that determines a simulated rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SimSettings {
-    /// How real the load cell is.
     pub profile: SimProfile,
-    /// Seed of every random number the rig uses.
     pub seed: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
-    /// Samples a second.
     pub rate: SimRate,
-    /// What the tissue loses by having been deeper.
     pub softening: SimSoftening,
-    /// White noise of the ideal load cell.
     pub noise: SimNoise,
-    /// How stiff the tissue is.
     pub stiffness: SimStiffness,
     /// How far behind the surface a stiff base stands.
     pub thickness: SimThickness,
-    /// How far the rig itself gives way.
     pub compliance: SimCompliance,
     /// How far loading moves the tissue's surface.
     pub preconditioning: SimPreconditioning,
-    /// What its bath is heated to.
     pub bath: SimBath,
-    /// When its digital input goes high.
     pub input: SimInput,
 }
 
@@ -73,11 +63,8 @@ pub struct SimSettings {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the simulated rig's {setting} cannot be '{value}'; give {choices}")]
 pub struct SimSettingError {
-    /// Which setting.
     pub setting: &'static str,
-    /// What was given.
     pub value: String,
-    /// What is accepted.
     pub choices: &'static str,
 }
 
@@ -127,7 +114,6 @@ fn unusual<T: Default + PartialEq + fmt::Display>(
     (value != T::default()).then(|| (name.to_owned(), value.to_string()))
 }
 
-/// A setting that is one of some words.
 macro_rules! words {
     ($name:ident, $setting:literal, $choices:literal, $($variant:ident = $word:literal),+) => {
         impl fmt::Display for $name {

@@ -26,7 +26,6 @@ pub const SWITCH_MARGIN_MM: f64 = 2.0;
 /// Targets and counts fit the controller's 32-bit position register.
 const PULSES_MAX: u64 = 1 << 31;
 
-/// A motion under way.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     course: Course,
@@ -42,13 +41,10 @@ struct Motion {
 pub struct AxisSample {
     /// Reported position: whole pulses at or below the commanded position.
     pub pulses: i64,
-    /// Status bits.
     pub status: AxisStatus,
-    /// True position of the probe.
     pub position: Position,
 }
 
-/// The controller axis with the slide on it.
 #[derive(Clone, Debug)]
 pub struct Slider {
     mm_per_pulse: f64,
@@ -60,7 +56,6 @@ pub struct Slider {
     reverse_limit: f64,
     forward_limit: f64,
     is_motor_on: bool,
-    /// Counted position.
     position: Position,
     motion: Option<Motion>,
     /// A move ended at this very tick, so the axis was still moving when last reported.

@@ -67,7 +67,6 @@ fn energy(body: &ModifiedKelvin, x: f64) -> f64 {
     x * x * (mu1 / 2.0 + x * (mu2 / 3.0 + x * mu3 / 4.0))
 }
 
-/// One specimen.
 #[derive(Clone, Debug)]
 pub struct Tissue {
     surface: Position,

@@ -12,13 +12,10 @@ const HEARD_MAX: usize = 512;
 
 /// A link to a device that speaks in lines, with nothing else going on.
 pub struct TextConsole<'a> {
-    /// The link and what was exchanged over it.
     pub link: TappedLink<'a>,
-    /// What it is called in errors.
     device: &'static str,
     lines: Lines,
     ready: VecDeque<(Nanos, String)>,
-    /// The newest bytes that came.
     pub heard: Vec<u8>,
 }
 
@@ -44,7 +41,6 @@ impl<'a> TextConsole<'a> {
         self.link.now()
     }
 
-    /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), DeviceError> {
         self.link.write(text.as_bytes()).map_err(|err| DeviceError::lost(self.device, &err))
     }

@@ -5,57 +5,40 @@ use crate::galil;
 use std::io;
 use thiserror::Error;
 
-/// A device cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DeviceError {
-    /// Nothing comes.
     #[error("the {device} does not answer; {hint}")]
     Silent {
-        /// What was expected.
         device: &'static str,
-        /// What to look at.
         hint: &'static str,
     },
-    /// Something else answers.
     #[error("this is no {device} but {found}; check which cable goes where")]
     Other {
-        /// What was expected.
         device: &'static str,
-        /// What it is, or what it said.
         found: String,
     },
-    /// Another one of its kind.
     #[error(
         "the {device} has serial number {found} but the rig file says {expected}; check which cable goes where, or correct the file"
     )]
     OtherSerial {
-        /// What was expected.
         device: &'static str,
-        /// What it told.
         found: String,
-        /// What the rig file says.
         expected: String,
     },
     /// It cannot do what is needed, or is not set up for it.
     #[error("the {device} cannot be used: {detail}")]
     Unfit {
-        /// What was expected.
         device: &'static str,
-        /// Why, and what to do.
         detail: String,
     },
-    /// The link went while the device was opened.
     #[error("the link to the {device} was lost while it was opened ({detail}); check the cable")]
     Lost {
-        /// What was expected.
         device: &'static str,
-        /// What the operating system said.
         detail: String,
     },
 }
 
 impl DeviceError {
-    /// The link is gone.
     pub(crate) fn lost(device: &'static str, err: &io::Error) -> Self {
         Self::Lost { device, detail: err.to_string() }
     }

@@ -5,9 +5,7 @@ use palpate_model::rig::RawBytes;
 
 /// What opening a load cell gives: who it is, how to go on with it, and what was said so far.
 pub struct OpenedCell {
-    /// What it is.
     pub description: CellDescription,
-    /// It sends values from now on.
     pub dialogue: Box<dyn CellDialogue>,
     /// What was exchanged, by the host's clock.
     pub raw: Vec<RawBytes>,

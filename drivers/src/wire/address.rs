@@ -12,16 +12,12 @@ use thiserror::Error;
 /// A controller in the same laboratory answers within milliseconds.
 const CONNECT_MAX: Duration = Duration::from_secs(3);
 
-/// Where a device is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A serial port, 8 data bits, no parity, one stop bit.
     Serial {
-        /// Path or name of the port.
         port: String,
-        /// Bits per second.
         baud: u32,
-        /// Whether RTS and CTS hold bytes back.
         has_handshake: bool,
     },
     /// `HOST:PORT`.
@@ -37,55 +33,38 @@ impl fmt::Display for Place {
     }
 }
 
-/// A device cannot be reached.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WireError {
-    /// No such port.
     #[error("there is no serial port {port}; this computer has {present}")]
     Missing {
-        /// The port asked for.
         port: String,
-        /// Those there are, in words.
         present: String,
     },
-    /// Somebody has it.
     #[error("the serial port {port} is in use by another program; close that program first")]
     Busy {
-        /// The port.
         port: String,
     },
-    /// This account may not.
     #[error(
         "this account may not open {port}; add it to the group that owns the port (on Linux mostly `sudo usermod -aG dialout $USER`) and log in again"
     )]
     Forbidden {
-        /// The port.
         port: String,
     },
-    /// Anything else about a port.
     #[error("the serial port {port} cannot be opened ({detail}); check cable and settings")]
     Port {
-        /// The port.
         port: String,
-        /// What the operating system said.
         detail: String,
     },
-    /// Not an address.
     #[error("'{address}' is not an address ({detail}); give HOST:PORT, such as 192.168.1.10:23")]
     Address {
-        /// What was given.
         address: String,
-        /// What the operating system said.
         detail: String,
     },
-    /// Nobody answers.
     #[error(
         "nothing answers at {address} ({detail}); check that the device is on and its address, and that not all its connections are taken"
     )]
     Unreachable {
-        /// The address.
         address: String,
-        /// What the operating system said.
         detail: String,
     },
 }

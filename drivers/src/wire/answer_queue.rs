@@ -4,7 +4,6 @@ use crate::rig::RigEventBody;
 use palpate_model::rig::{Ack, Fault, RigCommand};
 use std::collections::VecDeque;
 
-/// Commands that were not answered for yet.
 #[derive(Clone, Debug, Default)]
 pub struct AnswerQueue {
     owed: VecDeque<(u64, Option<RigEventBody>)>,
@@ -12,7 +11,6 @@ pub struct AnswerQueue {
 }
 
 impl AnswerQueue {
-    /// Notes a command that wants an answer.
     pub fn owe(&mut self) -> u64 {
         self.count += 1;
         self.owed.push_back((self.count, None));
@@ -25,12 +23,10 @@ impl AnswerQueue {
         }
     }
 
-    /// It is done, with what was set.
     pub fn acknowledge(&mut self, number: u64, command: RigCommand) {
         self.answer(number, RigEventBody::Ack(Ack { command }));
     }
 
-    /// It is not done.
     pub fn refuse(&mut self, number: u64, detail: impl Into<String>) {
         let detail = detail.into();
         self.answer(number, RigEventBody::Fault(Fault::CommandRefused { detail }));

@@ -16,7 +16,6 @@ pub struct CallerTime {
 }
 
 impl CallerTime {
-    /// Nobody has asked yet.
     #[must_use]
     pub const fn new(clock: HostClock) -> Self {
         Self { clock, origin: None, newest: Nanos::ZERO }

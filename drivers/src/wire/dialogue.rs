@@ -11,9 +11,7 @@ pub struct LinkStats {
     pub answers: u64,
     /// Shortest time from writing a question to the end of its answer.
     pub round_trip_min: Nanos,
-    /// Mean of it.
     pub round_trip_mean: Nanos,
-    /// Longest.
     pub round_trip_max: Nanos,
     /// Questions that may wait for their answers at once.
     pub in_flight: usize,
@@ -29,7 +27,6 @@ pub struct LinkStats {
 }
 
 impl LinkStats {
-    /// Takes one measured round trip.
     pub fn push(&mut self, round_trip: Nanos) {
         let sum = self.round_trip_mean.0 as f64 * self.answers as f64 + round_trip.0 as f64;
         self.round_trip_min =
@@ -58,7 +55,6 @@ pub trait Dialogue: Send {
     /// A command that a stop has overtaken before it got here; the stop comes next. A motion is not begun.
     fn overtaken(&mut self, now: Nanos, command: RigCommand);
 
-    /// Bytes have arrived.
     fn received(&mut self, now: Nanos, bytes: &[u8]);
 
     /// Whole lines to be written now, if there are any.
@@ -83,7 +79,6 @@ pub trait Dialogue: Send {
         None
     }
 
-    /// How the link behaves.
     fn stats(&self) -> LinkStats;
 }
 

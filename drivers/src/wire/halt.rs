@@ -12,12 +12,10 @@ use std::time::Duration;
 /// How often it is looked whether a stop has been written.
 const LOOK_EVERY: Duration = Duration::from_micros(200);
 
-/// Stops of a link, counted.
 #[derive(Debug, Default)]
 pub(super) struct StopCounters {
     /// Handed to the link's thread.
     pub sent: AtomicU64,
-    /// The newest of which every byte is written.
     pub written: AtomicU64,
 }
 
@@ -38,7 +36,6 @@ impl HaltHandle {
         Self { stops, standing, owner }
     }
 
-    /// How many stops are on the wire.
     pub fn written(&self) -> u64 {
         self.standing.written.load(Ordering::Acquire)
     }
@@ -80,7 +77,6 @@ thread_local! {
     static DEFERRED: RefCell<Option<DeferredWork>> = const { RefCell::new(None) };
 }
 
-/// This thread is the only one that has a link.
 pub(super) fn owns_link() {
     OWNS_LINK.set(true);
 }

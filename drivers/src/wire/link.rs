@@ -25,11 +25,9 @@ fn gone() -> io::Error {
     io::Error::new(ErrorKind::UnexpectedEof, "the device has hung up")
 }
 
-/// A serial port.
 pub struct SerialLink(Box<dyn SerialPort>);
 
 impl SerialLink {
-    /// A port that was opened.
     #[must_use]
     pub fn new(port: Box<dyn SerialPort>) -> Self {
         Self(port)
@@ -53,11 +51,9 @@ impl Link for SerialLink {
     }
 }
 
-/// A TCP connection, each write sent at once.
 pub struct TcpLink(TcpStream);
 
 impl TcpLink {
-    /// A connection that was opened.
     pub fn new(stream: TcpStream) -> io::Result<Self> {
         stream.set_nodelay(true)?;
         stream.set_nonblocking(true)?;

@@ -28,7 +28,6 @@ const PIECES_MAX: usize = 65_536;
 /// So much of what a device sends is read at once.
 const CHUNK: usize = 4096;
 
-/// What a line is called and when it is closed.
 #[derive(Clone, Debug)]
 pub struct LinkThreadSettings {
     /// The device's name in the log of raw bytes, such as `controller`; the thread is called so too.
@@ -73,7 +72,6 @@ type Shared = Arc<(Mutex<Reports>, Condvar)>;
 /// A dialogue on a link, in a thread of its own. Dropped it says farewell and closes the link.
 pub struct LinkThread {
     device: Arc<str>,
-    /// Stops: looked at before anything that waits.
     stops: SyncSender<NumberedCommand>,
     commands: SyncSender<NumberedCommand>,
     /// Stops sent and stops written, shared with those who may have to send one when nobody else can.
@@ -84,7 +82,6 @@ pub struct LinkThread {
 }
 
 impl LinkThread {
-    /// Starts the thread.
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,
@@ -181,7 +178,6 @@ impl LinkThread {
         std::mem::take(&mut reports.raw)
     }
 
-    /// How the link behaves.
     pub fn stats(&self) -> LinkStats {
         let (reports, _) = &*self.reports;
         let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
@@ -226,9 +222,7 @@ struct LinkOwner<D> {
     standing: Arc<StopCounters>,
     /// The number of the newest stop that the dialogue has.
     stops_taken: u64,
-    /// To be handed over.
     events: Vec<RigEvent>,
-    /// The same of bytes.
     raw: Vec<RawBytes>,
     reports: Shared,
 }
@@ -251,7 +245,6 @@ impl<D> Drop for LinkOwner<D> {
     }
 }
 
-/// Why a link failed.
 fn describe_error(err: &io::Error) -> String {
     match err.kind() {
         io::ErrorKind::BrokenPipe
@@ -289,7 +282,6 @@ impl<D: Dialogue> LinkOwner<D> {
         self.events.push(RigEvent::new((self.clock)(), link_lost(ending)));
     }
 
-    /// Commands, lines, bytes: once.
     fn turn(&mut self) -> io::Result<()> {
         self.take_stops();
         self.arrived.extend(self.queued.try_iter());

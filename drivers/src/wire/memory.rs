@@ -23,7 +23,6 @@ pub struct MemoryLink {
     outgoing: Shared,
 }
 
-/// Both ends of a wire.
 #[must_use]
 pub fn pair() -> (MemoryLink, MemoryLink) {
     let (one, other) = (Shared::default(), Shared::default());

@@ -7,15 +7,12 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Longest single wait for bytes.
 const READ_MAX: Duration = Duration::from_millis(5);
 
-/// A link, and what was exchanged over it.
 pub struct TappedLink<'a> {
     link: &'a mut dyn Link,
     clock: &'a HostClock,
     device: Arc<str>,
-    /// What was exchanged so far.
     pub raw: Vec<RawBytes>,
 }
 
@@ -30,7 +27,6 @@ impl<'a> TappedLink<'a> {
         (self.clock)()
     }
 
-    /// Writes bytes as they are.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.link.write(bytes)?;
         self.tap(true, bytes);

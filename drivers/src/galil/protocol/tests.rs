@@ -12,7 +12,6 @@ fn reply(text: &str, is_accepted: bool) -> GalilMessage {
     GalilMessage::Reply(GalilReply { is_accepted, bytes: text.into() })
 }
 
-/// What a controller sent, and what it means.
 type Transcript = (&'static str, &'static [u8], &'static [(&'static str, bool)]);
 
 const TRANSCRIPTS: [Transcript; 25] = [

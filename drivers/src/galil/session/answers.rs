@@ -143,7 +143,6 @@ impl Session {
         }
     }
 
-    /// From here on samples are polled.
     pub(super) fn abandon_recording(&mut self, now: Nanos) {
         let Some(mut recording) = self.recording.take() else {
             return;

@@ -25,9 +25,7 @@ const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
 
-/// Why a motion is not begun.
 const OVERTAKEN: &str = "a stop came first, so it was not begun";
-/// Why nothing is done any more.
 const RESET: &str = "the controller was reset; open the rig again";
 
 /// A stop that is sent until the controller has accepted it.
@@ -41,34 +39,26 @@ struct PendingStop {
 }
 
 impl PendingStop {
-    /// One that nobody waits for.
     const QUIET: Self = Self { number: None, command: RigCommand::Stop, refusals: 0 };
 }
 
-/// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum ExpectedReply {
-    /// A sample.
     Sample,
     /// A sample behind a command; `true` behind the begin of a motion.
     Marked(bool),
-    /// Elements of a recorded array.
     Elements,
     /// Increments of a sine, which a stop or a limit may have ended before.
     Segment,
     /// The watchdog's variable.
     Renewal,
-    /// A part of the order under way.
     Part,
-    /// A command that stops.
     Stop(PendingStop),
     /// `TC1`, after a refusal of the order under way.
     RefusalReason,
-    /// A number that must come back.
     Marker(u32),
 }
 
-/// A line to be written.
 #[derive(Clone, Debug, PartialEq)]
 struct Outgoing {
     pub text: String,
@@ -78,15 +68,11 @@ struct Outgoing {
 /// How fast the link was when the controller was set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PollPace {
-    /// Between two questions.
     pub every: Nanos,
-    /// Questions that may wait for answers at once.
     pub in_flight: usize,
-    /// Length of a sample of the controller.
     pub tick: Nanos,
 }
 
-/// The dialogue.
 #[derive(Clone, Debug)]
 pub struct Session {
     settings: GalilSettings,
@@ -111,7 +97,6 @@ pub struct Session {
     resync: Option<Resynchronisation>,
     /// Stops whose answers went by while the order was being looked for.
     unconfirmed: Vec<PendingStop>,
-    /// Why nothing but stops is done any more.
     is_reset: bool,
     /// When somebody took samples last; the beginning counts.
     attended_at: Nanos,
@@ -125,7 +110,6 @@ pub struct Session {
 }
 
 impl Session {
-    /// With a controller that was set up just now.
     #[must_use]
     pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
         let recording = connected.plan.map(ArrayRecording::new);

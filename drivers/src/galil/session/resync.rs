@@ -22,7 +22,6 @@ pub(super) struct Resynchronisation {
 }
 
 impl Resynchronisation {
-    /// Whether enough was asked.
     pub fn is_over(&self, now: Nanos) -> bool {
         let is_late = |at: Nanos| now.since(at) >= MARKER_MAX;
         self.markers >= MARKERS_MAX && self.marker_at.is_some_and(is_late)

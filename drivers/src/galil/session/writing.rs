@@ -40,7 +40,6 @@ impl Session {
         self.send_urgent(command, ExpectedReply::Stop(stop));
     }
 
-    /// Refuses motions that wait or are being set.
     fn drop_motions(&mut self, now: Nanos, why: &str) {
         let mut ended = Vec::new();
         self.orders.retain(|(number, order)| {
@@ -211,7 +210,6 @@ impl Session {
         None
     }
 
-    /// A stop, or whatever else waits for nothing.
     fn take_urgent(&mut self, now: Nanos) -> Option<Outgoing> {
         let line = self.urgent.pop_front()?;
         let Some(resync) = &mut self.resync else {
@@ -228,7 +226,6 @@ impl Session {
         Some(Outgoing { expects: Vec::new(), ..line })
     }
 
-    /// The part of an order that begins something.
     fn take_beginning(&mut self, now: Nanos) -> Option<Outgoing> {
         let (line, _) = self.beginning.take()?;
         if let Some((_, order)) = &mut self.order {

@@ -27,21 +27,17 @@ const FEED_MIN: f64 = 1.0;
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
 
-/// Why a motion is not begun.
 const OVERTAKEN: &str = "a stop came first, so it was not begun";
 
 /// What happens with an axis, shared with whoever needs its past.
 pub type SharedTrack = Arc<Mutex<Track>>;
 
-/// A reset whose welcome is to come.
 struct PendingReset {
-    /// The stops that it does.
     owed: Vec<(u64, RigCommand)>,
     begun: Nanos,
     written: Nanos,
 }
 
-/// The dialogue.
 pub struct Session {
     settings: GrblSettings,
     facts: BoardParameters,
@@ -64,12 +60,9 @@ pub struct Session {
     polled: Option<Nanos>,
     heard_at: Nanos,
     looked_at: Nanos,
-    /// Stops that a status after them will confirm.
     stops: Vec<(u64, RigCommand, Nanos)>,
     reset_pending: Option<PendingReset>,
-    /// The newest state that is known.
     state: GrblState,
-    /// Why nothing but stops is done any more.
     locked: Option<String>,
     attended_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -77,7 +70,6 @@ pub struct Session {
 }
 
 impl Session {
-    /// With a board that was set up just now.
     #[must_use]
     pub fn new(
         settings: GrblSettings,
@@ -212,7 +204,6 @@ impl Session {
         self.motion = Some(motion);
     }
 
-    /// Into the tissue.
     fn is_outwards(&self, motion: &JogMotion) -> bool {
         motion.side() * self.settings.sign() as f64 > 0.0
     }

@@ -7,7 +7,6 @@ use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 
 impl Session {
-    /// Nothing that waits is begun any more.
     fn drop_orders(&mut self, now: Nanos, why: &str) {
         let waiting: Vec<u64> = self.orders.drain(..).map(|(number, _)| number).collect();
         for number in waiting {
@@ -18,7 +17,6 @@ impl Session {
         }
     }
 
-    /// No motion that waits is begun any more.
     pub(super) fn drop_motions(&mut self, now: Nanos, why: &str) {
         for (number, order) in std::mem::take(&mut self.orders) {
             if matches!(order, RigCommand::MoveTo(_) | RigCommand::Oscillate(_)) {
@@ -32,7 +30,6 @@ impl Session {
         }
     }
 
-    /// Brakes whatever moves.
     pub(super) fn cancel(&mut self, now: Nanos) {
         self.urgent.push_back(vec![JOG_CANCEL]);
         if let Some(motion) = &mut self.motion {
@@ -139,7 +136,6 @@ impl Session {
         self.stops.push((number, command, now));
     }
 
-    /// Reasons to stop that nobody has asked for.
     pub(super) fn watch(&mut self, now: Nanos) {
         let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > PAUSE {

@@ -17,16 +17,13 @@ const RANGE: f64 = 1.1;
 /// How readings become counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaugeScale {
-    /// Unit of every reading.
     pub unit: ForceUnit,
-    /// Digits behind the point of every reading.
     pub decimals: u8,
     /// Largest count of its range.
     pub counts_max: i32,
 }
 
 impl GaugeScale {
-    /// That of a gauge that gives such readings.
     #[must_use]
     pub fn new(like: GaugeReading, capacity: Newtons) -> Self {
         let per_count = like.unit.newtons() * like.number.step();
@@ -41,10 +38,8 @@ impl GaugeScale {
     }
 }
 
-/// A gauge that sends readings.
 pub type GaugeDialogue = LineCell<GaugeReadings>;
 
-/// What its lines mean.
 pub struct GaugeReadings {
     scale: GaugeScale,
     silence_max: Nanos,

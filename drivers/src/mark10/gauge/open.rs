@@ -68,7 +68,6 @@ impl CellDevice for GaugeSettings {
     }
 }
 
-/// What no gauge can do.
 pub(crate) fn check(settings: &GaugeSettings) -> Result<(), DeviceError> {
     if !RATES.contains(&settings.per_second) {
         let rates = RATES.map(|rate| rate.to_string()).join(", ");

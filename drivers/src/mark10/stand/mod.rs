@@ -54,14 +54,11 @@ pub const LAG: Seconds = Seconds(0.15);
 /// And by which share of the way that is made its speed may be off. A guess.
 pub const SPEED_TOLERANCE: f64 = 0.005;
 
-/// What palpate has to know of a stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandSettings {
-    /// Name of the rig, for the operator.
     pub name: String,
     /// End of the travel from home. Home is where the stand's travel reads zero.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
     /// Acceleration of the commanded course; the stand's own is not known and cannot be set.
     pub acceleration: MmPerS2,

@@ -17,7 +17,6 @@ const DEVICE: &str = "Mark-10 stand";
 const ANSWER_MAX: Nanos = Nanos::from_millis(500);
 /// A line without a byte for so long has nothing more to say, at any latency of a USB converter.
 const QUIET: Nanos = Nanos::from_millis(60);
-/// Samples by which the link is measured.
 const MEASURED: usize = 20;
 /// Speeds are written in tenths of mm/min (ESM301 user's guide, page 24).
 const SPEED_QUANTUM: MmPerS = MmPerS(0.1 / 60.0);
@@ -28,22 +27,16 @@ const EVERY_MIN: Nanos = Nanos::from_millis(2);
 /// Other questions take samples away: they come further apart by this.
 const BETWEEN: f64 = 1.5;
 
-/// A stand that was set up.
 #[derive(Clone, Debug)]
 pub struct ConnectedStand {
-    /// What it makes of the rig.
     pub description: RigDescription,
     /// How its readings become counts.
     pub scale: GaugeScale,
-    /// How to ask it.
     pub pace: StandPace,
-    /// The link as it was measured.
     pub stats: LinkStats,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 
-/// Sets a stand up.
 pub fn connect(
     link: &mut dyn Link,
     clock: &HostClock,
@@ -178,7 +171,6 @@ fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     Ok(status.is_some())
 }
 
-/// The travel with a margin, read back.
 fn set_limits(
     console: &mut TextConsole<'_>,
     settings: &StandSettings,

@@ -7,13 +7,11 @@
 
 use crate::mark10::protocol::{Decimal, GaugeLine, GaugeReading};
 
-/// Stop.
 pub const STOP: &str = "s";
 /// Highest speed that can be written, in tenths of mm/min.
 const SPEED_MAX: i64 = 99_999;
 /// Furthest limit that can be written, in hundredths of mm.
 const LIMIT_MAX: i64 = 99_999;
-/// Millimetres of an inch.
 const INCH: f64 = 25.4;
 
 /// `e0200.3`: the speed in tenths of mm/min; `None` when it has no such form.
@@ -37,13 +35,11 @@ pub const fn ask_limit(is_upper: bool) -> &'static str {
     if is_upper { "v" } else { "w" }
 }
 
-/// Commands for the gauge on the stand.
 #[must_use]
 pub fn to_gauge(command: &str) -> String {
     format!("/{command}\r\\")
 }
 
-/// What the crosshead does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crosshead {
     /// `U`.
@@ -57,13 +53,10 @@ pub enum Crosshead {
 /// The answer to `p`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// What it does.
     pub crosshead: Crosshead,
     /// Whether it keeps to its travel limits (`L`); `None` when it does not tell.
     pub is_limit_mode: Option<bool>,
-    /// Upper limit switch.
     pub is_at_upper: bool,
-    /// Lower limit switch.
     pub is_at_lower: bool,
 }
 
@@ -126,7 +119,6 @@ pub struct Pair {
 /// The gauge's part of `n`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GaugeForce {
-    /// A reading.
     Reading(GaugeReading),
     /// Beyond the gauge's range.
     Overload,

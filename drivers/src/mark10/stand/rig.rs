@@ -8,15 +8,11 @@ use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings, Place};
 use std::sync::Arc;
 
-/// A motorised stand with its gauge.
 pub type StandRig = DeviceRig<StandDevice>;
 
-/// A stand to be opened.
 #[derive(Clone)]
 pub struct StandDevice {
-    /// Where it is.
     pub place: Place,
-    /// What it is.
     pub settings: StandSettings,
 }
 

@@ -8,7 +8,6 @@ struct Notes {
     lines: VecDeque<Vec<u8>>,
     events: VecDeque<(Nanos, RigEventBody)>,
     fails_at: Option<u8>,
-    /// Done just before it fails.
     fails: Box<dyn Fn() + Send>,
 }
 
@@ -103,7 +102,6 @@ fn settings() -> LinkThreadSettings {
     LinkThreadSettings { device: "controller".into(), farewell: b"bye".to_vec() }
 }
 
-/// Generous: a computer with much else to do.
 const WAIT: Duration = Duration::from_secs(20);
 
 fn read(link: &mut impl Link, count: usize) -> Vec<u8> {

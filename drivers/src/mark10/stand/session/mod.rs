@@ -18,7 +18,6 @@ use std::collections::VecDeque;
 
 /// A tick of the rig's clock, which is the host's.
 pub const TICK: Nanos = Nanos::from_millis(1);
-/// An answer later than this was lost.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 /// After a garbled answer the line is left to fall silent for so long.
 const QUIET: Nanos = Nanos::from_millis(40);
@@ -26,7 +25,6 @@ const QUIET: Nanos = Nanos::from_millis(40);
 const QUIET_LOST: Nanos = Nanos::from_millis(1_000);
 /// So many answers garbled in a row, and the link counts as dead; a lost one counts for two.
 const LOST_MAX: u32 = 3;
-/// And so many, and the crosshead is stopped.
 const GARBLED_MAX: u32 = 2;
 /// How often the crosshead's state is asked for, while it moves without a new travel and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
@@ -45,7 +43,6 @@ const OVERTAKEN: &str = "a stop came first, so it was not begun";
 /// How fast the link was when the stand was opened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandPace {
-    /// Between two questions.
     pub every: Nanos,
     /// Whether the stand answers `p`.
     pub has_status: bool,
@@ -61,7 +58,6 @@ enum StandQuestion {
     Limit(i64),
 }
 
-/// A move that is being set up or made.
 #[derive(Clone, Copy, Debug)]
 struct StandMove {
     command: MoveTo,
@@ -75,7 +71,6 @@ enum Motion {
     Rest,
     /// Speed, limit and letter that are still to be written.
     Setting(StandMove, VecDeque<(String, Option<StandQuestion>)>),
-    /// Let go, and not seen to move.
     LetGo(StandMove, Nanos),
     /// Seen to move; the course began with that sample.
     Moving {
@@ -86,7 +81,6 @@ enum Motion {
     },
 }
 
-/// The dialogue.
 #[derive(Debug)]
 pub struct StandSession {
     settings: StandSettings,
@@ -96,7 +90,6 @@ pub struct StandSession {
     lines: Lines,
     pair: Pair,
     question: Option<(StandQuestion, Nanos)>,
-    /// Lines that came since.
     lines_since: usize,
     next_sample: Nanos,
     status_at: Nanos,
@@ -106,7 +99,6 @@ pub struct StandSession {
     lost_answers: u32,
     stop_due: bool,
     stopped_at: Option<Nanos>,
-    /// Stops that the next answer confirms.
     unconfirmed: Vec<RigCommand>,
     orders: VecDeque<RigCommand>,
     motion: Motion,
@@ -115,7 +107,6 @@ pub struct StandSession {
     travel_changed: Nanos,
     /// Pulses told at the stand's travel zero.
     offset: i64,
-    /// Where it was commanded to rest.
     rests_at: Option<i64>,
     tick: Option<u64>,
     /// Of the newest sample's time.
@@ -129,7 +120,6 @@ pub struct StandSession {
 }
 
 impl StandSession {
-    /// With a stand that was set up just now.
     #[must_use]
     pub fn new(settings: StandSettings, connected: &ConnectedStand, now: Nanos) -> Self {
         let ConnectedStand { scale, pace, stats, .. } = *connected;
@@ -201,7 +191,6 @@ impl StandSession {
         self.unconfirmed.push(command);
     }
 
-    /// A command that is done here.
     fn execute_now(&mut self, now: Nanos, command: RigCommand) {
         if let RigCommand::DefinePosition { pulses } = command {
             if !matches!(self.motion, Motion::Rest) || self.tick.is_none() {
@@ -259,7 +248,6 @@ impl StandSession {
         matches!(self.motion, Motion::LetGo(..) | Motion::Moving { .. })
     }
 
-    /// Asks for an answer.
     fn ask(
         &mut self,
         now: Nanos,
