@@ -10,7 +10,7 @@ const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
 #[derive(Clone, Copy, Debug)]
 struct LastStamp {
     ticks: u32,
-    /// The same without wraps and restarts.
+    /// Time without wraps and restarts.
     time: Nanos,
     at: Nanos,
     /// Board's time and host's when counting began.
@@ -22,7 +22,7 @@ pub enum BoardTime {
     Repeated,
     /// The board's time.
     At(Nanos),
-    /// The same, of a board that has counted from the beginning since the stamp before.
+    /// The board's time, after a restart since the stamp before.
     Restarted(Nanos),
 }
 
@@ -34,7 +34,7 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
-    /// One of 32 bits that has told nothing yet.
+    /// One of 32 bits.
     #[must_use]
     pub const fn new(nanos_per_tick: u64) -> Self {
         Self { nanos_per_tick, last: None }
@@ -42,7 +42,7 @@ impl BoardClock {
 
     pub fn take(&mut self, now: Nanos, ticks: u32) -> BoardTime {
         let Some(last) = self.last else {
-            // The first count of the board is its time; whatever came before is nobody's business.
+            // The first count of the board is its time.
             let time = Nanos(u64::from(ticks) * self.nanos_per_tick);
             self.last = Some(LastStamp { ticks, time, at: now, from: (time, now) });
             return BoardTime::At(time);

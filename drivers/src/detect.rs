@@ -1,9 +1,9 @@
-//! Who is at the other end of a link: one question that moves nothing, and what each device says to it.
+//! Detection of the device on a link: one question that moves nothing, and the answer of each device to it.
 //!
 //! The question is `?` and an end of line. Grbl reports its status to the `?`, before the line is even read
-//! (gnea/grbl, doc/markdown/interface.md); a Mark-10 gauge tells its reading (GCL2, Series 5 user's guide, page 17); the
-//! load cell on an HX711 tells its header; a Galil controller refuses the command with a `?` of its own (DMC-1700/1800
-//! user manual, chapter 5), after which it may be asked for its revision (`^R^V`).
+//! (gnea/grbl, doc/markdown/interface.md); a Mark-10 gauge sends its reading (GCL2, Series 5 user's guide, page 17);
+//! the load cell on an HX711 sends its header; a Galil controller refuses the command with a `?` of its own
+//! (DMC-1700/1800 user manual, chapter 5), after which it may be asked for its revision (`^R^V`).
 
 use crate::devices::{DeviceKind, split_lines};
 use crate::galil::{self, GalilBoard};
@@ -13,7 +13,7 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-/// A device may be talking already, or starting anew because its port was opened, as an Arduino does for 1.5 s.
+/// A device may be sending already, or restarting because its port was opened, as an Arduino does for 1.5 s.
 const LISTEN: Nanos = Nanos::from_millis(2_000);
 const ANSWER_MAX: Nanos = Nanos::from_millis(700);
 const READ_MAX: Duration = Duration::from_millis(5);
@@ -23,9 +23,9 @@ const SHOWN_MAX: usize = 80;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A device that palpate drives: its word in a rig file, its introduction, and what it said of itself.
+    /// A device that palpate drives: its word in a rig file, its introduction, and its own words.
     Device(&'static str, &'static str, String),
-    /// Something that palpate does not know, by what it said.
+    /// A device that palpate does not know, by its answer.
     Unknown(String),
     Silent,
 }
@@ -55,8 +55,8 @@ impl fmt::Display for Found {
     }
 }
 
-/// Listens, asks, and tells who it is. Nothing moves: what is written is `?`, an end of line, and after an answer like a
-/// Galil controller's `^R^V`.
+/// Listens, asks, and identifies the device. Nothing moves: what is written is `?`, an end of line, and after an
+/// answer like a Galil controller's `^R^V`.
 pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
     let mut received = Vec::new();
     receive(link, clock, LISTEN, &mut received, |received| recognise(received).is_some())?;
@@ -105,7 +105,7 @@ fn receive(
     Ok(())
 }
 
-/// A device that says who it is in whole lines; a line without its end may be half a line.
+/// A device that is recognised by its whole lines; a line without its end may be half a line.
 fn recognise(received: &[u8]) -> Option<Found> {
     let end = received.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
     let text = String::from_utf8_lossy(&received[..end]);
@@ -113,7 +113,7 @@ fn recognise(received: &[u8]) -> Option<Found> {
     Some(Found::of(kind, text))
 }
 
-/// What was heard, fit to be shown: the first line's worth, marks in place of what is no text.
+/// The beginning of what was received, without control characters and bytes that are no text.
 fn readable(received: &[u8]) -> String {
     let text = String::from_utf8_lossy(received);
     let plain = text.chars().map(|c| if c.is_control() { ' ' } else { c });
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_are_known_by_what_they_say() {
+    fn devices_are_recognised_by_their_lines() {
         let of = |received: &str| recognise(received.as_bytes()).and_then(|found| found.device());
         // gnea/grbl, doc/markdown/interface.md.
         assert_eq!(of("\r\nGrbl 1.1h ['$' for help]\r\n"), Some("grbl"));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shown_gives_a_terminal_no_orders() {
+    fn shown_text_has_no_control_characters() {
         assert_eq!(readable(b"\x1b[2Jhello\r\n\xff"), "[2Jhello  \u{fffd}");
     }
 }

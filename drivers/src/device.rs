@@ -1,19 +1,20 @@
-//! A rig on wires: whatever opens its devices, and one rig over it.
+//! A rig made of devices on links.
 
 use crate::galil::GalilOpenError;
 use crate::grbl::GrblOpenError;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{CallerTime, HaltHandle, HostClock, LinkStats, LinkThread, WireError};
+use crate::wire::{
+    CallerTime, HaltHandle, HostClock, LinkStats, LinkThread, TOO_MANY_COMMANDS, WireError,
+};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
+use palpate_model::rig::{RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
-use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
 
-/// Several lines are listened to in turns of this length.
+/// Longest wait for one of several links.
 const TURN: Nanos = Nanos::from_millis(1);
 
 /// A device that a rig file describes cannot be used.
@@ -27,34 +28,28 @@ pub enum OpenError {
     Text(#[from] DeviceError),
     #[error(transparent)]
     Wire(#[from] WireError),
-    #[error("the operating system gives no thread for a link ({0}); close other programs")]
+    #[error("the operating system cannot start a thread for a link ({0}); close other programs")]
     Thread(String),
-}
-
-impl OpenError {
-    pub(crate) fn thread(err: &io::Error) -> Self {
-        Self::Thread(err.to_string())
-    }
 }
 
 pub struct Opened {
     pub description: RigDescription,
-    /// Newtons of a volt, where the load cell itself is calibrated.
+    /// Newtons per volt, where the load cell itself is calibrated.
     pub newtons_per_volt: Option<f64>,
     pub link: Option<String>,
     /// One for each device. The first is that of the axis, to which commands go.
     pub lines: Vec<LinkThread>,
-    /// What was exchanged before the threads had the links, by the host's clock.
+    /// Bytes exchanged before the threads had the links, by the host's clock.
     pub raw: Vec<RawBytes>,
 }
 
 /// The devices of a rig, to be opened as often as the operator asks.
 pub trait RigDevice: Send {
-    /// Opens the links, checks and sets up what is behind them, and lets it send samples. Nothing moves. All lines of an
-    /// earlier call are closed.
+    /// Opens the links, checks and sets up what is behind them, and lets it send samples. Nothing moves. All lines of
+    /// an earlier call are closed.
     fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError>;
 
-    /// Fills in what no single line knows. `now` is on the host's clock.
+    /// Fills in what no single link knows. `now` is on the host's clock.
     fn complete(&mut self, _now: Nanos, body: RigEventBody) -> RigEventBody {
         body
     }
@@ -62,13 +57,13 @@ pub trait RigDevice: Send {
 
 pub struct DeviceRig<D> {
     device: D,
-    /// Without lines while it is being connected anew, and after that has failed.
+    /// Without links while it is being connected again, and after that has failed.
     opened: Opened,
-    /// What was taken from each line and not told yet.
+    /// An event of each link that waits for earlier ones of others.
     pending: Vec<Option<RigEvent>>,
     clock: HostClock,
     time: CallerTime,
-    refused: VecDeque<Fault>,
+    refused: VecDeque<RigEventBody>,
 }
 
 impl<D: RigDevice> DeviceRig<D> {
@@ -89,7 +84,7 @@ impl<D: RigDevice> DeviceRig<D> {
         &self.device
     }
 
-    /// The time that [`Rig::take_raw`] tells, now.
+    /// The caller's time now, as [`Rig::take_raw`] has it.
     pub fn now(&self) -> Nanos {
         self.time.caller_time((self.clock)())
     }
@@ -101,32 +96,32 @@ impl<D: RigDevice> DeviceRig<D> {
             return None;
         };
         loop {
-            let mut left = end.since((self.clock)());
-            for (place, line) in self.opened.lines.iter().enumerate() {
+            let mut wait = end.since((self.clock)());
+            for (index, line) in self.opened.lines.iter().enumerate() {
                 if self.pending.iter().any(Option::is_some) {
-                    left = Nanos::ZERO;
+                    wait = Nanos::ZERO;
                 }
-                if self.pending[place].is_none() {
-                    let turn = match (place == last, last) {
-                        (true, 0) => left,
-                        (true, _) => left.min(TURN),
+                if self.pending[index].is_none() {
+                    let turn = match (index == last, last) {
+                        (true, 0) => wait,
+                        (true, _) => wait.min(TURN),
                         (false, _) => Nanos::ZERO,
                     };
-                    self.pending[place] = line.next_event(end, Duration::from_nanos(turn.0));
+                    self.pending[index] = line.next_event(end, Duration::from_nanos(turn.0));
                 }
             }
-            let came = self.pending.iter_mut().filter(|event| event.is_some());
-            let oldest = came.min_by_key(|event| event.as_ref().map(|event| event.at));
+            let arrived = self.pending.iter_mut().filter(|event| event.is_some());
+            let oldest = arrived.min_by_key(|event| event.as_ref().map(|event| event.at));
             if let Some(oldest) = oldest {
                 return oldest.take();
             }
-            if left == Nanos::ZERO || last == 0 {
+            if wait == Nanos::ZERO || last == 0 {
                 return None;
             }
         }
     }
 
-    /// What was exchanged since this was last asked, at the host's time.
+    /// The bytes exchanged since the last call, at the host's time.
     fn take_raw_of_host(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.opened.raw);
         raw.extend(self.opened.lines.iter().flat_map(LinkThread::take_raw));
@@ -148,17 +143,16 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
         let sent = self.opened.lines.first_mut().map(|line| line.send(command));
         let detail = match sent {
             Some(Ok(())) => return,
-            Some(Err(_)) => "too many commands at once",
+            Some(Err(_)) => TOO_MANY_COMMANDS,
             None => "the rig is not connected",
         };
-        self.refused.push_back(Fault::CommandRefused { detail: detail.into() });
+        self.refused.push_back(RigEventBody::refusal(detail));
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
         let (now, end) = self.time.window(until);
-        if let Some(fault) = self.refused.pop_front() {
-            let at = self.time.event_time(now, until);
-            return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
+        if let Some(refusal) = self.refused.pop_front() {
+            return Some(RigEvent::new(self.time.event_time(now, until), refusal));
         }
         let event = self.next(end)?;
         let at = self.time.event_time(event.at, until);
@@ -167,7 +161,7 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
     }
 
     fn reconnect(&mut self) -> Result<(), RigError> {
-        // The old links say farewell and are closed, or their ports would be busy with them.
+        // The old links are closed first, or their ports would be busy.
         let closed = self.opened.lines.drain(..).flat_map(LinkThread::close);
         self.opened.raw.extend(closed);
         self.pending.clear();

@@ -21,7 +21,7 @@ pub const DEVICES: &[DeviceKind] = &[
 pub struct DeviceKind {
     pub word: &'static str,
     pub title: &'static str,
-    /// What stands before its own words where ports are listed.
+    /// Introduction of its own words where ports are listed.
     pub introduction: &'static str,
     pub role: Role,
     /// The line that gives it away among whole lines that were heard, if one does.
@@ -34,22 +34,22 @@ pub enum Role {
     /// A load cell beside an axis: its keys are in the table `[cell]`, but for those that say where it is.
     Cell {
         read: fn(&mut Fields) -> Option<Arc<dyn CellDevice>>,
-        /// How it is emulated, where the lines that it sends by itself are all there is to it.
+        /// Its emulation, if it only sends lines.
         emulation: Option<LineEmulation>,
     },
 }
 
-/// A load cell that sends lines whoever listens.
+/// A load cell that sends lines without being asked.
 #[derive(Clone, Copy)]
 pub struct LineEmulation {
     pub rate: f64,
-    /// The line, with its end, of a time since it was switched on and the signal of the emulated bridge behind the usual
-    /// amplifier.
+    /// The line, with its end, of a time since it was switched on and the signal of the emulated bridge behind the
+    /// usual amplifier.
     pub line: fn(Nanos, Volts) -> String,
 }
 
 impl DeviceKind {
-    /// Which device has said whole lines, if one is recognised, and the line that gave it away.
+    /// The device that has sent whole lines, if one is recognised, and the line that identifies it.
     #[must_use]
     pub fn recognise_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
         DEVICES.iter().find_map(|kind| Some((kind, (kind.recognise)(lines)?)))

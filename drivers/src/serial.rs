@@ -17,9 +17,7 @@ pub enum SerialError {
     #[error(
         "the serial ports of this computer cannot be listed ({detail}); check the permissions of this account and try again"
     )]
-    Listing {
-        detail: String,
-    },
+    Listing { detail: String },
 }
 
 /// The serial ports of this computer in order of their names; empty when there are none.
@@ -52,7 +50,7 @@ mod tests {
     use serialport::UsbPortInfo;
 
     #[test]
-    fn a_usb_port_says_who_made_it() {
+    fn description_of_a_usb_port_has_its_manufacturer() {
         let port = described(SerialPortInfo {
             port_name: "/dev/ttyUSB0".to_owned(),
             port_type: SerialPortType::UsbPort(UsbPortInfo {

@@ -1,4 +1,4 @@
-//! How samples are taken: the link is measured, and record arrays are set up where they are worth it.
+//! How samples are taken: the link is measured, and record arrays are set up if that gives fresher samples.
 
 use super::console::{ANSWER_MAX, GalilConsole};
 use super::model::GalilOpenError;
@@ -30,10 +30,10 @@ const ELEMENT_BYTES: f64 = 20.0;
 const FETCH_BYTES: f64 = 60.0;
 /// Share of what the link carries that fetching may take; the rest is for stops, the watchdog and jitter.
 const LOAD_MAX: f64 = 0.7;
-/// Between two fetches at least: two samples of 512 a second, and nobody needs younger ones.
+/// Between two fetches at least: two samples of 512 a second; younger ones are of no use.
 const FETCH_EVERY: Nanos = Nanos::from_millis(4);
-/// How old samples may be when they arrive: the shortest silence that stops a run (20 ms at speed), less what a computer
-/// with much else to do takes.
+/// Largest age of samples when they arrive: the shortest silence that stops a run (20 ms at speed), less what a
+/// computer with much else to do takes.
 const AGE_MAX: Nanos = Nanos::from_millis(15);
 
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ pub struct LinkMeasurement {
     bytes: f64,
 }
 
-/// How long an answer takes alone, and how fast answers come in a row.
+/// Measures the duration of a single answer and the rate of answers to questions in a row.
 pub fn measure(
     console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
@@ -87,13 +87,14 @@ pub fn measure(
 
 impl LinkMeasurement {
     pub fn polling(&self, tick: Nanos) -> PollPace {
-        // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
+        // Sooner than a sample lasts, so that none is missed for jitter; repeated samples are dropped.
         let every = self.apart.max(Nanos(tick.0 * 6 / 10));
         let in_flight = (self.trip.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
         PollPace { every, in_flight, tick }
     }
 
-    /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
+    /// The pace for fetching elements of 2^n samples, and their age when they arrive; `None` when the link carries
+    /// less.
     fn fetching(&self, tick: Nanos, n: u32) -> Option<(PollPace, Nanos)> {
         let bytes_per_ns = self.bytes / self.apart.0 as f64;
         let interval = (tick.0 << n) as f64;
@@ -110,11 +111,11 @@ impl LinkMeasurement {
     }
 }
 
-/// How samples are taken from now on, in words too.
+/// The sampling that was set up.
 pub struct SamplingSetup {
     pub pace: PollPace,
     pub plan: Option<RecordingPlan>,
-    /// What is the same whenever the same controller is opened over the same link, for the rig's identity.
+    /// The part that stays the same from one opening to the next, for the rig's identity.
     pub words: String,
     pub measured: String,
 }
@@ -136,7 +137,7 @@ pub fn set_up(
             measured: format!("samples polled at up to {rate:.0} a second{why}"),
         }
     };
-    // A recording of whoever was here before takes the controller's time.
+    // A recording that an earlier program has left running takes the controller's time.
     console.try_ask("RC 0")?;
     if settings.sampling == Sampling::Poll {
         return Ok(polled(""));
@@ -150,38 +151,43 @@ pub fn set_up(
         if settings.sampling == Sampling::Record {
             return Err(GalilOpenError::NoRecording("the link is too slow for it".into()));
         }
-        return Ok(polled(", because recorded samples would be old when they come over this link"));
+        return Ok(polled(
+            ", because recorded samples would be too old when they arrive over this link",
+        ));
     };
-    match start(console, settings, n, tick)? {
+    match start_recording(console, settings, n, tick) {
         Ok(plan) => Ok(SamplingSetup {
             pace,
             plan: Some(plan),
             words: format!("{:.0} samples/s recorded", 1e9 / (tick.0 << n) as f64),
             measured: format!(
-                "recorded samples are up to {:.0} ms old when they come",
+                "recorded samples are up to {:.0} ms old when they arrive",
                 ms(age).ceil()
             ),
         }),
-        Err(why) if settings.sampling == Sampling::Record => Err(GalilOpenError::NoRecording(why)),
-        Err(why) => Ok(polled(&format!(", because the controller does not record ({why})"))),
+        Err(GalilOpenError::NoRecording(why)) if settings.sampling != Sampling::Record => {
+            Ok(polled(&format!(", because the controller does not record ({why})")))
+        }
+        Err(err) => Err(err),
     }
 }
 
 /// The letters of analog inputs 1 to 8 in `_AF` (DMC-1700/1800 user manual, page 159).
 const INPUTS: [char; 8] = ['X', 'Y', 'Z', 'W', 'E', 'F', 'G', 'H'];
 
-/// Starts a recording every 2^n samples; in words why there is none.
-fn start(
+/// Starts a recording every 2^n samples.
+fn start_recording(
     console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
     n: u32,
     tick: Nanos,
-) -> Result<Result<RecordingPlan, String>, GalilOpenError> {
+) -> Result<RecordingPlan, GalilOpenError> {
     for name in ARRAYS {
-        // Those of another ring, if palpate was here before.
+        // Arrays of an earlier session may have another length.
         console.try_ask(&format!("DA {name}[]"))?;
     }
-    // Elements that are free (DMC-40x0 command reference, `DM`); firmware that does not tell refuses what is too much.
+    // Elements that are free (DMC-40x0 command reference, `DM`); firmware that does not report it refuses what is too
+    // much.
     let free = console.try_ask("DM ?")?;
     let free = free.numbers().filter(|_| free.is_accepted);
     let room = free.map_or(f64::INFINITY, |numbers| ROOM_MAX * numbers[0]);
@@ -198,7 +204,7 @@ fn start(
         }
     }
     let Some(ring) = ring else {
-        return Ok(Err("it has no room for arrays".into()));
+        return Err(GalilOpenError::NoRecording("it has no room for arrays".into()));
     };
     let (a, input) = (settings.axis, INPUTS[usize::from(settings.input - 1) % 8]);
     let arrays = ARRAYS.map(|name| format!("{name}[]")).join(",");
@@ -209,7 +215,7 @@ fn start(
     ] {
         if !console.try_ask(&command)?.is_accepted {
             let why = console.try_ask("TC1")?.text();
-            return Ok(Err(format!("it refuses {command}: {why}")));
+            return Err(GalilOpenError::NoRecording(format!("it refuses {command}: {why}")));
         }
     }
     anchor(console, settings, (1 << n, tick), ring)
@@ -222,7 +228,7 @@ fn anchor(
     settings: &GalilSettings,
     (interval, tick): (i64, Nanos),
     ring: i64,
-) -> Result<Result<RecordingPlan, String>, GalilOpenError> {
+) -> Result<RecordingPlan, GalilOpenError> {
     let question = recording::question(settings);
     let mut rough: Option<i64> = None;
     let (mut least, mut most, mut count) = (i64::MAX, i64::MIN, 0);
@@ -233,7 +239,8 @@ fn anchor(
         }
         let reply = console.ask(&question)?;
         let Some(status) = reply.numbers().as_deref().and_then(RecordingStatus::read) else {
-            return Ok(Err("its answers have other numbers than were asked for".into()));
+            let why = "its answers do not have the expected numbers";
+            return Err(GalilOpenError::NoRecording(why.into()));
         };
         count += 1;
         if rough.is_none() && status.next == 0 {
@@ -244,14 +251,15 @@ fn anchor(
         let half = ring / 2;
         let off = (status.next - 1 - linear + half).rem_euclid(ring) - half;
         if off.abs() > 2 {
-            return Ok(Err("it does not record as often as it was told".into()));
+            let why = "it does not record at the interval that was set";
+            return Err(GalilOpenError::NoRecording(why.into()));
         }
         let newest = linear + off;
         let base = status.time - newest * interval;
         (least, most) = (least.min(base), most.max(base));
         if count >= ANCHORS.start && most - least >= interval - 1 {
-            return Ok(Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick }));
+            return Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick });
         }
     }
-    Ok(Err("its clock and its recording do not fit".into()))
+    Err(GalilOpenError::NoRecording("its clock and its recording do not agree".into()))
 }

@@ -1,18 +1,18 @@
-//! When a sample of the controller was taken, on the host's clock.
+//! The time at which the controller took a sample, on the host's clock.
 //!
 //! A question that was written at one time and answered at another was evaluated in between. The narrowest of these
-//! spans tells best how the controller's clock lies to the host's; the two may drift apart meanwhile.
+//! spans shows best how the controller's clock lies to the host's; the two may drift apart meanwhile.
 
 use palpate_model::Nanos;
 
 /// Quartz of a controller and of a computer: a hundred parts in a million each at most. Not confirmed for any board.
 const DRIFT: f64 = 2e-4;
 
-/// How the controller's clock lies to the host's.
+/// The offset of the controller's clock from the host's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ClockAlignment {
     best: Option<Span>,
-    /// How far the middle of a question was from where the controller's clock said, at most.
+    /// Largest distance of the middle of a question from the time by the controller's clock.
     pub deviation_max: Nanos,
 }
 
@@ -36,7 +36,7 @@ impl Span {
 }
 
 impl ClockAlignment {
-    /// Takes a question's times and the tick that it told, for ticks of a length.
+    /// Takes a question's times and the tick of its answer, for ticks of a length.
     pub fn push(&mut self, tick: u64, length: Nanos, sent: Nanos, answered: Nanos) {
         let span = Span { tick, sent, answered };
         if let Some(at) = self.host_time(tick, length) {
@@ -57,8 +57,8 @@ impl ClockAlignment {
         Some(Nanos(at.max(0.0).round() as u64))
     }
 
-    /// How far [`ClockAlignment::host_time`] may be wrong at a time: a question's half round trip, drift, and the sample itself,
-    /// in which the controller answers.
+    /// Largest error of [`ClockAlignment::host_time`] at a time: a question's half round trip, drift, and the sample
+    /// itself, in which the controller answers.
     pub fn uncertainty(&self, at: Nanos, length: Nanos) -> Option<Nanos> {
         let best = self.best?;
         Some(Nanos((best.uncertainty(at) + length.0 as f64).round() as u64))

@@ -1,4 +1,4 @@
-//! What a Galil controller says when it refuses a command, with what to do about it.
+//! Reasons why a Galil controller refuses a command, and what to do about them.
 
 use super::codes::ErrorCode;
 use std::fmt;

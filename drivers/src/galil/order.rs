@@ -1,4 +1,4 @@
-//! One command of palpate as commands of the controller: what is sent, what must come back.
+//! One command of palpate as commands of the controller, and the answers that must come back.
 
 use super::protocol::GalilReply;
 use super::sampling::signed;
@@ -41,7 +41,7 @@ pub struct GalilOrder {
     /// The part that counts was written, so that the axis may already be doing it.
     pub is_begun: bool,
     tick: Nanos,
-    /// Of a sine that was set: what goes on after its begin.
+    /// The increments that follow the beginning of a sine.
     pub feed: Option<SineFeed>,
 }
 
@@ -73,7 +73,7 @@ impl GalilOrder {
                     (settings.counts(wanted.speed), settings.counts2(wanted.acceleration));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
                     return OrderStep::Refused(format!(
-                        "a speed of {} is beyond the {} of the rig file",
+                        "a speed of {} is above the {} of the rig file",
                         wanted.speed, settings.speed_max
                     ));
                 }
@@ -126,7 +126,7 @@ impl GalilOrder {
         }
     }
 
-    /// All is set: is it what was asked, and how does it go on?
+    /// Compares what was set with what was asked, and sends the part that begins something.
     fn send_main_part(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let numbers = std::mem::take(&mut self.numbers);
@@ -139,13 +139,13 @@ impl GalilOrder {
                         wanted.target_pulses
                     ));
                 }
-                // It rounds down to its resolution; what is above is not what was asked.
+                // The controller rounds down to its resolution; a larger value is an error.
                 let speed_asked = settings.counts(wanted.speed) as f64;
                 let ac_asked = settings.counts2(wanted.acceleration) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
                     return OrderStep::Refused(format!(
-                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts, where \
-                         {speed_asked} and {ac_asked} were asked for"
+                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts after \
+                         {speed_asked} and {ac_asked} were set"
                     ));
                 }
                 let made = MoveTo {
@@ -159,7 +159,7 @@ impl GalilOrder {
                 let wanted = software_limits(settings, 0, settings.travel.0);
                 if (signed(forward), signed(reverse)) != (Some(wanted.0), Some(wanted.1)) {
                     return OrderStep::Refused(format!(
-                        "it reads back software limits {forward} and {reverse} where {} and {} were set",
+                        "it reads back software limits {forward} and {reverse} after {} and {} were set",
                         wanted.0, wanted.1
                     ));
                 }
@@ -170,7 +170,7 @@ impl GalilOrder {
                 let ac_asked = settings.counts2(wanted.acceleration) as f64;
                 if ac != dc || ac <= 0.0 || ac > ac_asked {
                     return OrderStep::Refused(format!(
-                        "it reads back acceleration {ac} and deceleration {dc} in counts, where {ac_asked} was asked for"
+                        "it reads back acceleration {ac} and deceleration {dc} in counts after {ac_asked} was set"
                     ));
                 }
                 let made =
@@ -179,9 +179,7 @@ impl GalilOrder {
                 (RigCommand::Oscillate(made), feed.begin())
             }
             _ => {
-                return OrderStep::Refused(
-                    "its answer has other numbers than were asked for".into(),
-                );
+                return OrderStep::Refused("its answer does not have the expected numbers".into());
             }
         };
         self.stage = Stage::Doing(made);

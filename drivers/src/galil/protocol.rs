@@ -1,4 +1,4 @@
-//! Bytes of a Galil DMC controller: replies counted by their prompts, text nobody asked for, numbers, lines of
+//! Bytes of a Galil DMC controller: replies counted by their prompts, unsolicited text, numbers, lines of
 //! commands.
 //!
 //! Every command of a line is answered by a prompt of its own, `:` when it was accepted and `?` when it was not, with
@@ -10,7 +10,7 @@ use super::error::GalilError;
 pub const LINE_MAX: usize = 80;
 /// Longest text of one reply. A whole upload is asked for in pieces shorter than this.
 pub const REPLY_MAX: usize = 64 * 1024;
-/// Longest line nobody asked for; a program's line has 80 characters.
+/// Longest unsolicited line; a program's line has 80 characters.
 const UNSOLICITED_MAX: usize = 1024;
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
 const UPLOAD_END: u8 = 0x1a;
@@ -18,7 +18,7 @@ const UPLOAD_END: u8 = 0x1a;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GalilMessage {
     Reply(GalilReply),
-    /// A line that a program of the controller wrote, told apart by its top bits (`CW 1`).
+    /// A line that a program of the controller wrote, marked by its top bits (`CW 1`).
     Unsolicited(String),
     /// More than [`REPLY_MAX`] bytes without a prompt: this is no controller, or its baud rate is another.
     Flood,
@@ -28,7 +28,7 @@ pub enum GalilMessage {
 pub struct GalilReply {
     /// Whether it ended with `:`.
     pub is_accepted: bool,
-    /// What stood before the prompt, line ends and end marks taken off.
+    /// The text before the prompt, without line ends and end marks.
     pub bytes: Vec<u8>,
 }
 

@@ -5,8 +5,8 @@
 //! `base + k * 2^n`. Every later pair of `_RD` and `TIME` is checked against that.
 //!
 //! DMC-1700/1800 user manual, page 159: of a recorded `_TS` only bits 0 to 4 are valid. Whether the motor is on, and
-//! whether the axis moves when its stop code does not tell, is therefore taken from the question that comes with every
-//! fetch.
+//! whether the axis moves when its stop code does not show it, is therefore taken from the question that comes with
+//! every fetch.
 
 use super::sampling::{self, signed, ts, whole};
 use super::settings::GalilSettings;
@@ -68,7 +68,7 @@ impl RecordingStatus {
     }
 }
 
-/// What comes out, in the order of the controller's clock.
+/// Output in the order of the controller's clock.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecordingOutput {
     /// The numbers of a poll, and whether a motion was begun just before.
@@ -91,9 +91,6 @@ struct Chunk {
     columns: Vec<Vec<f64>>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RecordingMismatch;
-
 #[derive(Clone, Debug)]
 pub struct ArrayRecording {
     plan: RecordingPlan,
@@ -110,7 +107,7 @@ pub struct ArrayRecording {
     is_moving: bool,
     newest_output: i64,
     /// Elements that were written over before they were fetched.
-    pub lost: u64,
+    pub samples_lost: u64,
 }
 
 /// The question while recording: that of polls, and the next element before the clock.
@@ -135,7 +132,7 @@ impl ArrayRecording {
             pulses_given: None,
             is_moving: false,
             newest_output: i64::MIN,
-            lost: 0,
+            samples_lost: 0,
         }
     }
 
@@ -154,26 +151,27 @@ impl ArrayRecording {
         waiting.into_iter().map(|waiting| waiting.out).collect()
     }
 
-    /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits.
+    /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits. Returns whether it fits the
+    /// recording.
     pub fn take_status(
         &mut self,
         status: RecordingStatus,
         asked_at: Nanos,
         marked: Option<bool>,
-    ) -> Result<(), RecordingMismatch> {
+    ) -> bool {
         let expected = (status.time - self.plan.base).div_euclid(self.plan.interval);
         // The clock may have gone on by a sample between `_RD` and `TIME`.
         let behind = (expected - (status.next - 1)).rem_euclid(self.plan.ring);
         let is_late =
             behind == 1 && (status.time - self.plan.base).rem_euclid(self.plan.interval) == 0;
         if behind != 0 && !is_late {
-            return Err(RecordingMismatch);
+            return false;
         }
         self.newest = expected - behind;
         self.status_asked_at = asked_at;
         let oldest = self.newest - self.plan.ring + self.plan.ring / MARGIN;
         if self.next < oldest {
-            self.lost += (oldest - self.next).unsigned_abs();
+            self.samples_lost += (oldest - self.next).unsigned_abs();
             self.next = oldest;
             self.chunk = None;
         }
@@ -187,7 +185,7 @@ impl ArrayRecording {
             });
         }
         self.earlier = self.status.replace(status);
-        Ok(())
+        true
     }
 
     /// The commands that fetch the next elements, if there are any; nothing while others are on their way.
@@ -239,7 +237,7 @@ impl ArrayRecording {
         }
         let chunk = self.chunk.take()?;
         if self.is_stale(chunk.first, now) {
-            // The next look tells from where on they are whole, and counts the others as lost.
+            // The next status shows from where on they are whole, and counts the others as lost.
             self.newest = self.next - 1;
             return Some(Vec::new());
         }
@@ -260,7 +258,7 @@ impl ArrayRecording {
         Some(out)
     }
 
-    /// What waits for no more elements, when all that there are were fetched.
+    /// Reports that wait for no more elements, when all elements were fetched.
     pub fn release_settled(&mut self) -> Vec<RecordingOutput> {
         let mut out = Vec::new();
         if self.next > self.newest
@@ -271,7 +269,7 @@ impl ArrayRecording {
         out
     }
 
-    /// What waits for samples before `time`.
+    /// Releases what waits for samples before `time`.
     fn release_due(&mut self, time: i64, out: &mut Vec<RecordingOutput>) {
         let is_due = |one: &mut HeldOutput| one.time.is_some_and(|at| at <= time);
         while let Some(waiting) = self.waiting.pop_front_if(is_due) {
@@ -290,7 +288,7 @@ impl ArrayRecording {
         }
     }
 
-    /// A counter that was set anew while the axis rested shows it a little before the sample behind the command, and
+    /// A counter that was set again while the axis rested shows it a little before the sample behind the command, and
     /// before its acknowledgement.
     fn belongs_after_waiting(&self, time: i64, pulses_given: f64) -> bool {
         let is_set_now = |one: &HeldOutput| {

@@ -22,7 +22,7 @@ impl GalilDevice {
         Self { worst_case_mm: settings.travel.0, place, settings }
     }
 
-    /// How far the axis goes at most when palpate falls silent, in mm, as it was set up last.
+    /// Longest way of the axis after palpate falls silent, in mm, as it was set up last.
     pub const fn worst_case_mm(&self) -> f64 {
         self.worst_case_mm
     }
@@ -33,13 +33,13 @@ impl RigDevice for GalilDevice {
         let device: Arc<str> = "galil".into();
         let mut link = self.place.open()?;
         let connected = connect(link.as_mut(), clock, &self.settings, &device)?;
-        // The same controller the next time, whatever the rig file leaves open.
+        // The next opening must find the same controller, even if the rig file has no serial number.
         self.settings.serial_number = connected.board.serial_number;
         self.worst_case_mm = connected.worst_case_mm;
         let session = Session::new(self.settings.clone(), &connected, clock());
         let line_settings = LinkThreadSettings {
             device,
-            // The recording ends too: whoever comes next finds a controller that does nothing.
+            // The recording ends too, so that the next program finds an idle controller.
             farewell: format!("ST{};RC 0\r", self.settings.axis).into_bytes(),
         };
         Ok(Opened {

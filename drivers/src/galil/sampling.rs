@@ -1,14 +1,15 @@
 //! From the numbers of a poll to a sample.
 
 use super::settings::GalilSettings;
+use crate::rig::axis_status;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_model::units::Volts;
 
 /// `TIME` counts samples in a number of the controller, which has 31 bits before the point (DMC-40x0 user manual,
 /// variables). Where it wraps is not confirmed; at a millisecond each it takes 24 days.
 const TIME_WRAPS: u64 = 1 << 31;
-/// A clock that goes back has wrapped only from within a minute (half of one at `TM 500`) before [`TIME_WRAPS`] to within
-/// one behind zero; any other has begun anew.
+/// A clock that goes back has wrapped only from within a minute (half of one at `TM 500`) before [`TIME_WRAPS`] to
+/// within one behind zero; any other has restarted.
 const WRAP_NEAR: u64 = 60 * 1024;
 
 /// Bits of `TS` (DMC-1400 user manual, page 211).
@@ -24,13 +25,13 @@ pub mod ts {
 /// reference, `SC`: "decelerating or stopped by").
 pub const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
 
-/// What became of a poll's answer.
+/// Outcome of a poll.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SampleOutcome {
     Reading(Reading),
     /// The same sample again: two polls fell between two of them.
     Same,
-    /// The clock went back, or a digit of it was lost: the next answer will tell.
+    /// The clock went back, or a digit of it was lost: the next answer decides.
     Doubtful,
     /// The clock went back twice: the controller has been reset.
     Reset,
@@ -55,7 +56,7 @@ impl Sampler {
     }
 
     /// The command that asks for a sample: signal, pulses given, commanded position, switches, stop code, clock. All
-    /// are told in one go, so that they belong together to a sample of the controller or two.
+    /// are sent in one answer, so that they belong to one sample of the controller or two.
     #[must_use]
     pub fn question(settings: &GalilSettings) -> String {
         let (input, a) = (settings.input, settings.axis);
@@ -66,7 +67,7 @@ impl Sampler {
         self.was_moving
     }
 
-    /// Whether a clock that shows this has begun anew since the newest sample.
+    /// Whether a clock that shows this has restarted since the newest sample.
     pub fn is_reset(&self, time: i64) -> bool {
         self.time.is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
     }
@@ -98,7 +99,7 @@ impl Sampler {
         match self.time {
             Some(last) if time == last && !is_begun => return Some(SampleOutcome::Same),
             Some(last) if time < last => {
-                // Either it wrapped or it began anew; what it counted stays counted.
+                // Either it wrapped or it restarted; what it counted stays counted.
                 let is_wrapped = is_wrapped(last, time);
                 self.offset += if is_wrapped { TIME_WRAPS } else { last + 1 };
                 if !is_wrapped {
@@ -137,17 +138,14 @@ impl Sampler {
         if s.is_reversed {
             std::mem::swap(&mut forward, &mut reverse);
         }
-        let bits = [
+        axis_status([
             (is_moving, AxisStatus::MOVING),
             (is_early && (is_moving || self.was_moving), AxisStatus::STOPPING),
             (s.home.is_closed(is_high(ts::HOME)), AxisStatus::HOME),
             (forward, AxisStatus::FORWARD_LIMIT),
             (reverse, AxisStatus::REVERSE_LIMIT),
             (!is_high(ts::MOTOR_OFF), AxisStatus::MOTOR_ON),
-        ];
-        bits.into_iter()
-            .filter(|(is_set, _)| *is_set)
-            .fold(AxisStatus::default(), |all, (_, bit)| all | bit)
+        ])
     }
 }
 

@@ -1,46 +1,36 @@
-//! How a Galil controller is wired to slide and load cell: what it cannot tell by itself.
+//! How a Galil controller is wired to slide and load cell, which it cannot report itself.
 
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 
 /// Pulses of the drive (`MT`, Galil application note 2446).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorType {
-    /// Active-low pulses, `MT 2`.
-    ActiveLow,
-    /// Active-high pulses, `MT -2`.
-    ActiveHigh,
+    ActiveLow = 2,
+    ActiveHigh = -2,
 }
 
 impl MotorType {
     /// The argument of `MT`.
     #[must_use]
-    pub const fn code(self) -> f64 {
-        match self {
-            Self::ActiveLow => 2.0,
-            Self::ActiveHigh => -2.0,
-        }
+    pub fn code(self) -> f64 {
+        f64::from(self as i8)
     }
 }
 
 /// Range of an analog input (`AQ`; RIO-47xxx user manual, page 38).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnalogRange {
-    Bipolar5,
-    Bipolar10,
-    Unipolar5,
-    Unipolar10,
+    Bipolar5 = 1,
+    Bipolar10 = 2,
+    Unipolar5 = 3,
+    Unipolar10 = 4,
 }
 
 impl AnalogRange {
     /// The second argument of `AQ`.
     #[must_use]
     pub const fn code(self) -> u8 {
-        match self {
-            Self::Bipolar5 => 1,
-            Self::Bipolar10 => 2,
-            Self::Unipolar5 => 3,
-            Self::Unipolar10 => 4,
-        }
+        self as u8
     }
 
     #[must_use]
@@ -69,18 +59,15 @@ impl AnalogRange {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Levels {
     /// The switch pulls its input low, the usual wiring.
-    ActiveLow,
-    ActiveHigh,
+    ActiveLow = -1,
+    ActiveHigh = 1,
 }
 
 impl Levels {
     /// The argument of `CN`.
     #[must_use]
     pub const fn code(self) -> i8 {
-        match self {
-            Self::ActiveLow => -1,
-            Self::ActiveHigh => 1,
-        }
+        self as i8
     }
 
     /// Whether a switch with this level at its input is closed.
@@ -90,7 +77,7 @@ impl Levels {
     }
 }
 
-/// What palpate has to know to drive a slide with a Galil controller.
+/// Settings of a slide driven by a Galil controller.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GalilSettings {
     pub name: String,
@@ -106,9 +93,9 @@ pub struct GalilSettings {
     pub travel: Position,
     pub speed_max: MmPerS,
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
-    /// How the drive wants its pulses.
+    /// Polarity of the drive's pulses.
     pub motor_type: MotorType,
     pub limits: Levels,
     pub home: Levels,
@@ -118,7 +105,7 @@ pub struct GalilSettings {
     pub bits: u8,
     /// White noise of the signal at rest, standard deviation.
     pub noise: Volts,
-    /// What is before the converter to keep higher frequencies out, in words.
+    /// The anti-aliasing filter before the converter, in words.
     pub filter: Option<String>,
     /// Serial number that the controller must have; any without.
     pub serial_number: Option<u64>,

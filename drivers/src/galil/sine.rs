@@ -12,9 +12,9 @@ use palpate_model::units::{Position, Seconds};
 /// `DT`: an increment lasts 2^3 samples, 8 ms. Between two of them a sine is off a straight line by `a w^2 t^2 / 8`, at
 /// 4096 counts/s^2 a thirtieth of a pulse.
 const INTERVAL: u32 = 3;
-/// So far ahead increments are sent: what a busy computer may be late by, and what the axis goes on for without it.
+/// Lead of the increments: a busy computer may be so late, and the axis goes on for so long without it.
 const LEAD: Nanos = Nanos::from_millis(400);
-/// Of a double of as many counts as a travel has.
+/// Rounding error of a double with as many counts as a travel has.
 const ROUNDING: f64 = 1e-6;
 /// Increments that begin a sine; a question has to fit behind them into the line.
 const FIRST: usize = 2;
@@ -88,7 +88,7 @@ impl SineFeed {
         self.sent += 1 << n;
         let at = Seconds(self.sent as f64 * self.tick.seconds().0);
         // Upwards, for between two increments the counter shows the last whole count, below the place that it is at; so
-        // what it tells is within one count of the sine. Not confirmed for any board. Far below 2^31 counts.
+        // what it shows is within one count of the sine. Not confirmed for any board. Far below 2^31 counts.
         let place = (self.path.position(at).0 * self.counts_per_mm - ROUNDING).ceil() as i64;
         commands.push(format!("CD{}={}", self.axis, place - self.place));
         self.place = place;
@@ -105,7 +105,7 @@ impl SineFeed {
         !self.is_over && self.lead(now) <= 0
     }
 
-    /// When the next increments should be sent; never once all are.
+    /// Time of the next increments; `None` once all are sent.
     pub fn due(&self) -> Option<Nanos> {
         let sent = Nanos(self.sent * self.tick.0);
         (!self.is_over).then(|| Nanos((self.begun_at + sent).0.saturating_sub(LEAD.0)))

@@ -12,7 +12,7 @@ use palpate_model::units::{MmPerS, Seconds, Volts};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-/// Grbl makes any speed; this is the step in which speeds are told, 0.6 mm/min.
+/// Grbl makes any speed; this is the step in which speeds are reported, 0.6 mm/min.
 const SPEED_QUANTUM: MmPerS = MmPerS(0.01);
 /// A stop begins with what Grbl has made ahead, five segments of 10 ms, and the start of a motion is known to some ms.
 const LAG: Seconds = Seconds(0.08);

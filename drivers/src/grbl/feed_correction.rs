@@ -1,6 +1,6 @@
 //! Keeps a board at the host's pace. Grbl makes its steps by a clock of its own; that of an Arduino with a resonator is
-//! off by half a percent, in a ramp of 80 s by 0.4 s: more than the jogs that are sent ahead last. So feeds are told
-//! that much higher or lower, by what status reports say of the way done.
+//! off by half a percent, in a ramp of 80 s by 0.4 s: more than the jogs that are sent ahead last. So feeds are sent
+//! that much higher or lower, according to the way in status reports.
 
 use palpate_model::Nanos;
 
@@ -11,19 +11,19 @@ const GRAIN: f64 = 0.005;
 /// Share of what a motion is ahead by that is made good in a second. Jogs are sent up to 0.4 s ahead: two seconds are
 /// slow enough not to overshoot.
 const GAIN: f64 = 0.5;
-/// Of what it is ahead by over a second, the share that is laid to the clock: an eighth of the gain's square is smooth.
+/// Share of a second's lead that is attributed to the clock: an eighth of the gain's square is smooth.
 const DRIFT_GAIN: f64 = GAIN * GAIN / 8.0;
 /// Resonators are right to half a percent (Murata Ceralock, CSTCE series); what seems more is something else.
 const DRIFT_MAX: f64 = 0.01;
 const CHANGE_MAX: f64 = 0.02;
-/// Reports that are further apart tell of a pause of the computer.
+/// Reports that are further apart come from a pause of the computer.
 const APART_MAX: f64 = 0.5;
 
-/// What is known of the board's clock.
+/// Rate and lead of the board's clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FeedCorrection {
     drift: f64,
-    /// By how many s the motion under way is ahead of its profile, of late.
+    /// Lead of the motion under way over its profile, in s.
     ahead: f64,
     last_report: Option<Nanos>,
 }
@@ -34,7 +34,7 @@ impl FeedCorrection {
     }
 
     /// A report, asked for and answered at these times: the axis is ahead of its profile by so many s, as far as steps
-    /// of so many s can tell.
+    /// of so many s can show.
     pub fn update(&mut self, queried_at: Nanos, now: Nanos, ahead: f64, step: f64) {
         if now.since(queried_at) > LATE_MAX {
             return;
@@ -43,7 +43,7 @@ impl FeedCorrection {
             .last_report
             .replace(queried_at)
             .map_or(0.0, |last| (queried_at.since(last).0 as f64 * 1e-9).min(APART_MAX));
-        // Of coarse steps less is believed, by the share of the variance that is not theirs.
+        // The coarser the steps, the less the report counts: by the share of the variance that is not theirs.
         let trust = GRAIN * GRAIN / (GRAIN * GRAIN + step * step / 12.0);
         self.ahead = trust * ahead;
         let drift = self.drift + DRIFT_GAIN * self.ahead * passed;

@@ -21,7 +21,7 @@ use protocol::Incoming;
 
 pub use axis::open;
 pub use connect::{Connected, connect};
-pub use error::{Alarm, GrblOpenError, Refusal};
+pub use error::{GrblCode, GrblOpenError};
 pub use fitness::MM_PER_STEP_MIN;
 pub use motion::worst_case_mm;
 pub use session::{Session, SharedTrack};

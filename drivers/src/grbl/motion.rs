@@ -4,13 +4,15 @@ use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, Profile};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
-/// So long the axis may go on at full speed, beside the way of braking, on what it was given: 60 ms for segments that
-/// Grbl makes ahead (five of 10 ms, and one that is being made), a chunk, and the rest for links that are slow.
+/// Longest time that the axis may go on at full speed with the jogs it has, without the way of braking: 60 ms for
+/// segments that Grbl makes ahead (five of 10 ms, and one that is being made), a chunk, and the rest for links that
+/// are slow.
 const AHEAD: Seconds = Seconds(0.3);
 const CHUNK: Seconds = Seconds(0.08);
 /// Chunks that are in the planner at once at most; it takes 15 (planner.h).
 const CHUNKS_MAX: f64 = 8.0;
-/// Where it is, is known to so much: the start to 20 ms, and a clock that is off by half a percent is followed to 30.
+/// Uncertainty of the position as a time: the start is known to 20 ms, and a clock that is off by half a percent is
+/// followed to 30.
 const KNOWN: Seconds = Seconds(0.05);
 
 #[derive(Clone, Debug)]
@@ -25,10 +27,10 @@ pub struct JogMotion {
     /// From 0 on, in mm.
     pub profile: Profile,
     pub started: Option<Nanos>,
-    /// When it was told to end early.
+    /// When its early end was commanded.
     pub cancelled: Option<Nanos>,
     pub repeated: Nanos,
-    /// Its end was told to the track.
+    /// The track knows its end.
     pub is_braking: bool,
     /// Whether the board has taken its newest jog is not known, so a report of rest may come before it.
     pub is_doubtful: bool,
@@ -84,10 +86,10 @@ impl JogMotion {
         Self::profile(way, &self.wanted)
     }
 
-    /// How long before its time it is at these steps, where it goes at its full speed.
+    /// Lead over the profile at these steps, while the axis goes at full speed.
     pub fn ahead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
-        // A step is told of as soon as it is begun, and lasts until the next.
+        // A step is reported as soon as it begins, and lasts until the next.
         let way = ((steps - self.from) as f64 * self.side() + 0.5) * mm_per_pulse;
         let ramp = speed / acceleration;
         let phase = ramp + (way - 0.5 * speed * ramp) / speed;
@@ -142,7 +144,7 @@ fn ahead_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
     speed.0 * AHEAD.0 + speed.0 * speed.0 / (2.0 * acceleration.0)
 }
 
-/// How far the axis goes at most, in mm, when the link is lost at full speed: all that was sent, half a chunk that went
+/// Longest way of the axis, in mm, after the link is lost at full speed: all that was sent, half a chunk that went
 /// with the last one, and what its place is uncertain by.
 #[must_use]
 pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {

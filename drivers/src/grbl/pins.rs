@@ -1,11 +1,12 @@
-//! What the switches on the board's pins say of the axis.
+//! The switches on the board's pins as states of the axis.
 
 use super::protocol::GrblStatus;
 use super::settings::{GrblSettings, HomeSwitch};
+use crate::rig::axis_status;
 use palpate_model::rig::AxisStatus;
 
-/// Where both ends share a pin: so near to one of them it is that one that closes. Looking for home the engine leaves a
-/// switch by 8 mm.
+/// Where both ends share a pin, a switch that closes so near to one end belongs to it. In the search for home the
+/// engine leaves a switch by 8 mm.
 const NEAR_MM: f64 = 10.0;
 
 #[derive(Debug, Default)]
@@ -51,14 +52,11 @@ impl EndSwitches {
                 (is_limit && !is_far, is_far, false)
             }
         };
-        let bits = [
+        axis_status([
             (is_home, AxisStatus::HOME),
             (is_forward, AxisStatus::FORWARD_LIMIT),
             (is_reverse, AxisStatus::REVERSE_LIMIT),
-        ];
-        bits.iter()
-            .filter(|(is_closed, _)| *is_closed)
-            .fold(AxisStatus(0), |all, (_, bit)| all | *bit)
+        ])
     }
 }
 

@@ -1,9 +1,9 @@
-//! What Grbl 1.1 writes, line by line (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
+//! Lines that Grbl 1.1 writes (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
 //!
 //! Bytes in, [`Incoming`] out; nothing else. Forms that older firmware or other compile options give are read too where
 //! the documents allow them.
 
-use super::error::{Alarm, Refusal};
+use super::error::GrblCode;
 
 /// Longer lines are none of Grbl's: its own are at most 80 characters and a status report about 120.
 pub const LINE_MAX: usize = 256;
@@ -59,15 +59,12 @@ impl GrblState {
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrblStatus {
     pub state: GrblState,
-    /// Machine position of each axis, where it is told.
+    /// Machine position of each axis, if the report has it.
     pub machine: Option<Vec<f64>>,
-    /// Work position of each axis, where it is told instead.
+    /// Work position of each axis, if the report has it instead.
     pub work: Option<Vec<f64>>,
-    pub offset: Option<Vec<f64>>,
     /// Pins that are closed: `X`, `Y`, `Z`, `P` and others.
     pub pins: String,
-    /// Free blocks of the planner and free bytes of the input buffer.
-    pub free: Option<(u32, u32)>,
 }
 
 impl GrblStatus {
@@ -79,9 +76,7 @@ impl GrblStatus {
             state: GrblState::parse(fields.next()?)?,
             machine: None,
             work: None,
-            offset: None,
             pins: String::new(),
-            free: None,
         };
         for field in fields {
             // Fields may come in any order, and new ones may come.
@@ -91,14 +86,9 @@ impl GrblStatus {
             match name {
                 "MPos" => status.machine = Some(numbers(values)?),
                 "WPos" => status.work = Some(numbers(values)?),
-                "WCO" => status.offset = Some(numbers(values)?),
                 "Pn" => status.pins = values.to_owned(),
-                "Bf" => {
-                    let numbers = numbers(values)?;
-                    if let [blocks, bytes] = numbers[..] {
-                        status.free = Some((blocks.max(0.0) as u32, bytes.max(0.0) as u32));
-                    }
-                }
+                // Not used, but a garbled number spoils the report.
+                "WCO" | "Bf" => drop(numbers(values)?),
                 _ => {}
             }
         }
@@ -128,8 +118,8 @@ fn number(text: &str) -> Option<f64> {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incoming {
     Ok,
-    Refused(Refusal),
-    Alarm(Alarm),
+    Refused(GrblCode),
+    Alarm(GrblCode),
     /// An answer to [`QUERY`].
     Status(GrblStatus),
     Hello(String),
@@ -150,10 +140,10 @@ impl Incoming {
         }
         // Words without numbers are those of version 0.9 and of some compile options: "error: Bad number format".
         if let Some(code) = line.strip_prefix("error:") {
-            return Self::Refused(Refusal::parse(code));
+            return Self::Refused(GrblCode::parse(false, code));
         }
         if let Some(code) = line.strip_prefix("ALARM:") {
-            return Self::Alarm(Alarm::parse(code));
+            return Self::Alarm(GrblCode::parse(true, code));
         }
         if let Some(inner) = line.strip_prefix('<') {
             let inner = inner.strip_suffix('>');

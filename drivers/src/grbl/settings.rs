@@ -24,13 +24,13 @@ pub struct GrblSettings {
     pub travel: Position,
     pub speed_max: MmPerS,
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
     /// Its home switch.
     pub home: HomeSwitch,
     /// A closed limit pin is home when the rig is opened: nothing else can have closed it.
     pub is_closed_home: bool,
-    /// The text of `$I=`, by which a board is told from others.
+    /// The text of `$I=`, which identifies a board.
     pub build_info: Option<String>,
     /// Unlock a board that is locked when it is opened (`$X`).
     pub is_unlocking: bool,
@@ -52,7 +52,7 @@ impl GrblSettings {
     }
 }
 
-/// What the board's own settings make of it.
+/// Values read from the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardParameters {
     /// `$100` to `$102`.

@@ -17,6 +17,9 @@ const VERSION: &str = "1";
 pub const COUNT_MIN: i32 = -(1 << 23);
 /// See [`COUNT_MIN`].
 pub const COUNT_MAX: i32 = (1 << 23) - 1;
+/// What is reported when the board cannot read its chip.
+pub(super) const NO_CHIP: &str =
+    "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply";
 const BOARD_MAX: usize = 16;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -141,14 +144,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sum_is_that_of_the_catalogues() {
+    fn crc_has_the_check_value_of_the_catalogues() {
         // CRC-16/CCITT-FALSE (also IBM-3740): the check value that catalogues of CRCs give.
         assert_eq!(crc(b"123456789"), 0x29b1);
         assert_eq!(crc(b""), 0xffff);
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_lines_are_read_back() {
         let header = Header { rate: 80, gain: 128, board: "bench-1".into() };
         let started = Message::Started { micros: 1204, header: header.clone() };
         assert_eq!(line(&started), "B,1204,palpate-hx711,1,80,128,bench-1*8C6B\r\n");

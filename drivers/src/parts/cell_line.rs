@@ -1,18 +1,18 @@
-//! A load cell's dialogue on a line of its own: samples with their time on the host's clock.
+//! A load cell's dialogue on a link of its own: samples with their time on the host's clock.
 
 use super::cell_clock::CellClock;
 use super::track::Track;
 use crate::cell::CellDialogue;
 use crate::rig::RigEventBody;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{Dialogue, LinkStats, lock};
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, AxisStatus, Fault, Reading, RigCommand};
+use palpate_model::rig::{Age, AxisStatus, Reading, RigCommand};
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-/// Samples are told on this grid: a thousandth of a second, which both clocks are good for.
+/// Samples are reported on this grid: a thousandth of a second, which both clocks are good for.
 pub const TICK: Nanos = Nanos::from_millis(1);
-/// So many samples may be missing before the cell counts as gone.
+/// The cell counts as gone after so many missing samples.
 const SILENT_PERIODS: f64 = 5.0;
 /// Computers and USB converters pause for so long now and then.
 const SILENT_MIN: Nanos = Nanos::from_millis(250);
@@ -25,11 +25,11 @@ pub struct CellLine {
     clock: CellClock,
     start: Nanos,
     period: Nanos,
-    /// How long before it was sent a sample was felt.
+    /// Age of a sample when it is sent.
     delay: Nanos,
     last_tick: Option<u64>,
-    heard: Nanos,
-    looked: Nanos,
+    heard_at: Nanos,
+    looked_at: Nanos,
     silence: Nanos,
     is_silent: bool,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -37,7 +37,7 @@ pub struct CellLine {
 }
 
 impl CellLine {
-    /// A cell of so many values a second, felt so long before they are sent. Ticks count from `start`.
+    /// A cell with so many values a second, each so old when it is sent. Ticks count from `start`.
     pub fn new(
         cell: Box<dyn CellDialogue>,
         (rate, delay): (f64, Nanos),
@@ -54,8 +54,8 @@ impl CellLine {
             period,
             delay,
             last_tick: None,
-            heard: start,
-            looked: start,
+            heard_at: start,
+            looked_at: start,
             silence: silence.max(SILENT_MIN),
             is_silent: false,
             events: VecDeque::new(),
@@ -63,20 +63,18 @@ impl CellLine {
         }
     }
 
-    /// Whatever has gone wrong with the cell, the axis is not to press on blindly.
+    /// Any failure of the cell stops the axis: it must not press without a force.
     fn stop_axis(&self) {
-        let mut track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
-        track.is_stop_wanted = true;
+        lock(&self.track).is_stop_wanted = true;
     }
 
     fn fault(&mut self, now: Nanos, detail: String) {
         self.stop_axis();
-        let fault = Fault::CommandRefused { detail };
-        self.events.push_back((now, RigEventBody::Fault(fault)));
+        self.events.push_back((now, RigEventBody::refusal(detail)));
     }
 
-    /// When a sample was sent that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
-    /// before it a period apart, or closer where there is less time since the last one.
+    /// The time at which a cell without a clock sent a sample that came with `newer` ones behind it: the newest just
+    /// now, those before it a period apart, or closer where there is less time since the last one.
     fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
         let newest = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
         // The samples that are left share what is left of the time.
@@ -87,7 +85,7 @@ impl CellLine {
     fn take_samples(&mut self, now: Nanos) {
         let burst: Vec<_> = std::iter::from_fn(|| self.cell.take_sample()).collect();
         for (place, sample) in burst.iter().enumerate() {
-            self.heard = now;
+            self.heard_at = now;
             self.is_silent = false;
             let newer = burst.len() - 1 - place;
             let (taken, within) = match sample.device_time {
@@ -95,14 +93,14 @@ impl CellLine {
                     let taken = self.clock.map(device, sample.at);
                     (taken, self.clock.spread())
                 }
-                // It was taken at any time of its period, and told on the grid.
+                // It was taken at any time of its period, and reported on the grid.
                 None => {
                     (self.laid_back(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
                 }
             };
             let taken = Nanos(taken.0.saturating_sub(self.delay.0));
             let tick = (taken.since(self.start).0 + TICK.0 / 2) / TICK.0;
-            // Two in one thousandth of a second: the second is told for the next.
+            // Two in one thousandth of a second: the second is reported for the next.
             let tick = self.last_tick.map_or(tick, |last| tick.max(last + 1));
             self.last_tick = Some(tick);
             let reading = Reading {
@@ -127,24 +125,22 @@ impl Dialogue for CellLine {
 
     fn command(&mut self, _now: Nanos, _command: RigCommand) {}
 
-    fn overtaken(&mut self, _now: Nanos, _command: RigCommand) {}
-
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
         self.cell.received(now, bytes);
         self.take_samples(now);
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let pause = now.since(std::mem::replace(&mut self.looked, now));
+        let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > PAUSE {
-            self.heard = self.heard + pause;
+            self.heard_at = self.heard_at + pause;
         }
-        if now.since(self.heard) > self.silence && !std::mem::replace(&mut self.is_silent, true) {
+        if now.since(self.heard_at) > self.silence && !std::mem::replace(&mut self.is_silent, true)
+        {
             let ms = self.silence.0 / 1_000_000;
-            self.fault(
-                now,
-                format!("the load cell has sent nothing for {ms} ms; check its cable and power"),
-            );
+            let words =
+                format!("the load cell has sent nothing for {ms} ms; check its cable and power");
+            self.fault(now, words);
         }
         self.take_samples(now);
         None
@@ -170,7 +166,7 @@ impl Dialogue for CellLine {
 }
 
 impl Drop for CellLine {
-    /// However its thread ends, such as with a port that is gone.
+    /// Also when its thread ends by itself, such as when the port is gone.
     fn drop(&mut self) {
         self.stop_axis();
     }

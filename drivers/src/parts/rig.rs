@@ -3,24 +3,22 @@
 use super::cell_line::{CellLine, TICK};
 use super::track::Track;
 use crate::cell::CellDevice;
-use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
+use crate::device::{OpenError, Opened, RigDevice};
 use crate::grbl::{self, GrblSettings};
 use crate::rig::RigEventBody;
 use crate::text::OpenedCell;
-use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place};
+use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place, lock};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, RawBytes, RigCommand};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-/// An axis in progress, and what it writes its deeds into.
+/// An axis in progress and the track that it writes.
 pub struct OpenedAxis {
     pub line: LinkThread,
     pub track: Arc<Mutex<Track>>,
     /// Bytes of the time before the thread had the link.
     pub raw: Vec<RawBytes>,
 }
-
-pub type PartsRig = DeviceRig<SplitRigDevices>;
 
 #[derive(Clone)]
 pub struct SplitRigDevices {
@@ -29,7 +27,7 @@ pub struct SplitRigDevices {
     track: Arc<Mutex<Track>>,
     /// The host's clock where ticks begin.
     start: Nanos,
-    /// What the axis' own pulses are more than the caller's.
+    /// Offset of the axis' own pulses from the caller's.
     zero: i64,
     motions_shown: u64,
 }
@@ -83,7 +81,7 @@ impl RigDevice for SplitRigDevices {
     }
 
     fn complete(&mut self, now: Nanos, body: RigEventBody) -> RigEventBody {
-        let track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
+        let track = lock(&self.track);
         match body {
             RigEventBody::Reading(mut reading) => {
                 let placed = track.at(self.start + Nanos(reading.tick * TICK.0));

@@ -1,4 +1,4 @@
-//! Where an axis was at a time, by the courses that were commanded and what was confirmed of them.
+//! The past positions of an axis, from the courses that were commanded and confirmed.
 //!
 //! The thread that talks to the axis writes it; samples of a load cell, which arrive later than they were taken, look
 //! the past up in it.
@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 /// Motions and states that are remembered: minutes of them. Samples are looked up a fraction of a second late.
 const PIECES_MAX: usize = 256;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct TrackPiece {
     from: Nanos,
     /// Pulses where it begins.
@@ -23,7 +23,7 @@ struct TrackPiece {
     motion: u64,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Track {
     pieces: VecDeque<TrackPiece>,
     inputs: VecDeque<(Nanos, AxisStatus)>,
@@ -43,14 +43,15 @@ pub struct AxisState {
 impl Track {
     #[must_use]
     pub fn at_rest(pulses: i64) -> Self {
-        let mut track = Self {
-            pieces: VecDeque::new(),
-            inputs: VecDeque::new(),
-            motion: 0,
-            is_stop_wanted: false,
-        };
+        let mut track = Self::default();
         track.begin_rest(Nanos::ZERO, pulses);
         track
+    }
+
+    fn motion_under_way(&self) -> Option<(TrackPiece, Profile, f64)> {
+        let last = *self.pieces.back()?;
+        let (profile, pulses_per_mm) = last.course?;
+        Some((last, profile, pulses_per_mm))
     }
 
     fn push(&mut self, piece: TrackPiece) {
@@ -61,16 +62,11 @@ impl Track {
     }
 
     pub fn begin_rest(&mut self, from: Nanos, pulses: i64) {
-        self.push(TrackPiece {
-            from,
-            pulses: pulses as f64,
-            course: None,
-            status: AxisStatus(0),
-            motion: self.motion,
-        });
+        let (pulses, motion) = (pulses as f64, self.motion);
+        self.push(TrackPiece { from, pulses, motion, ..TrackPiece::default() });
     }
 
-    /// It moves from then on: a profile in mm from zero, and how many pulses a mm of it is.
+    /// Begins a motion with a profile in mm from zero and pulses per mm.
     pub fn begin_motion(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
         self.motion += 1;
         self.push(TrackPiece {
@@ -83,10 +79,7 @@ impl Track {
     }
 
     pub fn begin_braking(&mut self, from: Nanos) {
-        let Some(last) = self.pieces.back().copied() else {
-            return;
-        };
-        let Some((profile, pulses_per_mm)) = last.course else {
+        let Some((last, profile, pulses_per_mm)) = self.motion_under_way() else {
             return;
         };
         let since = seconds(from, last.from);
@@ -103,7 +96,7 @@ impl Track {
         debug_assert!((end.position(Seconds(0.0)).0 * pulses_per_mm - here).abs() < 1e-6);
     }
 
-    /// The motion under way ends earlier than was told, at the end of this profile, such as when the way behind it was
+    /// The motion under way ends earlier than planned, at the end of this profile, such as when the way behind it was
     /// never given.
     pub fn shorten_motion(&mut self, profile: Profile) {
         if let Some(TrackPiece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
@@ -111,12 +104,9 @@ impl Track {
         }
     }
 
-    /// Nobody watches the axis any more: it rests where and when its motion ends.
+    /// The axis is no longer watched: it rests where and when its motion ends.
     pub fn finish_motion(&mut self) {
-        let Some(last) = self.pieces.back().copied() else {
-            return;
-        };
-        let Some((profile, pulses_per_mm)) = last.course else {
+        let Some((last, profile, pulses_per_mm)) = self.motion_under_way() else {
             return;
         };
         let end = last.pulses + profile.end().0 * pulses_per_mm;
@@ -137,13 +127,7 @@ impl Track {
     pub fn at(&self, time: Nanos) -> AxisState {
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
         // Before all that is remembered: as it was first.
-        let piece = piece.or(self.pieces.front()).copied().unwrap_or(TrackPiece {
-            from: Nanos::ZERO,
-            pulses: 0.0,
-            course: None,
-            status: AxisStatus(0),
-            motion: 0,
-        });
+        let piece = piece.or(self.pieces.front()).copied().unwrap_or_default();
         let way = piece.course.map_or(0.0, |(profile, pulses_per_mm)| {
             profile.position(seconds(time, piece.from)).0 * pulses_per_mm
         });
@@ -167,7 +151,7 @@ mod tests {
     use palpate_model::units::{MmPerS, MmPerS2, Position};
 
     #[test]
-    fn the_past_is_looked_up_as_it_was() {
+    fn position_and_status_are_looked_up_at_any_past_time() {
         let mut track = Track::at_rest(100);
         let ms = Nanos::from_millis;
         let profile = Profile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
@@ -190,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_nobody_watches_ends() {
+    fn motion_that_is_no_longer_watched_ends() {
         let mut track = Track::at_rest(100);
         let ms = Nanos::from_millis;
         let speed = (MmPerS(2.0), MmPerS2(20.0));

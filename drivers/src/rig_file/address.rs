@@ -21,12 +21,18 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
         }),
         (None, Some(address)) => {
             if baud.is_some() {
-                fields.mistake(&key("baud"), "a controller on a network has no baud rate");
+                fields.mistake(
+                    &key("baud"),
+                    "a controller on a network has no baud rate; remove this",
+                );
             }
             Some(Place::Tcp(address))
         }
         (Some(_), Some(_)) => {
-            fields.mistake(&key("address"), "a device is at a port or at an address, not at both");
+            fields.mistake(
+                &key("address"),
+                "a device is at a port or at an address, not at both; remove one of them",
+            );
             None
         }
         (None, None) => {
@@ -34,7 +40,7 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
             fields.mistake(
                 &key("port"),
                 &format!(
-                    "where is the {what}? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\""
+                    "the {what} has no address; give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\""
                 ),
             );
             None

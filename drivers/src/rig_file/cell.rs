@@ -28,7 +28,7 @@ pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
     let per_second = per_second.map_or(usual.per_second, |rate| rate as u16);
     if !RATES.contains(&per_second) {
         let rates = RATES.map(|rate| rate.to_string()).join(", ");
-        fields.mistake("cell.readings_per_second", &format!("gauges send {rates}"));
+        fields.mistake("cell.readings_per_second", &format!("give one of {rates}"));
     }
     let filter = fields.whole("cell.filter", 0, u64::from(FILTER_MAX));
     let is_reversed =

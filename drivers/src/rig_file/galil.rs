@@ -13,7 +13,7 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(vec![place], device))
 }
 
-/// Where the controller is, and how it is wired.
+/// Address and settings of the controller.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
     let place = read_address(fields, "");
     let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
@@ -21,7 +21,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let axis = match axis.as_bytes() {
         [letter @ b'A'..=b'H'] => char::from(*letter),
         _ => {
-            fields.mistake("axis", "an axis is a letter from A to H");
+            fields.mistake("axis", "give a letter from A to H");
             'A'
         }
     };
@@ -46,7 +46,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
         let least = 1024.0 * mm_per_pulse;
         fields.mistake(
             "acceleration_mm_s2",
-            &format!("the controller makes no less than {least:.4} mm/s2 with such pulses"),
+            &format!("give at least {least:.4} mm/s2, the least that the controller makes with such pulses"),
         );
     }
     let range = range?;

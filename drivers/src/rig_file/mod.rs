@@ -1,4 +1,4 @@
-//! The description of a rig as a file: what is wired to what, which no device can tell.
+//! The description of a rig as a file: what is wired to what, which no device can report.
 //!
 //! Text in, a [`RigFile`] or every mistake with its line out; [`RigFile::open`] then opens the devices. The keys are
 //! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
@@ -50,7 +50,9 @@ impl RigFile {
     pub fn parse(file: &str, text: &str) -> Result<Self, RigFileError> {
         let error = |mistakes| RigFileError { file: file.to_owned(), mistakes };
         if text.len() > BYTES_MAX {
-            let message = format!("more than {BYTES_MAX} bytes are no rig file");
+            let message = format!(
+                "the file has more than {BYTES_MAX} bytes, which is no rig file; check its path"
+            );
             return Err(error(vec![Mistake { line: 0, message }]));
         }
         let mut fields = Fields::read(text).map_err(|mistake| error(vec![mistake]))?;
@@ -69,7 +71,7 @@ impl RigFile {
         Self { places, open }
     }
 
-    /// Where its devices are, that of the axis first.
+    /// Addresses of its devices, that of the axis first.
     pub fn places(&self) -> &[Place] {
         &self.places
     }

@@ -1,4 +1,4 @@
-//! What stands before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
+//! The bench before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
 //! cell. The rig gives way in between: the probe is not quite where the axis is.
 
 use super::random::Random;
@@ -18,11 +18,9 @@ const SOLVED_MM: f64 = 1e-12;
 /// Four to eight steps are usual; a search that takes more is stuck at the rounding of the force.
 const SOLVE_STEPS_MAX: usize = 60;
 
-/// What the probe and the cell feel at a tick.
+/// Forces at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BenchForces {
-    /// True position of the probe's tip.
-    pub probe: Position,
     pub on_probe: Newtons,
     /// Force on the load cell: the probe's and the weights'.
     pub on_cell: Newtons,
@@ -52,9 +50,14 @@ impl Bench {
         }
     }
 
-    /// What the probe would meet first: the specimen's surface, or without a specimen the base.
+    /// The first surface before the probe: the specimen's, or without a specimen the base.
     pub fn surface(&self) -> Position {
         self.specimen.as_ref().map_or(self.base, Tissue::surface)
+    }
+
+    /// True position of the probe's tip.
+    pub fn probe(&self) -> Position {
+        self.probe
     }
 
     pub fn base(&self) -> Position {
@@ -84,10 +87,10 @@ impl Bench {
 
     /// The axis has moved straight to a true position in a time step.
     pub fn advance(&mut self, axis: Position, dt: Seconds) -> BenchForces {
-        let compliance = self.settings.compliance.mm_per_newton();
+        let compliance = self.settings.compliance.thousandths();
         self.probe = if compliance > 0.0 { self.balanced(axis, dt, compliance) } else { axis };
         let on_probe = self.push(self.probe, dt);
-        BenchForces { probe: self.probe, on_probe, on_cell: on_probe + self.weights }
+        BenchForces { on_probe, on_cell: on_probe + self.weights }
     }
 
     /// Where the force that bends the rig is the force that tissue and base have there:

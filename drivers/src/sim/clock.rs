@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_even() {
+    fn ticks_have_equal_distances() {
         let mut clock = TickClock::new(40, 976_000);
         assert_eq!(clock.advance(), (40, Nanos(0)));
         assert_eq!(clock.advance(), (41, Nanos(976_000)));

@@ -44,15 +44,15 @@ pub(super) struct SurfaceRecession {
 
 impl SurfaceRecession {
     pub fn new(preconditioning: SimPreconditioning) -> Self {
-        Self { share: preconditioning.share(), depth_max: 0.0, depth: 0.0, set: 0.0 }
+        Self { share: preconditioning.hundredths(), depth_max: 0.0, depth: 0.0, set: 0.0 }
     }
 
-    /// How far the surface has receded, in mm.
+    /// Recession of the surface, in mm.
     pub fn get(&self) -> f64 {
         self.set
     }
 
-    /// Where the set is heading, in mm.
+    /// Limit of the set, in mm.
     fn limit(&self) -> f64 {
         let x = self.depth_max;
         self.share * x * x * x / (x * x + DEEP * DEEP)
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_restores_part_of_it() {
+    fn rest_restores_part_of_the_recession() {
         let mut press = Press::new(10);
         let fresh = press.cycle(30.0, 5.0);
         for _ in 0..8 {
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn none_is_none_to_the_last_bit() {
+    fn without_preconditioning_forces_stay_the_same_to_the_last_bit() {
         let mut with = Press::new(0);
         let plain = Tissue::new(&mut Random::new(4, Cause::Tissue), &SimSettings::default());
         let mut without = Press { surface: plain.surface(), tissue: plain };

@@ -1,4 +1,4 @@
-//! The sensors of a simulated rig beside its load cell: a bath that is slowly heated, and a switch somebody closes.
+//! Other sensors of a simulated rig: a bath that is slowly heated, and a switch.
 
 use super::amounts::{SimBath, SimInput};
 use super::settings::SimSettings;
@@ -11,13 +11,13 @@ const ROOM_CELSIUS: f64 = 21.0;
 /// Time constant of the bath in s: a litre under a heater of some hundred watts.
 const HEATING_SECS: f64 = 120.0;
 
-/// Values that the thermometer tells apart within a degree.
+/// Resolution of the thermometer: steps per degree.
 const VALUES_PER_DEGREE: f64 = 20.0;
 
-/// A sensor is told when it has changed, and once in this time in any case.
+/// A sensor is reported when it has changed, and once in this time in any case.
 const REPORT_EVERY: Nanos = Nanos::from_millis(1000);
 
-/// What is told of them, by the rig's time.
+/// The sensors and what was reported last, by the rig's time.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     bath: SimBath,
@@ -32,20 +32,20 @@ impl Sensors {
 
     pub fn described(settings: &SimSettings) -> RigSensors {
         RigSensors {
-            digital_inputs: settings.input.seconds().map_or(0, |_| 1),
-            has_bath: settings.bath.celsius().is_some(),
+            digital_inputs: u8::from(settings.input.positive().is_some()),
+            has_bath: settings.bath.positive().is_some(),
         }
     }
 
-    /// What is new at a time since the rig was switched on.
+    /// New readings at a time since the rig was switched on.
     pub fn take(&mut self, now: Nanos) -> Vec<SensorReading> {
         let secs = now.seconds().0;
-        let bath = self.bath.celsius().map(|end| {
+        let bath = self.bath.positive().map(|end| {
             let celsius = end - (end - ROOM_CELSIUS) * (-secs / HEATING_SECS).exp();
             let celsius = (celsius * VALUES_PER_DEGREE).round() / VALUES_PER_DEGREE;
             SensorReading::Bath { celsius }
         });
-        let input = self.input.seconds().map(|closes| {
+        let input = self.input.positive().map(|closes| {
             let is_high = secs >= closes;
             SensorReading::DigitalInput { number: 1, is_high }
         });
@@ -85,7 +85,7 @@ mod tests {
         assert_eq!(sensors.take(Nanos::from_millis(1)), []);
         // By hand: 37 - 16 / e = 31.114.
         let [SensorReading::Bath { celsius }, switch] = sensors.take(at(120))[..] else {
-            panic!("both are told")
+            panic!("both are reported")
         };
         assert!((celsius - 31.1).abs() < 1e-9, "{celsius}");
         assert_eq!(switch, high(true));

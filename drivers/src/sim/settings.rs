@@ -1,4 +1,4 @@
-//! What makes one simulated rig differ from another; with these values it can be rebuilt.
+//! The settings that make a simulated rig; with them it can be rebuilt.
 
 use super::amounts::{
     SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
@@ -9,7 +9,7 @@ use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How much of a laboratory the simulated load cell shows.
+/// Realism of the simulated load cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SimProfile {
     /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
@@ -50,10 +50,10 @@ pub struct SimSettings {
     pub softening: SimSoftening,
     pub noise: SimNoise,
     pub stiffness: SimStiffness,
-    /// How far behind the surface a stiff base stands.
+    /// Distance of the stiff base from the surface.
     pub thickness: SimThickness,
     pub compliance: SimCompliance,
-    /// How far loading moves the tissue's surface.
+    /// Recession of the tissue's surface by loading.
     pub preconditioning: SimPreconditioning,
     pub bath: SimBath,
     pub input: SimInput,

@@ -9,6 +9,7 @@
 //! the profile itself while the controller reports whole pulses. At rest it stands on the pulse.
 
 use super::random::Random;
+use crate::rig::axis_status;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{
     Ack, AxisStatus, Course, Fault, MoveTo, Oscillation, Profile, RigCommand, RigDescription, Sine,
@@ -36,7 +37,7 @@ struct Motion {
     is_reported: bool,
 }
 
-/// What the axis is at one tick.
+/// State of the axis at one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisSample {
     /// Reported position: whole pulses at or below the commanded position.
@@ -105,29 +106,18 @@ impl Slider {
 
     /// Executes one command at a tick. The acknowledgement carries what was really set.
     pub fn execute(&mut self, tick: u64, command: RigCommand) -> Result<Ack, Fault> {
-        let command = match command {
-            RigCommand::EnableMotor => {
-                self.is_motor_on = true;
-                command
-            }
-            RigCommand::MoveTo(wanted) => RigCommand::MoveTo(self.start_move(tick, wanted)?),
+        let mut made = command;
+        match command {
+            RigCommand::EnableMotor => self.is_motor_on = true,
+            RigCommand::MoveTo(wanted) => made = RigCommand::MoveTo(self.start_move(tick, wanted)?),
             RigCommand::Oscillate(wanted) => {
-                RigCommand::Oscillate(self.start_oscillation(tick, wanted)?)
+                made = RigCommand::Oscillate(self.start_oscillation(tick, wanted)?);
             }
-            RigCommand::Stop => {
-                self.stop(tick);
-                command
-            }
-            RigCommand::Halt => {
-                self.halt(tick);
-                command
-            }
-            RigCommand::DefinePosition { pulses } => {
-                self.define(pulses)?;
-                command
-            }
-        };
-        Ok(Ack { command })
+            RigCommand::Stop => self.stop(tick),
+            RigCommand::Halt => self.halt(tick),
+            RigCommand::DefinePosition { pulses } => self.define(pulses)?,
+        }
+        Ok(Ack { command: made })
     }
 
     /// Ends a tick: moves the probe, looks at the switches and reports.
@@ -136,10 +126,7 @@ impl Slider {
             self.motion = Some(Motion { is_reported: true, ..motion });
             let since = self.since(motion, tick);
             self.position = motion.course.position(since);
-            let speed = motion.course.velocity(since).0;
-            let closing = (speed > 0.0 && self.is_forward_limit_closed())
-                || (speed < 0.0 && self.is_reverse_limit_closed());
-            if closing {
+            if self.is_blocked(motion.course.velocity(since).0) {
                 self.stop(tick);
             }
         }
@@ -163,10 +150,14 @@ impl Slider {
         Ok(())
     }
 
-    fn check_direction(&self, way: f64) -> Result<(), Fault> {
-        if (way > 0.0 && self.is_forward_limit_closed())
+    /// Whether the limit switch in a direction is closed.
+    fn is_blocked(&self, way: f64) -> bool {
+        (way > 0.0 && self.is_forward_limit_closed())
             || (way < 0.0 && self.is_reverse_limit_closed())
-        {
+    }
+
+    fn check_direction(&self, way: f64) -> Result<(), Fault> {
+        if self.is_blocked(way) {
             return Err(refused(
                 "begin not possible towards a closed limit switch, move the other way",
             ));
@@ -177,14 +168,14 @@ impl Slider {
     fn start_move(&mut self, tick: u64, wanted: MoveTo) -> Result<MoveTo, Fault> {
         self.check_begin()?;
         if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refused(format!(
                 "target {} pulses is out of range, stay within {PULSES_MAX}",
                 wanted.target_pulses
             )));
         }
         let speed = rounded_down(wanted.speed.0, self.speed_quantum);
         if !(speed > 0.0 && speed <= self.speed_max * (1.0 + 1e-12)) {
-            return Err(refused(&format!(
+            return Err(refused(format!(
                 "speed {} is out of range, choose from {} to {} mm/s",
                 wanted.speed, self.speed_quantum, self.speed_max
             )));
@@ -209,13 +200,13 @@ impl Slider {
         let start = self.pulses_at(self.position);
         let far = made.amplitude_pulses.saturating_mul(2);
         if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refused(format!(
                 "an amplitude of {} pulses from {start} is out of range, stay within {PULSES_MAX}",
                 made.amplitude_pulses
             )));
         }
         let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
-        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(|why| refused(&why))?;
+        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refused)?;
         self.check_direction(made.amplitude_pulses as f64)?;
         self.motion = Some(Motion {
             course: Course::Sine(sine),
@@ -260,7 +251,7 @@ impl Slider {
             return Err(refused("position cannot be defined while the axis moves, stop it first"));
         }
         if pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refused(format!(
                 "position {pulses} pulses is out of range, stay within {PULSES_MAX}"
             )));
         }
@@ -271,7 +262,7 @@ impl Slider {
     }
 
     fn status(&self) -> AxisStatus {
-        let bits = [
+        axis_status([
             (self.motion.is_some(), AxisStatus::MOVING),
             (
                 self.is_just_halted || self.motion.is_some_and(|m| m.target_pulses.is_none()),
@@ -281,10 +272,7 @@ impl Slider {
             (self.is_forward_limit_closed(), AxisStatus::FORWARD_LIMIT),
             (self.is_reverse_limit_closed(), AxisStatus::REVERSE_LIMIT),
             (self.is_motor_on, AxisStatus::MOTOR_ON),
-        ];
-        bits.into_iter()
-            .filter(|(is_set, _)| *is_set)
-            .fold(AxisStatus::default(), |all, (_, bit)| all | bit)
+        ])
     }
 
     fn true_position(&self) -> Position {
@@ -319,7 +307,7 @@ fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
     if made > 0.0 && made.is_finite() {
         Ok(MmPerS2(made))
     } else {
-        Err(refused(&format!(
+        Err(refused(format!(
             "acceleration {wanted} is out of range, choose at least {ACCELERATION_QUANTUM}"
         )))
     }
@@ -331,6 +319,6 @@ fn rounded_down(wanted: f64, quantum: f64) -> f64 {
     (wanted / quantum + 1e-6).floor() * quantum
 }
 
-fn refused(detail: &str) -> Fault {
-    Fault::CommandRefused { detail: detail.to_owned() }
+fn refused(detail: impl Into<String>) -> Fault {
+    Fault::CommandRefused { detail: detail.into() }
 }

@@ -81,7 +81,7 @@ impl Tissue {
     /// A specimen drawn around the thesis's identified body (its equation 3.5), as stiff as the settings say.
     pub fn new(random: &mut Random, settings: &SimSettings) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
-        let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.share();
+        let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.hundredths();
         let (relaxation, viscosity) =
             (random.around_one(TIME_SPREAD), random.around_one(TIME_SPREAD));
         let thesis = ModifiedKelvin::THESIS;
@@ -95,8 +95,8 @@ impl Tissue {
             },
             // The probe powers up far outside; the first step places it.
             state: KelvinState::at_rest_from(Depth(-SURFACE_MM)),
-            softening: (settings.softening.share() > 0.0).then(|| Softening {
-                share: settings.softening.share(),
+            softening: (settings.softening.hundredths() > 0.0).then(|| Softening {
+                share: settings.softening.hundredths(),
                 depth_max: 0.0,
                 drive: 0.0,
                 lost_force: 0.0,

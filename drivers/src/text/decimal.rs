@@ -5,13 +5,13 @@ const DIGITS_MAX: usize = 8;
 const DECIMALS_MAX: usize = 5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Decimal {
+pub struct FixedDecimal {
     /// Its digits without the point, signed.
     pub digits: i32,
     pub decimals: u8,
 }
 
-impl Decimal {
+impl FixedDecimal {
     /// Reads digits with at most a minus before and a point within them: `+` is never sent (Model 7i user's guide, page
     /// 30, `OPOL`).
     #[must_use]

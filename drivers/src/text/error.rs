@@ -1,53 +1,52 @@
-//! Why a device that speaks in lines cannot be used, in words.
+//! Why a device that speaks in lines cannot be used.
 
 use crate::devices::{DeviceKind, split_lines};
 use crate::galil;
-use std::io;
 use thiserror::Error;
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DeviceError {
     #[error("the {device} does not answer; {hint}")]
-    Silent {
-        device: &'static str,
-        hint: &'static str,
-    },
-    #[error("this is no {device} but {found}; check which cable goes where")]
-    Other {
-        device: &'static str,
-        found: String,
-    },
+    Silent { device: &'static str, hint: &'static str },
+    #[error("the device is {found}, not a {device}; check the cables")]
+    Other { device: &'static str, found: String },
     #[error(
-        "the {device} has serial number {found} but the rig file says {expected}; check which cable goes where, or correct the file"
+        "the {device} has serial number {found}, the rig file says {expected}; check the cables, or correct the file"
     )]
-    OtherSerial {
-        device: &'static str,
-        found: String,
-        expected: String,
-    },
+    OtherSerial { device: &'static str, found: String, expected: String },
     /// It cannot do what is needed, or is not set up for it.
     #[error("the {device} cannot be used: {detail}")]
-    Unfit {
-        device: &'static str,
-        detail: String,
-    },
+    Unfit { device: &'static str, detail: String },
     #[error("the link to the {device} was lost while it was opened ({detail}); check the cable")]
-    Lost {
-        device: &'static str,
-        detail: String,
-    },
+    Lost { device: &'static str, detail: String },
 }
 
 impl DeviceError {
-    pub(crate) fn lost(device: &'static str, err: &io::Error) -> Self {
-        Self::Lost { device, detail: err.to_string() }
+    pub(crate) fn unfit(device: &'static str, detail: impl Into<String>) -> Self {
+        Self::Unfit { device, detail: detail.into() }
+    }
+
+    /// Compares a serial number or a name with that of the rig file, if it has one.
+    pub(crate) fn check_serial(
+        device: &'static str,
+        found: Option<&str>,
+        expected: Option<&str>,
+    ) -> Result<(), Self> {
+        match expected {
+            Some(expected) if found != Some(expected) => Err(Self::OtherSerial {
+                device,
+                found: found.unwrap_or("(not reported)").to_owned(),
+                expected: expected.to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 }
 
-/// Longest piece of what a stranger said that is told.
+/// Longest quotation of an unexpected answer.
 const QUOTE_MAX: usize = 60;
 
-/// What a device is that answered otherwise than expected: by its name where its words give it away.
+/// Names a device that answers unexpectedly, or quotes it where it is not recognised.
 #[must_use]
 pub fn describe_unknown_device(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
@@ -56,7 +55,7 @@ pub fn describe_unknown_device(bytes: &[u8]) -> String {
     known.map_or_else(
         || {
             let quote: String = text.chars().take(QUOTE_MAX).collect();
-            format!("something that says {quote:?}")
+            format!("an unknown device that sends {quote:?}")
         },
         str::to_owned,
     )
@@ -73,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strangers_are_called_by_their_names() {
+    fn unexpected_devices_are_recognised_by_their_lines() {
         for (bytes, name) in [
             ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
             ("error:8\r\n", "Grbl"),

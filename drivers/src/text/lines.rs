@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn any_end_ends_a_line() {
+    fn cr_or_lf_or_both_end_a_line() {
         let two = [Taken::Line("4.285 N".into()), Taken::Line("*10".into())];
         for text in ["4.285 N\r\n*10\r\n", "4.285 N\r*10\r", "\n4.285 N\n\n*10\n"] {
             assert_eq!(all(text.as_bytes()), two, "{text:?}");

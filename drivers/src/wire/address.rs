@@ -1,4 +1,4 @@
-//! Where a device is, and what can be wrong with opening it.
+//! The address of a device, and why a connection to it can fail.
 
 use super::link::{Link, SerialLink, TcpLink};
 use crate::serial::list_ports;
@@ -15,11 +15,7 @@ const CONNECT_MAX: Duration = Duration::from_secs(3);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A serial port, 8 data bits, no parity, one stop bit.
-    Serial {
-        port: String,
-        baud: u32,
-        has_handshake: bool,
-    },
+    Serial { port: String, baud: u32, has_handshake: bool },
     /// `HOST:PORT`.
     Tcp(String),
 }
@@ -36,37 +32,21 @@ impl fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WireError {
     #[error("there is no serial port {port}; this computer has {present}")]
-    Missing {
-        port: String,
-        present: String,
-    },
+    Missing { port: String, present: String },
     #[error("the serial port {port} is in use by another program; close that program first")]
-    Busy {
-        port: String,
-    },
+    Busy { port: String },
     #[error(
         "this account may not open {port}; add it to the group that owns the port (on Linux mostly `sudo usermod -aG dialout $USER`) and log in again"
     )]
-    Forbidden {
-        port: String,
-    },
+    Forbidden { port: String },
     #[error("the serial port {port} cannot be opened ({detail}); check cable and settings")]
-    Port {
-        port: String,
-        detail: String,
-    },
+    Port { port: String, detail: String },
     #[error("'{address}' is not an address ({detail}); give HOST:PORT, such as 192.168.1.10:23")]
-    Address {
-        address: String,
-        detail: String,
-    },
+    Address { address: String, detail: String },
     #[error(
-        "nothing answers at {address} ({detail}); check that the device is on and its address, and that not all its connections are taken"
+        "no device answers at {address} ({detail}); check power and address of the device, and that it has a free connection"
     )]
-    Unreachable {
-        address: String,
-        detail: String,
-    },
+    Unreachable { address: String, detail: String },
 }
 
 impl Place {
@@ -89,7 +69,7 @@ impl Place {
                     .to_socket_addrs()
                     .map_err(|err| wrong(err.to_string()))?
                     .next()
-                    .ok_or_else(|| wrong("it stands for no computer".into()))?;
+                    .ok_or_else(|| wrong("no computer has this name".into()))?;
                 let opened = TcpStream::connect_timeout(&resolved, CONNECT_MAX)
                     .and_then(TcpLink::new)
                     .map_err(|err| WireError::Unreachable {
@@ -144,21 +124,21 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_port_tells_which_there_are() {
+    fn missing_port_error_lists_the_ports_there_are() {
         let err = serial("/dev/there-is-no-such-port");
         assert!(matches!(err, WireError::Missing { .. }), "{err:?}");
         assert!(err.to_string().contains("this computer has"), "{err}");
     }
 
     #[test]
-    fn a_file_is_no_port() {
+    fn file_is_refused_as_a_port() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let err = serial(&file.path().display().to_string());
         assert!(matches!(err, WireError::Port { .. }), "{err:?}");
     }
 
     #[test]
-    fn addresses_are_checked_before_anybody_is_called() {
+    fn addresses_are_checked_before_connecting() {
         for wrong in ["", "localhost", "localhost:x", "127.0.0.1:99999"] {
             let Err(err) = Place::Tcp(wrong.into()).open() else {
                 panic!("'{wrong}' was opened");
@@ -169,12 +149,12 @@ mod tests {
     }
 
     #[test]
-    fn nobody_at_an_address_is_told() {
+    fn refused_connection_names_the_address() {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let address = free.local_addr().unwrap().to_string();
         drop(free);
         let Err(err) = Place::Tcp(address.clone()).open() else {
-            panic!("somebody answered");
+            panic!("a connection was accepted");
         };
         assert!(err.to_string().contains(&address), "{err}");
     }

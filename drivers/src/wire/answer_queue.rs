@@ -1,7 +1,7 @@
-//! Commands are answered in the order in which they came, whatever the order in which they are done.
+//! Commands are answered in the order in which they came, in whatever order they are done.
 
 use crate::rig::RigEventBody;
-use palpate_model::rig::{Ack, Fault, RigCommand};
+use palpate_model::rig::{Ack, RigCommand};
 use std::collections::VecDeque;
 
 #[derive(Clone, Debug, Default)]
@@ -17,26 +17,21 @@ impl AnswerQueue {
         self.count
     }
 
-    fn answer(&mut self, number: u64, body: RigEventBody) {
+    /// Answers a command. Returns the answers that may be given now, in order: those with none missing before them.
+    fn answer(&mut self, number: u64, body: RigEventBody) -> Vec<RigEventBody> {
         if let Some((_, answer)) = self.owed.iter_mut().find(|(owed, _)| *owed == number) {
             *answer = Some(body);
         }
+        let ready = self.owed.iter().take_while(|(_, answer)| answer.is_some()).count();
+        self.owed.drain(..ready).filter_map(|(_, answer)| answer).collect()
     }
 
-    pub fn acknowledge(&mut self, number: u64, command: RigCommand) {
-        self.answer(number, RigEventBody::Ack(Ack { command }));
+    pub fn acknowledge(&mut self, number: u64, command: RigCommand) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::Ack(Ack { command }))
     }
 
-    pub fn refuse(&mut self, number: u64, detail: impl Into<String>) {
-        let detail = detail.into();
-        self.answer(number, RigEventBody::Fault(Fault::CommandRefused { detail }));
-    }
-
-    /// The next answer, when all before it were given.
-    pub fn take(&mut self) -> Option<RigEventBody> {
-        let answer = self.owed.front_mut()?.1.take()?;
-        self.owed.pop_front();
-        Some(answer)
+    pub fn refuse(&mut self, number: u64, detail: impl Into<String>) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::refusal(detail))
     }
 }
 
@@ -48,11 +43,8 @@ mod tests {
     fn answers_come_in_the_order_of_the_commands() {
         let mut answers = AnswerQueue::default();
         let (first, second) = (answers.owe(), answers.owe());
-        answers.acknowledge(second, RigCommand::Stop);
-        assert_eq!(answers.take(), None);
-        answers.refuse(first, "no");
-        assert!(matches!(answers.take(), Some(RigEventBody::Fault(_))));
-        assert!(matches!(answers.take(), Some(RigEventBody::Ack(_))));
-        assert_eq!(answers.take(), None);
+        assert_eq!(answers.acknowledge(second, RigCommand::Stop), []);
+        let both = answers.refuse(first, "no");
+        assert!(matches!(both[..], [RigEventBody::Fault(_), RigEventBody::Ack(_)]));
     }
 }

@@ -1,4 +1,4 @@
-//! The time of whoever asks a rig for events, laid on the host's clock.
+//! The time of the caller that asks a rig for events, mapped to the host's clock.
 
 use super::HostClock;
 use palpate_model::Nanos;
@@ -7,10 +7,10 @@ use palpate_model::Nanos;
 /// catch up a quarter of a second.
 const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 
-/// Where the caller's zero is on the host's clock, and what was told last.
+/// The caller's zero on the host's clock, and the newest time that was reported.
 pub struct CallerTime {
     clock: HostClock,
-    /// `None` until somebody has asked.
+    /// `None` before the first call.
     origin: Option<Nanos>,
     newest: Nanos,
 }
@@ -25,7 +25,7 @@ impl CallerTime {
     pub fn window(&mut self, until: Nanos) -> (Nanos, Nanos) {
         let now = (self.clock)();
         let begun = Nanos(now.0.saturating_sub(until.0));
-        // A caller whose time stood still, as while the computer slept, begins anew.
+        // A caller whose time stood still, as while the computer slept, gets a new origin.
         let origin = match self.origin {
             Some(origin) if now.since(origin).since(until) <= BEHIND_MAX => origin,
             _ => begun,
@@ -34,14 +34,14 @@ impl CallerTime {
         (now, origin + until)
     }
 
-    /// The caller's time of a moment of the host's clock; never before what was told already.
+    /// The caller's time of an event on the host's clock; never before an earlier event.
     pub fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
         let origin = self.origin.unwrap_or(at);
         self.newest = at.since(origin).max(self.newest).min(until);
         self.newest
     }
 
-    /// The same without an order: of bytes that were exchanged.
+    /// The caller's time of bytes that were exchanged, in any order.
     pub fn caller_time(&self, at: Nanos) -> Nanos {
         at.since(self.origin.unwrap_or(Nanos::ZERO))
     }

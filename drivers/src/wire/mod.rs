@@ -10,21 +10,26 @@ mod dialogue;
 mod halt;
 mod link;
 mod link_thread;
-mod memory;
-mod tapped;
+mod setup_console;
 
 pub use address::{Place, WireError};
 pub use answer_queue::AnswerQueue;
 pub use caller_time::CallerTime;
+pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
 pub use dialogue::{Dialogue, LinkStats};
 pub use halt::{HaltHandle, after_farewell};
-pub use link::{Link, SerialLink, TcpLink};
+pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, pair};
 pub use link_thread::{LinkThread, LinkThreadSettings};
-pub use memory::{MemoryLink, pair};
-pub use tapped::TappedLink;
+pub use setup_console::SetupConsole;
 
 use palpate_model::Nanos;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Reads the computer's monotonic clock. Drivers are handed one and never read a clock by themselves.
 pub type HostClock = Arc<dyn Fn() -> Nanos + Send + Sync>;
+
+/// Locks what two threads share. After a panic of the other thread, which is reported as a lost link, the data can
+/// still be used.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

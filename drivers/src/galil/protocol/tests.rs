@@ -17,7 +17,7 @@ type Transcript = (&'static str, &'static [u8], &'static [(&'static str, bool)])
 const TRANSCRIPTS: [Transcript; 25] = [
     // DMC-1700/1800 user manual, page 79: "the DMC-1700/1800 returns a : if the instruction was accepted".
     ("accepted", b":", &[("", true)]),
-    // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 tells why.
+    // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 gives the reason.
     (
         "refused, then TC1",
         b"?1 Unrecognized command\r\n:",
@@ -59,7 +59,7 @@ const TRANSCRIPTS: [Transcript; 25] = [
         b" 1.0000\r\n 2.0000\r\n\x1a:",
         &[(" 1.0000\r\n 2.0000", true)],
     ),
-    // DMC-1700/1800 user manual, page 80: TC and TC0 tell the number alone.
+    // DMC-1700/1800 user manual, page 80: TC and TC0 give the number alone.
     ("refused, then TC0", b"?1\r\n:", &[("", false), ("1", true)]),
     // TC1 of a limit switch (DMC-40x0 command reference, `TC`).
     (
@@ -90,7 +90,7 @@ const TRANSCRIPTS: [Transcript; 25] = [
         b" 1.0000 2.0000 3.0000\r\n:",
         &[(" 1.0000 2.0000 3.0000", true)],
     ),
-    // `GalilController.cpp` of EPICS: WH tells the handle, or the serial port.
+    // `GalilController.cpp` of EPICS: WH gives the handle, or the serial port.
     ("WH, network", b"IHA\r\n:", &[("IHA", true)]),
     ("WH, serial", b"RS232\r\n:", &[("RS232", true)]),
     // The same: TH, one line for each handle.
@@ -104,8 +104,8 @@ const TRANSCRIPTS: [Transcript; 25] = [
     ),
     // The same: what begins with a limit's operand reads 1 while the switch is open.
     ("MG _LFA", b" 1.0000\r\n:", &[(" 1.0000", true)]),
-    // `GalilConnector.cpp` of EPICS: a download gives a prompt for `\` and one for `DL`, and a `?` before them for every
-    // line that is refused.
+    // `GalilConnector.cpp` of EPICS: a download gives a prompt for `\` and one for `DL`, and a `?` before them for
+    // every line that is refused.
     ("DL", b"::", &[("", true), ("", true)]),
     (
         "DL with a wrong line",
@@ -153,7 +153,7 @@ fn transcripts_are_understood_split_at_every_byte() {
 }
 
 #[test]
-fn text_nobody_asked_for_is_told_apart_byte_by_byte() {
+fn unsolicited_text_is_separated_byte_by_byte() {
     // DMC-41x3 user manual, page 45: with CW 1 the top bit of unsolicited characters is set.
     let marked = |text: &str| text.bytes().map(|byte| byte | 0x80).collect::<Vec<u8>>();
     let bytes =
@@ -197,7 +197,7 @@ fn lines_hold_eighty_characters() {
 }
 
 #[test]
-fn a_refusal_tells_what_to_do() {
+fn refusal_has_a_remedy() {
     let err = parse_error(&GalilReply {
         is_accepted: true,
         bytes: b"22 Begin not possible due to Limit Switch".to_vec(),
@@ -249,7 +249,7 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
 }
 
 #[test]
-fn a_signal_with_a_digit_lost_is_none() {
+fn signal_with_a_lost_digit_is_refused() {
     let is_whole = |text: &str| {
         let reply = GalilReply { is_accepted: true, bytes: text.into() };
         reply.begins_with_volts()

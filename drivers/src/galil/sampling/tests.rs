@@ -91,7 +91,7 @@ fn a_motion_just_begun_counts_as_one() {
 }
 
 #[test]
-fn what_counts_backwards_is_turned_round() {
+fn reversed_counts_and_limits_are_swapped() {
     let mut sampler = Sampler::new(GalilSettings { is_reversed: true, ..thesis() });
     let turned = reading(&mut sampler, [0.3, -50.0, -50.0, 11.0, 1.0, 9.0]);
     assert_eq!(turned.pulses, 50);
@@ -100,7 +100,7 @@ fn what_counts_backwards_is_turned_round() {
 }
 
 #[test]
-fn answers_that_are_none_are_refused() {
+fn answers_without_the_expected_numbers_are_refused() {
     let mut sampler = sampler();
     for wrong in [
         &[0.3, 0.0, 0.0, 15.0, 1.0][..],

@@ -1,16 +1,16 @@
-//! What an answer means: it belongs to the oldest question that has none.
+//! Answers: each belongs to the oldest question without one.
 
 use super::Outgoing;
 use super::{ExpectedReply, PendingStop, RESET, Session};
 use crate::galil::clock_alignment::ClockAlignment;
-use crate::galil::protocol::{GalilReply, pack_lines, parse_error};
+use crate::galil::protocol::{GalilReply, parse_error};
 use crate::galil::recording::{RecordingOutput, RecordingStatus};
 use crate::galil::sampling::{SampleOutcome, Sampler};
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
 
-/// At so many `?` to a stop `AB 1` is sent in its place; one more, and it counts as refused.
+/// After so many `?` to a stop, `AB 1` is sent in its place; after one more it counts as refused.
 const REFUSALS_MAX: u32 = 3;
 
 impl Session {
@@ -28,18 +28,18 @@ impl Session {
             ExpectedReply::Elements => self.on_elements(now, reply),
             ExpectedReply::Segment => {
                 if !reply.is_accepted && self.sine.take().is_some() {
-                    self.end_sine(now, "the controller takes no more of it");
+                    self.end_sine(now, "the controller refuses further increments");
                 }
             }
             ExpectedReply::Renewal => {
-                // A refusal is a program that is gone, which a reset explains; the clock will tell.
+                // A refusal means that the program is gone, as after a reset, which the clock shows.
                 if !reply.bytes.is_empty() {
                     self.resynchronise(now);
                 }
             }
             ExpectedReply::Part => {
                 let settings = self.settings.clone();
-                // Answers of an order that a stop has ended belong to nobody.
+                // Answers to an order that a stop has ended are dropped.
                 if let Some((_, order)) = &mut self.order {
                     let next = order.take(reply, &settings);
                     self.apply_step(now, next);
@@ -58,7 +58,7 @@ impl Session {
             ExpectedReply::RefusalReason => {
                 if let Some((number, _)) = self.order.take() {
                     let why = parse_error(reply).map(|err| err.to_string());
-                    let why = why.unwrap_or_else(|| "it does not say why".into());
+                    let why = why.unwrap_or_else(|| "the controller gives no reason".into());
                     self.refuse(now, number, why);
                 }
             }
@@ -78,10 +78,7 @@ impl Session {
                 let detail = format!("it refuses {:?}", stop.command);
                 match stop.number {
                     Some(number) => self.refuse(now, number, detail),
-                    None => {
-                        let fault = Fault::CommandRefused { detail };
-                        self.report_in_order(now, RigEventBody::Fault(fault));
-                    }
+                    None => self.report_in_order(now, RigEventBody::refusal(detail)),
                 }
             }
         }
@@ -119,27 +116,24 @@ impl Session {
             }
             return self.end_recording(now, sent, &status, false);
         }
-        match recording.take_status(status, sent, marked) {
-            Ok(()) => {
-                self.stats.lost = recording.lost;
-                self.timing.push(status.time as u64, self.pace.tick, sent, now);
-                self.fetch(now);
-            }
-            Err(_) => self.end_recording(now, sent, &status, marked == Some(true)),
+        if !recording.take_status(status, sent, marked) {
+            return self.end_recording(now, sent, &status, marked == Some(true));
         }
+        self.stats.lost = recording.samples_lost;
+        self.timing.push(status.time as u64, self.pace.tick, sent, now);
+        self.fetch(now);
     }
 
-    /// A recording that has ended by itself, because of a reset or for whatever else.
+    /// A recording that has ended by itself, such as by a reset.
     fn end_recording(&mut self, now: Nanos, sent: Nanos, status: &RecordingStatus, is_begun: bool) {
         self.abandon_recording(now);
-        // What waited has been told meanwhile, and its clock was right: that takes nothing from the doubt in this one.
+        // What waited has been reported meanwhile with a right clock; this clock stays doubtful all the same.
         self.sampler.doubts(status.time as u64);
         self.on_sample(now, Some(sent), &status.poll, is_begun);
         if !self.is_reset {
             let detail =
                 "the controller has stopped recording, and samples were lost; open the rig again";
-            let fault = Fault::CommandRefused { detail: detail.into() };
-            self.report(now, RigEventBody::Fault(fault));
+            self.report(now, RigEventBody::refusal(detail));
         }
     }
 
@@ -153,16 +147,13 @@ impl Session {
         }
     }
 
-    /// Asks for elements that are there, and tells what waited when there are none.
+    /// Asks for elements that are there, and reports what waited when there are none.
     pub(super) fn fetch(&mut self, now: Nanos) {
         let Some(recording) = &mut self.recording else {
             return;
         };
         if let Some(commands) = recording.fetch() {
-            for text in pack_lines(&commands) {
-                let expects = vec![ExpectedReply::Elements; text.matches(';').count() + 1];
-                self.fetches.push_back(Outgoing { text, expects });
-            }
+            self.fetches.extend(Outgoing::packed(&commands, ExpectedReply::Elements));
         } else if !recording.is_fetching() {
             for out in recording.release_settled() {
                 self.emit(now, out);
@@ -172,7 +163,7 @@ impl Session {
 
     pub(super) fn on_elements(&mut self, now: Nanos, reply: &GalilReply) {
         let Some(recording) = &mut self.recording else {
-            // Of a recording that was given up.
+            // An answer for a recording that was abandoned.
             return;
         };
         let column = reply.numbers().filter(|_| reply.is_accepted);
@@ -224,8 +215,8 @@ impl Session {
     /// A sine that cannot go on: the axis is stopped.
     pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
         self.send_urgent(RigCommand::Stop, ExpectedReply::Stop(PendingStop::QUIET));
-        let fault = Fault::CommandRefused { detail: format!("the sine was broken off: {why}") };
-        self.report_in_order(now, RigEventBody::Fault(fault));
+        let detail = format!("the sine was broken off: {why}");
+        self.report_in_order(now, RigEventBody::refusal(detail));
     }
 
     /// The controller has forgotten its settings: nothing may move before it is opened again.

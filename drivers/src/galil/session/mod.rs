@@ -8,13 +8,13 @@ mod writing;
 use super::clock_alignment::ClockAlignment;
 use super::connect::Connected;
 use super::order::GalilOrder;
-use super::protocol::{GalilMessage, GalilParser, LINE_MAX};
+use super::protocol::{GalilMessage, GalilParser, LINE_MAX, pack_lines};
 use super::recording::{self, ArrayRecording};
 use super::sampling::Sampler;
 use super::settings::GalilSettings;
 use super::sine::SineFeed;
 use crate::rig::RigEventBody;
-use crate::wire::{AnswerQueue, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, TOO_MANY_COMMANDS};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 use resync::{MARKERS_MAX, QUIET, Resynchronisation};
@@ -22,19 +22,16 @@ use std::collections::VecDeque;
 
 /// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
 
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
 const RESET: &str = "the controller was reset; open the rig again";
 
 /// A stop that is sent until the controller has accepted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct PendingStop {
-    /// The command it answers; `None` for a stop that nobody waits for.
+    /// The command it answers; `None` for a stop without a command.
     number: Option<u64>,
     command: RigCommand,
-    /// How often it came back with `?`, which may be a spoilt `:`.
+    /// Count of `?` answers, which may be spoilt `:`.
     refusals: u32,
 }
 
@@ -65,7 +62,21 @@ struct Outgoing {
     pub expects: Vec<ExpectedReply>,
 }
 
-/// How fast the link was when the controller was set up.
+impl Outgoing {
+    fn one(command: &str, expects: ExpectedReply) -> Self {
+        Self { text: format!("{command}\r"), expects: vec![expects] }
+    }
+
+    /// Commands in as few lines as hold them; each expects the same.
+    fn packed(commands: &[String], expects: ExpectedReply) -> impl Iterator<Item = Self> {
+        pack_lines(commands).into_iter().map(move |text| {
+            let count = text.matches(';').count() + 1;
+            Self { text, expects: vec![expects; count] }
+        })
+    }
+}
+
+/// Speed of the link, measured when the controller was set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PollPace {
     pub every: Nanos,
@@ -98,9 +109,9 @@ pub struct Session {
     /// Stops whose answers went by while the order was being looked for.
     unconfirmed: Vec<PendingStop>,
     is_reset: bool,
-    /// When somebody took samples last; the beginning counts.
+    /// Time of the newest request for samples; the start counts.
     attended_at: Nanos,
-    /// When the axis was stopped last because nobody took samples.
+    /// Time of the newest stop because no samples were taken.
     abandoned_at: Option<Nanos>,
     polled_at: Option<Nanos>,
     renewed_at: Option<Nanos>,
@@ -162,17 +173,13 @@ impl Session {
     }
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
-        self.answers.acknowledge(number, command);
-        self.report_answers(now);
+        for answer in self.answers.acknowledge(number, command) {
+            self.report_in_order(now, answer);
+        }
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
-        self.answers.refuse(number, detail);
-        self.report_answers(now);
-    }
-
-    fn report_answers(&mut self, now: Nanos) {
-        while let Some(answer) = self.answers.take() {
+        for answer in self.answers.refuse(number, detail) {
             self.report_in_order(now, answer);
         }
     }
@@ -193,15 +200,10 @@ impl Dialogue for Session {
         if self.is_reset {
             self.refuse(now, number, RESET);
         } else if self.orders.len() >= ORDERS_MAX {
-            self.refuse(now, number, "too many commands at once");
+            self.refuse(now, number, TOO_MANY_COMMANDS);
         } else {
             self.orders.push_back((number, command));
         }
-    }
-
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        // The stop that comes next ends it, if it is a motion.
-        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {

@@ -8,7 +8,7 @@ use palpate_model::rig::RigCommand;
 
 /// The line is quiet after so long without a byte.
 pub const QUIET: Nanos = Nanos::from_millis(25);
-/// So long a marker may take to come back; a controller needs a third of a second to start again.
+/// Longest time for a marker to come back; a controller needs a third of a second to restart.
 const MARKER_MAX: Nanos = Nanos::from_millis(350);
 /// Markers sent before the link counts as dead: on a line that spoils one byte in fifty all come back spoilt once in
 /// four thousand times.
@@ -44,11 +44,8 @@ impl Session {
         self.is_motion_begun = false;
         if let Some((number, _)) = self.order.take() {
             // It may or may not be under way: to be safe, it is not.
-            self.refuse(
-                now,
-                number,
-                "its answer was garbled, so the axis was stopped; check the cable",
-            );
+            let why = "its answer was garbled, so the axis was stopped; check the cable";
+            self.refuse(now, number, why);
             self.send_urgent(RigCommand::Stop, ExpectedReply::Stop(PendingStop::QUIET));
         }
         if let Some(recording) = &mut self.recording {
@@ -74,8 +71,8 @@ impl Session {
         }
     }
 
-    /// Keeps a stop whose answer nobody sees, until answers belong to questions again. Of those that nobody waits for
-    /// one is enough.
+    /// Keeps a stop whose answer cannot be recognised until answers belong to questions again. Of stops without a
+    /// command one is enough.
     pub(super) fn confirm_later(&mut self, stop: PendingStop) {
         let is_known = |one: &PendingStop| stop.number.is_none() && one.number.is_none();
         if !self.unconfirmed.iter().any(is_known) {
@@ -99,9 +96,6 @@ impl Session {
         self.expected.clear();
         // A number that no sample begins with, and another one each time.
         let number = 27_180 + resync.markers;
-        Some(Outgoing {
-            text: format!("MG {number}\r"),
-            expects: vec![ExpectedReply::Marker(number)],
-        })
+        Some(Outgoing::one(&format!("MG {number}"), ExpectedReply::Marker(number)))
     }
 }

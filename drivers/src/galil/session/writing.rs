@@ -1,19 +1,14 @@
-//! What is written next: stops before everything, then the watchdog, increments of a sine, commands, questions.
+//! The order of writing: stops before everything, then the watchdog, increments of a sine, commands, questions.
 
-use super::{ExpectedReply, OVERTAKEN, Outgoing, PendingStop, Session};
+use super::{ExpectedReply, Outgoing, PendingStop, Session};
 use crate::galil::order::{GalilOrder, OrderStep};
-use crate::galil::protocol::pack_lines;
 use crate::galil::recording::ArrayRecording;
 use crate::galil::watchdog;
+use crate::wire::{ATTENDED_MAX, OVERTAKEN};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 
-/// The watchdog is renewed, and the axis left to move, only while somebody takes samples: a computer whose palpate hangs
-/// is silent too.
-const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-
-/// Why an axis is stopped that nobody looks after.
-const ABANDONED: &str = "nobody took samples for half a second, so the axis was stopped";
+const ABANDONED: &str = "no samples were taken for half a second, so the axis was stopped";
 
 impl Session {
     pub(super) fn with_sample(
@@ -62,8 +57,8 @@ impl Session {
         }
     }
 
-    /// Stops an axis that may move while nobody takes samples, again and again until somebody does: a computer that hangs
-    /// has nobody to stop it, and a controller without the watchdog's program would go on.
+    /// Stops an axis that may move while no samples are taken, repeatedly until they are: if palpate hangs, the
+    /// operator cannot stop it from there, and a controller without the watchdog's program would go on.
     fn stop_if_abandoned(&mut self, now: Nanos) {
         let is_due = now.since(self.abandoned_at.unwrap_or(self.attended_at)) > ATTENDED_MAX;
         if !is_due || !self.may_move() {
@@ -100,11 +95,7 @@ impl Session {
         match next {
             OrderStep::Wait => {}
             OrderStep::Send(commands) => {
-                for text in pack_lines(&commands) {
-                    let parts = text.matches(';').count() + 1;
-                    let expects = vec![ExpectedReply::Part; parts];
-                    self.lines.push_back(Outgoing { text, expects });
-                }
+                self.lines.extend(Outgoing::packed(&commands, ExpectedReply::Part));
             }
             OrderStep::SendAndSample(commands) => {
                 let order = self.order.as_ref();
@@ -121,10 +112,9 @@ impl Session {
                     self.acknowledge(now, number, made);
                 }
             }
-            OrderStep::ReadReason => self.lines.push_back(Outgoing {
-                text: "TC1\r".into(),
-                expects: vec![ExpectedReply::RefusalReason],
-            }),
+            OrderStep::ReadReason => {
+                self.lines.push_back(Outgoing::one("TC1", ExpectedReply::RefusalReason))
+            }
             OrderStep::Refused(why) => {
                 if let Some((number, _)) = self.order.take() {
                     self.refuse(now, number, why);
@@ -157,14 +147,12 @@ impl Session {
         }
         if self.is_renewal_due(now) {
             self.renewed_at = Some(now);
-            return Some(Outgoing {
-                text: format!("{}=1\r", watchdog::VARIABLE),
-                expects: vec![ExpectedReply::Renewal],
-            });
+            let command = format!("{}=1", watchdog::VARIABLE);
+            return Some(Outgoing::one(&command, ExpectedReply::Renewal));
         }
         if self.sine.as_ref().is_some_and(|sine| sine.is_dry(now)) {
             self.sine = None;
-            self.end_sine(now, "this computer did not send it in time");
+            self.end_sine(now, "this computer did not send it in time; close other programs");
             return self.urgent.pop_front();
         }
         if let Some(commands) = self.sine.as_mut().and_then(|sine| sine.take(now)) {
@@ -202,10 +190,7 @@ impl Session {
         }
         if is_due && self.samples_in_flight() < self.pace.in_flight {
             self.polled_at = Some(now);
-            return Some(Outgoing {
-                text: format!("{}\r", self.question),
-                expects: vec![ExpectedReply::Sample],
-            });
+            return Some(Outgoing::one(&self.question, ExpectedReply::Sample));
         }
         None
     }

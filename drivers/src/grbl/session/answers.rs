@@ -1,12 +1,14 @@
-//! What the board says, and what follows from it.
+//! Lines of the board and what follows from them.
 
 use super::Session;
-use crate::grbl::error::{Alarm, Refusal};
+use crate::grbl::error::GrblCode;
 use crate::grbl::protocol::{CYCLE_START, GrblState, GrblStatus};
 use crate::grbl::times::STOP_MAX;
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};
+
+const LOCKED: &str = "the board is locked; look at the axis, then open the rig again";
 
 impl Session {
     pub(super) fn on_ok(&mut self, now: Nanos) {
@@ -34,7 +36,7 @@ impl Session {
         }
     }
 
-    pub(super) fn on_refusal(&mut self, now: Nanos, refusal: &Refusal) {
+    pub(super) fn on_refusal(&mut self, now: Nanos, refusal: &GrblCode) {
         if self.open.take().is_none() {
             self.stats.resynchronised += 1;
             return;
@@ -46,15 +48,12 @@ impl Session {
             self.motion = None;
             self.refuse(now, number, refusal.to_string());
         } else if motion.cancelled.is_none() {
-            self.fault(
-                now,
-                format!("a part of a motion was refused and the axis is stopped: {refusal}"),
-            );
-            self.cancel(now);
+            let why = format!("a part of a motion was refused, so the axis is stopped: {refusal}");
+            self.end(now, &why);
         }
     }
 
-    pub(super) fn on_alarm(&mut self, now: Nanos, alarm: &Alarm) {
+    pub(super) fn on_alarm(&mut self, now: Nanos, alarm: &GrblCode) {
         if self.reset_pending.is_some() {
             return;
         }
@@ -114,26 +113,24 @@ impl Session {
             self.acknowledge(now, number, command);
         }
         let Some(steps) = self.steps_of(status) else {
-            return self.lock_and_report(now, "it reports no machine position; set $10=1");
+            return self.lock_and_report(now, "the board reports no machine position; set $10=1");
         };
         self.on_pins(now, status, steps);
         match status.state {
             GrblState::Idle => self.on_idle(now, queried_at, steps),
             GrblState::Jog => self.on_jog(now, queried_at, steps),
             GrblState::Alarm if self.locked.is_some() => {}
-            GrblState::Alarm => {
-                self.lock_and_report(now, "it is locked; look at the axis, then open the rig again")
-            }
+            GrblState::Alarm => self.lock_and_report(now, LOCKED),
             other => {
                 let why = format!(
-                    "it is in state {other:?}, which palpate never asks for; press reset and open the rig again"
+                    "the board is in state {other:?}, which palpate never commands; press reset and open the rig again"
                 );
                 self.lock_and_report(now, &why);
             }
         }
     }
 
-    /// What the pins mean, and a stop at those at which Grbl does not stop.
+    /// Takes the pins, and stops at those at which Grbl does not stop.
     fn on_pins(&mut self, now: Nanos, status: &GrblStatus, steps: i64) {
         let is_known = self.track().at(now).status;
         let pulses = self.pulses(steps);
@@ -148,8 +145,8 @@ impl Session {
                 "the hold button of the board is pressed, so the axis is stopped",
             ),
             Some(true) if is_far => {
-                // Of one under way the samples tell it.
-                if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+                // For a motion under way the samples show it.
+                if let Some(number) = self.take_unacknowledged() {
                     self.refuse(now, number, "the far limit switch is closed");
                 }
                 self.cancel(now);
@@ -157,7 +154,7 @@ impl Session {
             // Whichever end it is.
             Some(false) if is_closing => self.end(
                 now,
-                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; look at it",
+                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; check the switch",
             ),
             _ => {}
         }
@@ -198,10 +195,10 @@ impl Session {
             }
             (None, Some(started)) if queried_at > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
-                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or mend the link");
+                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or repair the link");
                 } else if steps != motion.to {
                     let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
-                    self.fault(now, format!("the axis ended at {there} where {wanted} was commanded, in its own pulses; home it again"));
+                    self.fault(now, format!("the axis ended at {there} of its own pulses instead of {wanted}; home it again"));
                 }
             }
             _ => return,
@@ -229,7 +226,7 @@ impl Session {
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
-            self.fault(now, format!("the axis is at {here:.0} where {late:.0} was expected, in its own pulses, and is stopped; check the cable and home it"));
+            self.fault(now, format!("the axis is at {here:.0} of its own pulses instead of {late:.0}, so it is stopped; check the cable and home it"));
             return self.cancel(now);
         }
         let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);

@@ -1,7 +1,7 @@
 //! The dialogue with a board that has been set up: ways cut into short jogs, status asked for now and then, stops
 //! before everything.
 //!
-//! A jog that Grbl has is done whether anybody is there or not. So it gets no more way than it needs to keep its speed:
+//! Grbl finishes a jog that it has, even when the link is gone. So it gets no more way than it needs to keep its speed:
 //! when the link dies, the axis comes to rest by itself. The newest jog in the planner ends at rest (gnea/grbl,
 //! planner.c), so what is sent ahead is the way of braking and a little more.
 
@@ -16,20 +16,16 @@ use super::settings::{BoardParameters, GrblSettings};
 use super::times::{POLL, POLL_CLOSELY, REPORT_MAX, RESET_MAX, SILENCE_MAX};
 use crate::parts::Track;
 use crate::rig::RigEventBody;
-use crate::wire::{AnswerQueue, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, TOO_MANY_COMMANDS, lock};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, MoveTo, RigCommand};
+use palpate_model::rig::{MoveTo, RigCommand};
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
 const FEED_MIN: f64 = 1.0;
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
 
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
-
-/// What happens with an axis, shared with whoever needs its past.
+/// The track of an axis, shared with the load cell, which looks up its past.
 pub type SharedTrack = Arc<Mutex<Track>>;
 
 struct PendingReset {
@@ -53,7 +49,7 @@ pub struct Session {
     ends: EndSwitches,
     /// Where it rests, in steps of the board.
     steps: i64,
-    /// What the board's steps, in the direction of the rig, are more than the host's pulses.
+    /// Offset of the board's steps, in the direction of the rig, from the host's pulses.
     zero: i64,
     is_motor_on: bool,
     queried_at: Option<Nanos>,
@@ -108,7 +104,7 @@ impl Session {
     }
 
     fn track(&self) -> MutexGuard<'_, Track> {
-        self.track.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.track)
     }
 
     fn report(&mut self, now: Nanos, body: RigEventBody) {
@@ -116,23 +112,18 @@ impl Session {
     }
 
     fn fault(&mut self, now: Nanos, detail: impl Into<String>) {
-        let detail = detail.into();
-        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        self.report(now, RigEventBody::refusal(detail));
     }
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
-        self.answers.acknowledge(number, command);
-        self.report_answers(now);
+        for answer in self.answers.acknowledge(number, command) {
+            self.report(now, answer);
+        }
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
-        self.answers.refuse(number, detail);
-        self.report_answers(now);
-    }
-
-    fn report_answers(&mut self, now: Nanos) {
-        while let Some(body) = self.answers.take() {
-            self.report(now, body);
+        for answer in self.answers.refuse(number, detail) {
+            self.report(now, answer);
         }
     }
 
@@ -160,35 +151,37 @@ impl Session {
         }
     }
 
-    fn begin_move(&mut self, now: Nanos, number: u64, wanted: MoveTo) {
+    /// The target of a move in steps of the board and its feed in mm/min, or why the board cannot make it.
+    fn plan_move(&self, wanted: &MoveTo) -> Result<(i64, f64), String> {
         if !self.is_motor_on {
-            return self.refuse(now, number, "the motor is off; enable it first");
+            return Err("the motor is off; enable it first".into());
         }
         let settings = &self.settings;
         let scale = 1.0 / (settings.mm_per_pulse * self.facts.steps_per_mm);
         let feed = wanted.speed.0 * scale * 60.0;
         if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || feed < FEED_MIN {
-            let (speed, most) = (wanted.speed, settings.speed_max);
-            let least = FEED_MIN / 60.0;
-            return self.refuse(
-                now,
-                number,
-                format!("a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"),
-            );
+            let (speed, least, most) = (wanted.speed, FEED_MIN / 60.0, settings.speed_max);
+            return Err(format!(
+                "a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"
+            ));
         }
         if (wanted.acceleration.0 / settings.acceleration.0 - 1.0).abs() > 1e-6 {
             let (wanted, own) = (wanted.acceleration, settings.acceleration);
-            return self.refuse(
-                now,
-                number,
-                format!("an acceleration of {wanted} is not the {own} that the board is set to"),
-            );
+            return Err(format!("an acceleration of {wanted} differs from the {own} of the board"));
         }
-        let to = self.settings.sign() * (wanted.target_pulses + self.zero);
+        let to = settings.sign() * (wanted.target_pulses + self.zero);
         // Grbl reads eight digits of a number.
         if (to as f64 / self.facts.steps_per_mm).abs() > 9_999.0 {
-            return self.refuse(now, number, "the target is more than ten metres away");
+            return Err("the target is more than ten metres away".into());
         }
+        Ok((to, feed))
+    }
+
+    fn begin_move(&mut self, now: Nanos, number: u64, wanted: MoveTo) {
+        let (to, feed) = match self.plan_move(&wanted) {
+            Ok(planned) => planned,
+            Err(why) => return self.refuse(now, number, why),
+        };
         if to == self.steps {
             // Grbl makes nothing of a way that is none; a sample shows it as a motion all the same.
             let profile = JogMotion::profile(0.0, &wanted);
@@ -258,15 +251,10 @@ impl Dialogue for Session {
         if let Some(why) = self.locked.clone() {
             self.refuse(now, number, why);
         } else if self.orders.len() >= ORDERS_MAX {
-            self.refuse(now, number, "too many commands at once");
+            self.refuse(now, number, TOO_MANY_COMMANDS);
         } else {
             self.orders.push_back((number, command));
         }
-    }
-
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        // The stop that comes next ends it, if it is a motion.
-        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
@@ -317,14 +305,14 @@ impl Dialogue for Session {
         {
             let silence = RESET_MAX.0 as f64 * 1e-9;
             return Some(format!(
-                "the board has not answered a reset for {silence} s; the axis comes to rest by itself, unless somebody else moves it: use the emergency stop"
+                "the board has not answered a reset for {silence} s; the axis comes to rest by itself unless something else moves it; use the emergency stop"
             ));
         }
         let is_unsure = self.locked.is_none() || self.state.is_moving();
         let is_silent = now.since(self.heard_at) > SILENCE_MAX && is_unsure;
         is_silent.then(|| {
             let silence = SILENCE_MAX.0 as f64 * 1e-9;
-            format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
+            format!("the board has sent nothing for {silence} s; the axis comes to rest by itself; check cable and power")
         })
     }
 
@@ -334,7 +322,7 @@ impl Dialogue for Session {
 }
 
 impl Drop for Session {
-    /// However its thread ends, such as with a port that is gone: what the board was given ends in the track too.
+    /// When the thread ends, such as when the port is gone, jogs that the board has end in the track too.
     fn drop(&mut self) {
         self.settle_track(self.looked_at);
     }

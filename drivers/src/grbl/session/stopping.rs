@@ -1,33 +1,30 @@
-//! Stops, those that nobody asked for among them, and what becomes of what was under way.
+//! Stops, by command and by the session itself, and what becomes of the motion under way.
 
-use super::{OVERTAKEN, PendingReset, Session};
+use super::{PendingReset, Session};
 use crate::grbl::protocol::{GrblState, JOG_CANCEL, RESET};
-use crate::grbl::times::{ATTENDED_MAX, CANCEL_AGAIN, OK_MAX, PAUSE, RESET_AGAIN, SEGMENTS};
+use crate::grbl::times::{CANCEL_AGAIN, OK_MAX, PAUSE, RESET_AGAIN, SEGMENTS};
+use crate::wire::{ATTENDED_MAX, OVERTAKEN};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 
 impl Session {
-    fn drop_orders(&mut self, now: Nanos, why: &str) {
-        let waiting: Vec<u64> = self.orders.drain(..).map(|(number, _)| number).collect();
-        for number in waiting {
-            self.refuse(now, number, why);
-        }
-        if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
-            self.refuse(now, number, why);
-        }
-    }
-
-    pub(super) fn drop_motions(&mut self, now: Nanos, why: &str) {
+    /// Refuses commands of a kind that wait, and the motion under way if it is not acknowledged yet.
+    fn refuse_waiting(&mut self, now: Nanos, why: &str, is_refused: fn(&RigCommand) -> bool) {
         for (number, order) in std::mem::take(&mut self.orders) {
-            if matches!(order, RigCommand::MoveTo(_) | RigCommand::Oscillate(_)) {
+            if is_refused(&order) {
                 self.refuse(now, number, why);
             } else {
                 self.orders.push_back((number, order));
             }
         }
-        if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+        if let Some(number) = self.take_unacknowledged() {
             self.refuse(now, number, why);
         }
+    }
+
+    /// The number of the motion under way if it is not acknowledged yet.
+    pub(super) fn take_unacknowledged(&mut self) -> Option<u64> {
+        self.motion.as_mut()?.owed.take()
     }
 
     pub(super) fn cancel(&mut self, now: Nanos) {
@@ -45,9 +42,9 @@ impl Session {
         self.polled = None;
     }
 
-    /// Ends the motion under way, which may be one that nobody was told of yet.
+    /// Ends the motion under way, which may not have been acknowledged yet.
     pub(super) fn end(&mut self, now: Nanos, why: &str) {
-        match self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+        match self.take_unacknowledged() {
             Some(number) => self.refuse(now, number, why),
             None => self.fault(now, why),
         }
@@ -58,7 +55,7 @@ impl Session {
     pub(super) fn lock(&mut self, now: Nanos, why: &str) {
         if self.locked.is_none() {
             self.locked = Some(why.to_owned());
-            self.drop_orders(now, why);
+            self.refuse_waiting(now, why, |_| true);
         }
         self.open = None;
         let here = self.track().at(now).pulses.round() as i64;
@@ -93,7 +90,7 @@ impl Session {
             (None, Some(written)) => {
                 let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
                 let from = sign * motion.from as f64;
-                // It may have begun; nobody has said so.
+                // It may have begun without an answer.
                 self.track().begin_motion(written.min(now), from, given, pulses_per_mm);
             }
             _ => {}
@@ -112,18 +109,18 @@ impl Session {
             "it was cut short by a reset and its position is lost; open the rig again and home it"
                 .into(),
         );
-        self.drop_orders(now, OVERTAKEN);
+        self.refuse_waiting(now, OVERTAKEN, |_| true);
     }
 
     pub(super) fn stop(&mut self, now: Nanos, command: RigCommand) {
         let number = self.answers.owe();
-        self.drop_motions(now, OVERTAKEN);
+        self.refuse_waiting(now, OVERTAKEN, RigCommand::is_motion);
         if let Some(reset_pending) = &mut self.reset_pending {
             reset_pending.owed.push((number, command));
             return;
         }
         let is_moving = self.motion.is_some() || self.open.is_some() || self.state.is_moving();
-        // What is no jog is not ended by the cancel of a jog.
+        // Cancelling a jog does not end other motions.
         let is_foreign = matches!(self.state, GrblState::Run | GrblState::Home);
         if is_foreign || command == RigCommand::Halt && is_moving {
             return self.reset(now, number, command);
@@ -146,20 +143,9 @@ impl Session {
             self.stats.resynchronised += 1;
             if let Some(motion) = &mut self.motion {
                 motion.is_doubtful = true;
-            }
-            if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
-                self.refuse(
-                    now,
-                    number,
-                    "its answer was lost, so the axis was stopped; check the cable",
-                );
-                self.cancel(now);
-            } else if self.motion.as_ref().is_some_and(|motion| motion.cancelled.is_none()) {
-                self.fault(
-                    now,
-                    "an answer was lost in a motion, so the axis is stopped; check the cable",
-                );
-                self.cancel(now);
+                if motion.owed.is_some() || motion.cancelled.is_none() {
+                    self.end(now, "an answer was lost, so the axis is stopped; check the cable");
+                }
             }
         }
         if let Some(reset_pending) = &mut self.reset_pending
@@ -171,10 +157,11 @@ impl Session {
         let is_wanted = std::mem::take(&mut self.track().is_stop_wanted);
         let is_unattended = now.since(self.attended_at) > ATTENDED_MAX;
         if is_wanted {
-            self.drop_motions(now, "the load cell has failed, so it was not begun");
+            let why = "the load cell has failed, so it was not begun";
+            self.refuse_waiting(now, why, RigCommand::is_motion);
         } else if is_unattended {
-            let why = "nobody took samples for half a second, so it was not begun";
-            self.drop_motions(now, why);
+            let why = "no samples were taken for half a second, so it was not begun";
+            self.refuse_waiting(now, why, RigCommand::is_motion);
         }
         let Some(motion) = &mut self.motion else {
             return;
@@ -187,7 +174,7 @@ impl Session {
             Some(_) => {}
             None if is_wanted => self.cancel(now),
             None if is_unattended => {
-                self.end(now, "nobody took samples for half a second, so the axis is stopped");
+                self.end(now, "no samples were taken for half a second, so the axis is stopped");
             }
             None => {}
         }

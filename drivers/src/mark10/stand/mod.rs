@@ -1,7 +1,7 @@
 //! The motorised stands ESM301 and ESM303 with a gauge on them, driven by a computer (option "PC Control").
 //!
-//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `open.rs`, what happens once. [`StandRig`]
-//! puts a session on a link.
+//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `open.rs`, what happens once.
+//! [`StandRig`] puts a session on a link.
 //!
 //! # How it moves
 //!
@@ -11,10 +11,11 @@
 //!
 //! # Where it is
 //!
-//! The stand tells its travel some hundred times a second at best, and nobody says how it accelerates. So what is
-//! reported is the commanded course, from the sample in which the stand is first seen to move, as long as the
-//! stand's own travel agrees with it within [`REST_TOLERANCE_MM`] and the way of [`LAG`] at the speed of the move; if it
-//! does not, the stand's travel is reported, and the check of the path ends the run. What the stand told is in the log.
+//! The stand reports its travel some hundred times a second at best, and its acceleration is not published. So what
+//! is reported is the commanded course, from the sample in which the stand is first seen to move, as long as the
+//! stand's own travel agrees with it within [`REST_TOLERANCE_MM`] and the way of [`LAG`] at the speed of the move; if
+//! it does not, the stand's travel is reported, and the check of the path ends the run. The stand's own values are in
+//! the log.
 
 mod open;
 pub mod protocol;
@@ -46,7 +47,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
 
 /// Smallest step of a travel limit, and so of a move.
 pub const MM_PER_PULSE: f64 = 0.01;
-/// How far from its target the stand may come to rest, in mm. A guess, to be measured on the device.
+/// Largest distance from its target at which the stand may come to rest, in mm. A guess, to be measured on the device.
 pub const REST_TOLERANCE_MM: f64 = 0.05;
 /// By how long the stand may be behind or before the commanded course: two samples on a slow converter, and its
 /// acceleration. A guess, to be measured on the device.
@@ -62,7 +63,7 @@ pub struct StandSettings {
     pub speed_max: MmPerS,
     /// Acceleration of the commanded course; the stand's own is not known and cannot be set.
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
     /// Whether up is into the tissue; down without.
     pub is_upwards: bool,

@@ -1,14 +1,14 @@
-//! What happens once when a stand is opened: it is stopped, kept to its travel, its gauge set up. Nothing moves.
+//! Opening a stand: it is stopped, its travel is limited, its gauge is set up. Nothing moves.
 
-use super::protocol::{GaugeForce, Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
+use super::protocol::{Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
 use super::session::{StandPace, TICK};
 use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, StandSettings};
 use crate::mark10::gauge::{self, GaugeScale};
-use crate::mark10::protocol::{GaugeLine, GaugeList, GaugeReading};
+use crate::mark10::protocol::{GaugeForce, GaugeLine, GaugeList, GaugeReading};
 use crate::text::{DeviceError, TextConsole, describe_unknown_device};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::{AdcDescription, RawBytes, RigDescription};
+use palpate_model::rig::{RawBytes, RigDescription};
 use palpate_model::units::{MmPerS, Volts};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ const BETWEEN: f64 = 1.5;
 #[derive(Clone, Debug)]
 pub struct ConnectedStand {
     pub description: RigDescription,
-    /// How its readings become counts.
+    /// Conversion of its readings to counts.
     pub scale: GaugeScale,
     pub pace: StandPace,
     pub stats: LinkStats,
@@ -45,7 +45,7 @@ pub fn connect(
 ) -> Result<ConnectedStand, DeviceError> {
     gauge::check(&settings.gauge)?;
     let mut console = TextConsole::new(link, clock, name, DEVICE);
-    // Out of whatever was half said: a stop, the channel to the gauge closed, a gauge that sends by itself.
+    // Ends half a command: a stop, the channel to the gauge closed, readings that the gauge sends by itself ended.
     console.write(&format!("\\{STOP}{}", to_gauge("AOUT0")))?;
     console.drain(QUIET)?;
     // Millimetres, and the mode that keeps to travel limits.
@@ -72,7 +72,7 @@ pub fn connect(
         scale,
         pace,
         stats,
-        raw: console.link.raw,
+        raw: console.into_raw(),
     })
 }
 
@@ -96,70 +96,47 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, 
     }
     if is_inches {
         return Err(unfit(
-            "it goes on counting in inches; switch it to millimetres and PC control on",
+            "it keeps counting in inches; switch it to millimetres and PC control on",
         ));
     }
     Ok(found)
 }
 
 fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
-    if console.heard.is_empty() {
+    let received = console.received();
+    if received.is_empty() {
         return DeviceError::Silent {
             device: DEVICE,
             hint: "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
         };
     }
-    let heard = String::from_utf8_lossy(&console.heard).into_owned();
-    let is_part = heard.lines().any(|line| {
+    let is_part = String::from_utf8_lossy(&received).lines().any(|line| {
         super::protocol::travel(line).is_some()
             || matches!(GaugeLine::parse(line), GaugeLine::Reading(_))
     });
     if is_part {
         return unfit(
-            "it does not give force and travel together; check the cable to its gauge and the travel option",
+            "it does not send force and travel together; check the cable to its gauge and the travel option",
         );
     }
-    DeviceError::Other { device: DEVICE, found: describe_unknown_device(&console.heard) }
+    DeviceError::Other { device: DEVICE, found: describe_unknown_device(&received) }
 }
 
-/// The gauge's settings and, behind words, its serial number.
+/// The settings of the gauge and, after a blank, its serial number.
 fn set_up_gauge(
     console: &mut TextConsole<'_>,
     settings: &StandSettings,
 ) -> Result<(GaugeList, String), DeviceError> {
-    for command in gauge::commands(&settings.gauge) {
-        console.write(&to_gauge(&command))?;
-        console.drain(Nanos(QUIET.0 / 3))?;
-    }
-    console.write(&to_gauge("LIST"))?;
-    let list = console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
-        GaugeLine::List(list) => Some(list),
-        _ => None,
-    })?;
-    let list = list.ok_or_else(|| {
+    let list = gauge::set_up(console, &settings.gauge, to_gauge)?.ok_or_else(|| {
         unfit("its gauge does not answer LIST; it must be of Series 5 or 7, at 115200 baud over RS-232")
     })?;
-    gauge::check_list(&list, &settings.gauge)?;
-    console.write(&to_gauge("RS"))?;
-    let serial = console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
-        GaugeLine::Other(text) => Some(Some(text)),
-        GaugeLine::Error(_) => Some(None),
-        _ => None,
-    })?;
-    let serial = serial.flatten();
-    if let Some(expected) = &settings.gauge.serial_number
-        && serial.as_ref() != Some(expected)
-    {
-        return Err(DeviceError::OtherSerial {
-            device: "gauge on the stand",
-            found: serial.unwrap_or_else(|| "none that it tells".into()),
-            expected: expected.clone(),
-        });
-    }
+    let serial = gauge::ask_text(console, to_gauge, "RS")?;
+    let expected = settings.gauge.serial_number.as_deref();
+    DeviceError::check_serial("gauge on the stand", serial.as_deref(), expected)?;
     Ok((list, serial.map(|s| format!(" {s}")).unwrap_or_default()))
 }
 
-/// Whether it tells its state, and that it keeps to limits if it does.
+/// Whether it reports its state; if it does, it must keep to travel limits.
 fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     console.write("p")?;
     let status = console.find(ANSWER_MAX, Status::parse)?;
@@ -234,11 +211,7 @@ fn describe(
         speed_quantum: SPEED_QUANTUM,
         speed_max: settings.speed_max,
         acceleration: settings.acceleration,
-        adc: Some(AdcDescription {
-            counts_min: -scale.counts_max,
-            counts_max: scale.counts_max,
-            volts_per_count: step.0,
-        }),
+        adc: Some(scale.adc()),
         noise_expected: settings.gauge.noise_expected(step),
         pulse_lag: LAG,
         cell_delay: palpate_model::units::Seconds(0.0),
@@ -249,5 +222,5 @@ fn describe(
 }
 
 fn unfit(detail: &str) -> DeviceError {
-    DeviceError::Unfit { device: DEVICE, detail: detail.to_owned() }
+    DeviceError::unfit(DEVICE, detail)
 }

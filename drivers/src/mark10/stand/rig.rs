@@ -35,7 +35,7 @@ pub fn open(
     Ok(Opened {
         lines: vec![LinkThread::start(link, session, clock, line_settings)?],
         description: connected.description,
-        // The gauge tells newtons, each of which counts as a volt.
+        // The gauge reads newtons, each of which counts as a volt.
         newtons_per_volt: Some(1.0),
         link: None,
         raw: connected.raw,

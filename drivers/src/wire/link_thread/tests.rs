@@ -2,7 +2,7 @@ use super::*;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::Receiver;
 
-/// Notes what it is told, writes a line for each command and reports every byte as an acknowledgement of a stop.
+/// Notes its commands, writes a line for each command and reports every byte as an acknowledgement of a stop.
 struct Notes {
     heard: Arc<Mutex<Vec<String>>>,
     lines: VecDeque<Vec<u8>>,
@@ -116,7 +116,7 @@ fn read(link: &mut impl Link, count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn stops_overtake_what_waits() {
+fn stops_overtake_waiting_commands() {
     let (here, mut there) = super::super::pair();
     let (release, go_on) = sync_channel::<()>(1);
     let (waits, waiting) = sync_channel(1);
@@ -144,7 +144,7 @@ fn stops_overtake_what_waits() {
 }
 
 #[test]
-fn a_stop_waits_for_nobody_who_reads_reports() {
+fn stop_does_not_wait_for_a_reader_of_reports() {
     let (here, mut there) = super::super::pair();
     let mut line =
         LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
@@ -162,7 +162,7 @@ fn a_stop_waits_for_nobody_who_reads_reports() {
 }
 
 #[test]
-fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
+fn events_are_reported_in_order_and_a_lost_link_last() {
     let (here, mut there) = super::super::pair();
     let line = LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     there.write(b"ab").unwrap();
@@ -174,7 +174,7 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
     drop(there);
     let last = line.next_event(late, WAIT).unwrap();
     assert!(matches!(&last.body, RigEventBody::Fault(Fault::LinkLost { .. })), "{last:?}");
-    // Nobody waits for what will not come.
+    // Waiting for events that cannot come ends at once.
     assert_eq!(line.next_event(late, Duration::from_secs(600)), None);
 }
 
@@ -186,7 +186,7 @@ fn a_driver_that_fails_is_a_lost_link() {
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
     assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
-    // Nobody else has the link: its farewell stops what moves.
+    // No other thread has the link: its farewell stops what moves.
     assert_eq!(read(&mut there, 3), b"bye");
 }
 

@@ -1,4 +1,4 @@
-//! What an answer means: it belongs to the one question that is open.
+//! Answers: each belongs to the one open question.
 
 use super::{GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandQuestion, StandSession};
 use crate::mark10::stand::protocol::{Status, number};
@@ -26,7 +26,7 @@ impl StandSession {
             StandQuestion::Sample => {
                 if let Some((force, travel)) = self.pair.take(line) {
                     self.answered(now);
-                    // It was taken somewhere between question and answer.
+                    // It was taken at a time between question and answer.
                     let at = Nanos(sent.0 + now.since(sent).0 / 2);
                     self.on_sample(now, at, force, travel);
                 }
@@ -53,7 +53,7 @@ impl StandSession {
         }
     }
 
-    /// What was set and read back while a move is set up.
+    /// Checks a value that was set and read back for a move.
     fn check(&mut self, now: Nanos, is_right: bool, line: &str, what: &str) {
         if !is_right && let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
@@ -75,10 +75,8 @@ impl StandSession {
         self.quiet = quiet;
         if let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
-            self.refuse(
-                now,
-                "its answer was lost or garbled, so it was not begun; check the cable",
-            );
+            let why = "its answer was lost or garbled, so it was not begun; check the cable";
+            self.refuse(now, why);
         }
         // It stops at its limit by itself; no reason to wait for that.
         self.stop_due |= self.is_going() && self.lost_answers >= GARBLED_MAX;

@@ -1,9 +1,10 @@
-//! From the stand's travel and force to a sample: where the axis is told to be, and whether it moves.
+//! From the stand's travel and force to a sample: the reported position of the axis, and whether it moves.
 
 use super::{Motion, STILL, STILL_PULSES, StandMove, StandSession, TICK, pulses_of};
-use crate::mark10::stand::protocol::{Crosshead, GaugeForce};
+use crate::mark10::gauge::BEYOND_RANGE;
+use crate::mark10::protocol::GaugeForce;
 use crate::mark10::stand::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, SPEED_TOLERANCE};
-use crate::rig::RigEventBody;
+use crate::rig::{RigEventBody, axis_status};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{Age, AxisStatus, Fault, MoveTo, Profile, Reading};
@@ -15,20 +16,10 @@ impl StandSession {
             self.travel_changed = now;
         }
         self.travel = travel;
-        let counts = match force {
-            GaugeForce::Reading(reading)
-                if reading.unit == self.scale.unit
-                    && reading.number.decimals == self.scale.decimals =>
-            {
-                reading.number.digits
-            }
-            GaugeForce::Overload if self.counts < 0 => -self.scale.counts_max,
-            GaugeForce::Overload => self.scale.counts_max,
-            // Another unit or another resolution: somebody has pressed a key of the gauge.
-            GaugeForce::Reading(_) => {
-                let tick = self.tick.unwrap_or(0);
-                return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
-            }
+        // Another unit or another resolution: a key of the gauge has been pressed.
+        let Some(counts) = self.scale.counts(force, self.counts) else {
+            let tick = self.tick.unwrap_or(0);
+            return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
         };
         self.counts = counts;
         self.look_for_overload(now);
@@ -38,26 +29,22 @@ impl StandSession {
         }
         self.tick = Some(tick);
         let (pulses, moving) = self.locate(now, tick);
-        let mut status = AxisStatus::MOTOR_ON | moving;
-        if self.settings.pulses(travel) <= 0 {
-            status = status | AxisStatus::HOME;
-        }
         let (upper, lower) =
             self.status.map_or((false, false), |status| (status.is_at_upper, status.is_at_lower));
         let (forward, reverse) =
             if self.settings.is_upwards { (upper, lower) } else { (lower, upper) };
-        if forward {
-            status = status | AxisStatus::FORWARD_LIMIT;
-        }
-        if reverse {
-            status = status | AxisStatus::REVERSE_LIMIT;
-        }
+        let inputs = axis_status([
+            (true, AxisStatus::MOTOR_ON),
+            (self.settings.pulses(travel) <= 0, AxisStatus::HOME),
+            (forward, AxisStatus::FORWARD_LIMIT),
+            (reverse, AxisStatus::REVERSE_LIMIT),
+        ]);
         let reading = Reading {
             tick,
             counts: Some(counts),
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
-            status,
+            status: inputs | moving,
             age: Some(Age { by: now.since(at), within: now.since(at) }),
         };
         self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
@@ -66,25 +53,22 @@ impl StandSession {
 
     /// A reading at the end of the range stands for all that is beyond it, and no limit of force may see it.
     fn look_for_overload(&mut self, now: Nanos) {
-        let is_beyond = self.counts.saturating_abs() >= self.scale.counts_max;
+        let is_beyond = self.scale.is_beyond_range(self.counts);
         if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
             self.stop_due |= self.is_going();
-            self.refuse(
-                now,
-                "the force is beyond the gauge's range; take the load off before it is damaged",
-            );
+            self.refuse(now, BEYOND_RANGE);
         }
         self.is_beyond = is_beyond;
     }
 
-    /// Where the axis is told to be at a sample, and whether it moves.
+    /// The reported position of the axis at a sample, and whether it moves.
     fn locate(&mut self, now: Nanos, tick: u64) -> (i64, AxisStatus) {
         let none = AxisStatus(0);
         let true_pulses = self.reported_pulses(self.travel);
         match self.motion.clone() {
             Motion::Rest | Motion::Setting(..) => (self.at_rest(true_pulses), none),
             Motion::LetGo(stand_move, since) => {
-                // A move that a stop has ended at once is told too, or nobody would know that it is over.
+                // A move that a stop has ended at once is reported too, or its end would not be seen.
                 let is_over = stand_move.target == stand_move.from || self.stopped_at.is_some();
                 if !is_over && self.travel == stand_move.from && !self.has_status_moved() {
                     if now.since(since) > self.still_limit(stand_move.command) {
@@ -106,7 +90,7 @@ impl StandSession {
                     command.acceleration,
                 );
                 self.rests_at = None;
-                // A state that was told before it began is old.
+                // A state reported before it began is old.
                 self.status = None;
                 let stopped_tick = self.stopped_at.map(|_| tick);
                 self.motion = Motion::Moving {
@@ -155,7 +139,7 @@ impl StandSession {
                     (here - self.reported_pulses(stand_move.from)).abs() as f64 * MM_PER_PULSE;
                 let tolerance =
                     REST_TOLERANCE_MM + stand_move.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
-                // The truth, where it is not the course: who checks the path sees it.
+                // The measured position where it is off the course: the check of the path sees it.
                 let reported = if is_off(here, tolerance) { true_pulses } else { here };
                 return (reported, AxisStatus::MOVING);
             }
@@ -174,7 +158,7 @@ impl StandSession {
         (here, AxisStatus::MOVING | AxisStatus::STOPPING)
     }
 
-    /// Where it was commanded to be as long as it is about there, else where it is.
+    /// The commanded position as long as the axis is near it, else the true one.
     fn at_rest(&self, true_pulses: i64) -> i64 {
         let near =
             |pulses: &i64| (pulses - true_pulses).abs() as f64 * MM_PER_PULSE <= REST_TOLERANCE_MM;
@@ -182,7 +166,7 @@ impl StandSession {
     }
 
     pub(super) fn has_status_moved(&self) -> bool {
-        self.status.is_some_and(|status| status.crosshead != Crosshead::Stopped)
+        self.status.is_some_and(|status| status.is_moving)
     }
 
     /// Longest time without a new travel of a crosshead that moves.

@@ -9,10 +9,10 @@ use super::{MM_PER_PULSE, StandSettings};
 use crate::mark10::gauge::GaugeScale;
 use crate::rig::RigEventBody;
 use crate::text::Lines;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{ATTENDED_MAX, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
 use palpate_model::Nanos;
 use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{Ack, Fault, MoveTo, Profile, RigCommand};
+use palpate_model::rig::{Ack, MoveTo, Profile, RigCommand};
 use palpate_model::units::Position;
 use std::collections::VecDeque;
 
@@ -21,26 +21,21 @@ pub const TICK: Nanos = Nanos::from_millis(1);
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 /// After a garbled answer the line is left to fall silent for so long.
 const QUIET: Nanos = Nanos::from_millis(40);
-/// After a lost one for longer: it may only be late, and nothing in an answer tells to which question it belongs.
+/// After a lost one for longer: it may only be late, and an answer does not show to which question it belongs.
 const QUIET_LOST: Nanos = Nanos::from_millis(1_000);
-/// So many answers garbled in a row, and the link counts as dead; a lost one counts for two.
+/// The link counts as dead after so many garbled answers in a row; a lost answer counts for two.
 const LOST_MAX: u32 = 3;
 const GARBLED_MAX: u32 = 2;
-/// How often the crosshead's state is asked for, while it moves without a new travel and while it rests.
+/// Interval of questions for the crosshead's state while it moves without a new travel, and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
 const STATUS_RESTING: Nanos = Nanos::from_millis(300);
 /// A stop is repeated as often until the crosshead rests.
 const STOP_AGAIN: Nanos = Nanos::from_millis(100);
-/// Motions end when nobody takes samples for so long: palpate hangs.
-const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
 /// A crosshead that shows no new travel for so long rests, or has not begun; the time of some pulses comes to it.
 const STILL: Nanos = Nanos::from_millis(600);
 const STILL_PULSES: f64 = 4.0;
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
 
-/// How fast the link was when the stand was opened.
+/// Speed of the link, measured when the stand was opened.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandPace {
     pub every: Nanos,
@@ -105,11 +100,11 @@ pub struct StandSession {
     status: Option<Status>,
     travel: i64,
     travel_changed: Nanos,
-    /// Pulses told at the stand's travel zero.
+    /// Reported pulses at the stand's travel zero.
     offset: i64,
     rests_at: Option<i64>,
     tick: Option<u64>,
-    /// Of the newest sample's time.
+    /// Uncertainty of the newest sample's time.
     uncertainty: Nanos,
     counts: i32,
     /// The newest reading was beyond the gauge's range.
@@ -166,11 +161,9 @@ impl StandSession {
     }
 
     fn refuse(&mut self, now: Nanos, detail: impl Into<String>) {
-        let detail = detail.into();
-        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        self.report(now, RigEventBody::refusal(detail));
     }
 
-    /// Pulses as they are told, of a travel of the stand.
     fn reported_pulses(&self, travel: i64) -> i64 {
         self.settings.pulses(travel) + self.offset
     }
@@ -182,13 +175,19 @@ impl StandSession {
             self.refuse(now, OVERTAKEN);
         }
         for order in waiting {
-            match order {
-                RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => self.refuse(now, OVERTAKEN),
-                other => self.execute_now(now, other),
-            }
+            self.finish_order(now, order, OVERTAKEN);
         }
         self.stop_due = true;
         self.unconfirmed.push(command);
+    }
+
+    /// Refuses a motion; does anything else.
+    fn finish_order(&mut self, now: Nanos, command: RigCommand, why: &str) {
+        if command.is_motion() {
+            self.refuse(now, why);
+        } else {
+            self.execute_now(now, command);
+        }
     }
 
     fn execute_now(&mut self, now: Nanos, command: RigCommand) {
@@ -283,13 +282,9 @@ impl Dialogue for StandSession {
             return self.stop(now, command);
         }
         if self.orders.len() >= ORDERS_MAX {
-            return self.refuse(now, "too many commands at once");
+            return self.refuse(now, TOO_MANY_COMMANDS);
         }
         self.orders.push_back(command);
-    }
-
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
@@ -328,7 +323,7 @@ impl Dialogue for StandSession {
             return None;
         }
         self.quiet_until = None;
-        // Before the first sample nobody knows which way a target is.
+        // Before the first sample the direction to a target is not known.
         if matches!(self.motion, Motion::Rest)
             && self.tick.is_some()
             && let Some(command) = self.orders.pop_front()
@@ -337,12 +332,7 @@ impl Dialogue for StandSession {
         } else if self.is_going()
             && let Some(command) = self.orders.pop_front()
         {
-            match command {
-                RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => {
-                    self.refuse(now, "the crosshead still moves; stop it first");
-                }
-                other => self.execute_now(now, other),
-            }
+            self.finish_order(now, command, "the crosshead still moves; stop it first");
         }
         if let Motion::Setting(stand_move, steps) = &mut self.motion
             && let Some((text, question)) = steps.pop_front()
@@ -352,7 +342,7 @@ impl Dialogue for StandSession {
             }
             let stand_move = *stand_move;
             self.motion = Motion::LetGo(stand_move, now);
-            // What it said before the letter is old.
+            // A state reported before the letter is old.
             self.status = None;
             self.stopped_at = None;
             self.travel_changed = now;
@@ -386,7 +376,7 @@ impl Dialogue for StandSession {
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
         (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
-            "the stand gives no sensible answers any more; it stops at its travel limit; check cable and power"
+            "the stand no longer gives sensible answers; it stops at its travel limit; check cable and power"
                 .into()
         })
     }
