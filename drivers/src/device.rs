@@ -4,13 +4,10 @@ use crate::galil::GalilOpenError;
 use crate::grbl::GrblOpenError;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{
-    CallerTime, HaltHandle, HostClock, LinkStats, LinkThread, TOO_MANY_COMMANDS, WireError,
-};
+use crate::wire::{HaltHandle, HostClock, LinkStats, LinkThread, TOO_MANY_COMMANDS, WireError};
 use palpate_model::Nanos;
 use palpate_model::rig::{RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
-use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
 
@@ -55,6 +52,44 @@ pub trait RigDevice: Send {
     }
 }
 
+/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
+/// catch up a quarter of a second.
+const BEHIND_MAX: Nanos = Nanos::from_millis(250);
+
+/// The caller's zero on the host's clock, and the newest time that was reported.
+#[derive(Default)]
+struct CallerTime {
+    /// `None` before the first call.
+    origin: Option<Nanos>,
+    newest: Nanos,
+}
+
+impl CallerTime {
+    /// The caller asks for events until a time of its own: that time on the host's clock.
+    fn host_end(&mut self, now: Nanos, until: Nanos) -> Nanos {
+        let begun = Nanos(now.0.saturating_sub(until.0));
+        // A caller whose time stood still, as while the computer slept, gets a new origin.
+        let origin = match self.origin {
+            Some(origin) if now.since(origin).since(until) <= BEHIND_MAX => origin,
+            _ => begun,
+        };
+        self.origin = Some(origin);
+        origin + until
+    }
+
+    /// The caller's time of an event on the host's clock; never before an earlier event.
+    fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
+        let origin = self.origin.unwrap_or(at);
+        self.newest = at.since(origin).max(self.newest).min(until);
+        self.newest
+    }
+
+    /// The caller's time of bytes that were exchanged, in any order.
+    fn caller_time(&self, at: Nanos) -> Nanos {
+        at.since(self.origin.unwrap_or(Nanos::ZERO))
+    }
+}
+
 pub struct DeviceRig<D> {
     device: D,
     /// Without links while it is being connected again, and after that has failed.
@@ -74,7 +109,7 @@ impl<D: RigDevice> DeviceRig<D> {
             device,
             pending: opened.lines.iter().map(|_| None).collect(),
             opened,
-            time: CallerTime::new(Arc::clone(&clock)),
+            time: CallerTime::default(),
             clock,
             refused: VecDeque::new(),
         })
@@ -150,7 +185,8 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let (now, end) = self.time.window(until);
+        let now = (self.clock)();
+        let end = self.time.host_end(now, until);
         if let Some(refusal) = self.refused.pop_front() {
             return Some(RigEvent::new(self.time.event_time(now, until), refusal));
         }

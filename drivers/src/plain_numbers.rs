@@ -192,16 +192,12 @@ impl PlainNumbers {
         let received = console.received();
         let Some(line) = wrong else {
             return if received.is_empty() {
-                DeviceError::Silent {
-                    device: DEVICE,
-                    hint: "check port, cable and that the board sends by itself",
-                }
+                console.no_answer("check port, cable and that the board sends by itself")
             } else {
                 unfit("it sends less than a number a second; make it send more")
             };
         };
-        let text = String::from_utf8_lossy(&received);
-        let other = DeviceKind::recognise_lines(&split_lines(&text));
+        let other = DeviceKind::recognise_lines(&split_lines(&received));
         if let Some((kind, _)) = other.filter(|(kind, _)| kind.word != KIND.word) {
             return DeviceError::Other { device: DEVICE, found: kind.title.into() };
         }

@@ -191,7 +191,7 @@ fn set_up_axis(
     let levels = [settings.limits.code(), settings.home.code()];
     let command = format!("CN {},{}", levels[0], levels[1]);
     set_if_readable(console, command, "_CN0,_CN1", &levels.map(f64::from))?;
-    let rate = settings.counts2(settings.acceleration);
+    let rate = settings.counts(settings.acceleration.0);
     console.ask(&format!("AC{a}={rate}"))?;
     console.ask(&format!("DC{a}={rate}"))?;
     // Limits are left at this rate; the older series have no such command and use that of `DC`.
@@ -202,7 +202,7 @@ fn set_up_axis(
         let found = format!("{} and {}", rates[0], rates[1]);
         return Err(GalilOpenError::set_otherwise(format!("AC{a}={rate}"), found));
     }
-    console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max)))?;
+    console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max.0)))?;
     // Before homing the axis can be anywhere on its travel, and homing may need all of it.
     let here = console.number(&format!("_TD{a}"))?;
     let here = settings.sign() * signed(here).unwrap_or(0);
@@ -259,22 +259,14 @@ fn start_watchdog(
     settings: &GalilSettings,
 ) -> Result<bool, GalilOpenError> {
     console.ask(&format!("{}=1", watchdog::VARIABLE))?;
-    let mut text = String::from("DL\r");
-    for line in watchdog::program(settings.axis) {
-        text.push_str(&line);
-        text.push('\r');
-    }
-    text.push('\\');
-    console.write(&text)?;
+    let program = watchdog::program(settings.axis).join("\r");
+    console.write(format!("DL\r{program}\r\\"))?;
     // One prompt for `\` and one for `DL`; a line that is refused gives `?` before them.
     let replies = console.replies(2, DOWNLOAD_MAX)?;
     let is_stored = replies.len() == 2 && replies.iter().all(|reply| reply.is_accepted);
     console.drain(QUIET)?;
-    if !is_stored {
-        return Ok(false);
-    }
-    let started = console.try_ask(&format!("XQ {},{}", watchdog::LABEL, watchdog::THREAD))?;
-    if !started.is_accepted {
+    let start = format!("XQ {},{}", watchdog::LABEL, watchdog::THREAD);
+    if !is_stored || !console.try_ask(&start)?.is_accepted {
         return Ok(false);
     }
     Ok(console.number(&format!("_XQ{}", watchdog::THREAD))? >= 0.0)

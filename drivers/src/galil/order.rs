@@ -70,7 +70,7 @@ impl GalilOrder {
             }
             RigCommand::MoveTo(wanted) => {
                 let (speed, rate) =
-                    (settings.counts(wanted.speed), settings.counts2(wanted.acceleration));
+                    (settings.counts(wanted.speed.0), settings.counts(wanted.acceleration.0));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
                     return OrderStep::Refused(format!(
                         "a speed of {} is above the {} of the rig file",
@@ -96,7 +96,7 @@ impl GalilOrder {
                 if let Err(why) = path.check(settings.speed_max, wanted.acceleration) {
                     return OrderStep::Refused(why);
                 }
-                let rate = settings.counts2(wanted.acceleration);
+                let rate = settings.counts(wanted.acceleration.0);
                 vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
             }
             RigCommand::Stop | RigCommand::Halt => {
@@ -140,8 +140,8 @@ impl GalilOrder {
                     ));
                 }
                 // The controller rounds down to its resolution; a larger value is an error.
-                let speed_asked = settings.counts(wanted.speed) as f64;
-                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                let speed_asked = settings.counts(wanted.speed.0) as f64;
+                let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
                     return OrderStep::Refused(format!(
                         "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts after \
@@ -167,7 +167,7 @@ impl GalilOrder {
                 (self.command, vec![define])
             }
             (RigCommand::Oscillate(wanted), &[ac, dc]) => {
-                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || ac <= 0.0 || ac > ac_asked {
                     return OrderStep::Refused(format!(
                         "it reads back acceleration {ac} and deceleration {dc} in counts after {ac_asked} was set"
@@ -188,14 +188,12 @@ impl GalilOrder {
     }
 
     fn done(&self, made: RigCommand) -> OrderStep {
-        match (self.command, self.numbers.as_slice()) {
-            // The number is `_MO`: 1 while the motor is off.
-            (RigCommand::EnableMotor, &[0.0]) => OrderStep::Done(made),
-            (RigCommand::EnableMotor, _) => OrderStep::Refused(
-                "the motor stays off after SH; check the amplifier and its enable input".into(),
-            ),
-            _ => OrderStep::Done(made),
+        // The number is `_MO`: 1 while the motor is off.
+        if self.command == RigCommand::EnableMotor && self.numbers != [0.0] {
+            let why = "the motor stays off after SH; check the amplifier and its enable input";
+            return OrderStep::Refused(why.into());
         }
+        OrderStep::Done(made)
     }
 }
 

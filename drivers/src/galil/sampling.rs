@@ -97,7 +97,6 @@ impl Sampler {
             return Some(SampleOutcome::Doubtful);
         }
         match self.time {
-            Some(last) if time == last && !is_begun => return Some(SampleOutcome::Same),
             Some(last) if time < last => {
                 // Either it wrapped or it restarted; what it counted stays counted.
                 let is_wrapped = is_wrapped(last, time);

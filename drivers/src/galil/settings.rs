@@ -137,15 +137,10 @@ impl GalilSettings {
         self.range.span().0 / f64::from(1_u32 << self.bits.min(24))
     }
 
-    /// Counts per second of a speed.
-    pub fn counts(&self, speed: MmPerS) -> i64 {
-        // Rounding forgives the decimals of millimetres; the controller rounds down to its quantum.
-        (speed.0 / self.mm_per_pulse).round() as i64
-    }
-
-    /// Counts per second squared of an acceleration.
-    pub fn counts2(&self, acceleration: MmPerS2) -> i64 {
-        (acceleration.0 / self.mm_per_pulse).round() as i64
+    /// Counts per second of a speed in mm/s, or per second squared of an acceleration in mm/s2. Rounding forgives the
+    /// decimals of millimetres; the controller rounds down to its quantum.
+    pub fn counts(&self, mm: f64) -> i64 {
+        (mm / self.mm_per_pulse).round() as i64
     }
 }
 
@@ -182,9 +177,9 @@ pub mod tests {
     #[test]
     fn counts_are_those_of_the_drive() {
         let thesis = thesis();
-        assert_eq!(thesis.counts(MmPerS(0.75)), 50);
-        assert_eq!(thesis.counts(MmPerS(0.9)), 60);
-        assert_eq!(thesis.counts2(MmPerS2(61.44)), 4096);
+        assert_eq!(thesis.counts(0.75), 50);
+        assert_eq!(thesis.counts(0.9), 60);
+        assert_eq!(thesis.counts(61.44), 4096);
         assert_eq!(thesis.volts_per_count(), 20.0 / 65_536.0);
     }
 

@@ -4,7 +4,7 @@ use super::Hx711Settings;
 use super::dialogue::Hx711Dialogue;
 use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, NO_CHIP, parse};
 use crate::cell::{CellDescription, CellDevice};
-use crate::text::{DeviceError, OpenedCell, TextConsole, describe_unknown_device};
+use crate::text::{DeviceError, OpenedCell, TextConsole};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
@@ -71,20 +71,14 @@ fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
             return Ok(header);
         }
     }
-    let received = console.received();
-    if received.is_empty() {
-        return Err(DeviceError::Silent {
-            device: DEVICE,
-            hint: "check port, cable and that palpate's sketch is on the board, with 115200 baud",
-        });
-    }
-    let is_missing = String::from_utf8_lossy(&received)
-        .lines()
-        .any(|line| matches!(parse(line), Some(Message::Missing { .. })));
-    if is_missing {
-        return Err(DeviceError::unfit(DEVICE, NO_CHIP));
-    }
-    Err(DeviceError::Other { device: DEVICE, found: describe_unknown_device(&received) })
+    let is_missing = |line: &str| matches!(parse(line), Some(Message::Missing { .. }));
+    Err(if console.received().lines().any(is_missing) {
+        DeviceError::unfit(DEVICE, NO_CHIP)
+    } else {
+        console.no_answer(
+            "check port, cable and that palpate's sketch is on the board, with 115200 baud",
+        )
+    })
 }
 
 /// Values a second by the board's clock.

@@ -71,23 +71,20 @@ impl Fields {
                 err.message().trim().replace('\n', ", ")
             ),
         })?;
+        let field = |key: String, span: Range<usize>, value: &DeValue<'_>| Field {
+            key,
+            line: line_of(text, &span),
+            value: value_of(value),
+            is_taken: false,
+        };
         let mut all = Vec::new();
         for (key, value) in document.get_ref().iter() {
-            let (name, line) = (key.get_ref().to_string(), line_of(text, &key.span()));
             match value.get_ref() {
-                DeValue::Table(table) => {
-                    for (key, value) in table.iter() {
-                        all.push(Field {
-                            key: format!("{name}.{}", key.get_ref()),
-                            line: line_of(text, &key.span()),
-                            value: value_of(value.get_ref()),
-                            is_taken: false,
-                        });
-                    }
-                }
-                value => {
-                    all.push(Field { key: name, line, value: value_of(value), is_taken: false })
-                }
+                DeValue::Table(table) => all.extend(table.iter().map(|(inner, value)| {
+                    let name = format!("{}.{}", key.get_ref(), inner.get_ref());
+                    field(name, inner.span(), value.get_ref())
+                })),
+                other => all.push(field(key.get_ref().to_string(), key.span(), other)),
             }
         }
         Ok(Self { all, mistakes: Vec::new() })

@@ -10,7 +10,7 @@ use crate::wire::Place;
 /// A rig with the board and the load cell beside it of a rig file.
 pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     // Both are read, so that the mistakes of both are reported.
-    let (axis, cell) = (read(name, fields), super::cell::read(fields));
+    let (axis, cell) = (read(name, fields), super::read_cell(fields));
     let (axis, cell) = (axis?, cell?);
     if axis.0 == cell.0 {
         fields

@@ -4,23 +4,23 @@
 //! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
 
 mod address;
-mod cell;
 pub mod fields;
 mod galil;
 mod grbl;
-mod stand;
+mod mark10;
 
-pub(crate) use cell::gauge;
 pub use fields::{Fields, Mistake};
 pub(crate) use galil::galil;
 pub(crate) use grbl::grbl;
-pub(crate) use stand::stand;
+pub(crate) use mark10::{gauge, stand};
 
+use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, RigDevice};
 use crate::devices::{DEVICES, Role};
 use crate::rig::Rig;
 use crate::wire::{HostClock, Place};
 use std::fmt;
+use std::sync::Arc;
 use thiserror::Error;
 
 pub const BYTES_MAX: usize = 64 * 1024;
@@ -33,16 +33,11 @@ pub struct RigFile {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", fields::in_words(.file, .mistakes))]
 pub struct RigFileError {
     pub file: String,
     /// What is wrong with it, in the order of its lines.
     pub mistakes: Vec<Mistake>,
-}
-
-impl fmt::Display for RigFileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&fields::in_words(&self.file, &self.mistakes))
-    }
 }
 
 impl RigFile {
@@ -86,6 +81,18 @@ impl fmt::Debug for RigFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("RigFile").field(&self.places).finish()
     }
+}
+
+/// Address and settings of the load cell in the table `[cell]`.
+fn read_cell(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
+    let cells = DEVICES.iter().filter_map(|kind| match kind.role {
+        Role::Cell { read, .. } => Some((kind.word, read)),
+        Role::Axis(_) => None,
+    });
+    let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
+    let place = address::read_address(fields, "cell.");
+    let cell = cell?(fields)?;
+    Some((place?, cell))
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {

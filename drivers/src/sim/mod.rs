@@ -22,8 +22,7 @@ pub use amounts::{
     SimStiffness, SimThickness,
 };
 pub use bench::Bench;
-pub use load_cell::calibration;
-pub use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
+pub use load_cell::{LoadCell, calibration, counts_from_volts, volts_from_counts};
 pub use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;

@@ -5,28 +5,31 @@ use super::amounts::{
     SimStiffness, SimThickness,
 };
 use std::collections::BTreeMap;
-use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Realism of the simulated load cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SimProfile {
-    /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
-    #[default]
-    Lab,
-    /// A straight cell without drift or converter, and white noise: 0.02 N rms unless set otherwise.
-    Ideal,
+palpate_model::named! {
+    /// Realism of the simulated load cell.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum SimProfile {
+        /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
+        #[default]
+        Lab = "lab",
+        /// A straight cell without drift or converter, and white noise: 0.02 N rms unless set otherwise.
+        Ideal = "ideal",
+    }
 }
 
-/// The controller's sample clock.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SimClock {
-    /// 1000 us per tick.
-    #[default]
-    Nominal,
-    /// 976 us per tick: what a Galil controller makes of its nominal millisecond (`TM 1000`).
-    Galil,
+palpate_model::named! {
+    /// The controller's sample clock.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum SimClock {
+        /// 1000 us per tick.
+        #[default]
+        Nominal = "nominal",
+        /// 976 us per tick: what a Galil controller makes of its nominal millisecond (`TM 1000`).
+        Galil = "galil",
+    }
 }
 
 impl SimClock {
@@ -90,54 +93,44 @@ impl SimSettings {
             ("seed".to_owned(), self.seed.to_string()),
             ("clock".to_owned(), self.clock.to_string()),
         ]);
-        let unusual = [
-            unusual("rate", self.rate),
-            unusual("softening", self.softening),
-            unusual("noise", self.noise),
-            unusual("stiffness", self.stiffness),
-            unusual("thickness", self.thickness),
-            unusual("compliance", self.compliance),
-            unusual("preconditioning", self.preconditioning),
-            unusual("bath", self.bath),
-            unusual("input", self.input),
+        let usual = Self::default();
+        let amounts = [
+            ("rate", self.rate.to_string(), usual.rate.to_string()),
+            ("softening", self.softening.to_string(), usual.softening.to_string()),
+            ("noise", self.noise.to_string(), usual.noise.to_string()),
+            ("stiffness", self.stiffness.to_string(), usual.stiffness.to_string()),
+            ("thickness", self.thickness.to_string(), usual.thickness.to_string()),
+            ("compliance", self.compliance.to_string(), usual.compliance.to_string()),
+            (
+                "preconditioning",
+                self.preconditioning.to_string(),
+                usual.preconditioning.to_string(),
+            ),
+            ("bath", self.bath.to_string(), usual.bath.to_string()),
+            ("input", self.input.to_string(), usual.input.to_string()),
         ];
-        map.extend(unusual.into_iter().flatten());
+        // Usual values are left out: rigs are described as they always were.
+        let unusual = amounts.into_iter().filter(|(_, value, usual)| value != usual);
+        map.extend(unusual.map(|(name, value, _)| (name.to_owned(), value)));
         map
     }
 }
 
-/// A setting with its name, unless it is the usual one: rigs are described as they always were.
-fn unusual<T: Default + PartialEq + fmt::Display>(
-    name: &str,
-    value: T,
-) -> Option<(String, String)> {
-    (value != T::default()).then(|| (name.to_owned(), value.to_string()))
+impl FromStr for SimProfile {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|profile| profile.name() == text);
+        found.ok_or_else(|| SimSettingError::new("profile", text, "'lab' or 'ideal'"))
+    }
 }
 
-macro_rules! words {
-    ($name:ident, $setting:literal, $choices:literal, $($variant:ident = $word:literal),+) => {
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self {
-                    $(Self::$variant => $word,)+
-                })
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = SimSettingError;
-            fn from_str(text: &str) -> Result<Self, Self::Err> {
-                match text {
-                    $($word => Ok(Self::$variant),)+
-                    _ => Err(SimSettingError::new($setting, text, $choices)),
-                }
-            }
-        }
-    };
+impl FromStr for SimClock {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|clock| clock.name() == text);
+        found.ok_or_else(|| SimSettingError::new("clock", text, "'nominal' or 'galil'"))
+    }
 }
-
-words!(SimProfile, "profile", "'lab' or 'ideal'", Lab = "lab", Ideal = "ideal");
-words!(SimClock, "clock", "'nominal' or 'galil'", Nominal = "nominal", Galil = "galil");
 
 #[cfg(test)]
 mod tests {

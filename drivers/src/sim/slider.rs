@@ -185,12 +185,8 @@ impl Slider {
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
         self.check_direction(target.distance_from(self.position))?;
         let made = MoveTo { target_pulses: wanted.target_pulses, speed, acceleration };
-        self.motion = Some(Motion {
-            course: Course::Move(Profile::to_rest(self.position, target, speed, acceleration)),
-            start_tick: tick,
-            target_pulses: Some(wanted.target_pulses),
-            is_reported: false,
-        });
+        let profile = Profile::to_rest(self.position, target, speed, acceleration);
+        self.begin(tick, Course::Move(profile), wanted.target_pulses);
         Ok(made)
     }
 
@@ -208,13 +204,13 @@ impl Slider {
         let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
         sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refused)?;
         self.check_direction(made.amplitude_pulses as f64)?;
-        self.motion = Some(Motion {
-            course: Course::Sine(sine),
-            start_tick: tick,
-            target_pulses: Some(start),
-            is_reported: false,
-        });
+        self.begin(tick, Course::Sine(sine), start);
         Ok(made)
+    }
+
+    fn begin(&mut self, tick: u64, course: Course, target: i64) {
+        let target_pulses = Some(target);
+        self.motion = Some(Motion { course, start_tick: tick, target_pulses, is_reported: false });
     }
 
     /// Replaces the motion by its deceleration; a move already ending early goes on as it is.

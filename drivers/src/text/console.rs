@@ -1,6 +1,6 @@
 //! Question and answer, one at a time, while a device that speaks in lines is set up.
 
-use super::error::DeviceError;
+use super::error::{DeviceError, describe_unknown_device};
 use super::lines::{Lines, Taken};
 use crate::wire::{HostClock, Link, SetupConsole};
 use palpate_model::Nanos;
@@ -73,9 +73,19 @@ impl<'a> TextConsole<'a> {
         result.map_err(|err| self.link_error(&err))
     }
 
-    /// The newest bytes that the device has sent.
-    pub fn received(&self) -> Vec<u8> {
-        self.console.last_received(RECEIVED_MAX)
+    /// The newest text that the device has sent.
+    pub fn received(&self) -> String {
+        String::from_utf8_lossy(&self.console.last_received(RECEIVED_MAX)).into_owned()
+    }
+
+    /// The error of a device that does not answer as expected: it is silent, which the hint is for, or another one.
+    pub fn no_answer(&self, hint: &'static str) -> DeviceError {
+        let (device, received) = (self.device, self.received());
+        if received.is_empty() {
+            DeviceError::Silent { device, hint }
+        } else {
+            DeviceError::Other { device, found: describe_unknown_device(&received) }
+        }
     }
 
     /// Bytes exchanged, by the host's clock.

@@ -47,11 +47,9 @@ impl DeviceError {
 const QUOTE_MAX: usize = 60;
 
 /// Names a device that answers unexpectedly, or quotes it where it is not recognised.
-#[must_use]
-pub fn describe_unknown_device(bytes: &[u8]) -> String {
-    let text = String::from_utf8_lossy(bytes);
-    let known = DeviceKind::recognise_lines(&split_lines(&text)).map(|(kind, _)| kind.title);
-    let known = known.or_else(|| is_prompts(&text).then_some(galil::KIND.title));
+pub(super) fn describe_unknown_device(text: &str) -> String {
+    let known = DeviceKind::recognise_lines(&split_lines(text)).map(|(kind, _)| kind.title);
+    let known = known.or_else(|| is_prompts(text).then_some(galil::KIND.title));
     known.map_or_else(
         || {
             let quote: String = text.chars().take(QUOTE_MAX).collect();
@@ -73,7 +71,7 @@ mod tests {
 
     #[test]
     fn unexpected_devices_are_recognised_by_their_lines() {
-        for (bytes, name) in [
+        for (text, name) in [
             ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
             ("error:8\r\n", "Grbl"),
             ("?:", "Galil"),
@@ -82,9 +80,9 @@ mod tests {
             ("-18.78 lbF\r\n", "Mark-10 gauge"),
             ("H,100,palpate-hx711,1,80,128,a*1234\r\n", "HX711"),
         ] {
-            assert!(describe_unknown_device(bytes.as_bytes()).contains(name), "{bytes:?}");
+            assert!(describe_unknown_device(text).contains(name), "{text:?}");
         }
-        let other = describe_unknown_device(b"\x00\xffhello\r\n");
+        let other = describe_unknown_device("\0\u{fffd}hello\r\n");
         assert!(other.contains("hello") && !other.contains('\0'), "{other}");
     }
 }

@@ -8,5 +8,5 @@ mod lines;
 pub use crate::cell::OpenedCell;
 pub use console::TextConsole;
 pub use decimal::FixedDecimal;
-pub use error::{DeviceError, describe_unknown_device};
+pub use error::DeviceError;
 pub use lines::{Lines, Taken};

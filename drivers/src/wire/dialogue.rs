@@ -2,7 +2,8 @@
 
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
-use palpate_model::rig::RigCommand;
+use palpate_model::rig::{Ack, RigCommand};
+use std::collections::VecDeque;
 
 /// Commands that wait in a dialogue; as many as may wait on the way to it.
 pub(crate) const ORDERS_MAX: usize = 64;
@@ -47,6 +48,38 @@ impl LinkStats {
     /// uncertain against its controller's.
     pub fn jitter(&self) -> Nanos {
         Nanos(self.round_trip_max.since(self.round_trip_min).0 / 2)
+    }
+}
+
+/// Commands are answered in the order in which they came, in whatever order they are done.
+#[derive(Clone, Debug, Default)]
+pub struct AnswerQueue {
+    owed: VecDeque<(u64, Option<RigEventBody>)>,
+    count: u64,
+}
+
+impl AnswerQueue {
+    pub fn owe(&mut self) -> u64 {
+        self.count += 1;
+        self.owed.push_back((self.count, None));
+        self.count
+    }
+
+    /// Answers a command. Returns the answers that may be given now, in order: those with none missing before them.
+    fn answer(&mut self, number: u64, body: RigEventBody) -> Vec<RigEventBody> {
+        if let Some((_, answer)) = self.owed.iter_mut().find(|(owed, _)| *owed == number) {
+            *answer = Some(body);
+        }
+        let ready = self.owed.iter().take_while(|(_, answer)| answer.is_some()).count();
+        self.owed.drain(..ready).filter_map(|(_, answer)| answer).collect()
+    }
+
+    pub fn acknowledge(&mut self, number: u64, command: RigCommand) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::Ack(Ack { command }))
+    }
+
+    pub fn refuse(&mut self, number: u64, detail: impl Into<String>) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::refusal(detail))
     }
 }
 
@@ -105,5 +138,14 @@ mod tests {
         assert_eq!(stats.round_trip_mean, Nanos(2_000));
         assert_eq!(stats.round_trip_max, Nanos(3_000));
         assert_eq!(stats.jitter(), Nanos(1_000));
+    }
+
+    #[test]
+    fn answers_come_in_the_order_of_the_commands() {
+        let mut answers = AnswerQueue::default();
+        let (first, second) = (answers.owe(), answers.owe());
+        assert_eq!(answers.acknowledge(second, RigCommand::Stop), []);
+        let both = answers.refuse(first, "no");
+        assert!(matches!(both[..], [RigEventBody::Fault(_), RigEventBody::Ack(_)]));
     }
 }

@@ -4,8 +4,6 @@
 //! every protocol can be tested without a port, a thread or a clock. [`LinkThread`] runs one on a link.
 
 mod address;
-mod answer_queue;
-mod caller_time;
 mod dialogue;
 mod halt;
 mod link;
@@ -13,10 +11,8 @@ mod link_thread;
 mod setup_console;
 
 pub use address::{Place, WireError};
-pub use answer_queue::AnswerQueue;
-pub use caller_time::CallerTime;
 pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
-pub use dialogue::{Dialogue, LinkStats};
+pub use dialogue::{AnswerQueue, Dialogue, LinkStats};
 pub use halt::{HaltHandle, after_farewell};
 pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, pair};
 pub use link_thread::{LinkThread, LinkThreadSettings};

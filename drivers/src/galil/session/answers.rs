@@ -3,6 +3,7 @@
 use super::Outgoing;
 use super::{ExpectedReply, PendingStop, RESET, Session};
 use crate::galil::clock_alignment::ClockAlignment;
+use crate::galil::order::OrderStep;
 use crate::galil::protocol::{GalilReply, parse_error};
 use crate::galil::recording::{RecordingOutput, RecordingStatus};
 use crate::galil::sampling::{SampleOutcome, Sampler};
@@ -56,11 +57,9 @@ impl Session {
             }
             ExpectedReply::Stop(stop) => self.on_refused_stop(now, stop),
             ExpectedReply::RefusalReason => {
-                if let Some((number, _)) = self.order.take() {
-                    let why = parse_error(reply).map(|err| err.to_string());
-                    let why = why.unwrap_or_else(|| "the controller gives no reason".into());
-                    self.refuse(now, number, why);
-                }
+                let why = parse_error(reply).map(|err| err.to_string());
+                let why = why.unwrap_or_else(|| "the controller gives no reason".into());
+                self.apply_step(now, OrderStep::Refused(why));
             }
             ExpectedReply::Marker(_) => {}
         }

@@ -4,7 +4,7 @@ use super::dialogue::{GaugeDialogue, GaugeScale};
 use super::{FAREWELL, FILTER_MAX, GaugeSettings, RATES};
 use crate::cell::{CellDescription, CellDevice};
 use crate::mark10::protocol::{GaugeLine, GaugeList};
-use crate::text::{DeviceError, OpenedCell, TextConsole, describe_unknown_device};
+use crate::text::{DeviceError, OpenedCell, TextConsole};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::units::Volts;
@@ -96,14 +96,8 @@ fn silence_gauge(console: &mut TextConsole<'_>) -> Result<(), DeviceError> {
         return Ok(());
     }
     let received = console.received();
-    let text = String::from_utf8_lossy(&received);
-    let lines: Vec<GaugeLine> = text.lines().map(GaugeLine::parse).collect();
-    Err(if received.is_empty() {
-        DeviceError::Silent {
-            device: DEVICE,
-            hint: "check that it is on, its baud rate, and whether its menu sends over USB or RS-232",
-        }
-    } else if lines.iter().any(|line| matches!(line, GaugeLine::Error)) {
+    let lines: Vec<GaugeLine> = received.lines().map(GaugeLine::parse).collect();
+    Err(if lines.iter().any(|line| matches!(line, GaugeLine::Error)) {
         unfit(
             "it refuses LIST, as gauges of Series 4 do, which send single readings only; use one of Series 5, 7 or 7i",
         )
@@ -112,7 +106,9 @@ fn silence_gauge(console: &mut TextConsole<'_>) -> Result<(), DeviceError> {
             "it sends readings and hears nothing; check its cable and whether its menu listens to USB or RS-232",
         )
     } else {
-        DeviceError::Other { device: DEVICE, found: describe_unknown_device(&received) }
+        console.no_answer(
+            "check that it is on, its baud rate, and whether its menu sends over USB or RS-232",
+        )
     })
 }
 

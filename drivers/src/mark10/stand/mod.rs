@@ -19,18 +19,19 @@
 
 mod open;
 pub mod protocol;
-mod rig;
 mod session;
 
 pub use open::{ConnectedStand, connect};
-pub use rig::{StandDevice, StandRig, open};
 pub use session::{StandPace, StandSession};
 
 use super::gauge::GaugeSettings;
 use super::protocol::GaugeLine;
+use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file;
+use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings, Place};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
+use std::sync::Arc;
 
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "mark10-stand",
@@ -76,4 +77,38 @@ impl StandSettings {
     pub fn pulses(&self, travel_hundredths: i64) -> i64 {
         if self.is_upwards { travel_hundredths } else { -travel_hundredths }
     }
+}
+
+pub type StandRig = DeviceRig<StandDevice>;
+
+#[derive(Clone)]
+pub struct StandDevice {
+    pub place: Place,
+    pub settings: StandSettings,
+}
+
+impl RigDevice for StandDevice {
+    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+        open(self.place.open()?, &self.settings, clock)
+    }
+}
+
+/// Sets up the stand behind a link and begins to take samples.
+pub fn open(
+    mut link: Box<dyn Link>,
+    settings: &StandSettings,
+    clock: &HostClock,
+) -> Result<Opened, OpenError> {
+    let device: Arc<str> = "stand".into();
+    let connected = connect(link.as_mut(), clock, settings, &device)?;
+    let session = StandSession::new(settings.clone(), &connected, clock());
+    let line_settings = LinkThreadSettings { device, farewell: protocol::STOP.into() };
+    Ok(Opened {
+        lines: vec![LinkThread::start(link, session, clock, line_settings)?],
+        description: connected.description,
+        // The gauge reads newtons, each of which counts as a volt.
+        newtons_per_volt: Some(1.0),
+        link: None,
+        raw: connected.raw,
+    })
 }

@@ -5,7 +5,7 @@ use super::session::{StandPace, TICK};
 use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, StandSettings};
 use crate::mark10::gauge::{self, GaugeScale};
 use crate::mark10::protocol::{GaugeForce, GaugeLine, GaugeList, GaugeReading};
-use crate::text::{DeviceError, TextConsole, describe_unknown_device};
+use crate::text::{DeviceError, TextConsole};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{RawBytes, RigDescription};
@@ -103,23 +103,18 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, 
 }
 
 fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
-    let received = console.received();
-    if received.is_empty() {
-        return DeviceError::Silent {
-            device: DEVICE,
-            hint: "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
-        };
-    }
-    let is_part = String::from_utf8_lossy(&received).lines().any(|line| {
+    let is_part = |line: &str| {
         super::protocol::travel(line).is_some()
             || matches!(GaugeLine::parse(line), GaugeLine::Reading(_))
-    });
-    if is_part {
+    };
+    if console.received().lines().any(is_part) {
         return unfit(
             "it does not send force and travel together; check the cable to its gauge and the travel option",
         );
     }
-    DeviceError::Other { device: DEVICE, found: describe_unknown_device(&received) }
+    console.no_answer(
+        "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
+    )
 }
 
 /// The settings of the gauge and, after a blank, its serial number.

@@ -203,10 +203,7 @@ impl StandSession {
 
     fn begin(&mut self, now: Nanos, command: RigCommand) {
         let RigCommand::MoveTo(to) = command else {
-            if matches!(command, RigCommand::Oscillate(_)) {
-                return self.refuse(now, "the stand moves straight only, not on a sine");
-            }
-            return self.execute_now(now, command);
+            return self.finish_order(now, command, "the stand moves straight only, not on a sine");
         };
         let target = self.settings.pulses(to.target_pulses - self.offset);
         let tenths = (to.speed.0 * 600.0).round() as i64;

@@ -1,25 +1,12 @@
-//! The keys of a load cell on a wire of its own, in the table `[cell]`.
+//! The keys of a Mark-10 gauge, alone or on a stand, and of the stand.
 
+use super::RigFile;
 use super::address::read_address;
 use super::fields::Fields;
-use crate::cell::CellDevice;
-use crate::devices::{DEVICES, Role};
-use crate::mark10::GaugeSettings;
 use crate::mark10::gauge::{FILTER_MAX, RATES};
+use crate::mark10::{GaugeSettings, StandDevice, StandSettings};
 use crate::wire::Place;
 use palpate_model::units::Newtons;
-use std::sync::Arc;
-
-pub(super) fn read(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
-    let cells = DEVICES.iter().filter_map(|kind| match kind.role {
-        Role::Cell { read, .. } => Some((kind.word, read)),
-        Role::Axis(_) => None,
-    });
-    let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
-    let place = read_address(fields, "cell.");
-    let cell = cell?(fields)?;
-    Some((place?, cell))
-}
 
 pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
     let usual = GaugeSettings::default();
@@ -43,4 +30,30 @@ pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
         is_reversed: is_reversed?,
         noise,
     })
+}
+
+pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
+    let (place, settings) = read(name, fields)?;
+    let places = vec![place.clone()];
+    Some(RigFile::of(places, StandDevice { place, settings }))
+}
+
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
+    let place = read_address(fields, "");
+    let limits = fields.limits();
+    let is_upwards = fields.choice("direction", &[("down", false), ("up", true)], Some(false));
+    let gauge = gauge(fields);
+    let limits = limits?;
+    Some((
+        place?,
+        StandSettings {
+            name,
+            travel: limits.travel,
+            speed_max: limits.speed_max,
+            acceleration: limits.acceleration,
+            unseen: limits.unseen,
+            is_upwards: is_upwards?,
+            gauge: gauge?,
+        },
+    ))
 }
