@@ -31,7 +31,7 @@ pub enum Found {
 }
 
 impl Found {
-    fn of(kind: &'static DeviceKind, text: &str) -> Self {
+    fn from_kind(kind: &'static DeviceKind, text: &str) -> Self {
         let text = text.chars().take(SHOWN_MAX).collect();
         Self::Device(kind.word, kind.introduction, text)
     }
@@ -74,7 +74,7 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
         let mut answer = Vec::new();
         link.write(b"\x12\x16\r")?;
         receive(link, clock, ANSWER_MAX, &mut answer, |answer| answer.ends_with(b":"))?;
-        let text = readable(&answer);
+        let text = printable_text(&answer);
         let from = text.find("DMC").or_else(|| text.find("RIO"));
         if let Some(from) = from {
             let revision = text[from..].trim_end_matches([':', '?', ' ']);
@@ -85,7 +85,7 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
             return Ok(Found::Device(galil::KIND.word, galil::KIND.introduction, text));
         }
     }
-    Ok(if received.is_empty() { Found::Silent } else { Found::Unknown(readable(&received)) })
+    Ok(if received.is_empty() { Found::Silent } else { Found::Unknown(printable_text(&received)) })
 }
 
 /// Collects what comes in a time, until it is enough.
@@ -110,11 +110,11 @@ fn recognise(received: &[u8]) -> Option<Found> {
     let end = received.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
     let text = String::from_utf8_lossy(&received[..end]);
     let (kind, text) = DeviceKind::recognise_lines(&split_lines(&text))?;
-    Some(Found::of(kind, text))
+    Some(Found::from_kind(kind, text))
 }
 
 /// The beginning of what was received, without control characters and bytes that are no text.
-fn readable(received: &[u8]) -> String {
+fn printable_text(received: &[u8]) -> String {
     let text = String::from_utf8_lossy(received);
     let plain = text.chars().map(|c| if c.is_control() { ' ' } else { c });
     let plain: String = plain.take(SHOWN_MAX).collect();
@@ -141,6 +141,6 @@ mod tests {
 
     #[test]
     fn shown_text_has_no_control_characters() {
-        assert_eq!(readable(b"\x1b[2Jhello\r\n\xff"), "[2Jhello  \u{fffd}");
+        assert_eq!(printable_text(b"\x1b[2Jhello\r\n\xff"), "[2Jhello  \u{fffd}");
     }
 }

@@ -171,7 +171,7 @@ impl PlainNumbers {
             let (first_at, first_ticks, first) = all[0];
             if number.decimals != first.decimals {
                 return Err(unfit(format!(
-                    "its numbers have sometimes {} and sometimes {} digits after the point; print them all with the same number of digits",
+                    "its numbers had first {} and now {} digits after the point; print them all with the same number of digits",
                     first.decimals, number.decimals
                 )));
             }

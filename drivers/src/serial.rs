@@ -24,12 +24,12 @@ pub enum SerialError {
 pub fn list_ports() -> Result<Vec<PortInfo>, SerialError> {
     let ports = serialport::available_ports()
         .map_err(|err| SerialError::Listing { detail: err.to_string() })?;
-    let mut ports: Vec<PortInfo> = ports.into_iter().map(described).collect();
+    let mut ports: Vec<PortInfo> = ports.into_iter().map(describe_port).collect();
     ports.sort();
     Ok(ports)
 }
 
-fn described(port: SerialPortInfo) -> PortInfo {
+fn describe_port(port: SerialPortInfo) -> PortInfo {
     let description = match port.port_type {
         SerialPortType::UsbPort(usb) => {
             let mut words = vec![format!("USB {:04x}:{:04x}", usb.vid, usb.pid)];
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn description_of_a_usb_port_has_its_manufacturer() {
-        let port = described(SerialPortInfo {
+        let port = describe_port(SerialPortInfo {
             port_name: "/dev/ttyUSB0".to_owned(),
             port_type: SerialPortType::UsbPort(UsbPortInfo {
                 vid: 0x0403,

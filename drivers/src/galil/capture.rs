@@ -149,7 +149,7 @@ pub fn set_up(
     });
     let Some((n, (pace, age))) = chosen else {
         if settings.sampling == Sampling::Record {
-            return Err(GalilOpenError::NoRecording("the link is too slow for it".into()));
+            return Err(no_recording("the link is too slow for it"));
         }
         return Ok(polled(
             ", because recorded samples would be too old when they arrive over this link",
@@ -170,6 +170,10 @@ pub fn set_up(
         }
         Err(err) => Err(err),
     }
+}
+
+fn no_recording(why: &str) -> GalilOpenError {
+    GalilOpenError::NoRecording(why.into())
 }
 
 /// The letters of analog inputs 1 to 8 in `_AF` (DMC-1700/1800 user manual, page 159).
@@ -204,7 +208,7 @@ fn start_recording(
         }
     }
     let Some(ring) = ring else {
-        return Err(GalilOpenError::NoRecording("it has no room for arrays".into()));
+        return Err(no_recording("it has no room for arrays"));
     };
     let (a, input) = (settings.axis, INPUTS[usize::from(settings.input - 1) % 8]);
     let arrays = ARRAYS.map(|name| format!("{name}[]")).join(",");
@@ -239,8 +243,7 @@ fn anchor(
         }
         let reply = console.ask(&question)?;
         let Some(status) = reply.numbers().as_deref().and_then(RecordingStatus::read) else {
-            let why = "its answers do not have the expected numbers";
-            return Err(GalilOpenError::NoRecording(why.into()));
+            return Err(no_recording("its answers do not have the expected numbers"));
         };
         count += 1;
         if rough.is_none() && status.next == 0 {
@@ -251,8 +254,7 @@ fn anchor(
         let half = ring / 2;
         let off = (status.next - 1 - linear + half).rem_euclid(ring) - half;
         if off.abs() > 2 {
-            let why = "it does not record at the interval that was set";
-            return Err(GalilOpenError::NoRecording(why.into()));
+            return Err(no_recording("it does not record at the interval that was set"));
         }
         let newest = linear + off;
         let base = status.time - newest * interval;
@@ -261,5 +263,5 @@ fn anchor(
             return Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick });
         }
     }
-    Err(GalilOpenError::NoRecording("its clock and its recording do not agree".into()))
+    Err(no_recording("its clock and its recording do not agree"))
 }

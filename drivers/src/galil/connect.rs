@@ -6,7 +6,7 @@ use super::model::{GalilBoard, GalilOpenError};
 use super::order::{limit_commands, software_limits};
 use super::protocol::GalilParser;
 use super::recording::RecordingPlan;
-use super::sampling::signed;
+use super::sampling::parse_register;
 use super::session::PollPace;
 use super::settings::GalilSettings;
 use super::watchdog;
@@ -180,7 +180,7 @@ fn set_up_axis(
         console.ask(&command)?;
         console.check(&command, "_TM", &[f64::from(us)])?;
     }
-    let motor_type = settings.motor_type.code();
+    let motor_type = f64::from(settings.motor_type as i8);
     if console.number(&format!("_MT{a}"))? != motor_type {
         console.ask(&format!("MO{a}"))?;
         let command = format!("MT{a}={motor_type}");
@@ -188,7 +188,7 @@ fn set_up_axis(
         console.check(&command, &format!("_MT{a}"), &[motor_type])?;
     }
     set_if_readable(console, format!("KS{a}={SMOOTHING}"), &format!("_KS{a}"), &[SMOOTHING])?;
-    let levels = [settings.limits.code(), settings.home.code()];
+    let levels = [settings.limits as i8, settings.home as i8];
     let command = format!("CN {},{}", levels[0], levels[1]);
     set_if_readable(console, command, "_CN0,_CN1", &levels.map(f64::from))?;
     let rate = settings.counts(settings.acceleration.0);
@@ -205,7 +205,7 @@ fn set_up_axis(
     console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max.0)))?;
     // Before homing the axis can be anywhere on its travel, and homing may need all of it.
     let here = console.number(&format!("_TD{a}"))?;
-    let here = settings.sign() * signed(here).unwrap_or(0);
+    let here = settings.sign() * parse_register(here).unwrap_or(0);
     let travel = (settings.travel.0 / settings.mm_per_pulse).round() as i64;
     // Homing searches ten millimetres further than the travel.
     let margin = (10.0 / settings.mm_per_pulse).round() as i64;
@@ -241,7 +241,7 @@ fn set_up_input(
     console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<(), GalilOpenError> {
-    let (input, range) = (settings.input, settings.range.code());
+    let (input, range) = (settings.input, settings.range as u8);
     // A controller that has one range only does not know the command; then it must be the usual +-10 V.
     let command = format!("AQ {input},{range}");
     let reply = console.try_ask(&command)?;

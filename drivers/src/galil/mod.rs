@@ -21,7 +21,7 @@ mod watchdog;
 
 use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::devices::{DeviceKind, Role, find_line};
-use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place};
+use crate::wire::{HostClock, LinkThread, Place};
 use std::sync::Arc;
 
 pub use connect::{Connected, connect};
@@ -68,16 +68,13 @@ impl RigDevice for GalilDevice {
         self.settings.serial_number = connected.board.serial_number;
         self.worst_case_mm = connected.worst_case_mm;
         let session = Session::new(self.settings.clone(), &connected, clock());
-        let line_settings = LinkThreadSettings {
-            device,
-            // The recording ends too, so that the next program finds an idle controller.
-            farewell: format!("ST{};RC 0\r", self.settings.axis).into_bytes(),
-        };
+        // The recording ends too, so that the next program finds an idle controller.
+        let farewell = format!("ST{};RC 0\r", self.settings.axis).into_bytes();
         Ok(Opened {
             description: connected.description,
             newtons_per_volt: None,
             link: Some(connected.link),
-            lines: vec![LinkThread::start(link, session, clock, line_settings)?],
+            lines: vec![LinkThread::start(link, session, clock, device, farewell)?],
             raw: connected.raw,
         })
     }

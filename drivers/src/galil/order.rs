@@ -1,7 +1,7 @@
 //! One command of palpate as commands of the controller, and the answers that must come back.
 
 use super::protocol::GalilReply;
-use super::sampling::signed;
+use super::sampling::parse_register;
 use super::settings::GalilSettings;
 use super::sine::SineFeed;
 use palpate_model::Nanos;
@@ -132,7 +132,7 @@ impl GalilOrder {
         let numbers = std::mem::take(&mut self.numbers);
         let (made, commands) = match (self.command, numbers.as_slice()) {
             (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
-                let target = signed(target).map(|target| settings.sign() * target);
+                let target = parse_register(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
                     return OrderStep::Refused(format!(
                         "it reads back another target than {} pulses",
@@ -157,7 +157,9 @@ impl GalilOrder {
             }
             (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
                 let wanted = software_limits(settings, 0, settings.travel.0);
-                if (signed(forward), signed(reverse)) != (Some(wanted.0), Some(wanted.1)) {
+                if (parse_register(forward), parse_register(reverse))
+                    != (Some(wanted.0), Some(wanted.1))
+                {
                     return OrderStep::Refused(format!(
                         "it reads back software limits {forward} and {reverse} after {} and {} were set",
                         wanted.0, wanted.1

@@ -67,10 +67,6 @@ impl GalilParser {
         *self = Self::default();
     }
 
-    pub fn pending(&self) -> usize {
-        self.reply.len()
-    }
-
     pub fn take(&mut self, byte: u8) -> Option<GalilMessage> {
         if byte & 0x80 != 0 {
             return self.take_unsolicited(byte & 0x7f);

@@ -8,7 +8,7 @@
 //! whether the axis moves when its stop code does not show it, is therefore taken from the question that comes with
 //! every fetch.
 
-use super::sampling::{self, signed, ts, whole};
+use super::sampling::{self, parse_register, parse_whole, ts};
 use super::settings::GalilSettings;
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
@@ -56,11 +56,11 @@ impl RecordingStatus {
         let &[volts, pulses_given, commanded, switches, stop_code, next, time] = numbers else {
             return None;
         };
-        let bits = whole(switches)? as u32;
+        let bits = parse_whole(switches)? as u32;
         Some(Self {
             poll: [volts, pulses_given, commanded, switches, stop_code, time],
-            time: i64::try_from(whole(time)?).ok()?,
-            next: i64::try_from(whole(next)?).ok()?,
+            time: i64::try_from(parse_whole(time)?).ok()?,
+            next: i64::try_from(parse_whole(next)?).ok()?,
             commanded,
             is_moving: bits & ts::MOVING != 0 || pulses_given != commanded,
             is_off: bits & ts::MOTOR_OFF != 0,
@@ -281,7 +281,8 @@ impl ArrayRecording {
                 }
                 self.newest_output = at;
                 self.pulses_given = Some(poll[1]);
-                let is_high = whole(poll[3]).is_some_and(|bits| bits as u32 & ts::MOVING != 0);
+                let is_high =
+                    parse_whole(poll[3]).is_some_and(|bits| bits as u32 & ts::MOVING != 0);
                 self.is_moving = *is_begun || is_high || poll[1] != poll[2];
             }
             out.push(waiting.out);
@@ -309,8 +310,8 @@ impl ArrayRecording {
         settings: &GalilSettings,
     ) -> Option<[f64; 6]> {
         let status = self.status?;
-        let code = whole(stop_code)? as u32;
-        signed(pulses_given)?;
+        let code = parse_whole(stop_code)? as u32;
+        parse_register(pulses_given)?;
         let was_moving = self.is_moving;
         let is_near_motion = status.is_moving || self.earlier.is_some_and(|one| one.is_moving);
         let is_moving = (RUNNING.contains(&code) && is_near_motion)
@@ -320,7 +321,7 @@ impl ArrayRecording {
             || self.pulses_given.is_some_and(|last| last != pulses_given);
         self.pulses_given = Some(pulses_given);
         self.is_moving = is_moving;
-        let mut bits = whole(switches)? as u32 & 0x1f;
+        let mut bits = parse_whole(switches)? as u32 & 0x1f;
         if is_moving {
             bits |= ts::MOVING;
         }

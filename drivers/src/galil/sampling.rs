@@ -87,9 +87,9 @@ impl Sampler {
         let &[volts, pulses_given, commanded, switches, stop_code, time] = numbers else {
             return None;
         };
-        let (switches, stop_code) = (whole(switches)? as u32, whole(stop_code)? as u32);
-        let (pulses_given, commanded) = (signed(pulses_given)?, signed(commanded)?);
-        let time = whole(time)?;
+        let (switches, stop_code) = (parse_whole(switches)? as u32, parse_whole(stop_code)? as u32);
+        let (pulses_given, commanded) = (parse_register(pulses_given)?, parse_register(commanded)?);
+        let time = parse_whole(time)?;
         if !(volts.abs() <= 100.0 && switches < 256 && stop_code < 256) {
             return None;
         }
@@ -153,12 +153,12 @@ fn is_wrapped(last: u64, time: u64) -> bool {
     last.abs_diff(TIME_WRAPS) < WRAP_NEAR && time < WRAP_NEAR
 }
 
-pub fn whole(value: f64) -> Option<u64> {
+pub fn parse_whole(value: f64) -> Option<u64> {
     (value.fract() == 0.0 && (0.0..=4_294_967_295.0).contains(&value)).then_some(value as u64)
 }
 
 /// A position register: 32 bits with a sign.
-pub fn signed(value: f64) -> Option<i64> {
+pub fn parse_register(value: f64) -> Option<i64> {
     (value.fract() == 0.0 && value.abs() <= 2_147_483_648.0).then_some(value as i64)
 }
 

@@ -2,22 +2,14 @@
 
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 
-/// Pulses of the drive (`MT`, Galil application note 2446).
+/// Pulses of the drive: the argument of `MT` (Galil application note 2446).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorType {
     ActiveLow = 2,
     ActiveHigh = -2,
 }
 
-impl MotorType {
-    /// The argument of `MT`.
-    #[must_use]
-    pub fn code(self) -> f64 {
-        f64::from(self as i8)
-    }
-}
-
-/// Range of an analog input (`AQ`; RIO-47xxx user manual, page 38).
+/// Range of an analog input: the second argument of `AQ` (RIO-47xxx user manual, page 38).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnalogRange {
     Bipolar5 = 1,
@@ -27,12 +19,6 @@ pub enum AnalogRange {
 }
 
 impl AnalogRange {
-    /// The second argument of `AQ`.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-
     #[must_use]
     pub const fn span(self) -> Volts {
         Volts(match self {
@@ -55,7 +41,7 @@ impl AnalogRange {
     }
 }
 
-/// The level of a switch's input while the switch is closed.
+/// The level of a switch's input while the switch is closed: the argument of `CN`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Levels {
     /// The switch pulls its input low, the usual wiring.
@@ -64,12 +50,6 @@ pub enum Levels {
 }
 
 impl Levels {
-    /// The argument of `CN`.
-    #[must_use]
-    pub const fn code(self) -> i8 {
-        self as i8
-    }
-
     /// Whether a switch with this level at its input is closed.
     #[must_use]
     pub const fn is_closed(self, is_high: bool) -> bool {

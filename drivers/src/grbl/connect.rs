@@ -46,7 +46,7 @@ pub fn connect(
     let mut console = GrblConsole::open(link, clock, device, Parser::take);
     let welcome_version = wake(&mut console)?;
     let version = identify(&mut console, settings, welcome_version.as_deref())?;
-    let status = to_rest(&mut console)?;
+    let status = wait_for_rest(&mut console)?;
     // Whatever is on that pin opens and closes it while the slide leaves the switch, and each change is an alarm
     // (limits.c, the pin's interrupt).
     if settings.home == HomeSwitch::Probe && status.has_pin(settings.axis) {
@@ -55,7 +55,7 @@ pub fn connect(
     unlock(&mut console, settings, &status)?;
     let values = read_settings(&mut console)?;
     let steps_per_mm = check_settings(settings, &values)?;
-    let status = to_rest(&mut console)?;
+    let status = wait_for_rest(&mut console)?;
     if status.state != GrblState::Idle {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
@@ -143,15 +143,15 @@ fn identify(
     // `error:7` of a memory that was never written is no answer to anything; neither is half a line's. A dollar alone
     // asks for help; at the end of half a motion it makes an error of it, where an end of line would begin it.
     console.write(b"$\n")?;
-    let is_answered = has_ok(console)?;
+    let is_answered = wait_for_ok(console)?;
     // In motion it does not identify itself; held, asleep or behind an open door it takes no line at all.
-    let status = to_rest(console)?;
+    let status = wait_for_rest(console)?;
     if !matches!(status.state, GrblState::Idle | GrblState::Alarm) {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
     if !is_answered {
         console.write([CYCLE_START])?;
-        has_ok(console)?;
+        wait_for_ok(console)?;
     }
     let mut version = None;
     let mut text = String::new();
@@ -179,7 +179,7 @@ fn identify(
     }
 }
 
-fn has_ok(console: &mut GrblConsole<'_>) -> Result<bool, GrblOpenError> {
+fn wait_for_ok(console: &mut GrblConsole<'_>) -> Result<bool, GrblOpenError> {
     let until = console.now() + ANSWER_MAX;
     while let Some(incoming) = console.next_line(until)? {
         if incoming == Incoming::Ok {
@@ -189,7 +189,7 @@ fn has_ok(console: &mut GrblConsole<'_>) -> Result<bool, GrblOpenError> {
     Ok(false)
 }
 
-fn to_rest(console: &mut GrblConsole<'_>) -> Result<GrblStatus, GrblOpenError> {
+fn wait_for_rest(console: &mut GrblConsole<'_>) -> Result<GrblStatus, GrblOpenError> {
     let start = console.now();
     loop {
         let status = console.status()?;

@@ -18,7 +18,7 @@ mod times;
 use crate::device::OpenError;
 use crate::devices::{DeviceKind, Role, find_line};
 use crate::parts::{OpenedAxis, TICK, Track};
-use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings};
+use crate::wire::{HostClock, Link, LinkThread};
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{MmPerS, Seconds, Volts};
 use protocol::{Incoming, JOG_CANCEL};
@@ -67,8 +67,7 @@ pub fn open(
         connect(link.as_mut(), clock, settings, &device)?;
     let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * facts.steps)));
     let session = Session::new(settings.clone(), facts, Arc::clone(&track), stats, clock());
-    let line_settings = LinkThreadSettings { device, farewell: vec![JOG_CANCEL] };
-    let line = LinkThread::start(link, session, clock, line_settings)?;
+    let line = LinkThread::start(link, session, clock, device, vec![JOG_CANCEL])?;
     let description = RigDescription {
         name: settings.name.clone(),
         identity,

@@ -72,7 +72,7 @@ impl JogMotion {
     }
 
     /// 1 or -1 in steps of the board.
-    pub fn side(&self) -> f64 {
+    pub fn direction(&self) -> f64 {
         if self.to < self.from { -1.0 } else { 1.0 }
     }
 
@@ -81,16 +81,16 @@ impl JogMotion {
     }
 
     /// The part of the profile for which jogs were sent: what becomes of it when no more come.
-    pub fn given(&self, mm_per_pulse: f64) -> Profile {
+    pub fn given_profile(&self, mm_per_pulse: f64) -> Profile {
         let way = (self.sent - self.from).abs() as f64 * mm_per_pulse;
         Self::profile(way, &self.wanted)
     }
 
     /// Lead over the profile at these steps, while the axis goes at full speed.
-    pub fn ahead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
+    pub fn lead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
         // A step is reported as soon as it begins, and lasts until the next.
-        let way = ((steps - self.from) as f64 * self.side() + 0.5) * mm_per_pulse;
+        let way = ((steps - self.from) as f64 * self.direction() + 0.5) * mm_per_pulse;
         let ramp = speed / acceleration;
         let phase = ramp + (way - 0.5 * speed * ramp) / speed;
         let since = at.since(self.started?).0 as f64 * 1e-9;

@@ -199,10 +199,6 @@ impl Parser {
             }
         }
     }
-
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
 }
 
 /// An absolute jog in machine coordinates: axis letter, place in mm, speed in mm/min (doc/markdown/jogging.md).

@@ -43,12 +43,8 @@ impl GrblSettings {
     }
 
     /// 0 for `X`, 1 for `Y`, 2 for `Z`.
-    pub const fn index(&self) -> usize {
-        match self.axis {
-            'Y' => 1,
-            'Z' => 2,
-            _ => 0,
-        }
+    pub fn index(&self) -> usize {
+        "XYZ".find(self.axis).unwrap_or(0)
     }
 }
 

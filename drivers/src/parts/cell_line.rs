@@ -75,7 +75,7 @@ impl CellLine {
 
     /// The time at which a cell without a clock sent a sample that came with `newer` ones behind it: the newest just
     /// now, those before it a period apart, or closer where there is less time since the last one.
-    fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
+    fn sending_time(&self, at: Nanos, newer: u64) -> Nanos {
         let newest = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
         // The samples that are left share what is left of the time.
         let apart = self.period.min(Nanos(at.since(newest).0 / (newer + 1)));
@@ -95,7 +95,7 @@ impl CellLine {
                 }
                 // It was taken at any time of its period, and reported on the grid.
                 None => {
-                    (self.laid_back(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
+                    (self.sending_time(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
                 }
             };
             let taken = Nanos(taken.0.saturating_sub(self.delay.0));

@@ -7,7 +7,7 @@ use crate::device::{OpenError, Opened, RigDevice};
 use crate::grbl::{self, GrblSettings};
 use crate::rig::RigEventBody;
 use crate::text::OpenedCell;
-use crate::wire::{HostClock, LinkThread, LinkThreadSettings, Place, lock};
+use crate::wire::{HostClock, LinkThread, Place, lock};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, RawBytes, RigCommand};
 use std::sync::{Arc, Mutex};
@@ -60,8 +60,7 @@ impl RigDevice for SplitRigDevices {
         (self.zero, self.motions_shown) = (0, 0);
         let line =
             CellLine::new(dialogue, (cell.rate, cell.delay), Arc::clone(&self.track), self.start);
-        let line_settings = LinkThreadSettings { device, farewell };
-        let cell_line = LinkThread::start(link, line, clock, line_settings)?;
+        let cell_line = LinkThread::start(link, line, clock, device, farewell)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
         description.tick_nanos = TICK.0;
         description.adc = Some(cell.adc);

@@ -88,7 +88,7 @@ impl Bench {
     /// The axis has moved straight to a true position in a time step.
     pub fn advance(&mut self, axis: Position, dt: Seconds) -> BenchForces {
         let compliance = self.settings.compliance.thousandths();
-        self.probe = if compliance > 0.0 { self.balanced(axis, dt, compliance) } else { axis };
+        self.probe = if compliance > 0.0 { self.solve_probe(axis, dt, compliance) } else { axis };
         let on_probe = self.push(self.probe, dt);
         BenchForces { on_probe, on_cell: on_probe + self.weights }
     }
@@ -97,7 +97,7 @@ impl Bench {
     /// `probe = axis - compliance F(probe)` at the end of the step. Found by bisection with false-position
     /// steps in the bracket (the Illinois rule, Dowell & Jarratt, BIT 11 (1971) 168-174), for the force
     /// within a step grows with depth.
-    fn balanced(&self, axis: Position, dt: Seconds, compliance: f64) -> Position {
+    fn solve_probe(&self, axis: Position, dt: Seconds, compliance: f64) -> Position {
         let miss = |probe: f64| {
             let force = self.clone().push(Position(probe), dt).0;
             probe + compliance * force - axis.0
@@ -131,10 +131,8 @@ impl Bench {
     }
 
     fn push(&mut self, probe: Position, dt: Seconds) -> Newtons {
-        let tissue = match &mut self.specimen {
-            Some(tissue) => tissue.advance(probe, dt),
-            None => Newtons(0.0),
-        };
+        let tissue =
+            self.specimen.as_mut().map_or(Newtons(0.0), |tissue| tissue.advance(probe, dt));
         let into_base = probe.distance_from(self.base).max(0.0);
         tissue + Newtons(BASE_STIFFNESS * into_base)
     }

@@ -40,10 +40,7 @@ pub fn calibration(profile: SimProfile) -> Calibration {
 
 /// The converter of this profile's cell.
 pub fn adc(profile: SimProfile) -> Option<AdcDescription> {
-    match profile {
-        SimProfile::Lab => Some(LAB_ADC),
-        SimProfile::Ideal => None,
-    }
+    (profile == SimProfile::Lab).then_some(LAB_ADC)
 }
 
 /// White noise of the signal at rest, rms.

@@ -143,10 +143,6 @@ impl SimRig {
         }
     }
 
-    pub fn settings(&self) -> SimSettings {
-        self.settings
-    }
-
     /// What the laboratory's calibration of this rig's load cell says.
     pub fn calibration(&self) -> Calibration {
         calibration(self.settings.profile)

@@ -24,8 +24,8 @@ impl Random {
     /// The generator of `cause` under `seed`.
     pub fn new(seed: u64, cause: Cause) -> Self {
         let cause = cause as u64;
-        let high = scrambled(seed ^ scrambled(cause));
-        let low = scrambled(high);
+        let high = scramble(seed ^ scramble(cause));
+        let low = scramble(high);
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), u128::from(cause)))
     }
 
@@ -33,7 +33,7 @@ impl Random {
     pub fn of_specimen(seed: u64, specimen: u64) -> Self {
         match specimen {
             0 => Self::new(seed, Cause::Tissue),
-            _ => Self::new(seed ^ scrambled(specimen), Cause::Tissue),
+            _ => Self::new(seed ^ scramble(specimen), Cause::Tissue),
         }
     }
 
@@ -61,7 +61,7 @@ impl Random {
 
 /// The finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014): neighbouring seeds become
 /// unrelated states.
-fn scrambled(seed: u64) -> u64 {
+fn scramble(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -75,8 +75,8 @@ mod tests {
     #[test]
     fn the_scrambler_is_splitmix64() {
         // First two outputs of SplitMix64 from state 0 (the reference program's test values).
-        assert_eq!(scrambled(0), 0xe220_a839_7b1d_cdaf);
-        assert_eq!(scrambled(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
+        assert_eq!(scramble(0), 0xe220_a839_7b1d_cdaf);
+        assert_eq!(scramble(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
     }
 
     #[test]

@@ -140,10 +140,10 @@ impl Slider {
     /// Whether a motion may begin, or why it may not.
     fn check_begin(&self) -> Result<(), Fault> {
         if !self.is_motor_on {
-            return Err(refused("begin not valid with the motor off, enable it first"));
+            return Err(refusal("begin not valid with the motor off, enable it first"));
         }
         if self.motion.is_some() || self.is_just_ended {
-            return Err(refused(
+            return Err(refusal(
                 "begin not valid while the axis moves, wait until it reports rest",
             ));
         }
@@ -158,7 +158,7 @@ impl Slider {
 
     fn check_direction(&self, way: f64) -> Result<(), Fault> {
         if self.is_blocked(way) {
-            return Err(refused(
+            return Err(refusal(
                 "begin not possible towards a closed limit switch, move the other way",
             ));
         }
@@ -168,19 +168,19 @@ impl Slider {
     fn start_move(&mut self, tick: u64, wanted: MoveTo) -> Result<MoveTo, Fault> {
         self.check_begin()?;
         if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(format!(
+            return Err(refusal(format!(
                 "target {} pulses is out of range, stay within {PULSES_MAX}",
                 wanted.target_pulses
             )));
         }
-        let speed = rounded_down(wanted.speed.0, self.speed_quantum);
+        let speed = round_down(wanted.speed.0, self.speed_quantum);
         if !(speed > 0.0 && speed <= self.speed_max * (1.0 + 1e-12)) {
-            return Err(refused(format!(
+            return Err(refusal(format!(
                 "speed {} is out of range, choose from {} to {} mm/s",
                 wanted.speed, self.speed_quantum, self.speed_max
             )));
         }
-        let acceleration = acceleration_made(wanted.acceleration)?;
+        let acceleration = achievable_acceleration(wanted.acceleration)?;
         let speed = MmPerS(speed);
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
         self.check_direction(target.distance_from(self.position))?;
@@ -192,17 +192,18 @@ impl Slider {
 
     fn start_oscillation(&mut self, tick: u64, wanted: Oscillation) -> Result<Oscillation, Fault> {
         self.check_begin()?;
-        let made = Oscillation { acceleration: acceleration_made(wanted.acceleration)?, ..wanted };
+        let made =
+            Oscillation { acceleration: achievable_acceleration(wanted.acceleration)?, ..wanted };
         let start = self.pulses_at(self.position);
         let far = made.amplitude_pulses.saturating_mul(2);
         if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
-            return Err(refused(format!(
+            return Err(refusal(format!(
                 "an amplitude of {} pulses from {start} is out of range, stay within {PULSES_MAX}",
                 made.amplitude_pulses
             )));
         }
         let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
-        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refused)?;
+        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refusal)?;
         self.check_direction(made.amplitude_pulses as f64)?;
         self.begin(tick, Course::Sine(sine), start);
         Ok(made)
@@ -244,10 +245,10 @@ impl Slider {
 
     fn define(&mut self, pulses: i64) -> Result<(), Fault> {
         if self.motion.is_some() {
-            return Err(refused("position cannot be defined while the axis moves, stop it first"));
+            return Err(refusal("position cannot be defined while the axis moves, stop it first"));
         }
         if pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(format!(
+            return Err(refusal(format!(
                 "position {pulses} pulses is out of range, stay within {PULSES_MAX}"
             )));
         }
@@ -298,12 +299,12 @@ impl Slider {
 }
 
 /// The acceleration that the controller sets for a wish.
-fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
-    let made = rounded_down(wanted.0, ACCELERATION_QUANTUM.0);
+fn achievable_acceleration(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
+    let made = round_down(wanted.0, ACCELERATION_QUANTUM.0);
     if made > 0.0 && made.is_finite() {
         Ok(MmPerS2(made))
     } else {
-        Err(refused(format!(
+        Err(refusal(format!(
             "acceleration {wanted} is out of range, choose at least {ACCELERATION_QUANTUM}"
         )))
     }
@@ -311,10 +312,10 @@ fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
 
 /// The largest multiple of a quantum not above a wish. A wish that misses a multiple only by
 /// decimal rounding (1e-6 of a quantum) gets that multiple.
-fn rounded_down(wanted: f64, quantum: f64) -> f64 {
+fn round_down(wanted: f64, quantum: f64) -> f64 {
     (wanted / quantum + 1e-6).floor() * quantum
 }
 
-fn refused(detail: impl Into<String>) -> Fault {
+fn refusal(detail: impl Into<String>) -> Fault {
     Fault::CommandRefused { detail: detail.into() }
 }

@@ -60,7 +60,7 @@ impl Place {
                     .timeout(Duration::from_millis(1))
                     .open()
                     .map_err(|err| port_error(port, &err))?;
-                Ok(Box::new(SerialLink::new(opened)))
+                Ok(Box::new(SerialLink(opened)))
             }
             Self::Tcp(address) => {
                 let wrong =
@@ -86,20 +86,20 @@ fn port_error(port: &str, err: &serialport::Error) -> WireError {
     use serialport::ErrorKind as Kind;
     let port = port.to_owned();
     match err.kind() {
-        Kind::Io(ErrorKind::NotFound) => WireError::Missing { port, present: present() },
+        Kind::Io(ErrorKind::NotFound) => WireError::Missing { port, present: port_list() },
         Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
         Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
         // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
         // port"; on Windows a missing port has it too, with other words.
         Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
         Kind::NoDevice if !std::path::Path::new(&port).exists() => {
-            WireError::Missing { port, present: present() }
+            WireError::Missing { port, present: port_list() }
         }
         _ => WireError::Port { port, detail: err.to_string() },
     }
 }
 
-fn present() -> String {
+fn port_list() -> String {
     match list_ports() {
         Ok(ports) if ports.is_empty() => "none".to_owned(),
         Ok(ports) => ports

@@ -22,24 +22,17 @@ pub trait Link: Send {
 /// this long is stuck.
 pub const WRITE_MAX: Duration = Duration::from_millis(250);
 
-fn gone() -> io::Error {
+fn hung_up_error() -> io::Error {
     io::Error::new(ErrorKind::UnexpectedEof, "the device has hung up")
 }
 
-pub struct SerialLink(Box<dyn SerialPort>);
-
-impl SerialLink {
-    #[must_use]
-    pub fn new(port: Box<dyn SerialPort>) -> Self {
-        Self(port)
-    }
-}
+pub struct SerialLink(pub Box<dyn SerialPort>);
 
 impl Link for SerialLink {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.0.set_timeout(wait)?;
         match self.0.read(buffer) {
-            Ok(0) => Err(gone()),
+            Ok(0) => Err(hung_up_error()),
             Ok(count) => Ok(count),
             Err(err) if matches!(err.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
             Err(err) => Err(err),
@@ -96,7 +89,7 @@ impl<S: AsFd + Read + Write + Send> Link for SocketLink<S> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.wait(PollFlags::IN, wait)?;
         match self.0.read(buffer) {
-            Ok(0) => Err(gone()),
+            Ok(0) => Err(hung_up_error()),
             Ok(count) => Ok(count),
             Err(err) if matches!(err.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 Ok(0)
@@ -110,7 +103,7 @@ impl<S: AsFd + Read + Write + Send> Link for SocketLink<S> {
         let mut is_second_try = false;
         while !rest.is_empty() {
             match self.0.write(rest) {
-                Ok(0) => return Err(gone()),
+                Ok(0) => return Err(hung_up_error()),
                 Ok(count) => {
                     rest = &rest[count..];
                     is_second_try = false;

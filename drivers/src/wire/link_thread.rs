@@ -28,14 +28,6 @@ const PIECES_MAX: usize = 65_536;
 /// Longest read, in bytes.
 const CHUNK: usize = 4096;
 
-#[derive(Clone, Debug)]
-pub struct LinkThreadSettings {
-    /// The device's name in the log of raw bytes, such as `controller`; the thread is called so too.
-    pub device: Arc<str>,
-    /// Bytes written when the line is closed, such as a stop.
-    pub farewell: Vec<u8>,
-}
-
 /// A command with the number of stops that were sent before it.
 pub(super) type NumberedCommand = (u64, RigCommand);
 
@@ -82,11 +74,14 @@ pub struct LinkThread {
 }
 
 impl LinkThread {
+    /// `device` is the name of the device in the log of raw bytes and of the thread; `farewell` is written when the link is
+    /// closed, such as a stop.
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,
         clock: &HostClock,
-        settings: LinkThreadSettings,
+        device: Arc<str>,
+        farewell: Vec<u8>,
     ) -> Result<Self, OpenError> {
         let (stops, urgent) = sync_channel(COMMANDS_MAX);
         let (commands, queued) = sync_channel(COMMANDS_MAX);
@@ -99,13 +94,13 @@ impl LinkThread {
             Condvar::new(),
         ));
         let is_closing = Arc::new(AtomicBool::new(false));
-        let device = Arc::clone(&settings.device);
         let counters = Arc::new(StopCounters::default());
         let mut owner = LinkOwner {
             link,
             dialogue,
             clock: Arc::clone(clock),
-            settings,
+            device: Arc::clone(&device),
+            farewell,
             urgent,
             queued,
             arrived: VecDeque::new(),
@@ -121,7 +116,7 @@ impl LinkThread {
             .name(device.to_string())
             .spawn(move || {
                 mark_link_owner();
-                let _in = tracing::info_span!("device", name = &*owner.settings.device).entered();
+                let _in = tracing::info_span!("device", name = &*owner.device).entered();
                 tracing::info!("connected");
                 owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
                 owner.run(&closing);
@@ -206,7 +201,8 @@ struct LinkOwner<D> {
     link: Box<dyn Link>,
     dialogue: D,
     clock: HostClock,
-    settings: LinkThreadSettings,
+    device: Arc<str>,
+    farewell: Vec<u8>,
     urgent: Receiver<NumberedCommand>,
     queued: Receiver<NumberedCommand>,
     /// Taken out of `queued`, not looked at.
@@ -225,7 +221,7 @@ impl<D> Drop for LinkOwner<D> {
     /// other thread has the link; the work that was deferred is done after that.
     fn drop(&mut self) {
         if std::thread::panicking() {
-            let _ = self.link.write(&self.settings.farewell);
+            let _ = self.link.write(&self.farewell);
             run_deferred_work();
             let failed = link_lost("the driver has failed; open the rig again");
             self.events.push(RigEvent::new((self.clock)(), failed));
@@ -257,7 +253,7 @@ impl<D: Dialogue> LinkOwner<D> {
     fn run(&mut self, is_closing: &AtomicBool) {
         let ending = loop {
             if is_closing.load(Ordering::Relaxed) {
-                let farewell = self.settings.farewell.clone();
+                let farewell = self.farewell.clone();
                 // The link may be gone already; then nothing can be written.
                 let _ = self.write(farewell);
                 tracing::info!("closed");
@@ -339,7 +335,7 @@ impl<D: Dialogue> LinkOwner<D> {
     }
 
     fn tap(&mut self, at: Nanos, is_sent: bool, bytes: Vec<u8>) {
-        self.raw.push(RawBytes { at, device: Arc::clone(&self.settings.device), is_sent, bytes });
+        self.raw.push(RawBytes { at, device: Arc::clone(&self.device), is_sent, bytes });
     }
 
     /// Hands over events and bytes, unless they are being read at this moment: the thread that writes stops never

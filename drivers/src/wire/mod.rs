@@ -15,7 +15,7 @@ pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS
 pub use dialogue::{AnswerQueue, Dialogue, LinkStats};
 pub use halt::{HaltHandle, after_farewell};
 pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, pair};
-pub use link_thread::{LinkThread, LinkThreadSettings};
+pub use link_thread::LinkThread;
 pub use setup_console::SetupConsole;
 
 use palpate_model::Nanos;

@@ -27,7 +27,7 @@ impl Session {
             let started = Nanos(now.0.saturating_sub(self.facts.round_trip.0 / 2)).max(written);
             motion.started = Some(started);
             let from = sign * motion.from as f64;
-            let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
+            let pulses_per_mm = sign * motion.direction() / self.settings.mm_per_pulse;
             let (profile, owed, wanted) = (motion.profile, motion.owed.take(), motion.wanted);
             self.track().begin_motion(started, from, profile, pulses_per_mm);
             if let Some(number) = owed {
@@ -230,7 +230,7 @@ impl Session {
             return self.cancel(now);
         }
         let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);
-        if let Some(ahead) = motion.ahead(sampled, steps, self.settings.mm_per_pulse) {
+        if let Some(ahead) = motion.lead(sampled, steps, self.settings.mm_per_pulse) {
             let step = self.settings.mm_per_pulse / motion.wanted.speed.0;
             self.feed_correction.update(queried_at, now, ahead.0, step);
         }

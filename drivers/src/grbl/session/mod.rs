@@ -198,7 +198,7 @@ impl Session {
     }
 
     fn is_outwards(&self, motion: &JogMotion) -> bool {
-        motion.side() * self.settings.sign() as f64 > 0.0
+        motion.direction() * self.settings.sign() as f64 > 0.0
     }
 
     fn poll_every(&self, now: Nanos) -> Nanos {

@@ -83,12 +83,12 @@ impl Session {
         let Some(motion) = self.motion.take() else {
             return;
         };
-        let given = motion.given(self.settings.mm_per_pulse);
+        let given = motion.given_profile(self.settings.mm_per_pulse);
         let sign = self.settings.sign() as f64;
         match (motion.started, self.open) {
             (Some(_), _) if !motion.is_braking => self.track().shorten_motion(given),
             (None, Some(written)) => {
-                let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
+                let pulses_per_mm = sign * motion.direction() / self.settings.mm_per_pulse;
                 let from = sign * motion.from as f64;
                 // It may have begun without an answer.
                 self.track().begin_motion(written.min(now), from, given, pulses_per_mm);

@@ -29,7 +29,7 @@ use super::protocol::GaugeLine;
 use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file;
-use crate::wire::{HostClock, Link, LinkThread, LinkThreadSettings, Place};
+use crate::wire::{HostClock, Link, LinkThread, Place};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 use std::sync::Arc;
 
@@ -102,9 +102,9 @@ pub fn open(
     let device: Arc<str> = "stand".into();
     let connected = connect(link.as_mut(), clock, settings, &device)?;
     let session = StandSession::new(settings.clone(), &connected, clock());
-    let line_settings = LinkThreadSettings { device, farewell: protocol::STOP.into() };
+    let farewell = protocol::STOP.into();
     Ok(Opened {
-        lines: vec![LinkThread::start(link, session, clock, line_settings)?],
+        lines: vec![LinkThread::start(link, session, clock, device, farewell)?],
         description: connected.description,
         // The gauge reads newtons, each of which counts as a volt.
         newtons_per_volt: Some(1.0),

@@ -98,8 +98,9 @@ fn clock() -> HostClock {
     Arc::new(move || Nanos(count.fetch_add(1_000, Ordering::Relaxed)))
 }
 
-fn settings() -> LinkThreadSettings {
-    LinkThreadSettings { device: "controller".into(), farewell: b"bye".to_vec() }
+fn start(link: impl Link + 'static, notes: Notes) -> LinkThread {
+    LinkThread::start(Box::new(link), notes, &clock(), "controller".into(), b"bye".to_vec())
+        .unwrap()
 }
 
 const WAIT: Duration = Duration::from_secs(20);
@@ -123,7 +124,7 @@ fn stops_overtake_waiting_commands() {
     let notes = Notes::default();
     let heard = Arc::clone(&notes.heard);
     let gate = Gate { inner: here, waits, go_on };
-    let mut line = LinkThread::start(Box::new(gate), notes, &clock(), settings()).unwrap();
+    let mut line = start(gate, notes);
     waiting.recv().unwrap();
     let define = RigCommand::DefinePosition { pulses: 3 };
     line.send(define).unwrap();
@@ -146,8 +147,7 @@ fn stops_overtake_waiting_commands() {
 #[test]
 fn stop_does_not_wait_for_a_reader_of_reports() {
     let (here, mut there) = super::super::pair();
-    let mut line =
-        LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line = start(here, Notes::default());
     let reports = Arc::clone(&line.reports);
     let reading = reports.0.lock().unwrap();
     // Something to report comes first, so that the thread has wanted to hand it over.
@@ -164,7 +164,7 @@ fn stop_does_not_wait_for_a_reader_of_reports() {
 #[test]
 fn events_are_reported_in_order_and_a_lost_link_last() {
     let (here, mut there) = super::super::pair();
-    let line = LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let line = start(here, Notes::default());
     there.write(b"ab").unwrap();
     let late = Nanos(u64::MAX);
     for _ in 0..2 {
@@ -182,7 +182,7 @@ fn events_are_reported_in_order_and_a_lost_link_last() {
 fn a_driver_that_fails_is_a_lost_link() {
     let (here, mut there) = super::super::pair();
     let notes = Notes { fails_at: Some(b'!'), ..Notes::default() };
-    let line = LinkThread::start(Box::new(here), notes, &clock(), settings()).unwrap();
+    let line = start(here, notes);
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
     assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
@@ -193,8 +193,7 @@ fn a_driver_that_fails_is_a_lost_link() {
 #[test]
 fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
     let (here, mut there) = super::super::pair();
-    let mut line =
-        LinkThread::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line = start(here, Notes::default());
     let handle = line.halt_handle().unwrap();
     assert!(handle.halt(WAIT) && handle.written() == 1);
     assert_eq!(read(&mut there, 5), b"Halt\r");
@@ -233,8 +232,7 @@ fn what_waits_for_a_farewell_comes_after_it() {
             self.0.write(bytes)
         }
     }
-    let _line =
-        LinkThread::start(Box::new(EventLink(here, events)), notes, &clock(), settings()).unwrap();
+    let _line = start(EventLink(here, events), notes);
     there.write(b"!").unwrap();
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "written");
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "deferred");

@@ -37,17 +37,11 @@ impl StandSession {
                     self.status = Some(status);
                 }
             }
-            StandQuestion::Speed(tenths) => {
+            StandQuestion::Value { what, per_unit, expected } => {
                 if let Some(found) = number(line) {
                     self.answered(now);
-                    self.check(now, (found * 10.0).round() as i64 == tenths, line, "speed");
-                }
-            }
-            StandQuestion::Limit(hundredths) => {
-                if let Some(found) = number(line) {
-                    self.answered(now);
-                    let is_right = (found * 100.0).round() as i64 == hundredths;
-                    self.check(now, is_right, line, "travel limit");
+                    let is_right = (found * per_unit).round() as i64 == expected;
+                    self.check(now, is_right, line, what);
                 }
             }
         }

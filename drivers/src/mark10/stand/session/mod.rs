@@ -47,10 +47,12 @@ pub struct StandPace {
 enum StandQuestion {
     Sample,
     Status,
-    /// The speed as it was set, in tenths of mm/min.
-    Speed(i64),
-    /// A limit as it was set, in hundredths of mm.
-    Limit(i64),
+    /// A value that was set: its name, steps per unit (mm/min or mm), and the steps that were set.
+    Value {
+        what: &'static str,
+        per_unit: f64,
+        expected: i64,
+    },
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -220,9 +222,10 @@ impl StandSession {
         };
         let stand_move = StandMove { command: to, target, from: self.travel };
         let letter = if is_upper { "u" } else { "d" };
+        let value = |what, per_unit, expected| StandQuestion::Value { what, per_unit, expected };
         let steps = VecDeque::from([
-            (format!("{speed}a"), Some(StandQuestion::Speed(tenths))),
-            (format!("{limit}{}", ask_limit(is_upper)), Some(StandQuestion::Limit(target))),
+            (format!("{speed}a"), Some(value("speed", 10.0, tenths))),
+            (format!("{limit}{}", ask_limit(is_upper)), Some(value("travel limit", 100.0, target))),
             (letter.to_owned(), None),
         ]);
         self.motion = Motion::Setting(stand_move, steps);
