@@ -19,6 +19,7 @@ struct LastStamp {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardTime {
+    /// A line that came twice.
     Repeated,
     /// The board's time.
     At(Nanos),

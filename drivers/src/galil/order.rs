@@ -22,6 +22,7 @@ enum Stage {
 #[derive(Clone, Debug, PartialEq)]
 pub enum OrderStep {
     Wait,
+    /// Send these, each answered by a prompt.
     Send(Vec<String>),
     /// Send these, and behind them ask for a sample.
     SendAndSample(Vec<String>),

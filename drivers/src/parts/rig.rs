@@ -79,6 +79,7 @@ impl RigDevice for SplitRigDevices {
         })
     }
 
+    /// Adds the position and state of the axis at the time of the sample.
     fn complete(&mut self, now: Nanos, body: RigEventBody) -> RigEventBody {
         let track = lock(&self.track);
         match body {

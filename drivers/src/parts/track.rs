@@ -61,6 +61,7 @@ impl Track {
         self.pieces.push_back(piece);
     }
 
+    /// The axis rests from then on.
     pub fn begin_rest(&mut self, from: Nanos, pulses: i64) {
         let (pulses, motion) = (pulses as f64, self.motion);
         self.push(TrackPiece { from, pulses, motion, ..TrackPiece::default() });
@@ -78,6 +79,7 @@ impl Track {
         });
     }
 
+    /// Brakes the motion under way from then on.
     pub fn begin_braking(&mut self, from: Nanos) {
         let Some((last, profile, pulses_per_mm)) = self.motion_under_way() else {
             return;

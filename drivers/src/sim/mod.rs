@@ -67,6 +67,7 @@ pub struct Truth {
     pub base: Position,
     /// Where the pulse counter reads zero, in mm from the edge of the home switch.
     pub counter_zero: Position,
+    /// Parameters of the specimen mounted last.
     pub body: ModifiedKelvin,
     pub force: Newtons,
 }

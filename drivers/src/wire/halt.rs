@@ -29,6 +29,7 @@ pub struct HaltHandle {
 }
 
 impl HaltHandle {
+    /// Count of stops that are on the wire.
     pub fn written(&self) -> u64 {
         self.counters.written.load(Ordering::Acquire)
     }

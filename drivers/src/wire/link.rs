@@ -48,6 +48,7 @@ impl Link for SerialLink {
 /// A link over a socket.
 pub struct SocketLink<S>(S);
 
+/// A TCP connection that sends each write at once.
 pub type TcpLink = SocketLink<TcpStream>;
 
 /// One end of a wire within the program, for tests and demonstrations; dropping it unplugs the other end.

@@ -64,6 +64,7 @@ type Shared = Arc<(Mutex<Reports>, Condvar)>;
 /// A dialogue on a link, in a thread of its own. Dropping it writes the farewell and closes the link.
 pub struct LinkThread {
     device: Arc<str>,
+    /// Taken before commands that wait.
     stops: SyncSender<NumberedCommand>,
     commands: SyncSender<NumberedCommand>,
     /// Stops sent and stops written, shared with halt handles.
@@ -74,8 +75,8 @@ pub struct LinkThread {
 }
 
 impl LinkThread {
-    /// `device` is the name of the device in the log of raw bytes and of the thread; `farewell` is written when the link is
-    /// closed, such as a stop.
+    /// `device` is the name of the device in the log of raw bytes and of the thread; `farewell` is written when the
+    /// link is closed, such as a stop.
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,

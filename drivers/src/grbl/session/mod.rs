@@ -56,9 +56,11 @@ pub struct Session {
     polled: Option<Nanos>,
     heard_at: Nanos,
     looked_at: Nanos,
+    /// Stops that a status after them confirms.
     stops: Vec<(u64, RigCommand, Nanos)>,
     reset_pending: Option<PendingReset>,
     state: GrblState,
+    /// Why only stops are still executed.
     locked: Option<String>,
     attended_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,

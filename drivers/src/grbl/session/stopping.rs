@@ -27,6 +27,7 @@ impl Session {
         self.motion.as_mut()?.owed.take()
     }
 
+    /// Brakes whatever moves.
     pub(super) fn cancel(&mut self, now: Nanos) {
         self.urgent.push_back(vec![JOG_CANCEL]);
         if let Some(motion) = &mut self.motion {

@@ -25,6 +25,7 @@ const QUIET: Nanos = Nanos::from_millis(40);
 const QUIET_LOST: Nanos = Nanos::from_millis(1_000);
 /// The link counts as dead after so many garbled answers in a row; a lost answer counts for two.
 const LOST_MAX: u32 = 3;
+/// After so many the crosshead is stopped.
 const GARBLED_MAX: u32 = 2;
 /// Interval of questions for the crosshead's state while it moves without a new travel, and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
@@ -96,6 +97,7 @@ pub struct StandSession {
     lost_answers: u32,
     stop_due: bool,
     stopped_at: Option<Nanos>,
+    /// Stops that the next answer confirms.
     unconfirmed: Vec<RigCommand>,
     orders: VecDeque<RigCommand>,
     motion: Motion,
