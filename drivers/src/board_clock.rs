@@ -7,26 +7,23 @@ const FAST_MAX: f64 = 0.02;
 /// Lines of an earlier moment may arrive in one go with that of now.
 const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
 
-/// What a board told last.
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastStamp {
     ticks: u32,
-    /// The same without wraps and restarts.
+    /// Time without wraps and restarts.
     time: Nanos,
-    /// Arrival of that.
     at: Nanos,
     /// Board's time and host's when counting began.
     from: (Nanos, Nanos),
 }
 
-/// What a stamp means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BoardTime {
-    /// It was told before: a line that came twice.
+    /// A line that came twice.
     Repeated,
     /// The board's time.
     At(Nanos),
-    /// The same, of a board that has counted from the beginning since the stamp before.
+    /// The board's time, after a restart since the stamp before.
     Restarted(Nanos),
 }
 
@@ -34,22 +31,21 @@ pub enum BoardTime {
 #[derive(Clone, Copy, Debug)]
 pub struct BoardClock {
     nanos_per_tick: u64,
-    last: Option<Last>,
+    last: Option<LastStamp>,
 }
 
 impl BoardClock {
-    /// One of 32 bits that has told nothing yet.
+    /// One of 32 bits.
     #[must_use]
     pub const fn new(nanos_per_tick: u64) -> Self {
         Self { nanos_per_tick, last: None }
     }
 
-    /// The time of a stamp that has arrived now.
     pub fn take(&mut self, now: Nanos, ticks: u32) -> BoardTime {
         let Some(last) = self.last else {
-            // The first count of the board is its time; whatever came before is nobody's business.
+            // The first count of the board is its time.
             let time = Nanos(u64::from(ticks) * self.nanos_per_tick);
-            self.last = Some(Last { ticks, time, at: now, from: (time, now) });
+            self.last = Some(LastStamp { ticks, time, at: now, from: (time, now) });
             return BoardTime::At(time);
         };
         let step = ticks.wrapping_sub(last.ticks);
@@ -62,7 +58,7 @@ impl BoardClock {
         if run > host * (1.0 + FAST_MAX) + AHEAD_MAX.0 as f64 {
             return BoardTime::Restarted(self.restart(now, ticks));
         }
-        self.last = Some(Last { ticks, time, at: now, ..last });
+        self.last = Some(LastStamp { ticks, time, at: now, ..last });
         BoardTime::At(time)
     }
 
@@ -72,7 +68,7 @@ impl BoardClock {
             return Nanos::ZERO;
         };
         let time = Nanos(last.time.0 + now.since(last.at).0.max(1));
-        *last = Last { ticks, time, at: now, from: (time, now) };
+        *last = LastStamp { ticks, time, at: now, from: (time, now) };
         time
     }
 }

@@ -1,9 +1,9 @@
-//! A load cell on a wire of its own: what every such device gives, whatever it speaks.
+//! A load cell on a link of its own: what every such device provides, whatever its protocol.
 
-use crate::text::{DeviceError, Lines, OpenedCell, Taken};
+use crate::text::{DeviceError, Lines, Taken};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
-use palpate_model::rig::AdcDescription;
+use palpate_model::rig::{AdcDescription, RawBytes};
 use palpate_model::units::Volts;
 use std::collections::VecDeque;
 use std::fmt::Debug;
@@ -11,19 +11,16 @@ use std::sync::Arc;
 
 /// Values that may wait to be taken: a minute at 80 a second, 15 s at the fastest rate of a gauge.
 const SAMPLES_MAX: usize = 4_800;
-/// Troubles that may wait to be told.
 const TROUBLES_MAX: usize = 16;
 
-/// One value of a load cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellSample {
     /// Arrival of its last byte on the host's clock.
     pub at: Nanos,
     /// The device's own clock when it was taken, where it has one; it never goes back and never wraps.
     pub device_time: Option<Nanos>,
-    /// As the device counts.
     pub counts: i32,
-    /// The same in volts. A gauge that tells newtons counts as one volt a newton.
+    /// The same in volts. A gauge that reads newtons counts as one volt per newton.
     pub volts: Volts,
 }
 
@@ -32,21 +29,39 @@ pub struct CellSample {
 pub struct CellDescription {
     /// Model, firmware and settings, for the operator and the log.
     pub identity: String,
-    /// Range and step of its counts.
     pub adc: AdcDescription,
-    /// Standard deviation of its values at rest, as far as is known.
+    /// Standard deviation at rest, as far as is known.
     pub noise_expected: Volts,
-    /// Values a second.
+    /// Values per second.
     pub rate: f64,
-    /// How long before it was sent a value was felt: half of the time that its filter looks back.
+    /// Age of a value when it is sent: half of the time that the filter of the device looks back.
     pub delay: Nanos,
-    /// Newtons of a volt where the device itself is calibrated, as a force gauge is.
+    /// Newtons per volt where the device itself is calibrated, as a force gauge is.
     pub newtons_per_volt: Option<f64>,
+}
+
+/// A cell counts as gone when so many values in a row have not come, and at least a second.
+const VALUES_MISSED: f64 = 5.0;
+
+/// Longest silence of a cell with so many values per second.
+pub(crate) fn silence_max(rate: f64) -> Nanos {
+    Nanos::from_millis(1_000).max(Nanos((VALUES_MISSED * 1e9 / rate) as u64))
+}
+
+/// A load cell that has been identified and set up.
+pub struct OpenedCell {
+    pub description: CellDescription,
+    /// It sends values from now on.
+    pub dialogue: Box<dyn CellDialogue>,
+    /// Bytes exchanged, by the host's clock.
+    pub raw: Vec<RawBytes>,
+    /// Written when the link is closed, so that the device falls silent; may be empty.
+    pub farewell: Vec<u8>,
 }
 
 /// A load cell beside an axis, as its rig file describes it.
 pub trait CellDevice: Debug + Send + Sync {
-    /// Makes sure who answers on a link, sets it up and lets it send. `name` is what the log of bytes calls it.
+    /// Checks the identity of the device on a link, sets it up and lets it send. `name` stands in the log of bytes.
     fn open(
         &self,
         link: &mut dyn Link,
@@ -57,17 +72,15 @@ pub trait CellDevice: Debug + Send + Sync {
 
 /// A load cell that sends values by itself, in progress. It must neither wait nor read a clock.
 pub trait CellDialogue: Send {
-    /// Bytes have arrived.
     fn received(&mut self, now: Nanos, bytes: &[u8]);
 
     /// The oldest value not taken yet.
     fn take_sample(&mut self) -> Option<CellSample>;
 
-    /// What went wrong since this was last asked, in words: a restart, a value out of range. Garbled lines are counted,
-    /// not told one by one.
+    /// What went wrong since the last call, in words: a restart, a value out of range. Garbled lines are only counted.
     fn take_trouble(&mut self) -> Option<String>;
 
-    /// Lines that were no values.
+    /// Count of lines that were not values.
     fn garbled(&self) -> u64;
 
     /// Why the device counts as gone, if it does.
@@ -83,28 +96,43 @@ pub trait CellProtocol: Send {
     fn is_dead(&self, now: Nanos, newest: Nanos) -> Option<String>;
 }
 
-/// What a load cell has told and nobody has taken.
+/// Values and troubles of a load cell that wait to be taken.
 pub struct CellReports {
     samples: VecDeque<CellSample>,
     troubles: VecDeque<String>,
     newest: Nanos,
+    is_beyond_range: bool,
 }
 
 impl CellReports {
-    /// One more value. Where there is no room left the oldest goes.
-    pub fn sample(&mut self, sample: CellSample) {
-        self.newest = sample.at;
+    /// Adds a value that has arrived now. Without room the oldest one goes.
+    pub fn push_counts(
+        &mut self,
+        now: Nanos,
+        device_time: Option<Nanos>,
+        counts: i32,
+        volts_per_count: f64,
+    ) {
+        self.newest = now;
         if self.samples.len() >= SAMPLES_MAX {
             self.samples.pop_front();
         }
-        self.samples.push_back(sample);
+        let volts = Volts(f64::from(counts) * volts_per_count);
+        self.samples.push_back(CellSample { at: now, device_time, counts, volts });
     }
 
-    /// Something that the operator has to hear.
-    pub fn trouble(&mut self, words: &str) {
+    pub fn push_trouble(&mut self, words: &str) {
         if self.troubles.len() < TROUBLES_MAX {
             self.troubles.push_back(words.to_owned());
         }
+    }
+
+    /// Reports the first of several values beyond the range.
+    pub fn set_beyond_range(&mut self, is_beyond: bool, words: &str) {
+        if is_beyond && !self.is_beyond_range {
+            self.push_trouble(words);
+        }
+        self.is_beyond_range = is_beyond;
     }
 }
 
@@ -117,19 +145,15 @@ pub struct LineCell<P> {
 }
 
 impl<P: CellProtocol> LineCell<P> {
-    /// Goes on with a cell from `now`.
     #[must_use]
-    pub fn on(protocol: P, now: Nanos) -> Self {
-        Self {
-            protocol,
-            lines: Lines::default(),
-            reports: CellReports {
-                samples: VecDeque::new(),
-                troubles: VecDeque::new(),
-                newest: now,
-            },
-            garbled: 0,
-        }
+    pub fn start(protocol: P, now: Nanos) -> Self {
+        let reports = CellReports {
+            samples: VecDeque::new(),
+            troubles: VecDeque::new(),
+            newest: now,
+            is_beyond_range: false,
+        };
+        Self { protocol, lines: Lines::default(), reports, garbled: 0 }
     }
 }
 

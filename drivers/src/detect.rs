@@ -1,11 +1,11 @@
-//! Who is at the other end of a link: one question that moves nothing, and what each device says to it.
+//! Detection of the device on a link: one question that moves nothing, and the answer of each device to it.
 //!
 //! The question is `?` and an end of line. Grbl reports its status to the `?`, before the line is even read
-//! (gnea/grbl, doc/markdown/interface.md); a Mark-10 gauge tells its reading (GCL2, Series 5 user's guide, page 17); the
-//! load cell on an HX711 tells its header; a Galil controller refuses the command with a `?` of its own (DMC-1700/1800
-//! user manual, chapter 5), after which it may be asked for its revision (`^R^V`).
+//! (gnea/grbl, doc/markdown/interface.md); a Mark-10 gauge sends its reading (GCL2, Series 5 user's guide, page 17);
+//! the load cell on an HX711 sends its header; a Galil controller refuses the command with a `?` of its own
+//! (DMC-1700/1800 user manual, chapter 5), after which it may be asked for its revision (`^R^V`).
 
-use crate::devices::{DeviceKind, lines_of};
+use crate::devices::{DeviceKind, split_lines};
 use crate::galil::{self, GalilBoard};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
@@ -13,32 +13,27 @@ use std::fmt;
 use std::io;
 use std::time::Duration;
 
-/// A device may be talking already, or starting anew because its port was opened, as an Arduino does for 1.5 s.
+/// A device may be sending already, or restarting because its port was opened, as an Arduino does for 1.5 s.
 const LISTEN: Nanos = Nanos::from_millis(2_000);
-/// An answer takes longer on no link.
 const ANSWER_MAX: Nanos = Nanos::from_millis(700);
-/// Longest single wait for bytes.
 const READ_MAX: Duration = Duration::from_millis(5);
 /// More than any of these devices says; what comes after it is not looked at.
 const BYTES_MAX: usize = 4096;
-/// So much of what was heard is shown.
 const SHOWN_MAX: usize = 80;
 
-/// What answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A device that palpate drives: its word in a rig file, its introduction, and what it said of itself.
+    /// A device that palpate drives: its word in a rig file, its introduction, and its own words.
     Device(&'static str, &'static str, String),
-    /// Something that palpate does not know, by what it said.
+    /// A device that palpate does not know, by its answer.
     Unknown(String),
-    /// Nothing answers.
     Silent,
 }
 
 impl Found {
-    fn of(kind: &'static DeviceKind, said: &str) -> Self {
-        let said = said.chars().take(SHOWN_MAX).collect();
-        Self::Device(kind.word, kind.introduction, said)
+    fn from_kind(kind: &'static DeviceKind, text: &str) -> Self {
+        let text = text.chars().take(SHOWN_MAX).collect();
+        Self::Device(kind.word, kind.introduction, text)
     }
 
     /// The word for it in a rig file, if palpate drives it.
@@ -53,74 +48,74 @@ impl Found {
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Device(_, introduction, said) => write!(f, "{introduction}{said}"),
-            Self::Unknown(said) => write!(f, "unknown, says \"{said}\""),
+            Self::Device(_, introduction, text) => write!(f, "{introduction}{text}"),
+            Self::Unknown(text) => write!(f, "unknown, says \"{text}\""),
             Self::Silent => f.write_str("silent at this baud rate"),
         }
     }
 }
 
-/// Listens, asks, and tells who it is. Nothing moves: what is written is `?`, an end of line, and after an answer like a
-/// Galil controller's `^R^V`.
+/// Listens, asks, and identifies the device. Nothing moves: what is written is `?`, an end of line, and after an
+/// answer like a Galil controller's `^R^V`.
 pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
-    let mut heard = Vec::new();
-    hear(link, clock, LISTEN, &mut heard, |heard| recognise(heard).is_some())?;
-    if let Some(found) = recognise(&heard) {
+    let mut received = Vec::new();
+    receive(link, clock, LISTEN, &mut received, |received| recognise(received).is_some())?;
+    if let Some(found) = recognise(&received) {
         return Ok(found);
     }
-    heard.clear();
+    received.clear();
     link.write(b"?\r\n")?;
-    hear(link, clock, ANSWER_MAX, &mut heard, |heard| recognise(heard).is_some())?;
-    if let Some(found) = recognise(&heard) {
+    receive(link, clock, ANSWER_MAX, &mut received, |received| recognise(received).is_some())?;
+    if let Some(found) = recognise(&received) {
         return Ok(found);
     }
     // The `?` of a controller that refuses a line, perhaps behind an echo of it.
-    if heard.iter().any(|byte| matches!(byte, b'?' | b':')) {
+    if received.iter().any(|byte| matches!(byte, b'?' | b':')) {
         let mut answer = Vec::new();
         link.write(b"\x12\x16\r")?;
-        hear(link, clock, ANSWER_MAX, &mut answer, |answer| answer.ends_with(b":"))?;
-        let text = readable(&answer);
+        receive(link, clock, ANSWER_MAX, &mut answer, |answer| answer.ends_with(b":"))?;
+        let text = printable_text(&answer);
         let from = text.find("DMC").or_else(|| text.find("RIO"));
         if let Some(from) = from {
             let revision = text[from..].trim_end_matches([':', '?', ' ']);
-            let said = match GalilBoard::parse(revision) {
+            let text = match GalilBoard::parse(revision) {
                 Ok(board) => board.revision,
                 Err(err) => format!("{revision}: {err}"),
             };
-            return Ok(Found::Device(galil::KIND.word, galil::KIND.introduction, said));
+            return Ok(Found::Device(galil::KIND.word, galil::KIND.introduction, text));
         }
     }
-    Ok(if heard.is_empty() { Found::Silent } else { Found::Unknown(readable(&heard)) })
+    Ok(if received.is_empty() { Found::Silent } else { Found::Unknown(printable_text(&received)) })
 }
 
 /// Collects what comes in a time, until it is enough.
-fn hear(
+fn receive(
     link: &mut dyn Link,
     clock: &HostClock,
     wait: Nanos,
-    heard: &mut Vec<u8>,
+    received: &mut Vec<u8>,
     is_enough: impl Fn(&[u8]) -> bool,
 ) -> io::Result<()> {
     let start = clock();
     let mut buffer = [0_u8; 256];
-    while clock().since(start) < wait && heard.len() < BYTES_MAX && !is_enough(heard) {
+    while clock().since(start) < wait && received.len() < BYTES_MAX && !is_enough(received) {
         let count = link.read(&mut buffer, READ_MAX)?;
-        heard.extend_from_slice(&buffer[..count]);
+        received.extend_from_slice(&buffer[..count]);
     }
     Ok(())
 }
 
-/// A device that says who it is in whole lines; a line without its end may be half a line.
-fn recognise(heard: &[u8]) -> Option<Found> {
-    let end = heard.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
-    let text = String::from_utf8_lossy(&heard[..end]);
-    let (kind, said) = DeviceKind::of_lines(&lines_of(&text))?;
-    Some(Found::of(kind, said))
+/// A device that is recognised by its whole lines; a line without its end may be half a line.
+fn recognise(received: &[u8]) -> Option<Found> {
+    let end = received.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
+    let text = String::from_utf8_lossy(&received[..end]);
+    let (kind, text) = DeviceKind::recognise_lines(&split_lines(&text))?;
+    Some(Found::from_kind(kind, text))
 }
 
-/// What was heard, fit to be shown: the first line's worth, marks in place of what is no text.
-fn readable(heard: &[u8]) -> String {
-    let text = String::from_utf8_lossy(heard);
+/// The beginning of what was received, without control characters and bytes that are no text.
+fn printable_text(received: &[u8]) -> String {
+    let text = String::from_utf8_lossy(received);
     let plain = text.chars().map(|c| if c.is_control() { ' ' } else { c });
     let plain: String = plain.take(SHOWN_MAX).collect();
     plain.trim().to_owned()
@@ -131,8 +126,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_are_known_by_what_they_say() {
-        let of = |heard: &str| recognise(heard.as_bytes()).and_then(|found| found.device());
+    fn devices_are_recognised_by_their_lines() {
+        let of = |received: &str| recognise(received.as_bytes()).and_then(|found| found.device());
         // gnea/grbl, doc/markdown/interface.md.
         assert_eq!(of("\r\nGrbl 1.1h ['$' for help]\r\n"), Some("grbl"));
         assert_eq!(of("<Idle|MPos:0.000,0.000,0.000|FS:0,0>\r\nok\r\n"), Some("grbl"));
@@ -145,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shown_gives_a_terminal_no_orders() {
-        assert_eq!(readable(b"\x1b[2Jhello\r\n\xff"), "[2Jhello  \u{fffd}");
+    fn shown_text_has_no_control_characters() {
+        assert_eq!(printable_text(b"\x1b[2Jhello\r\n\xff"), "[2Jhello  \u{fffd}");
     }
 }

@@ -1,84 +1,104 @@
-//! A rig on wires: whatever opens its devices, and one rig over it.
+//! A rig made of devices on links.
 
 use crate::galil::GalilOpenError;
 use crate::grbl::GrblOpenError;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LinkStats, WireError};
+use crate::wire::{HaltHandle, HostClock, LinkStats, LinkThread, TOO_MANY_COMMANDS, WireError};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
+use palpate_model::rig::{RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
-use std::io;
-use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
 
-/// Several lines are listened to in turns of this length.
+/// Longest wait for one of several links.
 const TURN: Nanos = Nanos::from_millis(1);
 
 /// A device that a rig file describes cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum OpenError {
-    /// A Galil controller.
     #[error(transparent)]
     Galil(#[from] GalilOpenError),
-    /// A Grbl board.
     #[error(transparent)]
     Grbl(#[from] GrblOpenError),
-    /// A load cell or a stand.
     #[error(transparent)]
     Text(#[from] DeviceError),
-    /// A port cannot be opened.
     #[error(transparent)]
     Wire(#[from] WireError),
-    /// No thread for it.
-    #[error("the operating system gives no thread for a link ({0}); close other programs")]
+    #[error("the operating system cannot start a thread for a link ({0}); close other programs")]
     Thread(String),
 }
 
-impl OpenError {
-    pub(crate) fn thread(err: &io::Error) -> Self {
-        Self::Thread(err.to_string())
-    }
-}
-
-/// What opening the devices of a rig gives.
 pub struct Opened {
-    /// What they make of the rig.
     pub description: RigDescription,
-    /// Newtons of a volt, where the load cell itself is calibrated.
+    /// Newtons per volt, where the load cell itself is calibrated.
     pub newtons_per_volt: Option<f64>,
-    /// The link as it was measured, in words.
     pub link: Option<String>,
     /// One for each device. The first is that of the axis, to which commands go.
-    pub lines: Vec<Line>,
-    /// What was exchanged before the threads had the links, by the host's clock.
+    pub lines: Vec<LinkThread>,
+    /// Bytes exchanged before the threads had the links, by the host's clock.
     pub raw: Vec<RawBytes>,
 }
 
 /// The devices of a rig, to be opened as often as the operator asks.
 pub trait RigDevice: Send {
-    /// Opens the links, checks and sets up what is behind them, and lets it send samples. Nothing moves. All lines of an
-    /// earlier call are closed.
+    /// Opens the links, checks and sets up what is behind them, and lets it send samples. Nothing moves. All lines of
+    /// an earlier call are closed.
     fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError>;
 
-    /// Fills in what no single line knows. `now` is on the host's clock.
+    /// Fills in what no single link knows. `now` is on the host's clock.
     fn complete(&mut self, _now: Nanos, body: RigEventBody) -> RigEventBody {
         body
     }
 }
 
-/// Devices on wires as a rig.
+/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
+/// catch up a quarter of a second.
+const BEHIND_MAX: Nanos = Nanos::from_millis(250);
+
+/// The caller's zero on the host's clock, and the newest time that was reported.
+#[derive(Default)]
+struct CallerTime {
+    /// `None` before the first call.
+    origin: Option<Nanos>,
+    newest: Nanos,
+}
+
+impl CallerTime {
+    /// The caller asks for events until a time of its own: that time on the host's clock.
+    fn host_end(&mut self, now: Nanos, until: Nanos) -> Nanos {
+        let begun = Nanos(now.0.saturating_sub(until.0));
+        // A caller whose time stood still, as while the computer slept, gets a new origin.
+        let origin = match self.origin {
+            Some(origin) if now.since(origin).since(until) <= BEHIND_MAX => origin,
+            _ => begun,
+        };
+        self.origin = Some(origin);
+        origin + until
+    }
+
+    /// The caller's time of an event on the host's clock; never before an earlier event.
+    fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
+        let origin = self.origin.unwrap_or(at);
+        self.newest = at.since(origin).max(self.newest).min(until);
+        self.newest
+    }
+
+    /// The caller's time of bytes that were exchanged, in any order.
+    fn caller_time(&self, at: Nanos) -> Nanos {
+        at.since(self.origin.unwrap_or(Nanos::ZERO))
+    }
+}
+
 pub struct DeviceRig<D> {
     device: D,
-    /// Without lines while it is being connected anew, and after that has failed.
+    /// Without links while it is being connected again, and after that has failed.
     opened: Opened,
-    /// What was taken from each line and not told yet.
+    /// An event of each link that waits for earlier ones of others.
     pending: Vec<Option<RigEvent>>,
     clock: HostClock,
     time: CallerTime,
-    /// Refusals of commands that found no room.
-    refused: VecDeque<Fault>,
+    refused: VecDeque<RigEventBody>,
 }
 
 impl<D: RigDevice> DeviceRig<D> {
@@ -89,20 +109,19 @@ impl<D: RigDevice> DeviceRig<D> {
             device,
             pending: opened.lines.iter().map(|_| None).collect(),
             opened,
-            time: CallerTime::new(Arc::clone(&clock)),
+            time: CallerTime::default(),
             clock,
             refused: VecDeque::new(),
         })
     }
 
-    /// What was opened.
     pub const fn device(&self) -> &D {
         &self.device
     }
 
-    /// The time that [`Rig::take_raw`] tells, now.
+    /// The caller's time now, as [`Rig::take_raw`] has it.
     pub fn now(&self) -> Nanos {
-        self.time.of((self.clock)())
+        self.time.caller_time((self.clock)())
     }
 
     /// The oldest of what has come from the lines until `end` on the host's clock; of equal ones that of the axis.
@@ -112,35 +131,35 @@ impl<D: RigDevice> DeviceRig<D> {
             return None;
         };
         loop {
-            let mut left = end.since((self.clock)());
-            for (place, line) in self.opened.lines.iter().enumerate() {
+            let mut wait = end.since((self.clock)());
+            for (index, line) in self.opened.lines.iter().enumerate() {
                 if self.pending.iter().any(Option::is_some) {
-                    left = Nanos::ZERO;
+                    wait = Nanos::ZERO;
                 }
-                if self.pending[place].is_none() {
-                    let turn = match (place == last, last) {
-                        (true, 0) => left,
-                        (true, _) => left.min(TURN),
+                if self.pending[index].is_none() {
+                    let turn = match (index == last, last) {
+                        (true, 0) => wait,
+                        (true, _) => wait.min(TURN),
                         (false, _) => Nanos::ZERO,
                     };
-                    self.pending[place] = line.next_event(end, Duration::from_nanos(turn.0));
+                    self.pending[index] = line.next_event(end, Duration::from_nanos(turn.0));
                 }
             }
-            let came = self.pending.iter_mut().filter(|event| event.is_some());
-            let oldest = came.min_by_key(|event| event.as_ref().map(|event| event.at));
+            let arrived = self.pending.iter_mut().filter(|event| event.is_some());
+            let oldest = arrived.min_by_key(|event| event.as_ref().map(|event| event.at));
             if let Some(oldest) = oldest {
                 return oldest.take();
             }
-            if left == Nanos::ZERO || last == 0 {
+            if wait == Nanos::ZERO || last == 0 {
                 return None;
             }
         }
     }
 
-    /// What was exchanged since this was last asked, at the host's time.
+    /// The bytes exchanged since the last call, at the host's time.
     fn take_raw_of_host(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.opened.raw);
-        raw.extend(self.opened.lines.iter().flat_map(Line::take_raw));
+        raw.extend(self.opened.lines.iter().flat_map(LinkThread::take_raw));
         raw.sort_by_key(|piece| piece.at);
         raw
     }
@@ -159,27 +178,27 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
         let sent = self.opened.lines.first_mut().map(|line| line.send(command));
         let detail = match sent {
             Some(Ok(())) => return,
-            Some(Err(_)) => "too many commands at once",
+            Some(Err(_)) => TOO_MANY_COMMANDS,
             None => "the rig is not connected",
         };
-        self.refused.push_back(Fault::CommandRefused { detail: detail.into() });
+        self.refused.push_back(RigEventBody::refusal(detail));
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let (now, end) = self.time.asked(until);
-        if let Some(fault) = self.refused.pop_front() {
-            let at = self.time.told(now, until);
-            return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
+        let now = (self.clock)();
+        let end = self.time.host_end(now, until);
+        if let Some(refusal) = self.refused.pop_front() {
+            return Some(RigEvent::new(self.time.event_time(now, until), refusal));
         }
         let event = self.next(end)?;
-        let at = self.time.told(event.at, until);
+        let at = self.time.event_time(event.at, until);
         let body = self.device.complete((self.clock)(), event.body);
         Some(RigEvent::new(at, body))
     }
 
     fn reconnect(&mut self) -> Result<(), RigError> {
-        // The old links say farewell and are closed, or their ports would be busy with them.
-        let closed = self.opened.lines.drain(..).flat_map(Line::close);
+        // The old links are closed first, or their ports would be busy.
+        let closed = self.opened.lines.drain(..).flat_map(LinkThread::close);
         self.opened.raw.extend(closed);
         self.pending.clear();
         self.refused.clear();
@@ -208,7 +227,7 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = self.take_raw_of_host();
         for piece in &mut raw {
-            piece.at = self.time.of(piece.at);
+            piece.at = self.time.caller_time(piece.at);
         }
         raw
     }

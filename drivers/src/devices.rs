@@ -18,58 +18,50 @@ pub const DEVICES: &[DeviceKind] = &[
     crate::plain_numbers::KIND,
 ];
 
-/// A kind of device.
 pub struct DeviceKind {
-    /// Its word in a rig file.
     pub word: &'static str,
-    /// What it is, with its article.
     pub title: &'static str,
-    /// What stands before its own words where ports are listed.
+    /// Introduction of its own words where ports are listed.
     pub introduction: &'static str,
-    /// What it is in a rig.
     pub role: Role,
     /// The line that gives it away among whole lines that were heard, if one does.
     pub recognise: for<'a> fn(&[&'a str]) -> Option<&'a str>,
 }
 
-/// What a device is in a rig.
 pub enum Role {
     /// It moves the probe: its keys are those of the rig file itself. The first parameter is the rig's name.
     Axis(fn(String, &mut Fields) -> Option<RigFile>),
     /// A load cell beside an axis: its keys are in the table `[cell]`, but for those that say where it is.
     Cell {
-        /// Reads the keys.
         read: fn(&mut Fields) -> Option<Arc<dyn CellDevice>>,
-        /// How it is emulated, where the lines that it sends by itself are all there is to it.
+        /// Its emulation, if it only sends lines.
         emulation: Option<LineEmulation>,
     },
 }
 
-/// A load cell that sends lines whoever listens.
+/// A load cell that sends lines without being asked.
 #[derive(Clone, Copy)]
 pub struct LineEmulation {
-    /// Lines a second.
     pub rate: f64,
-    /// The line, with its end, of a time since it was switched on and the signal of the emulated bridge behind the usual
-    /// amplifier.
+    /// The line, with its end, of a time since it was switched on and the signal of the emulated bridge behind the
+    /// usual amplifier.
     pub line: fn(Nanos, Volts) -> String,
 }
 
 impl DeviceKind {
-    /// Which device has said whole lines, if one is recognised, and the line that gave it away.
+    /// The device that has sent whole lines, if one is recognised, and the line that identifies it.
     #[must_use]
-    pub fn of_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
+    pub fn recognise_lines<'a>(lines: &[&'a str]) -> Option<(&'static Self, &'a str)> {
         DEVICES.iter().find_map(|kind| Some((kind, (kind.recognise)(lines)?)))
     }
 }
 
 /// The lines of a text, without their ends and empty ones.
-pub(crate) fn lines_of(text: &str) -> Vec<&str> {
+pub(crate) fn split_lines(text: &str) -> Vec<&str> {
     let lines = text.split(['\r', '\n']).map(str::trim);
     lines.filter(|line| !line.is_empty()).collect()
 }
 
-/// The first line that a test holds for.
-pub(crate) fn first<'a>(lines: &[&'a str], is_it: impl Fn(&str) -> bool) -> Option<&'a str> {
+pub(crate) fn find_line<'a>(lines: &[&'a str], is_it: impl Fn(&str) -> bool) -> Option<&'a str> {
     lines.iter().copied().find(|line| is_it(line))
 }

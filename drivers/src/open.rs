@@ -1,11 +1,9 @@
 //! From a rig's name to the rig.
 
-use crate::rig::{Rig, RigError, RigEvent};
+use crate::rig::{Rig, RigError};
 use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
-use crate::wire::{HaltHandle, HostClock, LinkStats};
-use palpate_model::Nanos;
-use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
+use crate::wire::HostClock;
 use std::io::Read;
 
 /// Opens the rig called `name`: `sim`, or `sim:NAME` for a simulated rig that people share by name.
@@ -24,13 +22,11 @@ pub fn open(name: &str, settings: &SimSettings) -> Result<Box<dyn Rig>, RigError
     }
 }
 
-/// Whether a name is that of a rig file.
 #[must_use]
 pub fn is_rig_file(name: &str) -> bool {
     name.ends_with(".toml")
 }
 
-/// Reads a rig file.
 pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
     let unreadable = |detail: String| RigError::File { file: file.to_owned(), detail };
     let mut bytes = Vec::new();
@@ -40,7 +36,7 @@ pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
             open.take(rig_file::BYTES_MAX as u64 + 1).read_to_end(&mut bytes)
         })
         .map_err(|err| unreadable(err.to_string()))?;
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is no text".into()))?;
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not a text file".into()))?;
     Ok(RigFile::parse(file, &text)?)
 }
 
@@ -51,62 +47,13 @@ pub fn open_wired(file: &str, clock: &HostClock) -> Result<Box<dyn Rig>, RigErro
         .map_err(|error| RigError::Device { file: file.to_owned(), error })
 }
 
-impl<R: Rig + ?Sized> Rig for Box<R> {
-    fn description(&self) -> &RigDescription {
-        (**self).description()
-    }
-
-    fn send(&mut self, command: RigCommand) {
-        (**self).send(command);
-    }
-
-    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        (**self).next_event(until)
-    }
-
-    fn reconnect(&mut self) -> Result<(), RigError> {
-        (**self).reconnect()
-    }
-
-    fn link(&self) -> Option<&str> {
-        (**self).link()
-    }
-
-    fn is_virtual(&self) -> bool {
-        (**self).is_virtual()
-    }
-
-    fn by_hand(&mut self, action: HandAction) {
-        (**self).by_hand(action);
-    }
-
-    fn newtons_per_volt(&self) -> Option<f64> {
-        (**self).newtons_per_volt()
-    }
-
-    fn take_raw(&mut self) -> Vec<RawBytes> {
-        (**self).take_raw()
-    }
-
-    fn take_sensors(&mut self) -> Vec<SensorReading> {
-        (**self).take_sensors()
-    }
-
-    fn halt_handle(&self) -> Option<HaltHandle> {
-        (**self).halt_handle()
-    }
-
-    fn links(&self) -> Vec<(String, LinkStats)> {
-        (**self).links()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_model::Nanos;
 
     #[test]
-    fn a_shared_name_stands_in_the_description() {
+    fn shared_name_is_in_the_description() {
         for name in ["sim", "sim:bench 2"] {
             let rig = open(name, &SimSettings::default()).unwrap();
             assert_eq!(rig.description().name, name);
@@ -114,30 +61,21 @@ mod tests {
         }
     }
 
-    /// A box that answers for its rig hides whatever it does not hand on.
     #[test]
-    fn boxed_rig_tells_what_its_sensors_say() {
-        let settings = SimSettings { bath: "37".parse().unwrap(), ..SimSettings::default() };
-        let mut rig = open("sim", &settings).unwrap();
-        while rig.next_event(Nanos::from_millis(2_000)).is_some() {}
-        assert!(!Rig::take_sensors(&mut rig).is_empty());
-    }
-
-    #[test]
-    fn a_rig_file_that_cannot_be_used_is_told_by_name() {
+    fn error_of_a_rig_file_names_the_file() {
         let clock: HostClock = std::sync::Arc::new(|| Nanos::ZERO);
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("bench.toml").display().to_string();
         assert!(is_rig_file(&file) && !is_rig_file("sim"));
-        let said = |file: &str| match open_wired(file, &clock) {
+        let message = |file: &str| match open_wired(file, &clock) {
             Ok(_) => panic!("{file} was opened"),
             Err(err) => err.to_string(),
         };
-        assert!(said(&file).contains("cannot be read"));
+        assert!(message(&file).contains("cannot be read"));
         std::fs::write(&file, b"\xff").unwrap();
-        assert!(said(&file).contains("no text"));
+        assert!(message(&file).contains("not a text"));
         std::fs::write(&file, "device = \"marlin\"").unwrap();
-        assert!(said(&file).contains("bench.toml, line 1: device"));
+        assert!(message(&file).contains("bench.toml, line 1: device"));
         let text = "device = \"galil\"\nport = \"/dev/there-is-no-such-port\"\nmm_per_pulse = 0.015\n\
             travel_mm = 150\nspeed_max_mm_s = 20\nacceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n";
         std::fs::write(&file, text).unwrap();

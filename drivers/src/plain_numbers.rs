@@ -1,17 +1,17 @@
-//! A load cell that sends plain numbers: one a line, at a rate of its own, as an Arduino, an ESP32 or a weighing indicator
-//! does that prints `12345` or `1.234`, with a time before it or without.
+//! A load cell that sends plain numbers: one per line, at a rate of its own, as an Arduino, an ESP32 or a weighing
+//! indicator does that prints `12345` or `1.234`, with or without a time before it.
 //!
-//! Nothing is asked and nothing is written. A line counts only if it is what the rig file says and nothing else, with as
-//! many digits behind the point as when the cell was opened. Every other line is counted as garbled and stands in the
-//! log of bytes as it came. There is no checksum: a digit that was lost on the way leaves a number, which shows only as a
-//! jump of the force.
+//! Nothing is asked and nothing is written. A line counts only if it is what the rig file says and nothing else, with
+//! as many digits behind the point as when the cell was opened. Every other line is counted as garbled and stands in
+//! the log of bytes as it came. There is no checksum: a digit that was lost on the way leaves a number, which shows
+//! only as a jump of the force.
 
 use crate::board_clock::{BoardClock, BoardTime};
-use crate::cell::{CellDescription, CellDevice, CellProtocol, CellReports, CellSample, LineCell};
-use crate::devices::{DeviceKind, LineEmulation, Role, lines_of};
+use crate::cell::{CellDescription, CellDevice, CellProtocol, CellReports, LineCell, silence_max};
+use crate::devices::{DeviceKind, LineEmulation, Role, split_lines};
 use crate::mark10::protocol::ForceUnit;
 use crate::rig_file::Fields;
-use crate::text::{Decimal, DeviceError, OpenedCell, TextConsole};
+use crate::text::{DeviceError, FixedDecimal, OpenedCell, TextConsole};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
@@ -30,11 +30,11 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
             line: |_, volts| format!("{:.0}\r\n", volts.0 / 5.0 * 8_388_607.0),
         }),
     },
-    // The first line may be the end of one. A single number may be anybody's.
+    // The first line may be the end of one. Many devices send a single number.
     recognise: |lines| match lines {
         [_, first, second, rest @ ..] => {
             let mut all = [first, second].into_iter().chain(rest);
-            all.all(|line| Decimal::parse(line).is_some()).then_some(*first)
+            all.all(|line| FixedDecimal::parse(line).is_some()).then_some(*first)
         }
         _ => None,
     },
@@ -50,18 +50,13 @@ const PAUSE_MAX: Nanos = Nanos::from_millis(1_100);
 /// The rate is measured over so long, and over so many numbers.
 const MEASURE: Nanos = Nanos::from_millis(1_000);
 const MEASURED: usize = 5;
-/// A cell is gone when so many numbers in a row have not come, and at least a second.
-const NUMBERS_MISSED: f64 = 5.0;
-const SILENCE_MIN: Nanos = Nanos::from_millis(1_000);
-/// What a range of counts is called in volts: see the same of an HX711 board.
+/// Volts that a range of counts stands for, as for an HX711 board.
 const FULL_SCALE: Volts = Volts(5.0);
-/// Longest piece of a line that is quoted.
 const QUOTE_MAX: usize = 40;
 
-/// What the numbers are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Unit {
-    /// Of a converter; the whole range is called so many volts.
+    /// Counts of a converter; the volts stand for its whole range.
     Counts(Volts),
     /// A signal, and how many volts one is.
     Signal(f64),
@@ -81,23 +76,19 @@ const UNITS: [(&str, (&str, Unit)); 9] = [
     ("lbF", ("lbF", Unit::Force(ForceUnit::Pound))),
 ];
 
-/// What palpate has to know of such a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainNumbers {
     unit: Unit,
     unit_name: &'static str,
     /// End of the range on both sides, in the unit.
     full_scale: f64,
-    /// Whether pressing makes the numbers fall.
     is_reversed: bool,
     /// Length of a tick of the time before each number, where there is one.
     nanos_per_tick: Option<u64>,
-    /// Standard deviation at rest, in the unit.
     noise: Option<f64>,
 }
 
 impl PlainNumbers {
-    /// Reads the keys of a rig file.
     pub fn read(fields: &mut Fields) -> Option<Self> {
         let unit = fields.choice("cell.unit", &UNITS, None);
         let full_scale = fields.needed("cell.full_scale", 1e-6, 1e8);
@@ -112,7 +103,7 @@ impl PlainNumbers {
             (Unit::Counts(usual), volts) => Unit::Counts(volts.unwrap_or(usual)),
             (unit, None) => unit,
             (_, Some(_)) => {
-                let message = "only counts have it; remove it, or give unit = \"counts\"";
+                let message = "applies to counts only; remove it, or set unit = \"counts\"";
                 fields.mistake("cell.full_scale_v", message);
                 return None;
             }
@@ -136,13 +127,13 @@ impl PlainNumbers {
     }
 
     /// A line that is what the rig file says: the ticks of its time, where it has one, and its number.
-    fn parse(&self, line: &str) -> Option<(u32, Decimal)> {
+    fn parse(&self, line: &str) -> Option<(u32, FixedDecimal)> {
         let (ticks, number) = match self.nanos_per_tick {
             None => (0, line),
             Some(_) => {
                 let (ticks, number) = line.split_once([',', ';', ' '])?;
                 let ticks = ticks.trim();
-                // A sign before it would be none of a counter.
+                // A counter has no sign.
                 let is_plain = ticks.bytes().all(|byte| byte.is_ascii_digit());
                 (ticks.parse().ok().filter(|_| is_plain)?, number)
             }
@@ -152,23 +143,23 @@ impl PlainNumbers {
         if unsigned.is_some_and(|rest| rest.starts_with('-')) {
             return None;
         }
-        Some((ticks, Decimal::parse(unsigned.unwrap_or(number))?))
+        Some((ticks, FixedDecimal::parse(unsigned.unwrap_or(number))?))
     }
 
     /// Waits for numbers that come one after the other; gives one of them and their rate.
-    fn measure(&self, console: &mut TextConsole<'_>) -> Result<(Decimal, f64), DeviceError> {
+    fn measure(&self, console: &mut TextConsole<'_>) -> Result<(FixedDecimal, f64), DeviceError> {
         let start = console.now();
-        let mut all: Vec<(Nanos, u32, Decimal)> = Vec::new();
+        let mut all: Vec<(Nanos, u32, FixedDecimal)> = Vec::new();
         let mut wrong = None;
-        // What somebody has kept for us comes at once and says nothing of the rate; the line behind it may be the end of one.
+        // Buffered lines come at once and do not show the rate; the line after them may be the end of one.
         console.drain(BACKLOG)?;
         console.line(START_MAX)?;
-        while let Some(left) = START_MAX.0.checked_sub(console.now().since(start).0) {
-            let Some((at, line)) = console.line(Nanos(left))? else {
+        while let Some(rest) = START_MAX.0.checked_sub(console.now().since(start).0) {
+            let Some((at, line)) = console.line(Nanos(rest))? else {
                 break;
             };
             let Some((ticks, number)) = self.parse(&line) else {
-                // Sketches say something when they begin.
+                // Sketches print text when they start.
                 wrong = Some(line);
                 all.clear();
                 continue;
@@ -180,7 +171,7 @@ impl PlainNumbers {
             let (first_at, first_ticks, first) = all[0];
             if number.decimals != first.decimals {
                 return Err(unfit(format!(
-                    "its numbers have now {} and now {} digits behind the point; print them all with as many",
+                    "its numbers had first {} and now {} digits after the point; print them all with the same number of digits",
                     first.decimals, number.decimals
                 )));
             }
@@ -194,23 +185,19 @@ impl PlainNumbers {
                 return Ok((number, steps * 1e9 / nanos.max(1.0)));
             }
         }
-        Err(self.nothing(console, wrong))
+        Err(self.no_numbers_error(console, wrong))
     }
 
-    /// Why no numbers came.
-    fn nothing(&self, console: &TextConsole<'_>, wrong: Option<String>) -> DeviceError {
+    fn no_numbers_error(&self, console: &TextConsole<'_>, wrong: Option<String>) -> DeviceError {
+        let received = console.received();
         let Some(line) = wrong else {
-            return if console.heard.is_empty() {
-                DeviceError::Silent {
-                    device: DEVICE,
-                    hint: "check port, cable and that the board sends by itself",
-                }
+            return if received.is_empty() {
+                console.no_answer("check port, cable and that the board sends by itself")
             } else {
-                unfit("it sends less than a number a second; make it send more".into())
+                unfit("it sends less than a number a second; make it send more")
             };
         };
-        let heard = String::from_utf8_lossy(&console.heard);
-        let other = DeviceKind::of_lines(&lines_of(&heard));
+        let other = DeviceKind::recognise_lines(&split_lines(&received));
         if let Some((kind, _)) = other.filter(|(kind, _)| kind.word != KIND.word) {
             return DeviceError::Other { device: DEVICE, found: kind.title.into() };
         }
@@ -220,7 +207,7 @@ impl PlainNumbers {
             Some(_) => "a time, a comma and a number",
         };
         unfit(format!(
-            "it says {quote:?} where the rig file wants {wanted}; correct cell.time_column, or what the board prints"
+            "it sends {quote:?} where the rig file expects {wanted}; correct cell.time_column, or what the board prints"
         ))
     }
 }
@@ -237,7 +224,7 @@ impl CellDevice for PlainNumbers {
         let counts_max = (self.full_scale / like.step()).round();
         if counts_max > f64::from(i32::MAX) {
             return Err(unfit(format!(
-                "full_scale = {} is too much for numbers with {} digits behind the point",
+                "full_scale = {} is too large for numbers with {} digits after the point",
                 self.full_scale, like.decimals
             )));
         }
@@ -265,43 +252,40 @@ impl CellDevice for PlainNumbers {
             },
             noise_expected: Volts(noise),
             rate,
-            // Nobody knows what the board averages over.
+            // What the board averages over is not known.
             delay: Nanos::ZERO,
             newtons_per_volt: matches!(self.unit, Unit::Force(_)).then_some(1.0),
         };
-        let numbers = Numbers {
+        let numbers = PlainNumberReader {
             cell: self.clone(),
             decimals: like.decimals,
             counts_max: counts_max as i32,
             per_count,
             clock: BoardClock::new(self.nanos_per_tick.unwrap_or(1)),
-            silence_max: SILENCE_MIN.max(Nanos((NUMBERS_MISSED * 1e9 / rate) as u64)),
+            silence_max: silence_max(rate),
             is_begun: false,
-            is_beyond: false,
         };
         Ok(OpenedCell {
             description,
-            dialogue: Box::new(LineCell::on(numbers, console.now())),
-            raw: console.link.raw,
+            dialogue: Box::new(LineCell::start(numbers, console.now())),
+            raw: console.into_raw(),
             farewell: Vec::new(),
         })
     }
 }
 
-/// Numbers of a cell that was opened.
-struct Numbers {
+struct PlainNumberReader {
     cell: PlainNumbers,
     decimals: u8,
     counts_max: i32,
     per_count: f64,
     clock: BoardClock,
     silence_max: Nanos,
-    /// A whole line has ended: what was read of one while it was opened is nobody's.
+    /// A whole line has ended: the first one may have begun before the cell was opened.
     is_begun: bool,
-    is_beyond: bool,
 }
 
-impl CellProtocol for Numbers {
+impl CellProtocol for PlainNumberReader {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         if !std::mem::replace(&mut self.is_begun, true) {
             return true;
@@ -318,24 +302,17 @@ impl CellProtocol for Numbers {
             Some(BoardTime::At(time)) => Some(time),
             Some(BoardTime::Repeated) => return false,
             Some(BoardTime::Restarted(time)) => {
-                reports.trouble("the board has started anew; check its supply");
+                reports.push_trouble("the board has restarted; check its supply");
                 Some(time)
             }
         };
         let is_beyond = number.digits.saturating_abs() >= self.counts_max;
-        if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
-            reports.trouble(
-                "its number is at the end of its range or beyond; take the load off, or correct cell.full_scale of the rig file",
-            );
-        }
-        self.is_beyond = is_beyond;
+        reports.set_beyond_range(
+            is_beyond,
+            "its number is at the end of its range or beyond; take the load off, or correct cell.full_scale of the rig file",
+        );
         let counts = if self.cell.is_reversed { -number.digits } else { number.digits };
-        reports.sample(CellSample {
-            at: now,
-            device_time,
-            counts,
-            volts: Volts(f64::from(counts) * self.per_count),
-        });
+        reports.push_counts(now, device_time, counts, self.per_count);
         true
     }
 
@@ -347,10 +324,9 @@ impl CellProtocol for Numbers {
     }
 }
 
-fn unfit(detail: String) -> DeviceError {
-    DeviceError::Unfit { device: DEVICE, detail }
+fn unfit(detail: impl Into<String>) -> DeviceError {
+    DeviceError::unfit(DEVICE, detail)
 }
 
 #[cfg(test)]
-#[path = "plain_numbers_tests.rs"]
 mod tests;

@@ -9,12 +9,10 @@ use thread_priority::{
 /// Above ordinary real-time work such as sound (10 to 20 on common systems), below the kernel's own threads (50).
 const WANTED: u8 = 30;
 
-/// What was granted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Granted {
     /// Real time, first in first out, with this priority: nothing ordinary comes between.
     RealTime(u8),
-    /// As any program, and why.
     Ordinary(String),
 }
 

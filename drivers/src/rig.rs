@@ -5,7 +5,8 @@ use crate::rig_file::RigFileError;
 use crate::wire::{HaltHandle, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{
-    Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
+    Ack, AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription,
+    SensorReading,
 };
 use thiserror::Error;
 
@@ -14,62 +15,50 @@ use thiserror::Error;
 pub struct RigEvent {
     /// Arrival on the host's clock.
     pub at: Nanos,
-    /// What arrived.
     pub body: RigEventBody,
 }
 
 impl RigEvent {
-    /// A report with its arrival.
     #[must_use]
     pub const fn new(at: Nanos, body: RigEventBody) -> Self {
         Self { at, body }
     }
 }
 
-/// What a rig can report.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RigEventBody {
-    /// One sample.
     Reading(Reading),
-    /// A command was accepted.
     Ack(Ack),
-    /// Something went wrong.
     Fault(Fault),
 }
 
-/// A rig could not be opened.
+impl RigEventBody {
+    /// A command is refused, or something else has failed.
+    pub fn refusal(detail: impl Into<String>) -> Self {
+        Self::Fault(Fault::CommandRefused { detail: detail.into() })
+    }
+}
+
+/// The status whose bits are set.
+pub(crate) fn axis_status<const N: usize>(bits: [(bool, AxisStatus); N]) -> AxisStatus {
+    let set = bits.into_iter().filter(|(is_set, _)| *is_set);
+    set.fold(AxisStatus(0), |all, (_, bit)| all | bit)
+}
+
 #[derive(Debug, Error)]
 pub enum RigError {
-    /// The name does not stand for a rig.
     #[error(
         "no rig is called '{name}'; use 'sim', 'sim:NAME' for a shared simulated rig, or a rig file, NAME.toml"
     )]
-    Unknown {
-        /// The name given.
-        name: String,
-    },
-    /// The rig file cannot be read.
+    Unknown { name: String },
     #[error("the rig file {file} cannot be read ({detail}); check its path")]
-    File {
-        /// As it was given.
-        file: String,
-        /// What the operating system said.
-        detail: String,
-    },
-    /// The rig file has mistakes.
+    File { file: String, detail: String },
     #[error(transparent)]
     RigFile(#[from] RigFileError),
-    /// There is no link that could be made again.
-    #[error("this rig cannot be connected again; choose it anew")]
+    #[error("this rig cannot be connected again; close it and open it again")]
     NotAgain,
-    /// What the rig file describes cannot be used.
     #[error("rig {file}: {error}")]
-    Device {
-        /// The rig file.
-        file: String,
-        /// Why.
-        error: OpenError,
-    },
+    Device { file: String, error: OpenError },
 }
 
 /// A connected rig.
@@ -78,7 +67,7 @@ pub enum RigError {
 /// takes effect at the time of the newest event returned. A rig on real wires blocks in
 /// `next_event` until something arrives or `until` has come; the simulated rig computes.
 pub trait Rig: Send {
-    /// What the rig is, as read from it when it was connected.
+    /// The rig's description, read when it was connected.
     fn description(&self) -> &RigDescription;
 
     /// Hands one command to the rig. Refusals arrive as [`Fault::CommandRefused`].
@@ -87,15 +76,15 @@ pub trait Rig: Send {
     /// The next event at or before `until`, if there is one.
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent>;
 
-    /// Connects anew after the link was lost or the controller was reset: the same devices at the same place, checked and
-    /// set up as at first, the axis stopped. Nothing moves; where the axis is has to be found again. It may wait for
-    /// seconds. A rig whose link is whole is connected anew too. Who has asked the operator calls it.
+    /// Connects again after the link was lost or the controller was reset, also where the link still works: the same
+    /// devices at the same addresses, checked and set up as at first, the axis stopped. Nothing moves; the axis must be
+    /// homed again. It may wait for seconds. Callers have asked the operator.
     fn reconnect(&mut self) -> Result<(), RigError> {
         Err(RigError::NotAgain)
     }
 
     /// The link as it was measured when it was opened, in words for the operator: latency, jitter, and how samples are
-    /// taken over it. It differs a little each time; what is the same stands in the identity.
+    /// taken over it. It differs a little each time; what stays the same is in the identity.
     fn link(&self) -> Option<&str> {
         None
     }
@@ -103,34 +92,34 @@ pub trait Rig: Send {
     /// Whether time is simulated, so that the caller may run it at any pace.
     fn is_virtual(&self) -> bool;
 
-    /// A person has done something at the rig, as an instruction asked. On a rig on wires it is done by
-    /// then and there is nothing to do; a simulated rig does it now.
+    /// A person has done something at the rig, as an instruction asked. A real rig has nothing to do then; a simulated
+    /// rig does it now.
     fn by_hand(&mut self, _action: HandAction) {}
 
-    /// The bytes exchanged with devices since this was last asked, in order, at the caller's time. A rig without
+    /// The bytes exchanged with devices since the last call, in order, at the caller's time. A rig without
     /// wires has none. Must not wait.
     fn take_raw(&mut self) -> Vec<RawBytes> {
         Vec::new()
     }
 
-    /// What its sensors beside load cell and axis say that is new since this was last asked, in order. Every one is told
-    /// again from time to time. A rig without any has nothing to say. Must not wait.
+    /// New readings of sensors other than load cell and axis since the last call, in order. Each is repeated from
+    /// time to time. Must not wait.
     fn take_sensors(&mut self) -> Vec<SensorReading> {
         Vec::new()
     }
 
-    /// Newtons of a volt of its signal, where the load cell itself is calibrated as a force gauge is.
+    /// Newtons per volt of its signal, where the load cell itself is calibrated as a force gauge is.
     fn newtons_per_volt(&self) -> Option<f64> {
         None
     }
 
-    /// What stops its axis at once when whoever holds the rig cannot any more. A rig without wires moves only while it
-    /// is asked, and has none.
+    /// Stops the axis at once when the owner of the rig no longer can. A simulated rig moves only while it is asked for
+    /// events, and has none.
     fn halt_handle(&self) -> Option<HaltHandle> {
         None
     }
 
-    /// How each link has behaved since it was opened, by the name of the device behind it. A rig without wires has none.
+    /// Statistics of each link since it was opened, by the name of its device. A rig without wires has none.
     fn links(&self) -> Vec<(String, LinkStats)> {
         Vec::new()
     }

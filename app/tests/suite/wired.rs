@@ -63,7 +63,7 @@ fn what_is_not_as_the_file_says_is_told() {
 }
 
 /// What is said where a busy computer has ended a run, or the retract after it.
-const LATE: [&str; 4] = ["sample age", "stood still", "samples arrived", "nothing answers"];
+const LATE: [&str; 4] = ["sample age", "stood still", "samples arrived", "controller answers"];
 
 fn is_late(said: &str) -> bool {
     LATE.iter().any(|words| said.contains(words))

@@ -1,10 +1,10 @@
-//! How samples are taken: the link is measured, and record arrays are set up where they are worth it.
+//! How samples are taken: the link is measured, and record arrays are set up if that gives fresher samples.
 
-use super::console::{ANSWER_MAX, Console};
+use super::console::{ANSWER_MAX, GalilConsole};
 use super::model::GalilOpenError;
-use super::recording::{self, ARRAYS, Look, Plan};
+use super::recording::{self, ARRAYS, RecordingPlan, RecordingStatus};
 use super::sampling::Sampler;
-use super::session::Pace;
+use super::session::PollPace;
 use super::settings::{GalilSettings, Sampling};
 use crate::wire::LinkStats;
 use palpate_model::Nanos;
@@ -30,16 +30,14 @@ const ELEMENT_BYTES: f64 = 20.0;
 const FETCH_BYTES: f64 = 60.0;
 /// Share of what the link carries that fetching may take; the rest is for stops, the watchdog and jitter.
 const LOAD_MAX: f64 = 0.7;
-/// Between two fetches at least: two samples of 512 a second, and nobody needs younger ones.
+/// Between two fetches at least: two samples of 512 a second; younger ones are of no use.
 const FETCH_EVERY: Nanos = Nanos::from_millis(4);
-/// How old samples may be when they arrive: the shortest silence that stops a run (20 ms at speed), less what a computer
-/// with much else to do takes.
+/// Largest age of samples when they arrive: the shortest silence that stops a run (20 ms at speed), less what a
+/// computer with much else to do takes.
 const AGE_MAX: Nanos = Nanos::from_millis(15);
 
-/// What the link does.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured {
-    /// Round trips.
+pub struct LinkMeasurement {
     pub stats: LinkStats,
     /// The usual one, of which as many are longer as shorter.
     trip: Nanos,
@@ -49,18 +47,18 @@ pub struct Measured {
     bytes: f64,
 }
 
-/// How long an answer takes alone, and how fast answers come in a row.
+/// Measures the duration of a single answer and the rate of answers to questions in a row.
 pub fn measure(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
-) -> Result<Measured, GalilOpenError> {
+) -> Result<LinkMeasurement, GalilOpenError> {
     let question = Sampler::question(settings);
     let mut stats = LinkStats::default();
     let mut trips = Vec::with_capacity(SINGLE);
     for _ in 0..SINGLE {
-        let asked = console.now();
+        let start = console.now();
         console.ask(&question)?;
-        let trip = console.now().since(asked);
+        let trip = console.now().since(start);
         stats.push(trip);
         trips.push(trip);
     }
@@ -78,7 +76,7 @@ pub fn measure(
         apart = apart.min(Nanos((row.since(trip).0 / (ROW as u64 - 1)).max(1)));
         bytes = replies.iter().map(|reply| reply.bytes.len() + 3).sum();
     }
-    Ok(Measured {
+    Ok(LinkMeasurement {
         stats,
         trip,
         apart,
@@ -87,17 +85,17 @@ pub fn measure(
     })
 }
 
-impl Measured {
-    /// How to ask for samples one by one.
-    pub fn polling(&self, tick: Nanos) -> Pace {
-        // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
+impl LinkMeasurement {
+    pub fn polling(&self, tick: Nanos) -> PollPace {
+        // Sooner than a sample lasts, so that none is missed for jitter; repeated samples are dropped.
         let every = self.apart.max(Nanos(tick.0 * 6 / 10));
         let in_flight = (self.trip.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
-        Pace { every, in_flight, tick }
+        PollPace { every, in_flight, tick }
     }
 
-    /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
-    fn fetching(&self, tick: Nanos, n: u32) -> Option<(Pace, Nanos)> {
+    /// The pace for fetching elements of 2^n samples, and their age when they arrive; `None` when the link carries
+    /// less.
+    fn fetching(&self, tick: Nanos, n: u32) -> Option<(PollPace, Nanos)> {
         let bytes_per_ns = self.bytes / self.apart.0 as f64;
         let interval = (tick.0 << n) as f64;
         let left = LOAD_MAX * bytes_per_ns - ELEMENT_BYTES / interval;
@@ -108,42 +106,38 @@ impl Measured {
             Nanos((FETCH_BYTES / left) as u64).max(FETCH_EVERY).max(Nanos(self.trip.0 * 5 / 4));
         let transfer = (every.0 as f64 / interval * ELEMENT_BYTES + FETCH_BYTES) / bytes_per_ns;
         let age = Nanos(every.0 + 2 * self.trip.0 + transfer as u64);
-        let pace = Pace { every, in_flight: 1, tick };
+        let pace = PollPace { every, in_flight: 1, tick };
         Some((pace, age))
     }
 }
 
-/// How samples are taken from now on, in words too.
-pub struct Capture {
-    /// How to ask.
-    pub pace: Pace,
-    /// The recording, if there is one.
-    pub plan: Option<Plan>,
-    /// What is the same whenever the same controller is opened over the same link, for the rig's identity.
+/// The sampling that was set up.
+pub struct SamplingSetup {
+    pub pace: PollPace,
+    pub plan: Option<RecordingPlan>,
+    /// The part that stays the same from one opening to the next, for the rig's identity.
     pub words: String,
-    /// What was measured, for the operator.
     pub measured: String,
 }
 
-/// Chooses and starts it.
 pub fn set_up(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
-    measured: &Measured,
+    measured: &LinkMeasurement,
     tick: Nanos,
-) -> Result<Capture, GalilOpenError> {
+) -> Result<SamplingSetup, GalilOpenError> {
     let ms = |span: Nanos| span.0 as f64 * 1e-6;
     let polled = |why: &str| {
         let pace = measured.polling(tick);
         let rate = 1e9 / pace.every.max(tick).0 as f64;
-        Capture {
+        SamplingSetup {
             pace,
             plan: None,
             words: "samples polled".to_owned(),
             measured: format!("samples polled at up to {rate:.0} a second{why}"),
         }
     };
-    // A recording of whoever was here before takes the controller's time.
+    // A recording that an earlier program has left running takes the controller's time.
     console.try_ask("RC 0")?;
     if settings.sampling == Sampling::Poll {
         return Ok(polled(""));
@@ -155,40 +149,49 @@ pub fn set_up(
     });
     let Some((n, (pace, age))) = chosen else {
         if settings.sampling == Sampling::Record {
-            return Err(GalilOpenError::NoRecording("the link is too slow for it".into()));
+            return Err(no_recording("the link is too slow for it"));
         }
-        return Ok(polled(", because recorded samples would be old when they come over this link"));
+        return Ok(polled(
+            ", because recorded samples would be too old when they arrive over this link",
+        ));
     };
-    match start(console, settings, n, tick)? {
-        Ok(plan) => Ok(Capture {
+    match start_recording(console, settings, n, tick) {
+        Ok(plan) => Ok(SamplingSetup {
             pace,
             plan: Some(plan),
             words: format!("{:.0} samples/s recorded", 1e9 / (tick.0 << n) as f64),
             measured: format!(
-                "recorded samples are up to {:.0} ms old when they come",
+                "recorded samples are up to {:.0} ms old when they arrive",
                 ms(age).ceil()
             ),
         }),
-        Err(why) if settings.sampling == Sampling::Record => Err(GalilOpenError::NoRecording(why)),
-        Err(why) => Ok(polled(&format!(", because the controller does not record ({why})"))),
+        Err(GalilOpenError::NoRecording(why)) if settings.sampling != Sampling::Record => {
+            Ok(polled(&format!(", because the controller does not record ({why})")))
+        }
+        Err(err) => Err(err),
     }
+}
+
+fn no_recording(why: &str) -> GalilOpenError {
+    GalilOpenError::NoRecording(why.into())
 }
 
 /// The letters of analog inputs 1 to 8 in `_AF` (DMC-1700/1800 user manual, page 159).
 const INPUTS: [char; 8] = ['X', 'Y', 'Z', 'W', 'E', 'F', 'G', 'H'];
 
-/// Starts a recording every 2^n samples; in words why there is none.
-fn start(
-    console: &mut Console<'_>,
+/// Starts a recording every 2^n samples.
+fn start_recording(
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
     n: u32,
     tick: Nanos,
-) -> Result<Result<Plan, String>, GalilOpenError> {
+) -> Result<RecordingPlan, GalilOpenError> {
     for name in ARRAYS {
-        // Those of another ring, if palpate was here before.
+        // Arrays of an earlier session may have another length.
         console.try_ask(&format!("DA {name}[]"))?;
     }
-    // Elements that are free (DMC-40x0 command reference, `DM`); firmware that does not tell refuses what is too much.
+    // Elements that are free (DMC-40x0 command reference, `DM`); firmware that does not report it refuses what is too
+    // much.
     let free = console.try_ask("DM ?")?;
     let free = free.numbers().filter(|_| free.is_accepted);
     let room = free.map_or(f64::INFINITY, |numbers| ROOM_MAX * numbers[0]);
@@ -205,7 +208,7 @@ fn start(
         }
     }
     let Some(ring) = ring else {
-        return Ok(Err("it has no room for arrays".into()));
+        return Err(no_recording("it has no room for arrays"));
     };
     let (a, input) = (settings.axis, INPUTS[usize::from(settings.input - 1) % 8]);
     let arrays = ARRAYS.map(|name| format!("{name}[]")).join(",");
@@ -216,7 +219,7 @@ fn start(
     ] {
         if !console.try_ask(&command)?.is_accepted {
             let why = console.try_ask("TC1")?.text();
-            return Ok(Err(format!("it refuses {command}: {why}")));
+            return Err(GalilOpenError::NoRecording(format!("it refuses {command}: {why}")));
         }
     }
     anchor(console, settings, (1 << n, tick), ring)
@@ -225,11 +228,11 @@ fn start(
 /// Which sample each element is of: the earliest `TIME` at which an element is the newest is that at which it was
 /// written.
 fn anchor(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
     (interval, tick): (i64, Nanos),
     ring: i64,
-) -> Result<Result<Plan, String>, GalilOpenError> {
+) -> Result<RecordingPlan, GalilOpenError> {
     let question = recording::question(settings);
     let mut rough: Option<i64> = None;
     let (mut least, mut most, mut count) = (i64::MAX, i64::MIN, 0);
@@ -239,26 +242,26 @@ fn anchor(
             console.number("TIME")?;
         }
         let reply = console.ask(&question)?;
-        let Some(look) = reply.numbers().as_deref().and_then(Look::read) else {
-            return Ok(Err("its answers have other numbers than were asked for".into()));
+        let Some(status) = reply.numbers().as_deref().and_then(RecordingStatus::read) else {
+            return Err(no_recording("its answers do not have the expected numbers"));
         };
         count += 1;
-        if rough.is_none() && look.next == 0 {
+        if rough.is_none() && status.next == 0 {
             continue;
         }
-        let rough = *rough.get_or_insert(look.time - (look.next - 1) * interval);
-        let linear = (look.time - rough).div_euclid(interval);
+        let rough = *rough.get_or_insert(status.time - (status.next - 1) * interval);
+        let linear = (status.time - rough).div_euclid(interval);
         let half = ring / 2;
-        let off = (look.next - 1 - linear + half).rem_euclid(ring) - half;
+        let off = (status.next - 1 - linear + half).rem_euclid(ring) - half;
         if off.abs() > 2 {
-            return Ok(Err("it does not record as often as it was told".into()));
+            return Err(no_recording("it does not record at the interval that was set"));
         }
         let newest = linear + off;
-        let base = look.time - newest * interval;
+        let base = status.time - newest * interval;
         (least, most) = (least.min(base), most.max(base));
         if count >= ANCHORS.start && most - least >= interval - 1 {
-            return Ok(Ok(Plan { interval, ring, base: least, first: newest + 1, tick }));
+            return Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick });
         }
     }
-    Ok(Err("its clock and its recording do not fit".into()))
+    Err(no_recording("its clock and its recording do not agree"))
 }

@@ -1,13 +1,13 @@
-//! What happens once when a controller is opened: who it is, whether it is the right one, its settings, a limit to
-//! everything before anything can move, and how fast the link is.
+//! Opening a controller: identity, settings, limits before anything can move, and the speed of the link.
 
-use super::capture::{self, Capture};
-use super::console::Console;
+use super::capture::{self, SamplingSetup};
+use super::console::GalilConsole;
 use super::model::{GalilBoard, GalilOpenError};
 use super::order::{limit_commands, software_limits};
-use super::recording::Plan;
-use super::sampling::signed;
-use super::session::Pace;
+use super::protocol::GalilParser;
+use super::recording::RecordingPlan;
+use super::sampling::parse_register;
+use super::session::PollPace;
 use super::settings::GalilSettings;
 use super::watchdog;
 use crate::wire::{HostClock, Link, LinkStats};
@@ -27,32 +27,25 @@ const SMOOTHING: f64 = 0.5;
 const QUIET: Nanos = Nanos::from_millis(120);
 /// A download is answered when it has been stored.
 const DOWNLOAD_MAX: Nanos = Nanos::from_millis(10_000);
-/// By how many samples reported pulses may differ from the command: 1.5 of the smoothing filter, and two between
+/// Largest difference of reported pulses from the command, in samples: 1.5 of the smoothing filter, and two between
 /// `BG` or `ST` and the sample behind it.
 const LAG_SAMPLES: f64 = 4.0;
 /// Two samples of the controller may fall between two questions: on average they come further apart by this.
 const BETWEEN: f64 = 1.1;
 
-/// A controller that was set up.
 #[derive(Clone, Debug)]
 pub struct Connected {
-    /// Who it is.
     pub board: GalilBoard,
-    /// What it makes of the rig.
     pub description: RigDescription,
-    /// How to ask for samples.
-    pub pace: Pace,
-    /// The link as it was measured.
+    pub pace: PollPace,
     pub stats: LinkStats,
-    /// The same in words: latency, jitter, and what was made of it.
+    /// The link in words: latency, jitter, and the sampling chosen for it.
     pub link: String,
-    /// The recording that was started, if one was.
-    pub plan: Option<Plan>,
+    pub plan: Option<RecordingPlan>,
     /// Whether the watchdog's program runs.
     pub has_watchdog: bool,
-    /// How far the axis goes at most when palpate falls silent, in mm; the whole travel without a watchdog.
+    /// Longest way of the axis after palpate falls silent, in mm; the whole travel without a watchdog.
     pub worst_case_mm: f64,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 
@@ -63,21 +56,21 @@ pub fn connect(
     settings: &GalilSettings,
     device: &Arc<str>,
 ) -> Result<Connected, GalilOpenError> {
-    let mut console = Console::new(link, clock, device);
+    let mut console = GalilConsole::open(link, clock, device, GalilParser::take);
     let board = identify(&mut console, settings)?;
-    quieten(&mut console, settings)?;
+    silence_controller(&mut console, settings)?;
     let acceleration = set_up_axis(&mut console, settings)?;
     set_up_input(&mut console, settings)?;
     let has_watchdog = settings.has_watchdog && start_watchdog(&mut console, settings)?;
     let tm = console.number("_TM")?;
     if !(tm > 0.0 && tm <= 1e6) {
-        return Err(GalilOpenError::SetOtherwise { command: "TM".into(), found: tm.to_string() });
+        return Err(GalilOpenError::set_otherwise("TM", tm.to_string()));
     }
     let tick = Nanos((tm * NANOS_PER_TM).round() as u64);
-    // From here on only the signal has decimals, and its form is said with it: short answers are fast ones.
+    // From here on only the signal has decimals, in a format of its own: short answers are fast ones.
     console.try_ask("VF 10.0")?;
     let measured = capture::measure(&mut console, settings)?;
-    let Capture { pace, plan, words, measured: how } =
+    let SamplingSetup { pace, plan, words, measured: how } =
         capture::set_up(&mut console, settings, &measured, tick)?;
     let stats = LinkStats { in_flight: pace.in_flight, ..measured.stats };
     let worst_case_mm = if has_watchdog {
@@ -95,7 +88,7 @@ pub fn connect(
         ms(stats.round_trip_min),
         ms(stats.round_trip_max)
     );
-    // Whatever changes from one opening to the next stays out of the identity, by which repeats are compared.
+    // Values that change from one opening to the next stay out of the identity, by which repeats are compared.
     let words = format!("{safety}, {words}");
     let description = describe(settings, &board, acceleration, (pace, plan), &words, tm);
     Ok(Connected {
@@ -107,19 +100,19 @@ pub fn connect(
         plan,
         has_watchdog,
         worst_case_mm,
-        raw: console.link.raw,
+        raw: console.raw,
     })
 }
 
 fn identify(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<GalilBoard, GalilOpenError> {
-    // Half a line, or half a download, of whoever was here before is ended; echo is off from here on.
+    // Ends half a line or half a download of an earlier program; echo is off from here on.
     console.write("\rEO 0\r")?;
-    if console.drain(QUIET)? == 0 {
+    if console.drain_prompts(QUIET)? == 0 {
         console.write("\\\rEO 0\r")?;
-        if console.drain(Nanos(4 * QUIET.0))? == 0 {
+        if console.drain_prompts(Nanos(4 * QUIET.0))? == 0 {
             return Err(GalilOpenError::Silent);
         }
     }
@@ -136,7 +129,7 @@ fn identify(
         && board.serial_number != Some(expected)
     {
         let found =
-            board.serial_number.map_or_else(|| "none that it tells".to_owned(), |n| n.to_string());
+            board.serial_number.map_or_else(|| "(not reported)".to_owned(), |n| n.to_string());
         return Err(GalilOpenError::OtherSerial { found, expected });
     }
     let index = (settings.axis as usize).wrapping_sub('A' as usize);
@@ -151,7 +144,10 @@ fn identify(
 }
 
 /// Programs halted, the axis stopped, unsolicited text marked, numbers in a form that has all their digits.
-fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
+fn silence_controller(
+    console: &mut GalilConsole<'_>,
+    settings: &GalilSettings,
+) -> Result<(), GalilOpenError> {
     let a = settings.axis;
     console.ask("HX")?;
     console.ask(&format!("ST{a}"))?;
@@ -160,17 +156,14 @@ fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), Ga
     for form in ["LZ 1", "PF 10.0", "VF 10.4"] {
         console.try_ask(form)?;
     }
-    // The slowest stop that a controller allows itself takes longer than anybody waits for a rig to open.
+    // The slowest stop of a controller takes longer than an operator waits for a rig to open.
     let start = console.now();
     while console.number(&format!("_BG{a}"))? != 0.0 {
         if console.now().since(start) > Nanos::from_millis(5_000) {
             console.ask("AB 1")?;
         }
         if console.now().since(start) > Nanos::from_millis(6_000) {
-            return Err(GalilOpenError::SetOtherwise {
-                command: "AB 1".into(),
-                found: format!("axis {a} still moving"),
-            });
+            return Err(GalilOpenError::set_otherwise("AB 1", format!("axis {a} still moving")));
         }
     }
     Ok(())
@@ -178,26 +171,27 @@ fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), Ga
 
 /// Pulses, rates, switches and software limits. Gives the acceleration that was set.
 fn set_up_axis(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<MmPerS2, GalilOpenError> {
     let a = settings.axis;
     if let Some(us) = settings.sample_us {
-        console.set(&format!("TM {us}"), "_TM", f64::from(us))?;
+        let command = format!("TM {us}");
+        console.ask(&command)?;
+        console.check(&command, "_TM", &[f64::from(us)])?;
     }
-    let motor_type = settings.motor_type.code();
+    let motor_type = f64::from(settings.motor_type as i8);
     if console.number(&format!("_MT{a}"))? != motor_type {
         console.ask(&format!("MO{a}"))?;
-        console.set(&format!("MT{a}={motor_type}"), &format!("_MT{a}"), motor_type)?;
+        let command = format!("MT{a}={motor_type}");
+        console.ask(&command)?;
+        console.check(&command, &format!("_MT{a}"), &[motor_type])?;
     }
-    let command = format!("KS{a}={SMOOTHING}");
-    console.ask(&command)?;
-    read_back(console, command, &format!("_KS{a}"), &[SMOOTHING])?;
-    let levels = [settings.limits.code(), settings.home.code()];
+    set_if_readable(console, format!("KS{a}={SMOOTHING}"), &format!("_KS{a}"), &[SMOOTHING])?;
+    let levels = [settings.limits as i8, settings.home as i8];
     let command = format!("CN {},{}", levels[0], levels[1]);
-    console.ask(&command)?;
-    read_back(console, command, "_CN0,_CN1", &levels.map(f64::from))?;
-    let rate = settings.counts2(settings.acceleration);
+    set_if_readable(console, command, "_CN0,_CN1", &levels.map(f64::from))?;
+    let rate = settings.counts(settings.acceleration.0);
     console.ask(&format!("AC{a}={rate}"))?;
     console.ask(&format!("DC{a}={rate}"))?;
     // Limits are left at this rate; the older series have no such command and use that of `DC`.
@@ -205,15 +199,13 @@ fn set_up_axis(
     let rates = console.numbers(&format!("_AC{a},_DC{a}"))?;
     // It rounds down to its resolution.
     if rates[0] != rates[1] || rates[0] <= 0.0 || rates[0] > rate as f64 {
-        return Err(GalilOpenError::SetOtherwise {
-            command: format!("AC{a}={rate}"),
-            found: format!("{} and {}", rates[0], rates[1]),
-        });
+        let found = format!("{} and {}", rates[0], rates[1]);
+        return Err(GalilOpenError::set_otherwise(format!("AC{a}={rate}"), found));
     }
-    console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max)))?;
+    console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max.0)))?;
     // Before homing the axis can be anywhere on its travel, and homing may need all of it.
     let here = console.number(&format!("_TD{a}"))?;
-    let here = settings.sign() * signed(here).unwrap_or(0);
+    let here = settings.sign() * parse_register(here).unwrap_or(0);
     let travel = (settings.travel.0 / settings.mm_per_pulse).round() as i64;
     // Homing searches ten millimetres further than the travel.
     let margin = (10.0 / settings.mm_per_pulse).round() as i64;
@@ -221,13 +213,8 @@ fn set_up_axis(
         software_limits(settings, here - travel - margin, 2.0 * (settings.travel.0 + 10.0));
     for command in limit_commands(a, forward, reverse) {
         if let Some(list) = command.strip_prefix("MG ") {
-            let found = console.numbers(list)?;
-            if found != [forward as f64, reverse as f64] {
-                return Err(GalilOpenError::SetOtherwise {
-                    command: format!("FL{a}={forward};BL{a}={reverse}"),
-                    found: format!("{} and {}", found[0], found[1]),
-                });
-            }
+            let set = format!("FL{a}={forward};BL{a}={reverse}");
+            console.check(&set, list, &[forward as f64, reverse as f64])?;
         } else {
             console.ask(&command)?;
         }
@@ -235,64 +222,51 @@ fn set_up_axis(
     Ok(MmPerS2(rates[0] * settings.mm_per_pulse))
 }
 
-/// Compares what a command has set, where the firmware has the operands that tell it.
-fn read_back(
-    console: &mut Console<'_>,
+/// Sends a command and compares what it has set, where the firmware has the operands to read it back.
+fn set_if_readable(
+    console: &mut GalilConsole<'_>,
     command: String,
     operands: &str,
     wanted: &[f64],
 ) -> Result<(), GalilOpenError> {
+    console.ask(&command)?;
     let reply = console.try_ask(&format!("MG {operands}"))?;
-    if !reply.is_accepted {
-        return Ok(());
-    }
-    if reply.numbers().as_deref() != Some(wanted) {
-        let found = reply.text();
-        return Err(GalilOpenError::SetOtherwise { command, found });
+    if reply.is_accepted && reply.numbers().as_deref() != Some(wanted) {
+        return Err(GalilOpenError::set_otherwise(command, reply.text()));
     }
     Ok(())
 }
 
-fn set_up_input(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
-    let (input, range) = (settings.input, settings.range.code());
+fn set_up_input(
+    console: &mut GalilConsole<'_>,
+    settings: &GalilSettings,
+) -> Result<(), GalilOpenError> {
+    let (input, range) = (settings.input, settings.range as u8);
     // A controller that has one range only does not know the command; then it must be the usual +-10 V.
-    let reply = console.try_ask(&format!("AQ {input},{range}"))?;
+    let command = format!("AQ {input},{range}");
+    let reply = console.try_ask(&command)?;
     if reply.is_accepted {
-        let found = console.number(&format!("_AQ{input}"))?;
-        if found != f64::from(range) {
-            return Err(GalilOpenError::SetOtherwise {
-                command: format!("AQ {input},{range}"),
-                found: found.to_string(),
-            });
-        }
+        console.check(&command, &format!("_AQ{input}"), &[f64::from(range)])?;
     } else if settings.range != super::AnalogRange::Bipolar10 {
-        console.ask(&format!("AQ {input},{range}"))?;
+        console.ask(&command)?;
     }
     console.number(&format!("@AN[{input}]")).map(|_| ())
 }
 
 /// Downloads and starts the watchdog's program; `false` when the controller runs none.
 fn start_watchdog(
-    console: &mut Console<'_>,
+    console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
 ) -> Result<bool, GalilOpenError> {
     console.ask(&format!("{}=1", watchdog::VARIABLE))?;
-    let mut text = String::from("DL\r");
-    for line in watchdog::program(settings.axis) {
-        text.push_str(&line);
-        text.push('\r');
-    }
-    text.push('\\');
-    console.write(&text)?;
+    let program = watchdog::program(settings.axis).join("\r");
+    console.write(format!("DL\r{program}\r\\"))?;
     // One prompt for `\` and one for `DL`; a line that is refused gives `?` before them.
     let replies = console.replies(2, DOWNLOAD_MAX)?;
     let is_stored = replies.len() == 2 && replies.iter().all(|reply| reply.is_accepted);
     console.drain(QUIET)?;
-    if !is_stored {
-        return Ok(false);
-    }
-    let started = console.try_ask(&format!("XQ {},{}", watchdog::LABEL, watchdog::THREAD))?;
-    if !started.is_accepted {
+    let start = format!("XQ {},{}", watchdog::LABEL, watchdog::THREAD);
+    if !is_stored || !console.try_ask(&start)?.is_accepted {
         return Ok(false);
     }
     Ok(console.number(&format!("_XQ{}", watchdog::THREAD))? >= 0.0)
@@ -302,7 +276,7 @@ fn describe(
     settings: &GalilSettings,
     board: &GalilBoard,
     acceleration: MmPerS2,
-    (pace, plan): (Pace, Option<Plan>),
+    (pace, plan): (PollPace, Option<RecordingPlan>),
     words: &str,
     tm: f64,
 ) -> RigDescription {
@@ -319,7 +293,7 @@ fn describe(
         settings: BTreeMap::new(),
         mm_per_pulse: settings.mm_per_pulse,
         travel: settings.travel,
-        tick_nanos: (tm * NANOS_PER_TM).round() as u64,
+        tick_nanos: pace.tick.0,
         // Resolution of `SP`: 2 * (1000 / TM) counts/s (DMC-40x0 command reference).
         speed_quantum: MmPerS(2.0 * 1000.0 / tm * settings.mm_per_pulse),
         speed_max: settings.speed_max,

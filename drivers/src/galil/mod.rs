@@ -5,7 +5,7 @@
 //! controller is opened. [`GalilRig`] puts a session on a link.
 
 mod capture;
-mod codes;
+mod clock_alignment;
 mod connect;
 mod console;
 mod error;
@@ -13,21 +13,20 @@ mod model;
 mod order;
 pub mod protocol;
 mod recording;
-mod rig;
 mod sampling;
 mod session;
 mod settings;
 mod sine;
-mod timing;
 mod watchdog;
 
-use crate::devices::{DeviceKind, Role, first};
+use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
+use crate::devices::{DeviceKind, Role, find_line};
+use crate::wire::{HostClock, LinkThread, Place};
+use std::sync::Arc;
 
-pub use codes::ErrorCode;
 pub use connect::{Connected, connect};
-pub use error::GalilError;
+pub use error::{ErrorCode, GalilError};
 pub use model::{GalilBoard, GalilOpenError};
-pub use rig::{GalilDevice, GalilRig};
 pub use session::Session;
 pub use settings::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
 
@@ -36,5 +35,47 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     title: "a Galil controller",
     introduction: "Galil controller, ",
     role: Role::Axis(crate::rig_file::galil),
-    recognise: |lines| first(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
+    recognise: |lines| find_line(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
 };
+
+pub type GalilRig = DeviceRig<GalilDevice>;
+
+#[derive(Clone)]
+pub struct GalilDevice {
+    place: Place,
+    settings: GalilSettings,
+    worst_case_mm: f64,
+}
+
+impl GalilDevice {
+    #[must_use]
+    pub fn new(place: Place, settings: GalilSettings) -> Self {
+        Self { worst_case_mm: settings.travel.0, place, settings }
+    }
+
+    /// Longest way of the axis after palpate falls silent, in mm, as it was set up last.
+    pub const fn worst_case_mm(&self) -> f64 {
+        self.worst_case_mm
+    }
+}
+
+impl RigDevice for GalilDevice {
+    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+        let device: Arc<str> = "galil".into();
+        let mut link = self.place.open()?;
+        let connected = connect(link.as_mut(), clock, &self.settings, &device)?;
+        // The next opening must find the same controller, even if the rig file has no serial number.
+        self.settings.serial_number = connected.board.serial_number;
+        self.worst_case_mm = connected.worst_case_mm;
+        let session = Session::new(self.settings.clone(), &connected, clock());
+        // The recording ends too, so that the next program finds an idle controller.
+        let farewell = format!("ST{};RC 0\r", self.settings.axis).into_bytes();
+        Ok(Opened {
+            description: connected.description,
+            newtons_per_volt: None,
+            link: Some(connected.link),
+            lines: vec![LinkThread::start(link, session, clock, device, farewell)?],
+            raw: connected.raw,
+        })
+    }
+}

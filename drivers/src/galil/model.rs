@@ -2,6 +2,7 @@
 
 use super::error::GalilError;
 use std::fmt;
+use std::io;
 use thiserror::Error;
 
 /// A controller as it identifies itself (`^R^V`).
@@ -9,9 +10,8 @@ use thiserror::Error;
 pub struct GalilBoard {
     /// The whole answer, such as `DMC4143 Rev 1.3a`.
     pub revision: String,
-    /// Number of axes.
     pub axes: usize,
-    /// Serial number (`_BN`), where it tells one.
+    /// Serial number (`_BN`), where it reports one.
     pub serial_number: Option<u64>,
 }
 
@@ -34,7 +34,7 @@ impl GalilBoard {
             [3, 0, 0, 1, 0] => 1,
             [1, 8, ..] | [1, 7, ..] => {
                 return Err(unsupported(
-                    "it speaks the same language on a computer's bus, which palpate does not drive",
+                    "it is a card on a computer's bus, which palpate does not drive",
                 ));
             }
             _ => {
@@ -42,7 +42,7 @@ impl GalilBoard {
             }
         };
         if !(1..=8).contains(&axes) {
-            return Err(unsupported("its name tells no number of axes"));
+            return Err(unsupported("its name has no number of axes from 1 to 8"));
         }
         Ok(Self { revision: revision.to_owned(), axes, serial_number: None })
     }
@@ -58,77 +58,57 @@ impl fmt::Display for GalilBoard {
     }
 }
 
-/// A controller cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GalilOpenError {
     /// The link was lost while the controller was set up.
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
-    Lost {
-        /// What the operating system said.
-        detail: String,
-    },
-    /// Nothing came back.
+    Lost { detail: String },
     #[error(
-        "nothing answers like a Galil controller; check that it is on, the cable, and the baud rate of its jumpers"
+        "no Galil controller answers; check its power, the cable and the baud rate of its jumpers"
     )]
     Silent,
-    /// Something else answers.
     #[error(
-        "what answers is no Galil controller: it says '{got}'; check which port the rig file names"
+        "the device is not a Galil controller: it answers '{got}'; check the port in the rig file"
     )]
-    NoGalil {
-        /// What it said.
-        got: String,
-    },
-    /// A Galil device that is not driven.
+    NoGalil { got: String },
     #[error("{revision} cannot be used: {why}")]
-    Unsupported {
-        /// What it says it is.
-        revision: String,
-        /// Why not.
-        why: &'static str,
-    },
-    /// Another one of the same kind.
+    Unsupported { revision: String, why: &'static str },
     #[error(
-        "the controller has serial number {found}, the rig file says {expected}; a cable was swapped, or the rig file is of another rig"
+        "the controller has serial number {found}, the rig file says {expected}; check the cables and the serial_number of the rig file"
     )]
     OtherSerial {
-        /// Its number.
         found: String,
         /// The rig file's.
         expected: u64,
     },
-    /// It has fewer axes.
     #[error("{revision} has {axes} axes and no axis {axis}; correct the axis of the rig file")]
     NoAxis {
-        /// What it says it is.
         revision: String,
-        /// How many it has.
         axes: usize,
         /// The rig file's.
         axis: char,
     },
-    /// It refused a command that sets it up.
     #[error("the controller refuses {command} ({error})")]
-    Refused {
-        /// The command.
-        command: String,
-        /// Why.
-        error: GalilError,
-    },
-    /// It set something else.
-    #[error("the controller set {found} where {command} was asked; correct the rig file")]
-    SetOtherwise {
-        /// The command.
-        command: String,
-        /// What it reads back.
-        found: String,
-    },
+    Refused { command: String, error: GalilError },
+    #[error("the controller reads back {found} after {command}; correct the rig file")]
+    SetOtherwise { command: String, found: String },
     /// The rig file asks for a recording that there cannot be.
     #[error(
-        "samples cannot be recorded by this controller ({0}); leave sampling out of the rig file, or set it to \"auto\""
+        "this controller cannot record samples ({0}); remove sampling from the rig file or set it to \"auto\""
     )]
     NoRecording(String),
+}
+
+impl GalilOpenError {
+    pub(super) fn set_otherwise(command: impl Into<String>, found: impl Into<String>) -> Self {
+        Self::SetOtherwise { command: command.into(), found: found.into() }
+    }
+}
+
+impl From<io::Error> for GalilOpenError {
+    fn from(err: io::Error) -> Self {
+        Self::Lost { detail: err.to_string() }
+    }
 }
 
 #[cfg(test)]
@@ -136,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_tell_their_axes() {
+    fn axes_are_read_from_the_model_number() {
         for (revision, axes) in [
             ("DMC4143 Rev 1.3a", 4),
             ("DMC4010 Rev 1.3c-SER", 1),
@@ -149,14 +129,14 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_driven_is_refused_by_name() {
+    fn unsupported_controllers_are_refused_by_name() {
         for (revision, why) in [
             ("DMC1820 Rev 1.0", "bus"),
             ("DMC1842 Rev 1.0", "bus"),
             ("RIO47120 Rev 1.1b", "drives no axis"),
             ("DMC52010 Rev 1.0", "series"),
             ("DMC4103 Rev 1", "number of axes"),
-            ("Grbl 1.1h", "no Galil"),
+            ("Grbl 1.1h", "not a Galil"),
         ] {
             let err = GalilBoard::parse(revision).unwrap_err().to_string();
             assert!(err.contains(why) && err.contains(revision), "{err}");

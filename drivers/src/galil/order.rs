@@ -1,9 +1,9 @@
-//! One command of palpate as commands of the controller: what is sent, what must come back.
+//! One command of palpate as commands of the controller, and the answers that must come back.
 
-use super::protocol::Reply;
-use super::sampling::signed;
+use super::protocol::GalilReply;
+use super::sampling::parse_register;
 use super::settings::GalilSettings;
-use super::sine::Feed;
+use super::sine::SineFeed;
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, Oscillation, RigCommand, Sine};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
@@ -12,51 +12,41 @@ use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 /// are within 5 mm, and before its mechanical ends. They stop the axis when both palpate and a switch fail.
 pub const LIMIT_MARGIN_MM: f64 = 5.0;
 
-/// Which part of a command is under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
-    /// Numbers are set and read back.
     Setting,
     /// The part that counts was sent, for a command as it was set.
     Doing(RigCommand),
 }
 
-/// What to do next with a command.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Next {
-    /// Answers are still to come.
+pub enum OrderStep {
     Wait,
     /// Send these, each answered by a prompt.
     Send(Vec<String>),
     /// Send these, and behind them ask for a sample.
     SendAndSample(Vec<String>),
-    /// It is done, with what was set.
     Done(RigCommand),
     /// The controller refused a part of it: ask why.
-    AskWhy,
-    /// It cannot be done, in words.
+    ReadReason,
     Refused(String),
 }
 
-/// A command under way.
 #[derive(Clone, Debug)]
-pub struct Order {
-    /// As it was asked for.
+pub struct GalilOrder {
     pub command: RigCommand,
     stage: Stage,
-    /// Prompts still to come.
     open: usize,
-    /// Numbers read back so far.
     numbers: Vec<f64>,
     is_refused: bool,
     /// The part that counts was written, so that the axis may already be doing it.
     pub is_begun: bool,
     tick: Nanos,
-    /// Of a sine that was set: what goes on after its begin.
-    pub feed: Option<Feed>,
+    /// The increments that follow the beginning of a sine.
+    pub feed: Option<SineFeed>,
 }
 
-impl Order {
+impl GalilOrder {
     /// A command that was not begun, for samples of this length.
     #[must_use]
     pub const fn new(command: RigCommand, tick: Nanos) -> Self {
@@ -72,8 +62,7 @@ impl Order {
         }
     }
 
-    /// How it begins.
-    pub fn begin(&mut self, settings: &GalilSettings) -> Next {
+    pub fn begin(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let commands = match self.command {
             RigCommand::EnableMotor => {
@@ -82,10 +71,10 @@ impl Order {
             }
             RigCommand::MoveTo(wanted) => {
                 let (speed, rate) =
-                    (settings.counts(wanted.speed), settings.counts2(wanted.acceleration));
+                    (settings.counts(wanted.speed.0), settings.counts(wanted.acceleration.0));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
-                    return Next::Refused(format!(
-                        "a speed of {} is beyond the {} of the rig file",
+                    return OrderStep::Refused(format!(
+                        "a speed of {} is above the {} of the rig file",
                         wanted.speed, settings.speed_max
                     ));
                 }
@@ -106,21 +95,20 @@ impl Order {
                 let length = Seconds(self.tick.seconds().0);
                 let path = Sine::new(Position(0.0), &wanted, settings.mm_per_pulse, length);
                 if let Err(why) = path.check(settings.speed_max, wanted.acceleration) {
-                    return Next::Refused(why);
+                    return OrderStep::Refused(why);
                 }
-                let rate = settings.counts2(wanted.acceleration);
+                let rate = settings.counts(wanted.acceleration.0);
                 vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
             }
             RigCommand::Stop | RigCommand::Halt => {
-                return Next::Refused("a stop does not wait in a queue".into());
+                return OrderStep::Refused("a stop does not wait in a queue".into());
             }
         };
         self.open = commands.len();
-        Next::Send(commands)
+        OrderStep::Send(commands)
     }
 
-    /// Takes the answer to one of its commands.
-    pub fn take(&mut self, reply: &Reply, settings: &GalilSettings) -> Next {
+    pub fn take(&mut self, reply: &GalilReply, settings: &GalilSettings) -> OrderStep {
         self.open = self.open.saturating_sub(1);
         if reply.is_accepted {
             self.numbers.extend(reply.numbers().unwrap_or_default());
@@ -128,37 +116,37 @@ impl Order {
             self.is_refused = true;
         }
         if self.open > 0 {
-            return Next::Wait;
+            return OrderStep::Wait;
         }
         if self.is_refused {
-            return Next::AskWhy;
+            return OrderStep::ReadReason;
         }
         match self.stage {
-            Stage::Setting => self.do_it(settings),
+            Stage::Setting => self.send_main_part(settings),
             Stage::Doing(made) => self.done(made),
         }
     }
 
-    /// All is set: is it what was asked, and how does it go on?
-    fn do_it(&mut self, settings: &GalilSettings) -> Next {
+    /// Compares what was set with what was asked, and sends the part that begins something.
+    fn send_main_part(&mut self, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let numbers = std::mem::take(&mut self.numbers);
         let (made, commands) = match (self.command, numbers.as_slice()) {
             (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
-                let target = signed(target).map(|target| settings.sign() * target);
+                let target = parse_register(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
-                    return Next::Refused(format!(
+                    return OrderStep::Refused(format!(
                         "it reads back another target than {} pulses",
                         wanted.target_pulses
                     ));
                 }
-                // It rounds down to its resolution; what is above is not what was asked.
-                let speed_asked = settings.counts(wanted.speed) as f64;
-                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                // The controller rounds down to its resolution; a larger value is an error.
+                let speed_asked = settings.counts(wanted.speed.0) as f64;
+                let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
-                    return Next::Refused(format!(
-                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts, where \
-                         {speed_asked} and {ac_asked} were asked for"
+                    return OrderStep::Refused(format!(
+                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts after \
+                         {speed_asked} and {ac_asked} were set"
                     ));
                 }
                 let made = MoveTo {
@@ -170,9 +158,11 @@ impl Order {
             }
             (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
                 let wanted = software_limits(settings, 0, settings.travel.0);
-                if (signed(forward), signed(reverse)) != (Some(wanted.0), Some(wanted.1)) {
-                    return Next::Refused(format!(
-                        "it reads back software limits {forward} and {reverse} where {} and {} were set",
+                if (parse_register(forward), parse_register(reverse))
+                    != (Some(wanted.0), Some(wanted.1))
+                {
+                    return OrderStep::Refused(format!(
+                        "it reads back software limits {forward} and {reverse} after {} and {} were set",
                         wanted.0, wanted.1
                     ));
                 }
@@ -180,33 +170,33 @@ impl Order {
                 (self.command, vec![define])
             }
             (RigCommand::Oscillate(wanted), &[ac, dc]) => {
-                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || ac <= 0.0 || ac > ac_asked {
-                    return Next::Refused(format!(
-                        "it reads back acceleration {ac} and deceleration {dc} in counts, where {ac_asked} was asked for"
+                    return OrderStep::Refused(format!(
+                        "it reads back acceleration {ac} and deceleration {dc} in counts after {ac_asked} was set"
                     ));
                 }
                 let made =
                     Oscillation { acceleration: MmPerS2(ac * settings.mm_per_pulse), ..wanted };
-                let feed = self.feed.insert(Feed::new(&made, settings, self.tick));
+                let feed = self.feed.insert(SineFeed::new(&made, settings, self.tick));
                 (RigCommand::Oscillate(made), feed.begin())
             }
-            _ => return Next::Refused("its answer has other numbers than were asked for".into()),
+            _ => {
+                return OrderStep::Refused("its answer does not have the expected numbers".into());
+            }
         };
         self.stage = Stage::Doing(made);
         self.open = commands.len();
-        Next::SendAndSample(commands)
+        OrderStep::SendAndSample(commands)
     }
 
-    fn done(&self, made: RigCommand) -> Next {
-        match (self.command, self.numbers.as_slice()) {
-            // The number is `_MO`: 1 while the motor is off.
-            (RigCommand::EnableMotor, &[0.0]) => Next::Done(made),
-            (RigCommand::EnableMotor, _) => Next::Refused(
-                "the motor stays off after SH; check the amplifier and its enable input".into(),
-            ),
-            _ => Next::Done(made),
+    fn done(&self, made: RigCommand) -> OrderStep {
+        // The number is `_MO`: 1 while the motor is off.
+        if self.command == RigCommand::EnableMotor && self.numbers != [0.0] {
+            let why = "the motor stays off after SH; check the amplifier and its enable input";
+            return OrderStep::Refused(why.into());
         }
+        OrderStep::Done(made)
     }
 }
 
@@ -236,17 +226,17 @@ mod tests {
     use crate::galil::settings::tests::thesis;
 
     /// What becomes of an order whose numbers are read back so.
-    fn read_back(command: RigCommand, told: &[&str]) -> Next {
+    fn read_back(command: RigCommand, readback: &[&str]) -> OrderStep {
         let settings = thesis();
-        let mut order = Order::new(command, Nanos(976_563));
-        let Next::Send(commands) = order.begin(&settings) else {
+        let mut order = GalilOrder::new(command, Nanos(976_563));
+        let OrderStep::Send(commands) = order.begin(&settings) else {
             panic!("it is not set");
         };
-        let first = commands.len() - told.len();
-        let answers = std::iter::repeat_n("", first).chain(told.iter().copied());
-        let mut next = Next::Wait;
+        let first = commands.len() - readback.len();
+        let answers = std::iter::repeat_n("", first).chain(readback.iter().copied());
+        let mut next = OrderStep::Wait;
         for text in answers {
-            let reply = Reply { is_accepted: true, bytes: text.into() };
+            let reply = GalilReply { is_accepted: true, bytes: text.into() };
             next = order.take(&reply, &settings);
         }
         next
@@ -256,16 +246,16 @@ mod tests {
     fn nothing_faster_than_asked_for_is_begun() {
         let wanted =
             MoveTo { target_pulses: 1000, speed: MmPerS(0.75), acceleration: MmPerS2(61.44) };
-        for (told, is_begun) in [
+        for (readback, is_begun) in [
             (" 50 4096 4096", true),
             (" 48 3072 3072", true),
             (" 52 4096 4096", false),
             (" 500 4096 4096", false),
             (" 50 5120 5120", false),
         ] {
-            let next = read_back(RigCommand::MoveTo(wanted), &[told, " 1000"]);
-            let begins = matches!(next, Next::SendAndSample(_));
-            assert_eq!(begins, is_begun, "{told}: {next:?}");
+            let next = read_back(RigCommand::MoveTo(wanted), &[readback, " 1000"]);
+            let begins = matches!(next, OrderStep::SendAndSample(_));
+            assert_eq!(begins, is_begun, "{readback}: {next:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Bytes of a Galil DMC controller: replies counted by their prompts, text nobody asked for, numbers, lines of
+//! Bytes of a Galil DMC controller: replies counted by their prompts, unsolicited text, numbers, lines of
 //! commands.
 //!
 //! Every command of a line is answered by a prompt of its own, `:` when it was accepted and `?` when it was not, with
@@ -10,32 +10,29 @@ use super::error::GalilError;
 pub const LINE_MAX: usize = 80;
 /// Longest text of one reply. A whole upload is asked for in pieces shorter than this.
 pub const REPLY_MAX: usize = 64 * 1024;
-/// Longest line nobody asked for; a program's line has 80 characters.
-const UNASKED_MAX: usize = 1024;
+/// Longest unsolicited line; a program's line has 80 characters.
+const UNSOLICITED_MAX: usize = 1024;
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
 const UPLOAD_END: u8 = 0x1a;
 
-/// What came.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Incoming {
-    /// The answer to one command.
-    Reply(Reply),
-    /// A line that a program of the controller wrote, told apart by its top bits (`CW 1`).
-    Unasked(String),
+pub enum GalilMessage {
+    Reply(GalilReply),
+    /// A line that a program of the controller wrote, marked by its top bits (`CW 1`).
+    Unsolicited(String),
     /// More than [`REPLY_MAX`] bytes without a prompt: this is no controller, or its baud rate is another.
     Flood,
 }
 
-/// The answer to one command.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Reply {
+pub struct GalilReply {
     /// Whether it ended with `:`.
     pub is_accepted: bool,
-    /// What stood before the prompt, line ends and end marks taken off.
+    /// The text before the prompt, without line ends and end marks.
     pub bytes: Vec<u8>,
 }
 
-impl Reply {
+impl GalilReply {
     /// Its text; what is not ASCII stays visible as question marks in diamonds.
     pub fn text(&self) -> String {
         String::from_utf8_lossy(&self.bytes).trim().to_owned()
@@ -60,26 +57,19 @@ impl Reply {
 
 /// Reads replies out of bytes that come in any pieces.
 #[derive(Clone, Debug, Default)]
-pub struct Parser {
+pub struct GalilParser {
     reply: Vec<u8>,
-    unasked: Vec<u8>,
+    unsolicited: Vec<u8>,
 }
 
-impl Parser {
-    /// Forgets what has come of a reply.
+impl GalilParser {
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// Bytes of the reply under way.
-    pub fn pending(&self) -> usize {
-        self.reply.len()
-    }
-
-    /// Takes a byte; gives what it completed.
-    pub fn take(&mut self, byte: u8) -> Option<Incoming> {
+    pub fn take(&mut self, byte: u8) -> Option<GalilMessage> {
         if byte & 0x80 != 0 {
-            return self.take_unasked(byte & 0x7f);
+            return self.take_unsolicited(byte & 0x7f);
         }
         match byte {
             b':' | b'?' => {
@@ -87,11 +77,11 @@ impl Parser {
                 while matches!(bytes.last(), Some(b'\r' | b'\n' | &UPLOAD_END)) {
                     bytes.pop();
                 }
-                Some(Incoming::Reply(Reply { is_accepted: byte == b':', bytes }))
+                Some(GalilMessage::Reply(GalilReply { is_accepted: byte == b':', bytes }))
             }
             _ if self.reply.len() >= REPLY_MAX => {
                 self.reply.clear();
-                Some(Incoming::Flood)
+                Some(GalilMessage::Flood)
             }
             _ => {
                 self.reply.push(byte);
@@ -100,16 +90,16 @@ impl Parser {
         }
     }
 
-    fn take_unasked(&mut self, byte: u8) -> Option<Incoming> {
+    fn take_unsolicited(&mut self, byte: u8) -> Option<GalilMessage> {
         match byte {
             b'\r' => None,
             b'\n' => {
-                let line = std::mem::take(&mut self.unasked);
-                Some(Incoming::Unasked(String::from_utf8_lossy(&line).into_owned()))
+                let line = std::mem::take(&mut self.unsolicited);
+                Some(GalilMessage::Unsolicited(String::from_utf8_lossy(&line).into_owned()))
             }
             _ => {
-                if self.unasked.len() < UNASKED_MAX {
-                    self.unasked.push(byte);
+                if self.unsolicited.len() < UNSOLICITED_MAX {
+                    self.unsolicited.push(byte);
                 }
                 None
             }
@@ -139,7 +129,7 @@ pub fn numbers(text: &str) -> Option<Vec<f64>> {
 /// Joins commands with `;` to as few lines as hold them, each ended by a carriage return. A command that fills a line
 /// alone stays whole; the controller will refuse it.
 #[must_use]
-pub fn packed(commands: &[String]) -> Vec<String> {
+pub fn pack_lines(commands: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for command in commands {
         match lines.last_mut() {
@@ -158,7 +148,7 @@ pub fn packed(commands: &[String]) -> Vec<String> {
 
 /// The reply to `TC1`: number and text.
 #[must_use]
-pub fn error_of(reply: &Reply) -> Option<GalilError> {
+pub fn parse_error(reply: &GalilReply) -> Option<GalilError> {
     let text = reply.text();
     let digits = text.find(|c: char| !c.is_ascii_digit());
     let (number, words) = text.split_at(digits.unwrap_or(text.len()));
@@ -166,5 +156,4 @@ pub fn error_of(reply: &Reply) -> Option<GalilError> {
 }
 
 #[cfg(test)]
-#[path = "protocol_tests.rs"]
 mod tests;

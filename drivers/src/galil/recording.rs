@@ -5,10 +5,10 @@
 //! `base + k * 2^n`. Every later pair of `_RD` and `TIME` is checked against that.
 //!
 //! DMC-1700/1800 user manual, page 159: of a recorded `_TS` only bits 0 to 4 are valid. Whether the motor is on, and
-//! whether the axis moves when its stop code does not tell, is therefore taken from the question that comes with every
-//! fetch.
+//! whether the axis moves when its stop code does not show it, is therefore taken from the question that comes with
+//! every fetch.
 
-use super::sampling::{self, signed, ts, whole};
+use super::sampling::{self, parse_register, parse_whole, ts};
 use super::settings::GalilSettings;
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
@@ -28,23 +28,18 @@ const RUNNING: [u32; 5] = [0, 30, 50, 60, 100];
 
 /// A recording that runs, as it was found when it was started.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub struct RecordingPlan {
     /// Samples from one element to the next: 2^n.
     pub interval: i64,
-    /// Elements of an array.
     pub ring: i64,
     /// `TIME` of element 0, had it been there from the beginning.
     pub base: i64,
-    /// The first element to be fetched.
     pub first: i64,
-    /// Length of a sample of the controller.
     pub tick: Nanos,
 }
 
-/// An answer to the question while recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
-    /// The numbers of a poll.
+pub struct RecordingStatus {
     pub poll: [f64; 6],
     /// `TIME`.
     pub time: i64,
@@ -55,27 +50,27 @@ pub struct Look {
     is_off: bool,
 }
 
-impl Look {
+impl RecordingStatus {
     /// Reads the answer to [`question`].
     pub fn read(numbers: &[f64]) -> Option<Self> {
-        let &[volts, given, commanded, switches, stop_code, next, time] = numbers else {
+        let &[volts, pulses_given, commanded, switches, stop_code, next, time] = numbers else {
             return None;
         };
-        let bits = whole(switches)? as u32;
+        let bits = parse_whole(switches)? as u32;
         Some(Self {
-            poll: [volts, given, commanded, switches, stop_code, time],
-            time: i64::try_from(whole(time)?).ok()?,
-            next: i64::try_from(whole(next)?).ok()?,
+            poll: [volts, pulses_given, commanded, switches, stop_code, time],
+            time: i64::try_from(parse_whole(time)?).ok()?,
+            next: i64::try_from(parse_whole(next)?).ok()?,
             commanded,
-            is_moving: bits & ts::MOVING != 0 || given != commanded,
+            is_moving: bits & ts::MOVING != 0 || pulses_given != commanded,
             is_off: bits & ts::MOTOR_OFF != 0,
         })
     }
 }
 
-/// What comes out, in the order of the controller's clock.
+/// Output in the order of the controller's clock.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Out {
+pub enum RecordingOutput {
     /// The numbers of a poll, and whether a motion was begun just before.
     Sample([f64; 6], bool),
     /// A report that belongs behind all samples before it.
@@ -84,13 +79,11 @@ pub enum Out {
 
 /// A report or a sample out of line, which waits for the samples before it.
 #[derive(Clone, Debug)]
-struct Waiting {
-    /// Not known before the next look.
+struct HeldOutput {
     time: Option<i64>,
-    out: Out,
+    out: RecordingOutput,
 }
 
-/// Elements that were asked for.
 #[derive(Clone, Debug)]
 struct Chunk {
     first: i64,
@@ -98,31 +91,23 @@ struct Chunk {
     columns: Vec<Vec<f64>>,
 }
 
-/// A look does not fit the recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stopped;
-
-/// A recording that is being fetched.
 #[derive(Clone, Debug)]
-pub struct Recording {
-    plan: Plan,
+pub struct ArrayRecording {
+    plan: RecordingPlan,
     /// The next element to be asked for, and the newest that there is.
     next: i64,
     newest: i64,
-    /// The newest look and the one before.
-    look: Option<Look>,
-    /// The controller answered it after this.
-    looked_at: Nanos,
-    earlier: Option<Look>,
+    status: Option<RecordingStatus>,
+    status_asked_at: Nanos,
+    earlier: Option<RecordingStatus>,
     chunk: Option<Chunk>,
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<HeldOutput>,
     /// Pulses of the newest sample given out, and whether the axis moved.
-    given: Option<f64>,
+    pulses_given: Option<f64>,
     is_moving: bool,
-    /// The newest sample given out.
-    told: i64,
+    newest_output: i64,
     /// Elements that were written over before they were fetched.
-    pub lost: u64,
+    pub samples_lost: u64,
 }
 
 /// The question while recording: that of polls, and the next element before the clock.
@@ -132,23 +117,22 @@ pub fn question(settings: &GalilSettings) -> String {
     format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
 }
 
-impl Recording {
-    /// Of a recording that was started.
+impl ArrayRecording {
     #[must_use]
-    pub fn new(plan: Plan) -> Self {
+    pub fn new(plan: RecordingPlan) -> Self {
         Self {
             next: plan.first,
             newest: plan.first - 1,
             plan,
-            look: None,
-            looked_at: Nanos::ZERO,
+            status: None,
+            status_asked_at: Nanos::ZERO,
             earlier: None,
             chunk: None,
             waiting: VecDeque::new(),
-            given: None,
+            pulses_given: None,
             is_moving: false,
-            told: i64::MIN,
-            lost: 0,
+            newest_output: i64::MIN,
+            samples_lost: 0,
         }
     }
 
@@ -158,49 +142,50 @@ impl Recording {
 
     /// A report that belongs behind all samples that the controller has taken so far.
     pub fn hold(&mut self, event: RigEventBody) {
-        self.waiting.push_back(Waiting { time: None, out: Out::Event(event) });
+        self.waiting.push_back(HeldOutput { time: None, out: RecordingOutput::Event(event) });
     }
 
     /// Everything that waits, whatever samples are missing before it.
-    pub fn drain(&mut self) -> Vec<Out> {
+    pub fn drain(&mut self) -> Vec<RecordingOutput> {
         let waiting = std::mem::take(&mut self.waiting);
         waiting.into_iter().map(|waiting| waiting.out).collect()
     }
 
-    /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits.
-    pub fn look(
+    /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits. Returns whether it fits the
+    /// recording.
+    pub fn take_status(
         &mut self,
-        look: Look,
+        status: RecordingStatus,
         asked_at: Nanos,
         marked: Option<bool>,
-    ) -> Result<(), Stopped> {
-        let expected = (look.time - self.plan.base).div_euclid(self.plan.interval);
+    ) -> bool {
+        let expected = (status.time - self.plan.base).div_euclid(self.plan.interval);
         // The clock may have gone on by a sample between `_RD` and `TIME`.
-        let behind = (expected - (look.next - 1)).rem_euclid(self.plan.ring);
+        let behind = (expected - (status.next - 1)).rem_euclid(self.plan.ring);
         let is_late =
-            behind == 1 && (look.time - self.plan.base).rem_euclid(self.plan.interval) == 0;
+            behind == 1 && (status.time - self.plan.base).rem_euclid(self.plan.interval) == 0;
         if behind != 0 && !is_late {
-            return Err(Stopped);
+            return false;
         }
         self.newest = expected - behind;
-        self.looked_at = asked_at;
+        self.status_asked_at = asked_at;
         let oldest = self.newest - self.plan.ring + self.plan.ring / MARGIN;
         if self.next < oldest {
-            self.lost += (oldest - self.next).unsigned_abs();
+            self.samples_lost += (oldest - self.next).unsigned_abs();
             self.next = oldest;
             self.chunk = None;
         }
         for waiting in self.waiting.iter_mut().filter(|one| one.time.is_none()) {
-            waiting.time = Some(look.time);
+            waiting.time = Some(status.time);
         }
         if let Some(is_begun) = marked {
-            self.waiting.push_back(Waiting {
-                time: Some(look.time),
-                out: Out::Sample(look.poll, is_begun),
+            self.waiting.push_back(HeldOutput {
+                time: Some(status.time),
+                out: RecordingOutput::Sample(status.poll, is_begun),
             });
         }
-        self.earlier = self.look.replace(look);
-        Ok(())
+        self.earlier = self.status.replace(status);
+        true
     }
 
     /// The commands that fetch the next elements, if there are any; nothing while others are on their way.
@@ -219,19 +204,18 @@ impl Recording {
         Some(ARRAYS.map(fetch).into())
     }
 
-    /// Whether elements are on their way.
     pub fn is_fetching(&self) -> bool {
         self.chunk.is_some()
     }
 
     /// Forgets a fetch whose answers were lost; it will be done again.
-    pub fn give_up_fetch(&mut self) {
+    pub fn abandon_fetch(&mut self) {
         self.chunk = None;
     }
 
     /// Whether elements that came now may have been written over since it was known that they were there.
     fn is_stale(&self, first: i64, now: Nanos) -> bool {
-        let since = now.since(self.looked_at).0 as f64;
+        let since = now.since(self.status_asked_at).0 as f64;
         let written = since / (self.plan.interval as f64 * self.plan.tick.0 as f64);
         (self.newest - first) as f64 + written.ceil() + 1.0 >= self.plan.ring as f64
     }
@@ -242,7 +226,7 @@ impl Recording {
         now: Nanos,
         column: Vec<f64>,
         settings: &GalilSettings,
-    ) -> Option<Vec<Out>> {
+    ) -> Option<Vec<RecordingOutput>> {
         let chunk = self.chunk.as_mut()?;
         if i64::try_from(column.len()) != Ok(chunk.count) {
             return None;
@@ -253,7 +237,7 @@ impl Recording {
         }
         let chunk = self.chunk.take()?;
         if self.is_stale(chunk.first, now) {
-            // The next look tells from where on they are whole, and counts the others as lost.
+            // The next status shows from where on they are whole, and counts the others as lost.
             self.newest = self.next - 1;
             return Some(Vec::new());
         }
@@ -263,86 +247,88 @@ impl Recording {
             let time = self.time_of(chunk.first + at);
             // `at` is below the length of every column.
             let row = |column: usize| chunk.columns[column][at as usize];
-            self.come_out(time, &mut out);
-            if time > self.told && !self.belongs_behind(time, row(1)) {
+            self.release_due(time, &mut out);
+            if time > self.newest_output && !self.belongs_after_waiting(time, row(1)) {
                 let poll = self.sample(time, [row(0), row(1), row(2), row(3)], settings)?;
-                self.told = time;
-                out.push(Out::Sample(poll, false));
+                self.newest_output = time;
+                out.push(RecordingOutput::Sample(poll, false));
             }
         }
-        out.extend(self.settled());
+        out.extend(self.release_settled());
         Some(out)
     }
 
-    /// What waits for no more elements, when all that there are were fetched.
-    pub fn settled(&mut self) -> Vec<Out> {
+    /// Reports that wait for no more elements, when all elements were fetched.
+    pub fn release_settled(&mut self) -> Vec<RecordingOutput> {
         let mut out = Vec::new();
         if self.next > self.newest
-            && let Some(look) = self.look
+            && let Some(status) = self.status
         {
-            self.come_out(look.time, &mut out);
+            self.release_due(status.time, &mut out);
         }
         out
     }
 
-    /// What waits for samples before `time`.
-    fn come_out(&mut self, time: i64, out: &mut Vec<Out>) {
-        let is_due = |one: &mut Waiting| one.time.is_some_and(|at| at <= time);
+    /// Releases what waits for samples before `time`.
+    fn release_due(&mut self, time: i64, out: &mut Vec<RecordingOutput>) {
+        let is_due = |one: &mut HeldOutput| one.time.is_some_and(|at| at <= time);
         while let Some(waiting) = self.waiting.pop_front_if(is_due) {
-            if let (Out::Sample(poll, is_begun), Some(at)) = (&waiting.out, waiting.time) {
-                if at <= self.told {
+            if let (RecordingOutput::Sample(poll, is_begun), Some(at)) =
+                (&waiting.out, waiting.time)
+            {
+                if at <= self.newest_output {
                     continue;
                 }
-                self.told = at;
-                self.given = Some(poll[1]);
-                let is_high = whole(poll[3]).is_some_and(|bits| bits as u32 & ts::MOVING != 0);
+                self.newest_output = at;
+                self.pulses_given = Some(poll[1]);
+                let is_high =
+                    parse_whole(poll[3]).is_some_and(|bits| bits as u32 & ts::MOVING != 0);
                 self.is_moving = *is_begun || is_high || poll[1] != poll[2];
             }
             out.push(waiting.out);
         }
     }
 
-    /// A counter that was set anew while the axis rested shows it a little before the sample behind the command, and
+    /// A counter that was set again while the axis rested shows it a little before the sample behind the command, and
     /// before its acknowledgement.
-    fn belongs_behind(&self, time: i64, given: f64) -> bool {
-        let is_set_now = |one: &Waiting| {
-            let Out::Sample(poll, _) = &one.out else {
+    fn belongs_after_waiting(&self, time: i64, pulses_given: f64) -> bool {
+        let is_set_now = |one: &HeldOutput| {
+            let RecordingOutput::Sample(poll, _) = &one.out else {
                 return false;
             };
-            one.time.is_some_and(|at| at - time <= SETTING_MAX) && poll[1] == given
+            one.time.is_some_and(|at| at - time <= SETTING_MAX) && poll[1] == pulses_given
         };
         !self.is_moving
-            && self.given.is_some_and(|last| last != given)
+            && self.pulses_given.is_some_and(|last| last != pulses_given)
             && self.waiting.iter().any(is_set_now)
     }
 
-    /// The numbers that a poll would have given.
     fn sample(
         &mut self,
         time: i64,
-        [signal, given, switches, stop_code]: [f64; 4],
+        [signal, pulses_given, switches, stop_code]: [f64; 4],
         settings: &GalilSettings,
     ) -> Option<[f64; 6]> {
-        let look = self.look?;
-        let code = whole(stop_code)? as u32;
-        signed(given)?;
+        let status = self.status?;
+        let code = parse_whole(stop_code)? as u32;
+        parse_register(pulses_given)?;
         let was_moving = self.is_moving;
-        let is_near_motion = look.is_moving || self.earlier.is_some_and(|one| one.is_moving);
+        let is_near_motion = status.is_moving || self.earlier.is_some_and(|one| one.is_moving);
         let is_moving = (RUNNING.contains(&code) && is_near_motion)
             || (was_moving
-                && (given != look.commanded
-                    || (sampling::EARLY.contains(&code) && look.is_moving)))
-            || self.given.is_some_and(|last| last != given);
-        self.given = Some(given);
+                && (pulses_given != status.commanded
+                    || (sampling::EARLY.contains(&code) && status.is_moving)))
+            || self.pulses_given.is_some_and(|last| last != pulses_given);
+        self.pulses_given = Some(pulses_given);
         self.is_moving = is_moving;
-        let mut bits = whole(switches)? as u32 & 0x1f;
+        let mut bits = parse_whole(switches)? as u32 & 0x1f;
         if is_moving {
             bits |= ts::MOVING;
         }
-        if look.is_off {
+        if status.is_off {
             bits |= ts::MOTOR_OFF;
         }
         let volts = settings.range.volts_of_recorded(signal);
-        Some([volts, given, given, f64::from(bits), stop_code, time as f64])
+        Some([volts, pulses_given, pulses_given, f64::from(bits), stop_code, time as f64])
     }
 }

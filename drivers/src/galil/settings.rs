@@ -1,53 +1,24 @@
-//! How a Galil controller is wired to slide and load cell: what it cannot tell by itself.
+//! How a Galil controller is wired to slide and load cell, which it cannot report itself.
 
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 
-/// Pulses of the drive (`MT`, Galil application note 2446).
+/// Pulses of the drive: the argument of `MT` (Galil application note 2446).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorType {
-    /// Active-low pulses, `MT 2`.
-    ActiveLow,
-    /// Active-high pulses, `MT -2`.
-    ActiveHigh,
+    ActiveLow = 2,
+    ActiveHigh = -2,
 }
 
-impl MotorType {
-    /// The argument of `MT`.
-    #[must_use]
-    pub const fn code(self) -> f64 {
-        match self {
-            Self::ActiveLow => 2.0,
-            Self::ActiveHigh => -2.0,
-        }
-    }
-}
-
-/// Range of an analog input (`AQ`; RIO-47xxx user manual, page 38).
+/// Range of an analog input: the second argument of `AQ` (RIO-47xxx user manual, page 38).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AnalogRange {
-    /// -5 to 5 V.
-    Bipolar5,
-    /// -10 to 10 V.
-    Bipolar10,
-    /// 0 to 5 V.
-    Unipolar5,
-    /// 0 to 10 V.
-    Unipolar10,
+    Bipolar5 = 1,
+    Bipolar10 = 2,
+    Unipolar5 = 3,
+    Unipolar10 = 4,
 }
 
 impl AnalogRange {
-    /// The second argument of `AQ`.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Bipolar5 => 1,
-            Self::Bipolar10 => 2,
-            Self::Unipolar5 => 3,
-            Self::Unipolar10 => 4,
-        }
-    }
-
-    /// Width of the range.
     #[must_use]
     pub const fn span(self) -> Volts {
         Volts(match self {
@@ -64,32 +35,21 @@ impl AnalogRange {
         counts * self.span().0 / 65_536.0
     }
 
-    /// Whether it has two signs.
     #[must_use]
     pub const fn is_bipolar(self) -> bool {
         matches!(self, Self::Bipolar5 | Self::Bipolar10)
     }
 }
 
-/// The level of a switch's input while the switch is closed.
+/// The level of a switch's input while the switch is closed: the argument of `CN`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Levels {
     /// The switch pulls its input low, the usual wiring.
-    ActiveLow,
-    /// The switch lets its input rise.
-    ActiveHigh,
+    ActiveLow = -1,
+    ActiveHigh = 1,
 }
 
 impl Levels {
-    /// The argument of `CN`.
-    #[must_use]
-    pub const fn code(self) -> i8 {
-        match self {
-            Self::ActiveLow => -1,
-            Self::ActiveHigh => 1,
-        }
-    }
-
     /// Whether a switch with this level at its input is closed.
     #[must_use]
     pub const fn is_closed(self, is_high: bool) -> bool {
@@ -97,10 +57,9 @@ impl Levels {
     }
 }
 
-/// What palpate has to know to drive a slide with a Galil controller.
+/// Settings of a slide driven by a Galil controller.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GalilSettings {
-    /// Name of the rig, for the operator.
     pub name: String,
     /// Axis the slide is on, `A` to `H`.
     pub axis: char,
@@ -112,17 +71,13 @@ pub struct GalilSettings {
     pub is_reversed: bool,
     /// End of the travel, from home.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration of every move.
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
-    /// How the drive wants its pulses.
+    /// Polarity of the drive's pulses.
     pub motor_type: MotorType,
-    /// Limit switches.
     pub limits: Levels,
-    /// Home switch.
     pub home: Levels,
     /// Range of the load cell's input.
     pub range: AnalogRange,
@@ -130,28 +85,24 @@ pub struct GalilSettings {
     pub bits: u8,
     /// White noise of the signal at rest, standard deviation.
     pub noise: Volts,
-    /// What is before the converter to keep higher frequencies out, in words.
+    /// The anti-aliasing filter before the converter, in words.
     pub filter: Option<String>,
     /// Serial number that the controller must have; any without.
     pub serial_number: Option<u64>,
     /// Whether a program on the controller may stop the axis when palpate falls silent. It takes the place of a program
     /// that is there, but for one in permanent memory.
     pub has_watchdog: bool,
-    /// How samples are taken.
     pub sampling: Sampling,
     /// Period of the controller's samples as `TM` counts it, in its microseconds; left alone without.
     pub sample_us: Option<u16>,
 }
 
-/// How samples are taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampling {
     /// Recorded where that gives no old samples, else asked for.
     #[default]
     Auto,
-    /// Asked for one by one.
     Poll,
-    /// Recorded by the controller and fetched.
     Record,
 }
 
@@ -166,15 +117,10 @@ impl GalilSettings {
         self.range.span().0 / f64::from(1_u32 << self.bits.min(24))
     }
 
-    /// Counts per second of a speed.
-    pub fn counts(&self, speed: MmPerS) -> i64 {
-        // Rounding forgives the decimals of millimetres; the controller rounds down to its quantum.
-        (speed.0 / self.mm_per_pulse).round() as i64
-    }
-
-    /// Counts per second squared of an acceleration.
-    pub fn counts2(&self, acceleration: MmPerS2) -> i64 {
-        (acceleration.0 / self.mm_per_pulse).round() as i64
+    /// Counts per second of a speed in mm/s, or per second squared of an acceleration in mm/s2. Rounding forgives the
+    /// decimals of millimetres; the controller rounds down to its quantum.
+    pub fn counts(&self, mm: f64) -> i64 {
+        (mm / self.mm_per_pulse).round() as i64
     }
 }
 
@@ -211,9 +157,9 @@ pub mod tests {
     #[test]
     fn counts_are_those_of_the_drive() {
         let thesis = thesis();
-        assert_eq!(thesis.counts(MmPerS(0.75)), 50);
-        assert_eq!(thesis.counts(MmPerS(0.9)), 60);
-        assert_eq!(thesis.counts2(MmPerS2(61.44)), 4096);
+        assert_eq!(thesis.counts(0.75), 50);
+        assert_eq!(thesis.counts(0.9), 60);
+        assert_eq!(thesis.counts(61.44), 4096);
         assert_eq!(thesis.volts_per_count(), 20.0 / 65_536.0);
     }
 

@@ -12,16 +12,15 @@ use palpate_model::units::{Position, Seconds};
 /// `DT`: an increment lasts 2^3 samples, 8 ms. Between two of them a sine is off a straight line by `a w^2 t^2 / 8`, at
 /// 4096 counts/s^2 a thirtieth of a pulse.
 const INTERVAL: u32 = 3;
-/// So far ahead increments are sent: what a busy computer may be late by, and what the axis goes on for without it.
+/// Lead of the increments: a busy computer may be so late, and the axis goes on for so long without it.
 const LEAD: Nanos = Nanos::from_millis(400);
-/// Of a double of as many counts as a travel has.
+/// Rounding error of a double with as many counts as a travel has.
 const ROUNDING: f64 = 1e-6;
 /// Increments that begin a sine; a question has to fit behind them into the line.
 const FIRST: usize = 2;
 
-/// Increments of one sine.
 #[derive(Clone, Debug)]
-pub struct Feed {
+pub struct SineFeed {
     path: Sine,
     axis: char,
     /// Counts of a millimetre, signed.
@@ -38,8 +37,7 @@ pub struct Feed {
     is_over: bool,
 }
 
-impl Feed {
-    /// Of a command that was checked.
+impl SineFeed {
     #[must_use]
     pub fn new(command: &Oscillation, settings: &GalilSettings, tick: Nanos) -> Self {
         let length = Seconds(tick.seconds().0);
@@ -59,7 +57,6 @@ impl Feed {
         }
     }
 
-    /// The commands that begin it.
     pub fn begin(&mut self) -> Vec<String> {
         let mut commands = vec![format!("CM{}", self.axis)];
         for _ in 0..FIRST {
@@ -68,8 +65,7 @@ impl Feed {
         commands
     }
 
-    /// They were written now.
-    pub fn begun(&mut self, now: Nanos) {
+    pub fn mark_begun(&mut self, now: Nanos) {
         self.begun_at = now;
     }
 
@@ -92,7 +88,7 @@ impl Feed {
         self.sent += 1 << n;
         let at = Seconds(self.sent as f64 * self.tick.seconds().0);
         // Upwards, for between two increments the counter shows the last whole count, below the place that it is at; so
-        // what it tells is within one count of the sine. Not confirmed for any board. Far below 2^31 counts.
+        // what it shows is within one count of the sine. Not confirmed for any board. Far below 2^31 counts.
         let place = (self.path.position(at).0 * self.counts_per_mm - ROUNDING).ceil() as i64;
         commands.push(format!("CD{}={}", self.axis, place - self.place));
         self.place = place;
@@ -109,13 +105,12 @@ impl Feed {
         !self.is_over && self.lead(now) <= 0
     }
 
-    /// When the next increments should be sent; never once all are.
+    /// Time of the next increments; `None` once all are sent.
     pub fn due(&self) -> Option<Nanos> {
         let sent = Nanos(self.sent * self.tick.0);
         (!self.is_over).then(|| Nanos((self.begun_at + sent).0.saturating_sub(LEAD.0)))
     }
 
-    /// A line of increments, if they are due.
     pub fn take(&mut self, now: Nanos) -> Option<Vec<String>> {
         self.due().filter(|due| *due <= now)?;
         let mut commands: Vec<String> = Vec::new();
@@ -137,14 +132,14 @@ mod tests {
     use crate::galil::settings::tests::thesis;
     use palpate_model::units::MmPerS2;
 
-    fn feed(period_ticks: u32, cycles: u32) -> Feed {
+    fn feed(period_ticks: u32, cycles: u32) -> SineFeed {
         let command = Oscillation {
             amplitude_pulses: 50,
             period_ticks,
             cycles,
             acceleration: MmPerS2(61.44),
         };
-        Feed::new(&command, &thesis(), Nanos(976_563))
+        SineFeed::new(&command, &thesis(), Nanos(976_563))
     }
 
     #[test]
@@ -185,7 +180,7 @@ mod tests {
     fn no_more_is_sent_than_the_lead() {
         let mut feed = feed(4096, 1);
         feed.begin();
-        feed.begun(Nanos(0));
+        feed.mark_begun(Nanos(0));
         while feed.take(Nanos(0)).is_some() {}
         assert!(feed.lead(Nanos(0)) < LEAD.0 as i64 + 100_000_000);
         assert!(!feed.is_dry(LEAD) && feed.is_dry(Nanos(2 * LEAD.0)));

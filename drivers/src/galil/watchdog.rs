@@ -7,12 +7,12 @@ use palpate_model::units::{MmPerS, MmPerS2};
 pub const VARIABLE: &str = "plpwd";
 /// The program's label.
 pub const LABEL: &str = "#PLPWD";
-/// The thread it runs in: the first one is for whoever else has programs, and automatic subroutines.
+/// The thread it runs in: the first one is for other programs and automatic subroutines.
 pub const THREAD: u8 = 1;
-/// How often the program looks, in the controller's ms. Whether these are samples when `TM` is not 1000 is not confirmed:
-/// half as long at 500, renewals are still often enough.
+/// Interval of the program's checks, in the controller's ms. Whether these are samples when `TM` is not 1000 is not
+/// confirmed: half as long at 500, renewals are still often enough.
 const LOOK_MS: u32 = 250;
-/// How often palpate renews: so often that two renewals may be lost.
+/// Interval of renewals: so short that two of them may be lost.
 pub const RENEW: Nanos = Nanos::from_millis(40);
 
 /// Its lines. `WT`, `JP`, labels: DMC-40x0 command reference. `ST` of an axis leaves programs running.
@@ -30,7 +30,7 @@ pub fn program(axis: char) -> Vec<String> {
     ]
 }
 
-/// How far the axis goes at most after the last byte from palpate: two looks of the program at full speed, and the way
+/// Longest way of the axis after the last byte from palpate, in mm: two looks of the program at full speed, and the way
 /// of the brake.
 #[must_use]
 pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2, tick: Nanos) -> f64 {

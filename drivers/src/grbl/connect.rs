@@ -1,12 +1,12 @@
-//! What happens once when a board is opened: who it is, whether it is the right one, whether its settings are those of
-//! the rig file. Nothing is written that it keeps, and nothing moves.
+//! Opening a board: its identity and its settings are compared with the rig file. Nothing is written that the board
+//! keeps, and nothing moves.
 
-use super::console::Console;
+use super::console::GrblConsole;
 use super::error::GrblOpenError;
-use super::fitness::{check, read_settings, value};
+use super::fitness::{check_settings, read_settings, setting};
 use super::motion::worst_case_mm;
-use super::protocol::{self, CYCLE_START, Incoming, JOG_CANCEL, State, Status};
-use super::settings::{Facts, GrblSettings, HomeSwitch};
+use super::protocol::{self, CYCLE_START, GrblState, GrblStatus, Incoming, JOG_CANCEL, Parser};
+use super::settings::{BoardParameters, GrblSettings, HomeSwitch};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
@@ -14,46 +14,39 @@ use std::sync::Arc;
 
 /// Opening the port resets most boards, and a boot loader waits for a new program for one to two seconds.
 const START_MAX: Nanos = Nanos::from_millis(5_000);
-/// After so long without a byte a reset is asked for: a board that a limit has locked hears nothing else (gnea/grbl,
+/// After so long without a byte a reset is sent: a board that a limit has locked reacts to nothing else (gnea/grbl,
 /// protocol.c, `protocol_exec_rt_system`). Boot loaders of common boards are through by then.
 const RESET_AFTER: Nanos = Nanos::from_millis(2_500);
-/// Between two questions who is there.
 pub(super) const ASK_AGAIN: Nanos = Nanos::from_millis(300);
 /// An answer takes longer only while settings are written, which this never does.
 pub(super) const ANSWER_MAX: Nanos = Nanos::from_millis(1_500);
-/// A reset that has just begun shows itself by then: half a second without a word is no board that starts.
+/// A reset that has just begun shows its welcome by then.
 const SETTLE: Nanos = Nanos::from_millis(60);
-/// The slowest brake that anybody waits for.
 const REST_MAX: Nanos = Nanos::from_millis(5_000);
-/// Empty lines by which the link is measured.
 const PINGS: usize = 10;
 
-/// A board that was set up.
 #[derive(Clone, Debug)]
 pub struct Connected {
     /// Version, text of `$I=`, safety, for the operator and the log.
     pub identity: String,
-    /// What its settings make of it.
-    pub facts: Facts,
-    /// The link as it was measured.
+    pub facts: BoardParameters,
     pub stats: LinkStats,
-    /// How far the axis goes at most when palpate falls silent, in mm.
+    /// Longest way of the axis after palpate falls silent, in mm.
     pub worst_case_mm: f64,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 
-/// Sets a board up. A jog that somebody else has left behind is ended.
+/// Sets a board up. A jog that another program has left running is ended.
 pub fn connect(
     link: &mut dyn Link,
     clock: &HostClock,
     settings: &GrblSettings,
     device: &Arc<str>,
 ) -> Result<Connected, GrblOpenError> {
-    let mut console = Console::new(link, clock, device);
-    let said = wake(&mut console)?;
-    let version = identify(&mut console, settings, said.as_deref())?;
-    let status = to_rest(&mut console)?;
+    let mut console = GrblConsole::open(link, clock, device, Parser::take);
+    let welcome_version = wake(&mut console)?;
+    let version = identify(&mut console, settings, welcome_version.as_deref())?;
+    let status = wait_for_rest(&mut console)?;
     // Whatever is on that pin opens and closes it while the slide leaves the switch, and each change is an alarm
     // (limits.c, the pin's interrupt).
     if settings.home == HomeSwitch::Probe && status.has_pin(settings.axis) {
@@ -61,9 +54,9 @@ pub fn connect(
     }
     unlock(&mut console, settings, &status)?;
     let values = read_settings(&mut console)?;
-    let steps_per_mm = check(settings, &values)?;
-    let status = to_rest(&mut console)?;
-    if status.state != State::Idle {
+    let steps_per_mm = check_settings(settings, &values)?;
+    let status = wait_for_rest(&mut console)?;
+    if status.state != GrblState::Idle {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
     let is_shared = settings.home == HomeSwitch::Limit && !settings.is_closed_home;
@@ -71,19 +64,17 @@ pub fn connect(
         return Err(GrblOpenError::OnASwitch { axis: settings.axis });
     }
     let place = status.machine.as_ref().and_then(|place| place.get(settings.index()).copied());
-    let Some(place) = place else {
-        return Err(GrblOpenError::SetOtherwise {
-            number: 10,
-            meaning: "status reports",
-            found: value(&values, 10),
-            wanted: "1".into(),
-        });
-    };
+    let place = place.ok_or_else(|| GrblOpenError::SetOtherwise {
+        number: 10,
+        meaning: "status reports",
+        found: setting(&values, 10),
+        wanted: "1".into(),
+    })?;
     let mut stats = LinkStats::default();
     for _ in 0..PINGS {
-        let asked = console.now();
+        let start = console.now();
         console.ask("")?;
-        stats.push(console.now().since(asked));
+        stats.push(console.now().since(start));
     }
     stats.in_flight = 1;
     let worst_case_mm = worst_case_mm(settings.speed_max, settings.acceleration);
@@ -94,36 +85,32 @@ pub fn connect(
             settings.axis,
             (worst_case_mm * 10.0).ceil() / 10.0
         ),
-        facts: Facts {
+        facts: BoardParameters {
             steps_per_mm,
             steps: (place * steps_per_mm).round() as i64,
             round_trip: stats.round_trip_min,
         },
         stats,
         worst_case_mm,
-        raw: console.link.raw,
+        raw: console.raw,
     })
 }
 
-/// Waits until somebody answers. Gives the version of the welcome, where one came.
-fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
+/// Waits for an answer. Returns the version of the welcome, if one came.
+fn wake(console: &mut GrblConsole<'_>) -> Result<Option<String>, GrblOpenError> {
     let start = console.now();
-    let mut found = None;
-    let (mut has_heard, mut has_reset) = (false, false);
+    let (mut has_received, mut has_reset) = (false, false);
     while console.now().since(start) < START_MAX {
-        console.write(&[JOG_CANCEL, protocol::QUERY])?;
+        console.write([JOG_CANCEL, protocol::QUERY])?;
         let until = console.now() + ASK_AGAIN;
-        while let Some(incoming) = console.next(until)? {
-            has_heard = true;
+        while let Some(incoming) = console.next_line(until)? {
+            has_received = true;
             match incoming {
-                Incoming::Hello(version) => {
-                    found = Some(version);
-                    break;
-                }
+                Incoming::Hello(version) => return Ok(Some(version)),
                 Incoming::Status(_) => {
-                    // A board that is just being reset says its welcome behind this; then all begins anew.
+                    // A board that is just being reset sends its welcome after this; the dialogue then starts again.
                     let until = console.now() + SETTLE;
-                    while let Some(incoming) = console.next(until)? {
+                    while let Some(incoming) = console.next_line(until)? {
                         if let Incoming::Hello(version) = incoming {
                             return Ok(Some(version));
                         }
@@ -139,35 +126,32 @@ fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
                 _ => {}
             }
         }
-        if found.is_some() {
-            return Ok(found);
-        }
-        if !has_heard && !has_reset && console.now().since(start) >= RESET_AFTER {
+        if !has_received && !has_reset && console.now().since(start) >= RESET_AFTER {
             has_reset = true;
-            console.write(&[protocol::RESET])?;
+            console.write([protocol::RESET])?;
         }
     }
     Err(GrblOpenError::Silent)
 }
 
-/// Half a line of whoever was here before is spoilt and ended; then version and text of the board.
+/// Ends half a line that another program may have written, then reads version and text of the board.
 fn identify(
-    console: &mut Console<'_>,
+    console: &mut GrblConsole<'_>,
     settings: &GrblSettings,
-    said: Option<&str>,
+    welcome_version: Option<&str>,
 ) -> Result<String, GrblOpenError> {
-    // `error:7` of a memory that was never written is no answer to anything; neither is half a line's. A dollar alone asks
-    // for help; at the end of half a motion it makes an error of it, where an end of line would begin it.
+    // `error:7` of a memory that was never written is no answer to anything; neither is half a line's. A dollar alone
+    // asks for help; at the end of half a motion it makes an error of it, where an end of line would begin it.
     console.write(b"$\n")?;
-    let is_answered = has_ok(console)?;
-    // In motion it tells nothing about itself; held, asleep or behind an open door it takes no line at all.
-    let status = to_rest(console)?;
-    if !matches!(status.state, State::Idle | State::Alarm) {
+    let is_answered = wait_for_ok(console)?;
+    // In motion it does not identify itself; held, asleep or behind an open door it takes no line at all.
+    let status = wait_for_rest(console)?;
+    if !matches!(status.state, GrblState::Idle | GrblState::Alarm) {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
     }
     if !is_answered {
-        console.write(&[CYCLE_START])?;
-        has_ok(console)?;
+        console.write([CYCLE_START])?;
+        wait_for_ok(console)?;
     }
     let mut version = None;
     let mut text = String::new();
@@ -180,8 +164,9 @@ fn identify(
             own.clone_into(&mut text);
         }
     }
-    let version =
-        version.or_else(|| said.map(str::to_owned)).unwrap_or_else(|| "of unknown version".into());
+    let version = version
+        .or_else(|| welcome_version.map(str::to_owned))
+        .unwrap_or_else(|| "of unknown version".into());
     if !version.starts_with("1.1") {
         return Err(GrblOpenError::OtherVersion { version });
     }
@@ -194,9 +179,9 @@ fn identify(
     }
 }
 
-fn has_ok(console: &mut Console<'_>) -> Result<bool, GrblOpenError> {
+fn wait_for_ok(console: &mut GrblConsole<'_>) -> Result<bool, GrblOpenError> {
     let until = console.now() + ANSWER_MAX;
-    while let Some(incoming) = console.next(until)? {
+    while let Some(incoming) = console.next_line(until)? {
         if incoming == Incoming::Ok {
             return Ok(true);
         }
@@ -204,34 +189,33 @@ fn has_ok(console: &mut Console<'_>) -> Result<bool, GrblOpenError> {
     Ok(false)
 }
 
-/// Ends a jog that is under way.
-fn to_rest(console: &mut Console<'_>) -> Result<Status, GrblOpenError> {
+fn wait_for_rest(console: &mut GrblConsole<'_>) -> Result<GrblStatus, GrblOpenError> {
     let start = console.now();
     loop {
         let status = console.status()?;
-        if status.state != State::Jog {
+        if status.state != GrblState::Jog {
             return Ok(status);
         }
         if console.now().since(start) > REST_MAX {
             return Err(GrblOpenError::State("Jog".into()));
         }
-        console.write(&[JOG_CANCEL])?;
+        console.write([JOG_CANCEL])?;
     }
 }
 
 fn unlock(
-    console: &mut Console<'_>,
+    console: &mut GrblConsole<'_>,
     settings: &GrblSettings,
-    status: &Status,
+    status: &GrblStatus,
 ) -> Result<(), GrblOpenError> {
     match status.state {
-        State::Idle => Ok(()),
-        State::Alarm if settings.is_unlocking => console.ask("$X").map(|_| ()),
-        State::Alarm => {
+        GrblState::Idle => Ok(()),
+        GrblState::Alarm if settings.is_unlocking => console.ask("$X").map(|_| ()),
+        GrblState::Alarm => {
             let reason = if status.has_pin(settings.axis) {
                 "its limit switch is closed"
             } else {
-                "it wants to be homed or confirmed"
+                "it needs homing or unlocking"
             };
             Err(GrblOpenError::Locked { reason: reason.into() })
         }

@@ -2,62 +2,25 @@
 
 use super::connect::{ANSWER_MAX, ASK_AGAIN};
 use super::error::GrblOpenError;
-use super::protocol::{self, Incoming, Parser, Status};
-use crate::wire::{HostClock, Link, TappedLink};
+use super::protocol::{self, GrblStatus, Incoming, Parser};
+use crate::wire::SetupConsole;
 use palpate_model::Nanos;
-use std::collections::VecDeque;
-use std::sync::Arc;
 
-/// A link to a board with nothing else going on.
-pub(super) struct Console<'a> {
-    /// The link and what was exchanged over it.
-    pub link: TappedLink<'a>,
-    parser: Parser,
-    waiting: VecDeque<Incoming>,
-}
+pub(super) type GrblConsole<'a> = SetupConsole<'a, Parser, Incoming>;
 
-impl<'a> Console<'a> {
-    /// On a link.
-    pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
-        Self {
-            link: TappedLink::new(link, clock, device),
-            parser: Parser::default(),
-            waiting: VecDeque::new(),
-        }
-    }
-
-    /// The host's clock.
-    pub fn now(&self) -> Nanos {
-        self.link.now()
-    }
-
-    /// Writes bytes as they are.
-    pub fn write(&mut self, bytes: &[u8]) -> Result<(), GrblOpenError> {
-        self.link.write(bytes).map_err(lost)
-    }
-
+impl GrblConsole<'_> {
     /// The next line, if one comes in time.
-    pub fn next(&mut self, until: Nanos) -> Result<Option<Incoming>, GrblOpenError> {
-        loop {
-            if let Some(incoming) = self.waiting.pop_front() {
-                return Ok(Some(incoming));
-            }
-            if self.now() >= until {
-                return Ok(None);
-            }
-            for byte in self.link.read().map_err(lost)? {
-                self.waiting.extend(self.parser.take(byte));
-            }
-        }
+    pub fn next_line(&mut self, until: Nanos) -> Result<Option<Incoming>, GrblOpenError> {
+        Ok(self.next(until)?.map(|(_, line)| line))
     }
 
     /// Asks for a status until one comes.
-    pub fn status(&mut self) -> Result<Status, GrblOpenError> {
+    pub fn status(&mut self) -> Result<GrblStatus, GrblOpenError> {
         let end = self.now() + ANSWER_MAX;
         while self.now() < end {
-            self.write(&[protocol::QUERY])?;
+            self.write([protocol::QUERY])?;
             let until = self.now() + ASK_AGAIN;
-            while let Some(incoming) = self.next(until)? {
+            while let Some(incoming) = self.next_line(until)? {
                 if let Incoming::Status(status) = incoming {
                     return Ok(status);
                 }
@@ -68,25 +31,19 @@ impl<'a> Console<'a> {
 
     /// Sends a line and gives what comes before its `ok`.
     pub fn ask(&mut self, line: &str) -> Result<Vec<Incoming>, GrblOpenError> {
-        self.write(format!("{line}\n").as_bytes())?;
+        self.write(format!("{line}\n"))?;
         let until = self.now() + ANSWER_MAX;
         let mut all = Vec::new();
-        while let Some(incoming) = self.next(until)? {
+        while let Some(incoming) = self.next_line(until)? {
             match incoming {
                 Incoming::Ok => return Ok(all),
                 Incoming::Refused(refusal) => {
-                    return Err(GrblOpenError::Refused {
-                        line: line.to_owned(),
-                        detail: refusal.to_string(),
-                    });
+                    let detail = refusal.to_string();
+                    return Err(GrblOpenError::Refused { line: line.to_owned(), detail });
                 }
                 other => all.push(other),
             }
         }
         Err(GrblOpenError::Silent)
     }
-}
-
-fn lost(err: std::io::Error) -> GrblOpenError {
-    GrblOpenError::Lost { detail: err.to_string() }
 }

@@ -1,35 +1,21 @@
 //! Why a board cannot be opened; what Grbl says when it refuses a line or locks itself, with what to do about it.
 
 use std::fmt;
+use std::io;
 use thiserror::Error;
 
-/// A board cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GrblOpenError {
-    /// It was unplugged.
     #[error("the link was lost while the board was set up ({detail}); check the cable")]
-    Lost {
-        /// What the operating system said.
-        detail: String,
-    },
-    /// Nothing comes.
-    #[error("nothing answers like Grbl; check power, port and baud rate (115200 is Grbl's)")]
+    Lost { detail: String },
+    #[error("no Grbl board answers; check power, port and baud rate (115200 is Grbl's)")]
     Silent,
-    /// Something else answers.
-    #[error("what answers is not Grbl ({found}); check the port in the rig file")]
-    NotGrbl {
-        /// What it said.
-        found: String,
-    },
-    /// Too old for jogs.
+    #[error("the device is not a Grbl board: it answers '{found}'; check the port in the rig file")]
+    NotGrbl { found: String },
     #[error("the board runs Grbl {version}, which cannot be driven safely; load Grbl 1.1")]
-    OtherVersion {
-        /// What it says it is.
-        version: String,
-    },
-    /// A swapped cable.
+    OtherVersion { version: String },
     #[error(
-        "the board calls itself '{found}' where the rig file has '{expected}'; check the cables, or the build_info of the rig file"
+        "the board is called '{found}', the rig file says '{expected}'; check the cables and the build_info of the rig file"
     )]
     OtherBoard {
         /// Its text of `$I=`.
@@ -37,177 +23,110 @@ pub enum GrblOpenError {
         /// The rig file's.
         expected: String,
     },
-    /// It does not want to move.
     #[error(
-        "the board is locked after its start ({reason}); look whether the axis is free, then let palpate unlock it with unlock = true in the rig file, or switch its homing lock off with $22=0"
+        "the board is locked after its start ({reason}); check that the axis is free, then set unlock = true in the rig file, or switch the homing lock off with $22=0"
     )]
-    Locked {
-        /// What it said.
-        reason: String,
-    },
+    Locked { reason: String },
     /// It is in a state in which nothing can be done.
     #[error("the board is in state {0}; reset it and open the rig again")]
     State(String),
     /// A limit switch is closed that Grbl itself watches.
     #[error(
-        "the limit pin of axis {axis} is closed, and the board would lock itself again as soon as it opens; move the slide off the switch by hand, then open the rig again"
+        "the limit pin of axis {axis} is closed, and the board locks itself again as soon as it opens; move the slide off the switch by hand, then open the rig again"
     )]
-    OnALimit {
-        /// The axis.
-        axis: char,
-    },
-    /// A setting is not that of the rig file.
+    OnALimit { axis: char },
     #[error(
         "the board has ${number}={found} ({meaning}) where the rig file needs {wanted}; correct the rig file, or send ${number}={wanted} from a terminal"
     )]
-    SetOtherwise {
-        /// Number of the setting.
-        number: u16,
-        /// What it is.
-        meaning: &'static str,
-        /// As the board has it.
-        found: f64,
-        /// As it should be.
-        wanted: String,
-    },
-    /// Its steps are shorter than what it tells.
+    SetOtherwise { number: u16, meaning: &'static str, found: f64, wanted: String },
+    /// Its steps are shorter than the resolution of its reports.
     #[error(
-        "the board has ${number}={found} (steps a mm), but tells places in thousandths of a mm only, so that more than 1000 cannot be checked; set the drive to coarser microsteps"
+        "the board has ${number}={found} (steps per mm), but reports positions in thousandths of a mm only, so more than 1000 steps per mm cannot be checked; set the drive to coarser microsteps"
     )]
-    TooFine {
-        /// Number of the setting.
-        number: u16,
-        /// What it is.
-        found: f64,
-    },
-    /// Nobody knows at which end it stands.
+    TooFine { number: u16, found: f64 },
+    /// It is not known at which end the axis stands.
     #[error(
-        "the limit pin of axis {axis} is closed, and home and the far limit look alike on it; move the slide off the switch by hand, or say closed_is_home = true in the rig file if nothing but home can have closed it"
+        "the limit pin of axis {axis} is closed, and home and the far limit share it; move the slide off the switch by hand, or set closed_is_home = true in the rig file if only home can have closed it"
     )]
-    OnASwitch {
-        /// The axis.
-        axis: char,
-    },
-    /// It refuses a question.
+    OnASwitch { axis: char },
     #[error("the board refuses {line} ({detail})")]
-    Refused {
-        /// What was asked.
-        line: String,
-        /// Why.
-        detail: String,
-    },
+    Refused { line: String, detail: String },
 }
 
-/// `error:N`.
+impl From<io::Error> for GrblOpenError {
+    fn from(err: io::Error) -> Self {
+        Self::Lost { detail: err.to_string() }
+    }
+}
+
+/// `error:N` or `ALARM:N`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    /// The number, where there is one.
+pub struct GrblCode {
+    is_alarm: bool,
     pub code: Option<u8>,
-    /// The words of firmware that has words.
+    /// The text of firmware that sends words instead of numbers.
     pub words: String,
 }
 
-/// `ALARM:N`.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Alarm {
-    /// The number, where there is one.
-    pub code: Option<u8>,
-    /// The words of firmware that has words.
-    pub words: String,
-}
-
-fn split(text: &str) -> (Option<u8>, String) {
-    let text = text.trim();
-    match text.parse() {
-        Ok(code) => (Some(code), String::new()),
-        Err(_) => (None, text.to_owned()),
-    }
-}
-
-impl Refusal {
-    /// Reads what is behind `error:`.
+impl GrblCode {
+    /// Reads what is behind `error:` or `ALARM:`.
     #[must_use]
-    pub fn parse(text: &str) -> Self {
-        let (code, words) = split(text);
-        Self { code, words }
+    pub fn parse(is_alarm: bool, text: &str) -> Self {
+        let code = text.trim().parse().ok();
+        let words = if code.is_some() { String::new() } else { text.trim().to_owned() };
+        Self { is_alarm, code, words }
     }
 
-    /// What it means and what to do (doc/markdown/interface.md, table of error codes).
-    fn meaning(&self) -> &'static str {
-        match self.code {
-            Some(1 | 2 | 23..=29) => "a line was garbled on its way; check the cable",
-            Some(3 | 20) => "this firmware does not know the command; use Grbl 1.1",
-            Some(4) => "a number must not be negative",
-            Some(5) => "its homing is off; set $22=1 or let palpate look for home",
-            Some(7) => {
-                "its memory could not be read and holds the factory settings now; set them again and open the rig"
-            }
-            Some(8) => "it is not at rest; wait",
-            Some(9) => "it is locked; look at the axis, then open the rig again",
-            Some(10) => "soft limits need homing ($22=1)",
-            Some(11) => "a line was too long; bytes were lost, check the cable",
-            Some(12) => "so many steps a second it does not make; lower the speed",
-            Some(13) => "the safety door is open; close it",
-            Some(15) => {
-                "the target is outside the travel that it knows ($130 to $132); home it or correct the travel"
-            }
-            Some(16) => "the jog was garbled on its way; check the cable",
-            Some(22) => "the speed was lost on its way; check the cable",
-            _ => "",
-        }
-    }
-}
-
-impl Alarm {
-    /// Reads what is behind `ALARM:`.
-    #[must_use]
-    pub fn parse(text: &str) -> Self {
-        let (code, words) = split(text);
-        Self { code, words }
-    }
-
-    /// What it means and what to do (doc/markdown/interface.md, table of alarm codes).
-    fn meaning(&self) -> &'static str {
-        match self.code {
-            Some(1) => {
+    /// What it means and what to do (doc/markdown/interface.md, tables of error and alarm codes).
+    fn remedy(&self) -> &'static str {
+        match (self.is_alarm, self.code) {
+            (true, Some(1)) => {
                 "a limit switch has closed and the axis was stopped at once; free it by hand, then open the rig again and home it"
             }
-            Some(2) => "a target was outside the travel that it knows; open the rig again",
-            Some(3) => {
-                "it was reset in motion and its position is lost; open the rig again and home it"
+            (true, Some(2)) => "the target was outside the travel of the board; open the rig again",
+            (true, Some(3)) => {
+                "the board was reset in motion and its position is lost; open the rig again and home it"
             }
-            Some(4 | 5) => "a search for the probe has failed; check the probe's wiring",
-            Some(6..=9) => "its own homing has failed; check the limit switch and its cable",
-            _ => "it is locked; look at the axis, then open the rig again",
+            (true, Some(4 | 5)) => "a probe cycle has failed; check the wiring of the probe",
+            (true, Some(6..=9)) => {
+                "the board's own homing has failed; check the limit switch and its cable"
+            }
+            (true, _) | (false, Some(9)) => {
+                "the board is locked; look at the axis, then open the rig again"
+            }
+            (false, Some(1 | 2 | 11 | 16 | 22..=29)) => {
+                "a line was garbled on its way; check the cable"
+            }
+            (false, Some(3 | 20)) => "this firmware does not know the command; use Grbl 1.1",
+            (false, Some(4)) => "a number must not be negative",
+            (false, Some(5)) => {
+                "the board's homing is off; set $22=1 or let palpate search for home"
+            }
+            (false, Some(7)) => {
+                "the board could not read its memory and has factory settings now; set them again and open the rig"
+            }
+            (false, Some(8)) => "the board is not at rest; wait",
+            (false, Some(10)) => "soft limits need homing ($22=1)",
+            (false, Some(12)) => "the board makes fewer steps a second; lower the speed",
+            (false, Some(13)) => "the safety door is open; close it",
+            (false, Some(15)) => {
+                "the target is outside the travel of the board ($130 to $132); home it or correct the travel"
+            }
+            (false, _) => "",
         }
     }
 }
 
-fn write(
-    f: &mut fmt::Formatter<'_>,
-    name: &str,
-    code: Option<u8>,
-    words: &str,
-    meaning: &str,
-) -> fmt::Result {
-    match code {
-        Some(code) => write!(f, "{name}:{code}")?,
-        None => write!(f, "{name}: {words}")?,
-    }
-    if !meaning.is_empty() {
-        write!(f, ", {meaning}")?;
-    }
-    Ok(())
-}
-
-impl fmt::Display for Refusal {
+impl fmt::Display for GrblCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write(f, "error", self.code, &self.words, self.meaning())
-    }
-}
-
-impl fmt::Display for Alarm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write(f, "ALARM", self.code, &self.words, self.meaning())
+        let name = if self.is_alarm { "ALARM" } else { "error" };
+        match self.code {
+            Some(code) => write!(f, "{name}:{code}")?,
+            None => write!(f, "{name}: {}", self.words)?,
+        }
+        if !self.remedy().is_empty() {
+            write!(f, ", {}", self.remedy())?;
+        }
+        Ok(())
     }
 }

@@ -4,38 +4,33 @@ use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, Profile};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
-/// So long the axis may go on at full speed, beside the way of braking, on what it was given: 60 ms for segments that
-/// Grbl makes ahead (five of 10 ms, and one that is being made), a chunk, and the rest for links that are slow.
+/// Longest time that the axis may go on at full speed with the jogs it has, without the way of braking: 60 ms for
+/// segments that Grbl makes ahead (five of 10 ms, and one that is being made), a chunk, and the rest for links that
+/// are slow.
 const AHEAD: Seconds = Seconds(0.3);
-/// So long a chunk lasts.
 const CHUNK: Seconds = Seconds(0.08);
 /// Chunks that are in the planner at once at most; it takes 15 (planner.h).
 const CHUNKS_MAX: f64 = 8.0;
-/// Where it is, is known to so much: the start to 20 ms, and a clock that is off by half a percent is followed to 30.
+/// Uncertainty of the position as a time: the start is known to 20 ms, and a clock that is off by half a percent is
+/// followed to 30.
 const KNOWN: Seconds = Seconds(0.05);
 
-/// A motion under way.
 #[derive(Clone, Debug)]
-pub struct Motion {
-    /// As it was asked for.
+pub struct JogMotion {
     pub wanted: MoveTo,
-    /// Its number, until it is acknowledged.
     pub owed: Option<u64>,
     /// Steps of the board where it begins and ends.
     pub from: i64,
-    /// Where it ends.
     pub to: i64,
     /// mm/min of the board.
     pub feed: f64,
     /// From 0 on, in mm.
     pub profile: Profile,
-    /// When it began.
     pub started: Option<Nanos>,
-    /// When it was told to end early.
+    /// When its early end was commanded.
     pub cancelled: Option<Nanos>,
-    /// When it was last told so.
     pub repeated: Nanos,
-    /// Its end was told to the track.
+    /// The track knows its end.
     pub is_braking: bool,
     /// Whether the board has taken its newest jog is not known, so a report of rest may come before it.
     pub is_doubtful: bool,
@@ -43,7 +38,7 @@ pub struct Motion {
     sent: i64,
 }
 
-impl Motion {
+impl JogMotion {
     /// Over steps of the board.
     #[must_use]
     pub fn new(
@@ -77,26 +72,25 @@ impl Motion {
     }
 
     /// 1 or -1 in steps of the board.
-    pub fn side(&self) -> f64 {
+    pub fn direction(&self) -> f64 {
         if self.to < self.from { -1.0 } else { 1.0 }
     }
 
-    /// Whether nothing more is to be sent.
     pub const fn is_all_sent(&self) -> bool {
         self.sent == self.to
     }
 
     /// The part of the profile for which jogs were sent: what becomes of it when no more come.
-    pub fn given(&self, mm_per_pulse: f64) -> Profile {
+    pub fn given_profile(&self, mm_per_pulse: f64) -> Profile {
         let way = (self.sent - self.from).abs() as f64 * mm_per_pulse;
         Self::profile(way, &self.wanted)
     }
 
-    /// How long before its time it is at these steps, where it goes at its full speed.
-    pub fn ahead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
+    /// Lead over the profile at these steps, while the axis goes at full speed.
+    pub fn lead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
-        // A step is told of as soon as it is begun, and lasts until the next.
-        let way = ((steps - self.from) as f64 * self.side() + 0.5) * mm_per_pulse;
+        // A step is reported as soon as it begins, and lasts until the next.
+        let way = ((steps - self.from) as f64 * self.direction() + 0.5) * mm_per_pulse;
         let ramp = speed / acceleration;
         let phase = ramp + (way - 0.5 * speed * ramp) / speed;
         let since = at.since(self.started?).0 as f64 * 1e-9;
@@ -104,7 +98,6 @@ impl Motion {
         is_cruising.then_some(Seconds(phase - since))
     }
 
-    /// From start to rest.
     pub fn duration(&self) -> Nanos {
         Nanos((self.profile.duration().0 * 1e9) as u64)
     }
@@ -151,7 +144,7 @@ fn ahead_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
     speed.0 * AHEAD.0 + speed.0 * speed.0 / (2.0 * acceleration.0)
 }
 
-/// How far the axis goes at most, in mm, when the link is lost at full speed: all that was sent, half a chunk that went
+/// Longest way of the axis, in mm, after the link is lost at full speed: all that was sent, half a chunk that went
 /// with the last one, and what its place is uncertain by.
 #[must_use]
 pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
@@ -175,7 +168,7 @@ mod tests {
         for (speed, way) in long.into_iter().chain(short) {
             let wanted =
                 MoveTo { target_pulses: way, speed: MmPerS(speed), acceleration: MmPerS2(60.0) };
-            let mut motion = Motion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
+            let mut motion = JogMotion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
             let worst = worst_case_mm(wanted.speed, wanted.acceleration);
             let mut sent = motion.next_chunk(Nanos::ZERO, 0.0025).unwrap();
             assert!(sent.abs() as f64 * 0.0025 <= worst, "{speed}: {sent} first");

@@ -1,26 +1,24 @@
-//! What the switches on the board's pins say of the axis.
+//! The switches on the board's pins as states of the axis.
 
-use super::protocol::Status;
+use super::protocol::GrblStatus;
 use super::settings::{GrblSettings, HomeSwitch};
+use crate::rig::axis_status;
 use palpate_model::rig::AxisStatus;
 
-/// Where both ends share a pin: so near to one of them it is that one that closes. Looking for home the engine leaves a
-/// switch by 8 mm.
+/// Where both ends share a pin, a switch that closes so near to one end belongs to it. In the search for home the
+/// engine leaves a switch by 8 mm.
 const NEAR_MM: f64 = 10.0;
 
-/// What is known of the ends of an axis.
 #[derive(Debug, Default)]
-pub struct Ends {
-    /// The last motion led into the tissue.
+pub struct EndSwitches {
     is_outwards: bool,
     /// Where home and the far limit were last seen closed, in pulses from the board's zero.
     home: Option<i64>,
     far: Option<i64>,
 }
 
-impl Ends {
-    /// A motion begins.
-    pub fn leave(&mut self, is_outwards: bool) {
+impl EndSwitches {
+    pub fn begin_motion(&mut self, is_outwards: bool) {
         self.is_outwards = is_outwards;
     }
 
@@ -28,7 +26,7 @@ impl Ends {
     pub fn inputs(
         &mut self,
         settings: &GrblSettings,
-        status: &Status,
+        status: &GrblStatus,
         known: AxisStatus,
         pulses: i64,
     ) -> AxisStatus {
@@ -54,14 +52,11 @@ impl Ends {
                 (is_limit && !is_far, is_far, false)
             }
         };
-        let bits = [
+        axis_status([
             (is_home, AxisStatus::HOME),
             (is_forward, AxisStatus::FORWARD_LIMIT),
             (is_reverse, AxisStatus::REVERSE_LIMIT),
-        ];
-        bits.iter()
-            .filter(|(is_closed, _)| *is_closed)
-            .fold(AxisStatus(0), |all, (_, bit)| all | *bit)
+        ])
     }
 }
 
@@ -88,7 +83,11 @@ mod tests {
     }
 
     /// What a way shows: for each report the place in mm and whether the pin is closed.
-    fn seen(ends: &mut Ends, known: &mut AxisStatus, way: &[(f64, bool)]) -> Vec<AxisStatus> {
+    fn seen(
+        ends: &mut EndSwitches,
+        known: &mut AxisStatus,
+        way: &[(f64, bool)],
+    ) -> Vec<AxisStatus> {
         let settings = shared();
         way.iter()
             .map(|(mm, is_closed)| {
@@ -96,7 +95,7 @@ mod tests {
                     "Jog|MPos:{mm:.3},0.000,0.000|FS:0,0{}",
                     if *is_closed { "|Pn:X" } else { "" }
                 );
-                let status = Status::parse(&text).expect("a status");
+                let status = GrblStatus::parse(&text).expect("a status");
                 let pulses = (mm / settings.mm_per_pulse).round() as i64;
                 *known = ends.inputs(&settings, &status, *known, pulses);
                 *known
@@ -107,28 +106,28 @@ mod tests {
     #[test]
     fn a_far_limit_that_bounces_never_becomes_home() {
         let (far, home, none) = (AxisStatus::FORWARD_LIMIT, AxisStatus::HOME, AxisStatus(0));
-        let (mut ends, mut known) = (Ends::default(), none);
-        ends.leave(true);
+        let (mut ends, mut known) = (EndSwitches::default(), none);
+        ends.begin_motion(true);
         assert_eq!(seen(&mut ends, &mut known, &[(151.0, false), (152.0, true)]), [none, far]);
         // Back from it: open for a report, closed again, then really open.
-        ends.leave(false);
+        ends.begin_motion(false);
         let way = [(152.0, true), (151.9, false), (151.8, true), (150.0, false)];
         assert_eq!(seen(&mut ends, &mut known, &way), [far, none, far, none]);
         // The other end, and back over its edge.
         let way = [(5.0, false), (0.0, true), (0.1, false), (0.0, true)];
         assert_eq!(seen(&mut ends, &mut known, &way), [none, home, none, home]);
         // Left again, over an edge that bounces: a stop at worst, and home is where it was.
-        ends.leave(true);
+        ends.begin_motion(true);
         let way = [(0.1, false), (0.2, true), (0.5, false)];
         assert_eq!(seen(&mut ends, &mut known, &way), [none, far, none]);
-        ends.leave(false);
+        ends.begin_motion(false);
         assert_eq!(seen(&mut ends, &mut known, &[(0.0, true)]), [home]);
     }
 
     #[test]
     fn a_pin_that_closes_after_a_motion_outwards_is_the_far_limit() {
-        let (mut ends, mut known) = (Ends::default(), AxisStatus(0));
-        ends.leave(true);
+        let (mut ends, mut known) = (EndSwitches::default(), AxisStatus(0));
+        ends.begin_motion(true);
         let way = [(151.9, false), (152.0, true)];
         assert_eq!(seen(&mut ends, &mut known, &way)[1], AxisStatus::FORWARD_LIMIT);
     }

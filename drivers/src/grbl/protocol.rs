@@ -1,49 +1,38 @@
-//! What Grbl 1.1 writes, line by line (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
+//! Lines that Grbl 1.1 writes (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
 //!
 //! Bytes in, [`Incoming`] out; nothing else. Forms that older firmware or other compile options give are read too where
 //! the documents allow them.
 
-use super::error::{Alarm, Refusal};
+use super::error::GrblCode;
 
 /// Longer lines are none of Grbl's: its own are at most 80 characters and a status report about 120.
 pub const LINE_MAX: usize = 256;
 
 /// Status query (doc/markdown/commands.md, real-time commands).
 pub const QUERY: u8 = b'?';
-/// Soft reset.
 pub const RESET: u8 = 0x18;
-/// Jog cancel.
 pub const JOG_CANCEL: u8 = 0x85;
 /// Cycle start. A cancel that is heard in a jog and looked at when that has ended leaves Grbl suspended, though it says
 /// `Idle`, and it takes no line until this comes (protocol.c, `protocol_exec_rt_system`; observed with 1.1h). It does
 /// nothing to a board at rest.
 pub const CYCLE_START: u8 = b'~';
 
-/// Machine states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// At rest, ready.
+pub enum GrblState {
     Idle,
-    /// G-code moves.
     Run,
-    /// A jog moves.
     Jog,
     /// Held, `true` when at rest.
     Hold(bool),
-    /// Locked.
     Alarm,
-    /// The safety door is or was open.
     Door,
-    /// G-code is checked, nothing moves.
     Check,
     /// Looking for home by itself.
     Home,
-    /// Asleep until a reset.
     Sleep,
 }
 
-impl State {
-    /// Whether the axis moves in it.
+impl GrblState {
     #[must_use]
     pub const fn is_moving(self) -> bool {
         matches!(self, Self::Run | Self::Jog | Self::Home)
@@ -68,33 +57,26 @@ impl State {
 
 /// A status report. Units are those of `$13`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Status {
-    /// What it does.
-    pub state: State,
-    /// Machine position of each axis, where it is told.
+pub struct GrblStatus {
+    pub state: GrblState,
+    /// Machine position of each axis, if the report has it.
     pub machine: Option<Vec<f64>>,
-    /// Work position of each axis, where it is told instead.
+    /// Work position of each axis, if the report has it instead.
     pub work: Option<Vec<f64>>,
-    /// Work coordinate offset, told now and then.
-    pub offset: Option<Vec<f64>>,
     /// Pins that are closed: `X`, `Y`, `Z`, `P` and others.
     pub pins: String,
-    /// Free blocks of the planner and free bytes of the input buffer.
-    pub free: Option<(u32, u32)>,
 }
 
-impl Status {
+impl GrblStatus {
     /// Reads what is between `<` and `>`.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut fields = text.split('|');
         let mut status = Self {
-            state: State::parse(fields.next()?)?,
+            state: GrblState::parse(fields.next()?)?,
             machine: None,
             work: None,
-            offset: None,
             pins: String::new(),
-            free: None,
         };
         for field in fields {
             // Fields may come in any order, and new ones may come.
@@ -104,14 +86,9 @@ impl Status {
             match name {
                 "MPos" => status.machine = Some(numbers(values)?),
                 "WPos" => status.work = Some(numbers(values)?),
-                "WCO" => status.offset = Some(numbers(values)?),
                 "Pn" => status.pins = values.to_owned(),
-                "Bf" => {
-                    let numbers = numbers(values)?;
-                    if let [blocks, bytes] = numbers[..] {
-                        status.free = Some((blocks.max(0.0) as u32, bytes.max(0.0) as u32));
-                    }
-                }
+                // Not used, but a garbled number spoils the report.
+                "WCO" | "Bf" => drop(numbers(values)?),
                 _ => {}
             }
         }
@@ -119,7 +96,6 @@ impl Status {
         (status.machine.is_some() || status.work.is_some()).then_some(status)
     }
 
-    /// Whether a pin is closed.
     pub fn has_pin(&self, pin: char) -> bool {
         self.pins.contains(pin)
     }
@@ -139,26 +115,18 @@ fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-/// One line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Incoming {
-    /// A line was done, or planned.
     Ok,
-    /// A line was refused.
-    Refused(Refusal),
-    /// The machine is locked.
-    Alarm(Alarm),
+    Refused(GrblCode),
+    Alarm(GrblCode),
     /// An answer to [`QUERY`].
-    Status(Status),
-    /// It has started: the version.
+    Status(GrblStatus),
     Hello(String),
-    /// A numbered setting.
     Setting(u16, f64),
     /// What is between `[` and `]`.
     Message(String),
-    /// Anything else, such as a startup line.
     Other(String),
-    /// More than any line of Grbl.
     Flood,
 }
 
@@ -172,14 +140,14 @@ impl Incoming {
         }
         // Words without numbers are those of version 0.9 and of some compile options: "error: Bad number format".
         if let Some(code) = line.strip_prefix("error:") {
-            return Self::Refused(Refusal::parse(code));
+            return Self::Refused(GrblCode::parse(false, code));
         }
         if let Some(code) = line.strip_prefix("ALARM:") {
-            return Self::Alarm(Alarm::parse(code));
+            return Self::Alarm(GrblCode::parse(true, code));
         }
         if let Some(inner) = line.strip_prefix('<') {
             let inner = inner.strip_suffix('>');
-            return inner.and_then(Status::parse).map_or_else(other, Self::Status);
+            return inner.and_then(GrblStatus::parse).map_or_else(other, Self::Status);
         }
         if let Some(inner) = line.strip_prefix('[') {
             let inner = inner.strip_suffix(']');
@@ -210,7 +178,6 @@ pub struct Parser {
 }
 
 impl Parser {
-    /// Takes one byte.
     pub fn take(&mut self, byte: u8) -> Option<Incoming> {
         match byte {
             b'\r' | b'\n' => {
@@ -232,11 +199,6 @@ impl Parser {
             }
         }
     }
-
-    /// Forgets half a line.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
 }
 
 /// An absolute jog in machine coordinates: axis letter, place in mm, speed in mm/min (doc/markdown/jogging.md).
@@ -247,5 +209,4 @@ pub fn jog(axis: char, mm: f64, mm_per_min: f64) -> String {
 }
 
 #[cfg(test)]
-#[path = "protocol_tests.rs"]
 mod tests;

@@ -14,27 +14,23 @@ pub enum HomeSwitch {
 /// Everything about the board that only its owner can know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GrblSettings {
-    /// What the operator calls the rig.
     pub name: String,
     /// `X`, `Y` or `Z`.
     pub axis: char,
-    /// Way of a step.
     pub mm_per_pulse: f64,
     /// Positive machine coordinates lead away from the tissue.
     pub is_reversed: bool,
     /// End of the travel; home is 0.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration and deceleration.
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
     /// Its home switch.
     pub home: HomeSwitch,
     /// A closed limit pin is home when the rig is opened: nothing else can have closed it.
     pub is_closed_home: bool,
-    /// The text of `$I=`, by which a board is told from others.
+    /// The text of `$I=`, which identifies a board.
     pub build_info: Option<String>,
     /// Unlock a board that is locked when it is opened (`$X`).
     pub is_unlocking: bool,
@@ -47,18 +43,14 @@ impl GrblSettings {
     }
 
     /// 0 for `X`, 1 for `Y`, 2 for `Z`.
-    pub const fn index(&self) -> usize {
-        match self.axis {
-            'Y' => 1,
-            'Z' => 2,
-            _ => 0,
-        }
+    pub fn index(&self) -> usize {
+        "XYZ".find(self.axis).unwrap_or(0)
     }
 }
 
-/// What the board's own settings make of it.
+/// Values read from the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facts {
+pub struct BoardParameters {
     /// `$100` to `$102`.
     pub steps_per_mm: f64,
     /// Where the axis rests, in steps of the board.

@@ -1,4 +1,4 @@
-//! How often the dialogue asks, and how long it waits for what.
+//! Intervals of questions, and the longest waits for answers.
 
 use palpate_model::Nanos;
 
@@ -17,12 +17,10 @@ pub const PAUSE: Nanos = Nanos::from_millis(20);
 pub const OK_MAX: Nanos = Nanos::from_millis(400);
 /// A jog that was still in the input buffer begins after a cancel, so that is written again and again until all rests.
 pub const CANCEL_AGAIN: Nanos = Nanos::from_millis(40);
-/// Without anybody asking for reports the axis is stopped: a computer that hangs counts as dead.
-pub const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it, and half a second
-/// more where the axis was in motion (report.c, `report_alarm_message`).
+/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it, and half a
+/// second more where the axis was in motion (report.c, `report_alarm_message`).
 pub const RESET_AGAIN: Nanos = Nanos::from_millis(100);
-/// Without a welcome for so long after the first reset, nobody knows what the axis does.
+/// Without a welcome for so long after the first reset, what the axis does is not known.
 pub const RESET_MAX: Nanos = Nanos::from_millis(2_000);
 /// A stop is answered by then though the axis is still braking, because it takes longer: the engine waits for a second.
 pub const STOP_MAX: Nanos = Nanos::from_millis(700);

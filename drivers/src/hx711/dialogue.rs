@@ -1,26 +1,22 @@
-//! An HX711 board in progress: it sends by itself, nothing is asked.
+//! An HX711 board in progress: it sends values by itself.
 
-use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
+use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, NO_CHIP, parse};
 use crate::board_clock::{BoardClock, BoardTime};
-use crate::cell::{CellProtocol, CellReports, CellSample, LineCell};
+use crate::cell::{CellProtocol, CellReports, LineCell};
 use palpate_model::Nanos;
-use palpate_model::units::Volts;
 
 /// Ten conversions of the slow chip: longer than an answer of the board can be late.
 const SILENCE_MAX: Nanos = Nanos::from_millis(1_000);
 /// `micros()`.
 const NANOS_PER_TICK: u64 = 1_000;
-const RESTARTED: &str = "the HX711 board has started anew; check its supply";
+const RESTARTED: &str = "the HX711 board has restarted; check its supply";
 
-/// A board that sends values.
-pub type Hx711Dialogue = LineCell<Hx711Lines>;
+pub type Hx711Dialogue = LineCell<Hx711LineReader>;
 
-/// What its lines mean.
-pub struct Hx711Lines {
+pub struct Hx711LineReader {
     header: Header,
     volts_per_count: f64,
     clock: BoardClock,
-    is_beyond: bool,
     is_missing: bool,
     other: Option<String>,
 }
@@ -29,74 +25,64 @@ impl Hx711Dialogue {
     /// Goes on with the board of a header from `now`.
     #[must_use]
     pub fn new(header: Header, volts_per_count: f64, now: Nanos) -> Self {
-        let lines = Hx711Lines {
+        let lines = Hx711LineReader {
             header,
             volts_per_count,
             clock: BoardClock::new(NANOS_PER_TICK),
-            is_beyond: false,
             is_missing: false,
             other: None,
         };
-        Self::on(lines, now)
+        Self::start(lines, now)
     }
 }
 
-impl Hx711Lines {
+impl Hx711LineReader {
     /// `false` for a value that was there already.
     fn value(&mut self, now: Nanos, micros: u32, count: i32, reports: &mut CellReports) -> bool {
         let time = match self.clock.take(now, micros) {
             BoardTime::Repeated => return false,
             BoardTime::At(time) => time,
             BoardTime::Restarted(time) => {
-                // The line that would have told it was lost.
-                reports.trouble(RESTARTED);
+                // The line that reports it was lost.
+                reports.push_trouble(RESTARTED);
                 time
             }
         };
         self.is_missing = false;
         let is_beyond = count == COUNT_MIN || count == COUNT_MAX;
-        if is_beyond && !self.is_beyond {
-            reports.trouble(
-                "the bridge's signal is beyond the HX711's range; check the cell's wires, or set gain 64 in the sketch",
-            );
-        }
-        self.is_beyond = is_beyond;
-        reports.sample(CellSample {
-            at: now,
-            device_time: Some(time),
-            counts: count,
-            volts: Volts(f64::from(count) * self.volts_per_count),
-        });
+        reports.set_beyond_range(
+            is_beyond,
+            "the bridge's signal is beyond the HX711's range; check the cell's wires, or set gain 64 in the sketch",
+        );
+        reports.push_counts(now, Some(time), count, self.volts_per_count);
         true
     }
 
     fn check(&mut self, header: Header) {
         if header.board != self.header.board || header.gain != self.header.gain {
             self.other = Some(format!(
-                "another HX711 board answers: {} with gain {} in place of {} with gain {}",
+                "another HX711 board answers: {} with gain {} instead of {} with gain {}",
                 header.board, header.gain, self.header.board, self.header.gain
             ));
         }
     }
 }
 
-impl CellProtocol for Hx711Lines {
+impl CellProtocol for Hx711LineReader {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         match parse(line) {
             Some(Message::Value { micros, count }) => {
                 return self.value(now, micros, count, reports);
             }
             Some(Message::Started { micros, header }) => {
-                reports.trouble(RESTARTED);
+                reports.push_trouble(RESTARTED);
                 self.clock.restart(now, micros);
                 self.check(header);
             }
             Some(Message::Header { header, .. }) => self.check(header),
             Some(Message::Missing { .. }) => {
                 if !std::mem::replace(&mut self.is_missing, true) {
-                    reports.trouble(
-                        "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply",
-                    );
+                    reports.push_trouble(NO_CHIP);
                 }
             }
             None => return false,
@@ -112,7 +98,7 @@ impl CellProtocol for Hx711Lines {
             return None;
         }
         Some(if self.is_missing {
-            "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply".into()
+            NO_CHIP.into()
         } else {
             "the HX711 board has sent no value for a second; check its cable and supply".into()
         })
@@ -160,17 +146,17 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_is_told_and_time_goes_on() {
+    fn restart_is_reported_and_time_goes_on() {
         let mut dialogue = dialogue();
         say(&mut dialogue, ms(10), &value(900_000_000, 5));
         say(&mut dialogue, ms(500), &Message::Started { micros: 1_000, header: header("a") });
         say(&mut dialogue, ms(513), &value(13_500, 6));
         let times = [(); 2].map(|()| dialogue.take_sample().unwrap().device_time.unwrap());
         assert_eq!(times[1].since(times[0]), Nanos(490_000_000 + 12_500_000));
-        assert!(dialogue.take_trouble().unwrap().contains("started anew"));
-        // The line that tells it may be lost.
+        assert!(dialogue.take_trouble().unwrap().contains("restarted"));
+        // The line that reports it may be lost.
         say(&mut dialogue, ms(600), &value(700, 6));
-        assert!(dialogue.take_trouble().unwrap().contains("started anew"));
+        assert!(dialogue.take_trouble().unwrap().contains("restarted"));
         let last = dialogue.take_sample().unwrap().device_time.unwrap();
         assert_eq!(last.since(times[1]), Nanos(87_000_000));
     }
@@ -187,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_range_and_a_missing_chip_are_told_once() {
+    fn value_beyond_range_and_missing_chip_are_reported_once() {
         let mut dialogue = dialogue();
         for i in 0..3 {
             say(&mut dialogue, ms(12 * i), &value(12_500 * i as u32 + 1, COUNT_MAX));

@@ -1,15 +1,17 @@
 //! A load cell bridge on an HX711 converter, with palpate's sketch on the Arduino that reads it.
 //!
-//! Read [`protocol`] first: lines that the sketch sends. `open.rs` makes sure who answers, [`Hx711Dialogue`] goes on.
+//! Read [`protocol`] first: lines that the sketch sends. `open.rs` checks the identity of the board,
+//! [`Hx711Dialogue`] goes on.
 //!
 //! # Volts
 //!
-//! The chip compares the bridge's signal with the voltage that feeds the bridge, so its count stands for mV/V whatever
-//! the supply: the whole range, 2^23 counts, is half the supply over the gain (HX711 data sheet, Avia Semiconductor,
-//! page 3: 19.5 mV at 5 V and gain 128). palpate and its limits speak of amplified volts. The rule is: the whole
-//! range at gain 128 is [`Hx711Settings::full_scale`], usually 5 V, which is what an amplifier of 256 times would make of
-//! the bridge with a supply of 5 V. A cell of 2 mV/V under its rated load is then at 2.56 V, a signal
-//! beyond the chip's range is at 5 V, above the 2.80 V at which every run stops, and gains 128 and 64 give the same volts.
+//! The chip compares the bridge's signal with the voltage that feeds the bridge, so its count stands for mV/V
+//! whatever the supply: the whole range, 2^23 counts, is half the supply over the gain (HX711 data sheet, Avia
+//! Semiconductor, page 3: 19.5 mV at 5 V and gain 128). palpate and its limits speak of amplified volts. The rule is:
+//! the whole range at gain 128 is [`Hx711Settings::full_scale`], usually 5 V, which is what an amplifier of 256 times
+//! would make of the bridge with a supply of 5 V. A cell of 2 mV/V under its rated load is then at 2.56 V, a signal
+//! beyond the chip's range is at 5 V, above the 2.80 V at which every run stops, and gains 128 and 64 give the same
+//! volts.
 
 mod dialogue;
 mod open;
@@ -18,7 +20,7 @@ pub mod protocol;
 pub use dialogue::Hx711Dialogue;
 
 use crate::cell::CellDevice;
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file::Fields;
 use palpate_model::units::Volts;
 use std::sync::Arc;
@@ -29,18 +31,17 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     introduction: "load cell on an HX711, ",
     role: Role::Cell { read, emulation: None },
     recognise: |lines| {
-        first(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
+        find_line(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
     },
 };
 
-/// What palpate has to know of an HX711 board.
+/// Settings of an HX711 board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hx711Settings {
     /// Name that the board must have, as it stands in its sketch; any without.
     pub board: Option<String>,
-    /// What the chip's whole range at gain 128 is called in volts. Calibrations belong to it.
+    /// Volts that the chip's whole range at gain 128 stands for. Calibrations belong to it.
     pub full_scale: Volts,
-    /// Standard deviation of the signal at rest.
     pub noise: Volts,
 }
 

@@ -1,10 +1,10 @@
-//! What happens once when an HX711 board is opened.
+//! Opening an HX711 board.
 
 use super::Hx711Settings;
 use super::dialogue::Hx711Dialogue;
-use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
+use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, NO_CHIP, parse};
 use crate::cell::{CellDescription, CellDevice};
-use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
+use crate::text::{DeviceError, OpenedCell, TextConsole};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
@@ -14,17 +14,15 @@ const DEVICE: &str = "HX711 board";
 /// Opening the port resets an Arduino Uno, whose boot loader then waits up to two seconds; the chip needs another 0.4 s
 /// (data sheet, page 3).
 const START_MAX: Nanos = Nanos::from_millis(5_000);
-/// How often it is asked who it is until then.
 const ASK_EVERY: Nanos = Nanos::from_millis(400);
 /// Conversions that a value is a mean of: after so many the output has settled (data sheet, page 3).
 const SETTLING: f64 = 4.0;
-/// Conversions by which its rate is measured.
 const MEASURED: usize = 9;
-/// So long may they take at 10 a second.
+/// Longest time for these conversions, at 10 a second.
 const MEASURE_MAX: Nanos = Nanos::from_millis(2_500);
 
 impl CellDevice for Hx711Settings {
-    /// Waits for the board, makes sure which it is and measures its rate.
+    /// Waits for the board, checks its identity and measures its rate.
     fn open(
         &self,
         link: &mut dyn Link,
@@ -33,19 +31,11 @@ impl CellDevice for Hx711Settings {
     ) -> Result<OpenedCell, DeviceError> {
         let is_scale = self.full_scale.0.is_finite() && self.full_scale.0 > 0.0;
         if !is_scale {
-            return Err(unfit("its full scale must be above 0 V".into()));
+            return Err(DeviceError::unfit(DEVICE, "its full scale must be above 0 V"));
         }
         let mut console = TextConsole::new(link, clock, name, DEVICE);
         let header = identify(&mut console)?;
-        if let Some(expected) = &self.board
-            && *expected != header.board
-        {
-            return Err(DeviceError::OtherSerial {
-                device: DEVICE,
-                found: header.board,
-                expected: expected.clone(),
-            });
-        }
+        DeviceError::check_serial(DEVICE, Some(&header.board), self.board.as_deref())?;
         let rate = measure(&mut console)?;
         let volts_per_count = self.volts_per_count(header.gain);
         let description = CellDescription {
@@ -62,7 +52,7 @@ impl CellDevice for Hx711Settings {
         Ok(OpenedCell {
             description,
             dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
-            raw: console.link.raw,
+            raw: console.into_raw(),
             farewell: Vec::new(),
         })
     }
@@ -76,27 +66,19 @@ fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
             Some(Message::Header { header, .. }) => Some(header),
             _ => None,
         })?;
-        match found {
-            // The chip may not have been measured yet.
-            Some(header) if header.rate > 0 => return Ok(header),
-            _ => {}
+        // The rate is 0 while the board has not measured the chip yet.
+        if let Some(header) = found.filter(|header| header.rate > 0) {
+            return Ok(header);
         }
     }
-    if console.heard.is_empty() {
-        return Err(DeviceError::Silent {
-            device: DEVICE,
-            hint: "check port, cable and that palpate's sketch is on the board, with 115200 baud",
-        });
-    }
-    let is_missing = String::from_utf8_lossy(&console.heard)
-        .lines()
-        .any(|line| matches!(parse(line), Some(Message::Missing { .. })));
-    if is_missing {
-        return Err(unfit(
-            "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
-        ));
-    }
-    Err(DeviceError::Other { device: DEVICE, found: stranger(&console.heard) })
+    let is_missing = |line: &str| matches!(parse(line), Some(Message::Missing { .. }));
+    Err(if console.received().lines().any(is_missing) {
+        DeviceError::unfit(DEVICE, NO_CHIP)
+    } else {
+        console.no_answer(
+            "check port, cable and that palpate's sketch is on the board, with 115200 baud",
+        )
+    })
 }
 
 /// Values a second by the board's clock.
@@ -113,12 +95,6 @@ fn measure(console: &mut TextConsole<'_>) -> Result<f64, DeviceError> {
     steps.sort_unstable();
     match steps.get(steps.len() / 2) {
         Some(step) if *step > 0 && micros.len() == MEASURED => Ok(1e6 / f64::from(*step)),
-        _ => {
-            Err(unfit("the chip does not answer it; check DOUT, SCK and the chip's supply".into()))
-        }
+        _ => Err(DeviceError::unfit(DEVICE, NO_CHIP)),
     }
-}
-
-fn unfit(detail: String) -> DeviceError {
-    DeviceError::Unfit { device: DEVICE, detail }
 }

@@ -11,18 +11,17 @@
 //! garbled line is never a value. `micros()` has 32 bits and wraps every 71.6 minutes. The chip gives its lowest or
 //! highest count when its input is beyond its range (HX711 data sheet, Avia Semiconductor, page 4).
 
-/// What the sketch calls its format.
 const NAME: &str = "palpate-hx711";
-/// The version of it that is read here.
 const VERSION: &str = "1";
 /// Lowest and highest of 24 bits: the input is beyond the range.
 pub const COUNT_MIN: i32 = -(1 << 23);
 /// See [`COUNT_MIN`].
 pub const COUNT_MAX: i32 = (1 << 23) - 1;
-/// Longest name of a board.
+/// What is reported when the board cannot read its chip.
+pub(super) const NO_CHIP: &str =
+    "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply";
 const BOARD_MAX: usize = 16;
 
-/// What a board says about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Header {
     /// Conversions a second as wired at the chip's RATE pin: 10 or 80; 0 while the chip does not answer.
@@ -33,31 +32,25 @@ pub struct Header {
     pub board: String,
 }
 
-/// A line that was understood.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
-    /// The board has started.
     Started {
         /// The board's clock in microseconds.
         micros: u32,
-        /// What it is.
         header: Header,
     },
     /// The answer to `?`.
     Header {
         /// The board's clock in microseconds.
         micros: u32,
-        /// What it is.
         header: Header,
     },
-    /// One conversion.
     Value {
         /// The board's clock when it was ready, in microseconds.
         micros: u32,
         /// The chip's count.
         count: i32,
     },
-    /// The chip does not answer the board.
     Missing {
         /// The board's clock in microseconds.
         micros: u32,
@@ -151,14 +144,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sum_is_that_of_the_catalogues() {
+    fn crc_has_the_check_value_of_the_catalogues() {
         // CRC-16/CCITT-FALSE (also IBM-3740): the check value that catalogues of CRCs give.
         assert_eq!(crc(b"123456789"), 0x29b1);
         assert_eq!(crc(b""), 0xffff);
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_lines_are_read_back() {
         let header = Header { rate: 80, gain: 128, board: "bench-1".into() };
         let started = Message::Started { micros: 1204, header: header.clone() };
         assert_eq!(line(&started), "B,1204,palpate-hx711,1,80,128,bench-1*8C6B\r\n");

@@ -3,7 +3,7 @@
 //! Commands end with CR or CR LF, answers with CR LF; commands that set something are silent unless they fail (Series 5
 //! user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31; Series 4 user's guide, page 16).
 
-pub use crate::text::Decimal;
+pub use crate::text::FixedDecimal;
 
 palpate_model::named! {
     /// A unit of force. Gauges have units of torque and units that the user defines too; those are none.
@@ -42,7 +42,6 @@ impl ForceUnit {
         Self::ALL.into_iter().find(is_it)
     }
 
-    /// Newtons of one.
     #[must_use]
     pub const fn newtons(self) -> f64 {
         match self {
@@ -59,17 +58,21 @@ impl ForceUnit {
 
 /// A reading: compression positive, tension negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reading {
-    /// The number.
-    pub number: Decimal,
-    /// Its unit.
+pub struct GaugeReading {
+    pub number: FixedDecimal,
     pub unit: ForceUnit,
+}
+
+/// A force, or that it is beyond the range of the gauge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaugeForce {
+    Reading(GaugeReading),
+    Overload,
 }
 
 /// The answer to `LIST`: settings, by the abbreviations that set them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GaugeList {
-    /// Version of the firmware.
     pub firmware: String,
     /// Unit of force; what stands there when it is another unit.
     pub unit: Result<ForceUnit, String>,
@@ -77,50 +80,25 @@ pub struct GaugeList {
     pub mode: String,
     /// Exponent of the filter of displayed readings, 2^n samples.
     pub filter_displayed: Option<u8>,
-    /// Exponent of the filter of current readings.
     pub filter_current: Option<u8>,
-    /// Readings that it sends by itself, as `AOUT` sets them.
-    pub auto_transmit: Option<u16>,
-    /// Whether units are sent with readings.
     pub has_units: bool,
     /// Whether tension is positive; some firmware does not say.
     pub is_inverted: Option<bool>,
-    /// Whether the sign is left out.
     pub is_unsigned: Option<bool>,
-    /// The whole line.
     pub line: String,
 }
 
-/// A line of a gauge.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GaugeLine {
-    /// A reading with its unit.
-    Reading(Reading),
+    Reading(GaugeReading),
     /// A reading beyond the gauge's range.
     Overload,
-    /// The last command was refused.
-    Error(GaugeError),
+    /// The last command was refused: `*10` illegal, `*11` not applicable, `*12` invalid specifier, `*22` value too
+    /// large (Series 5 user's guide, page 19).
+    Error,
     /// The answer to `LIST`.
     List(GaugeList),
-    /// Anything else, such as a model number.
     Other(String),
-}
-
-/// Why a gauge refuses a command (Series 5 user's guide, page 19).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum GaugeError {
-    /// `*10`.
-    #[error("illegal command, *10")]
-    Illegal,
-    /// `*11`.
-    #[error("not applicable, *11")]
-    NotApplicable,
-    /// `*12`.
-    #[error("invalid specifier, *12")]
-    Specifier,
-    /// `*22`.
-    #[error("value too large, *22")]
-    TooLarge,
 }
 
 impl GaugeLine {
@@ -128,27 +106,48 @@ impl GaugeLine {
     #[must_use]
     pub fn parse(line: &str) -> Self {
         let line = line.trim();
-        let error = match line {
-            "*10" => Some(GaugeError::Illegal),
-            "*11" => Some(GaugeError::NotApplicable),
-            "*12" => Some(GaugeError::Specifier),
-            "*22" => Some(GaugeError::TooLarge),
-            _ => None,
-        };
-        if let Some(error) = error {
-            return Self::Error(error);
+        if matches!(line, "*10" | "*11" | "*12" | "*22") {
+            return Self::Error;
         }
         if let Some((number, unit)) = line.split_once(' ')
             && let (Some(number), Some(unit)) =
-                (Decimal::parse(number), ForceUnit::parse(unit.trim_start()))
+                (FixedDecimal::parse(number), ForceUnit::parse(unit.trim_start()))
         {
-            return Self::Reading(Reading { number, unit });
+            return Self::Reading(GaugeReading { number, unit });
         }
-        // A guess: the guides tell what the display shows, not what is sent then.
+        // A guess: the guides say what the display shows, not what is sent then.
         if line.to_ascii_uppercase().starts_with("OVER") {
             return Self::Overload;
         }
         GaugeList::parse(line).map_or_else(|| Self::Other(line.to_owned()), Self::List)
+    }
+}
+
+impl GaugeLine {
+    pub fn force(&self) -> Option<GaugeForce> {
+        match self {
+            Self::Reading(reading) => Some(GaugeForce::Reading(*reading)),
+            Self::Overload => Some(GaugeForce::Overload),
+            _ => None,
+        }
+    }
+
+    /// The settings of a gauge.
+    pub fn list(self) -> Option<GaugeList> {
+        match self {
+            Self::List(list) => Some(list),
+            _ => None,
+        }
+    }
+
+    /// A text that was asked for; `Some(None)` where the gauge does not know the command. A serial number may be all
+    /// digits; a reading always has its unit.
+    pub fn text_or_error(self) -> Option<Option<String>> {
+        match self {
+            Self::Other(text) => Some(Some(text)),
+            Self::Error => Some(None),
+            _ => None,
+        }
     }
 }
 
@@ -173,7 +172,6 @@ impl GaugeList {
             mode: fields[2].to_owned(),
             filter_displayed: small("FLTC"),
             filter_current: small("FLTP"),
-            auto_transmit: after("AOUT").and_then(|n| n.parse().ok()),
             has_units: fields.contains(&"FULL"),
             is_inverted: flag("IPOL"),
             is_unsigned: flag("OPOL"),
@@ -188,7 +186,7 @@ mod tests {
 
     fn reading(line: &str) -> Option<(i32, u8, ForceUnit)> {
         match GaugeLine::parse(line) {
-            GaugeLine::Reading(Reading { number, unit }) => {
+            GaugeLine::Reading(GaugeReading { number, unit }) => {
                 Some((number.digits, number.decimals, unit))
             }
             _ => None,
@@ -200,13 +198,13 @@ mod tests {
         // Page 16, "Example return strings".
         assert_eq!(reading("-18.78 lbF"), Some((-1878, 2, ForceUnit::Pound)));
         assert_eq!(reading("4.285 N"), Some((4285, 3, ForceUnit::Newton)));
-        let number = Decimal::parse("4.285").unwrap();
+        let number = FixedDecimal::parse("4.285").unwrap();
         assert_eq!((number.value(), number.step()), (4.285, 1e-3));
-        assert_eq!(Decimal::parse("-0.005").unwrap().value(), -0.005);
+        assert_eq!(FixedDecimal::parse("-0.005").unwrap().value(), -0.005);
     }
 
     #[test]
-    fn what_is_no_reading_is_none() {
+    fn lines_without_number_and_unit_are_no_readings() {
         for wrong in [
             "4.285",
             "+4.285 N",
@@ -239,7 +237,6 @@ mod tests {
         assert_eq!(list.unit, Ok(ForceUnit::Pound));
         assert_eq!(list.mode, "CUR");
         assert_eq!((list.filter_displayed, list.filter_current), (Some(8), Some(1)));
-        assert_eq!(list.auto_transmit, Some(0));
         assert!(list.has_units);
         assert_eq!((list.is_inverted, list.is_unsigned), (None, None));
         let GaugeLine::List(list) = GaugeLine::parse("V2.1;LBIN;PT;IPOL1;OPOL0;NUM;AOUT125") else {
@@ -247,20 +244,14 @@ mod tests {
         };
         assert_eq!(list.unit, Err("LBIN".to_owned()));
         assert_eq!((list.is_inverted, list.is_unsigned), (Some(true), Some(false)));
-        assert!(!list.has_units && list.auto_transmit == Some(125));
+        assert!(!list.has_units);
     }
 
     #[test]
     fn errors_of_the_series_5_guide() {
         // Page 19.
-        for (line, error) in [
-            ("*10", GaugeError::Illegal),
-            ("*11", GaugeError::NotApplicable),
-            ("*12", GaugeError::Specifier),
-            ("*22", GaugeError::TooLarge),
-        ] {
-            assert_eq!(GaugeLine::parse(line), GaugeLine::Error(error));
-            assert!(error.to_string().ends_with(line));
+        for line in ["*10", "*11", "*12", "*22"] {
+            assert_eq!(GaugeLine::parse(line), GaugeLine::Error, "{line}");
         }
         assert_eq!(GaugeLine::parse("*13"), GaugeLine::Other("*13".into()));
     }

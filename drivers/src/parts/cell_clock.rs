@@ -1,9 +1,9 @@
-//! When samples of a load cell were taken, on the host's clock.
+//! The times at which a load cell took its samples, on the host's clock.
 //!
 //! A device stamps its samples with a clock of its own, which runs at a rate of its own, and they arrive late by what
-//! the link takes, never early. The line under all arrivals is the clock: the shortest delays tell the truth (V. Paxson,
-//! On calibrating measurements of packet transit times, SIGMETRICS 1998, section 4; S. Moon, P. Skelly, D. Towsley,
-//! Estimation and removal of clock skew from network delay measurements, INFOCOM 1999).
+//! the link takes, never early. The line under all arrivals is the clock: the shortest delays are the true ones (V.
+//! Paxson, On calibrating measurements of packet transit times, SIGMETRICS 1998, section 4; S. Moon, P. Skelly, D.
+//! Towsley, Estimation and removal of clock skew from network delay measurements, INFOCOM 1999).
 
 use palpate_model::Nanos;
 use std::collections::VecDeque;
@@ -39,7 +39,7 @@ impl CellClock {
         Nanos(first_arrival.0.saturating_add_signed(estimate as i64))
     }
 
-    /// How far arrivals of late are from the line, at the median: half of them are nearer.
+    /// Median distance of recent arrivals from the line.
     pub fn spread(&self) -> Nanos {
         let mut late: Vec<f64> =
             self.prompt.iter().map(|(d, a)| a - (d * (1.0 + self.rate) + self.offset)).collect();

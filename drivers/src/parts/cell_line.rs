@@ -1,37 +1,35 @@
-//! A load cell's dialogue on a line of its own: samples with their time on the host's clock.
+//! A load cell's dialogue on a link of its own: samples with their time on the host's clock.
 
 use super::cell_clock::CellClock;
 use super::track::Track;
 use crate::cell::CellDialogue;
 use crate::rig::RigEventBody;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{Dialogue, LinkStats, lock};
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, AxisStatus, Fault, Reading, RigCommand};
+use palpate_model::rig::{Age, AxisStatus, Reading, RigCommand};
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-/// Samples are told on this grid: a thousandth of a second, which both clocks are good for.
+/// Samples are reported on this grid: a thousandth of a second, which both clocks are good for.
 pub const TICK: Nanos = Nanos::from_millis(1);
-/// So many samples may be missing before the cell counts as gone.
+/// The cell counts as gone after so many missing samples.
 const SILENT_PERIODS: f64 = 5.0;
 /// Computers and USB converters pause for so long now and then.
 const SILENT_MIN: Nanos = Nanos::from_millis(250);
 /// This thread looks every half a millisecond. When it did not for so long, it was not the cell that was silent.
 const PAUSE: Nanos = Nanos::from_millis(20);
 
-/// A load cell in progress.
 pub struct CellLine {
     cell: Box<dyn CellDialogue>,
     track: Arc<Mutex<Track>>,
     clock: CellClock,
     start: Nanos,
-    /// Between two samples.
     period: Nanos,
-    /// How long before it was sent a sample was felt.
+    /// Age of a sample when it is sent.
     delay: Nanos,
     last_tick: Option<u64>,
-    heard: Nanos,
-    looked: Nanos,
+    heard_at: Nanos,
+    looked_at: Nanos,
     silence: Nanos,
     is_silent: bool,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -39,7 +37,7 @@ pub struct CellLine {
 }
 
 impl CellLine {
-    /// A cell of so many values a second, felt so long before they are sent. Ticks count from `start`.
+    /// A cell with so many values a second, each so old when it is sent. Ticks count from `start`.
     pub fn new(
         cell: Box<dyn CellDialogue>,
         (rate, delay): (f64, Nanos),
@@ -56,8 +54,8 @@ impl CellLine {
             period,
             delay,
             last_tick: None,
-            heard: start,
-            looked: start,
+            heard_at: start,
+            looked_at: start,
             silence: silence.max(SILENT_MIN),
             is_silent: false,
             events: VecDeque::new(),
@@ -65,31 +63,29 @@ impl CellLine {
         }
     }
 
-    /// Whatever has gone wrong with the cell, the axis is not to press on blindly.
+    /// Any failure of the cell stops the axis: it must not press without a force.
     fn stop_axis(&self) {
-        let mut track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
-        track.is_stop_wanted = true;
+        lock(&self.track).is_stop_wanted = true;
     }
 
     fn fault(&mut self, now: Nanos, detail: String) {
         self.stop_axis();
-        let fault = Fault::CommandRefused { detail };
-        self.events.push_back((now, RigEventBody::Fault(fault)));
+        self.events.push_back((now, RigEventBody::refusal(detail)));
     }
 
-    /// When a sample was sent that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
-    /// before it a period apart, or closer where there is less time since the last one.
-    fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
-        let told = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
+    /// The time at which a cell without a clock sent a sample that came with `newer` ones behind it: the newest just
+    /// now, those before it a period apart, or closer where there is less time since the last one.
+    fn sending_time(&self, at: Nanos, newer: u64) -> Nanos {
+        let newest = self.last_tick.map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
         // The samples that are left share what is left of the time.
-        let apart = self.period.min(Nanos(at.since(told).0 / (newer + 1)));
+        let apart = self.period.min(Nanos(at.since(newest).0 / (newer + 1)));
         Nanos(at.0 - apart.0 * newer)
     }
 
     fn take_samples(&mut self, now: Nanos) {
         let burst: Vec<_> = std::iter::from_fn(|| self.cell.take_sample()).collect();
         for (place, sample) in burst.iter().enumerate() {
-            self.heard = now;
+            self.heard_at = now;
             self.is_silent = false;
             let newer = burst.len() - 1 - place;
             let (taken, within) = match sample.device_time {
@@ -97,14 +93,14 @@ impl CellLine {
                     let taken = self.clock.map(device, sample.at);
                     (taken, self.clock.spread())
                 }
-                // It was taken at any time of its period, and told on the grid.
+                // It was taken at any time of its period, and reported on the grid.
                 None => {
-                    (self.laid_back(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
+                    (self.sending_time(sample.at, newer as u64), Nanos(self.period.0 / 2 + TICK.0))
                 }
             };
             let taken = Nanos(taken.0.saturating_sub(self.delay.0));
             let tick = (taken.since(self.start).0 + TICK.0 / 2) / TICK.0;
-            // Two in one thousandth of a second: the second is told for the next.
+            // Two in one thousandth of a second: the second is reported for the next.
             let tick = self.last_tick.map_or(tick, |last| tick.max(last + 1));
             self.last_tick = Some(tick);
             let reading = Reading {
@@ -129,24 +125,22 @@ impl Dialogue for CellLine {
 
     fn command(&mut self, _now: Nanos, _command: RigCommand) {}
 
-    fn overtaken(&mut self, _now: Nanos, _command: RigCommand) {}
-
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
         self.cell.received(now, bytes);
         self.take_samples(now);
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let pause = now.since(std::mem::replace(&mut self.looked, now));
+        let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > PAUSE {
-            self.heard = self.heard + pause;
+            self.heard_at = self.heard_at + pause;
         }
-        if now.since(self.heard) > self.silence && !std::mem::replace(&mut self.is_silent, true) {
+        if now.since(self.heard_at) > self.silence && !std::mem::replace(&mut self.is_silent, true)
+        {
             let ms = self.silence.0 / 1_000_000;
-            self.fault(
-                now,
-                format!("the load cell has sent nothing for {ms} ms; check its cable and power"),
-            );
+            let words =
+                format!("the load cell has sent nothing for {ms} ms; check its cable and power");
+            self.fault(now, words);
         }
         self.take_samples(now);
         None
@@ -172,7 +166,7 @@ impl Dialogue for CellLine {
 }
 
 impl Drop for CellLine {
-    /// However its thread ends, such as with a port that is gone.
+    /// Also when its thread ends by itself, such as when the port is gone.
     fn drop(&mut self) {
         self.stop_axis();
     }
@@ -184,7 +178,6 @@ mod tests {
     use crate::cell::CellSample;
     use palpate_model::units::Volts;
 
-    /// A sample for every byte.
     #[derive(Default)]
     struct Bytes(VecDeque<CellSample>);
 
@@ -233,7 +226,7 @@ mod tests {
         let ms = Nanos::from_millis;
         let track = Arc::new(Mutex::new(Track::at_rest(0)));
         let mut line = CellLine::new(Box::<Bytes>::default(), (250.0, ms(0)), track, ms(1_000));
-        let mut told = Vec::new();
+        let mut ticks = Vec::new();
         // One, four that a converter has held back, then two that come closer than the rate.
         for (at, bytes) in [(1_010, &[0][..]), (1_026, &[0, 0, 0, 0]), (1_028, &[0, 0])] {
             line.received(ms(at), bytes);
@@ -241,9 +234,9 @@ mod tests {
                 let age = reading.age.expect("it is known");
                 assert_eq!(age.within, ms(3));
                 assert_eq!(now.since(ms(1_000 + reading.tick)), age.by);
-                told.push(reading.tick);
+                ticks.push(reading.tick);
             }
         }
-        assert_eq!(told, [10, 14, 18, 22, 26, 27, 28]);
+        assert_eq!(ticks, [10, 14, 18, 22, 26, 27, 28]);
     }
 }

@@ -3,44 +3,36 @@
 use super::cell_line::{CellLine, TICK};
 use super::track::Track;
 use crate::cell::CellDevice;
-use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
+use crate::device::{OpenError, Opened, RigDevice};
 use crate::grbl::{self, GrblSettings};
 use crate::rig::RigEventBody;
 use crate::text::OpenedCell;
-use crate::wire::{HostClock, Line, LineSettings, Place};
+use crate::wire::{HostClock, LinkThread, Place, lock};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, RawBytes, RigCommand};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
-/// An axis in progress, and what it writes its deeds into.
-pub struct Axis {
-    /// Its thread.
-    pub line: Line,
-    /// Where it was when.
+/// An axis in progress and the track that it writes.
+pub struct OpenedAxis {
+    pub line: LinkThread,
     pub track: Arc<Mutex<Track>>,
     /// Bytes of the time before the thread had the link.
     pub raw: Vec<RawBytes>,
 }
 
-/// An axis and a load cell.
-pub type PartsRig = DeviceRig<Parts>;
-
-/// An axis and a load cell to be opened.
 #[derive(Clone)]
-pub struct Parts {
+pub struct SplitRigDevices {
     axis: (Place, GrblSettings),
     cell: (Place, Arc<dyn CellDevice>),
-    /// Of what was opened last.
     track: Arc<Mutex<Track>>,
     /// The host's clock where ticks begin.
     start: Nanos,
-    /// What the axis' own pulses are more than the caller's.
+    /// Offset of the axis' own pulses from the caller's.
     zero: i64,
-    /// Motions of which a sample was told.
     motions_shown: u64,
 }
 
-impl Parts {
+impl SplitRigDevices {
     /// A Grbl board and a load cell, each with its place.
     #[must_use]
     pub fn new(axis: (Place, GrblSettings), cell: (Place, Arc<dyn CellDevice>)) -> Self {
@@ -55,7 +47,7 @@ impl Parts {
     }
 }
 
-impl RigDevice for Parts {
+impl RigDevice for SplitRigDevices {
     fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
         let ((axis_place, settings), (cell_place, cell)) = (&self.axis, &self.cell);
         let device: Arc<str> = "cell".into();
@@ -68,8 +60,7 @@ impl RigDevice for Parts {
         (self.zero, self.motions_shown) = (0, 0);
         let line =
             CellLine::new(dialogue, (cell.rate, cell.delay), Arc::clone(&self.track), self.start);
-        let line_settings = LineSettings { device, farewell };
-        let cell_line = Line::start(link, line, clock, line_settings)?;
+        let cell_line = LinkThread::start(link, line, clock, device, farewell)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
         description.tick_nanos = TICK.0;
         description.adc = Some(cell.adc);
@@ -88,9 +79,9 @@ impl RigDevice for Parts {
         })
     }
 
-    /// Where the axis was when a sample was taken.
+    /// Adds the position and state of the axis at the time of the sample.
     fn complete(&mut self, now: Nanos, body: RigEventBody) -> RigEventBody {
-        let track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
+        let track = lock(&self.track);
         match body {
             RigEventBody::Reading(mut reading) => {
                 let placed = track.at(self.start + Nanos(reading.tick * TICK.0));

@@ -1,4 +1,4 @@
-//! Where an axis was at a time, by the courses that were commanded and what was confirmed of them.
+//! The past positions of an axis, from the courses that were commanded and confirmed.
 //!
 //! The thread that talks to the axis writes it; samples of a load cell, which arrive later than they were taken, look
 //! the past up in it.
@@ -11,8 +11,8 @@ use std::collections::VecDeque;
 /// Motions and states that are remembered: minutes of them. Samples are looked up a fraction of a second late.
 const PIECES_MAX: usize = 256;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Piece {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct TrackPiece {
     from: Nanos,
     /// Pulses where it begins.
     pulses: f64,
@@ -23,63 +23,54 @@ struct Piece {
     motion: u64,
 }
 
-/// What an axis did.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Track {
-    pieces: VecDeque<Piece>,
+    pieces: VecDeque<TrackPiece>,
     inputs: VecDeque<(Nanos, AxisStatus)>,
     motion: u64,
     /// Something else of the rig has failed: the axis is to stop.
     pub is_stop_wanted: bool,
 }
 
-/// An axis at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct AxisState {
     /// Pulses of its own counter.
     pub pulses: f64,
-    /// Motion, switches, motor.
     pub status: AxisStatus,
-    /// How many motions had begun.
     pub motion: u64,
 }
 
 impl Track {
-    /// At rest.
     #[must_use]
     pub fn at_rest(pulses: i64) -> Self {
-        let mut track = Self {
-            pieces: VecDeque::new(),
-            inputs: VecDeque::new(),
-            motion: 0,
-            is_stop_wanted: false,
-        };
-        track.rest(Nanos::ZERO, pulses);
+        let mut track = Self::default();
+        track.begin_rest(Nanos::ZERO, pulses);
         track
     }
 
-    fn push(&mut self, piece: Piece) {
+    fn motion_under_way(&self) -> Option<(TrackPiece, Profile, f64)> {
+        let last = *self.pieces.back()?;
+        let (profile, pulses_per_mm) = last.course?;
+        Some((last, profile, pulses_per_mm))
+    }
+
+    fn push(&mut self, piece: TrackPiece) {
         if self.pieces.len() >= PIECES_MAX {
             self.pieces.pop_front();
         }
         self.pieces.push_back(piece);
     }
 
-    /// It rests here from then on.
-    pub fn rest(&mut self, from: Nanos, pulses: i64) {
-        self.push(Piece {
-            from,
-            pulses: pulses as f64,
-            course: None,
-            status: AxisStatus(0),
-            motion: self.motion,
-        });
+    /// The axis rests from then on.
+    pub fn begin_rest(&mut self, from: Nanos, pulses: i64) {
+        let (pulses, motion) = (pulses as f64, self.motion);
+        self.push(TrackPiece { from, pulses, motion, ..TrackPiece::default() });
     }
 
-    /// It moves from then on: a profile in mm from zero, and how many pulses a mm of it is.
-    pub fn moves(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
+    /// Begins a motion with a profile in mm from zero and pulses per mm.
+    pub fn begin_motion(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
         self.motion += 1;
-        self.push(Piece {
+        self.push(TrackPiece {
             from,
             pulses,
             course: Some((profile, pulses_per_mm)),
@@ -88,18 +79,15 @@ impl Track {
         });
     }
 
-    /// From then on the motion under way is braked.
-    pub fn brakes(&mut self, from: Nanos) {
-        let Some(last) = self.pieces.back().copied() else {
-            return;
-        };
-        let Some((profile, pulses_per_mm)) = last.course else {
+    /// Brakes the motion under way from then on.
+    pub fn begin_braking(&mut self, from: Nanos) {
+        let Some((last, profile, pulses_per_mm)) = self.motion_under_way() else {
             return;
         };
         let since = seconds(from, last.from);
         let end = profile.stopped_at(since);
         let here = profile.position(since).0 * pulses_per_mm;
-        self.push(Piece {
+        self.push(TrackPiece {
             from,
             // The braking begins where the profile is by then.
             pulses: last.pulses,
@@ -110,29 +98,25 @@ impl Track {
         debug_assert!((end.position(Seconds(0.0)).0 * pulses_per_mm - here).abs() < 1e-6);
     }
 
-    /// The motion under way ends earlier than was told, at the end of this profile, such as when the way behind it was
+    /// The motion under way ends earlier than planned, at the end of this profile, such as when the way behind it was
     /// never given.
-    pub fn shortened(&mut self, profile: Profile) {
-        if let Some(Piece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
+    pub fn shorten_motion(&mut self, profile: Profile) {
+        if let Some(TrackPiece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
             *course = profile;
         }
     }
 
-    /// Nobody watches the axis any more: it rests where and when its motion ends.
-    pub fn ends(&mut self) {
-        let Some(last) = self.pieces.back().copied() else {
-            return;
-        };
-        let Some((profile, pulses_per_mm)) = last.course else {
+    /// The axis is no longer watched: it rests where and when its motion ends.
+    pub fn finish_motion(&mut self) {
+        let Some((last, profile, pulses_per_mm)) = self.motion_under_way() else {
             return;
         };
         let end = last.pulses + profile.end().0 * pulses_per_mm;
         let after = Nanos((profile.duration().0 * 1e9) as u64);
-        self.rest(last.from + after, end.round() as i64);
+        self.begin_rest(last.from + after, end.round() as i64);
     }
 
-    /// Switches and motor from then on.
-    pub fn inputs(&mut self, from: Nanos, status: AxisStatus) {
+    pub fn set_inputs(&mut self, from: Nanos, status: AxisStatus) {
         if self.inputs.back().is_some_and(|(_, last)| *last == status) {
             return;
         }
@@ -142,23 +126,20 @@ impl Track {
         self.inputs.push_back((from, status));
     }
 
-    /// At a time.
-    pub fn at(&self, time: Nanos) -> Placed {
+    pub fn at(&self, time: Nanos) -> AxisState {
         let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
         // Before all that is remembered: as it was first.
-        let piece = piece.or(self.pieces.front()).copied().unwrap_or(Piece {
-            from: Nanos::ZERO,
-            pulses: 0.0,
-            course: None,
-            status: AxisStatus(0),
-            motion: 0,
-        });
+        let piece = piece.or(self.pieces.front()).copied().unwrap_or_default();
         let way = piece.course.map_or(0.0, |(profile, pulses_per_mm)| {
             profile.position(seconds(time, piece.from)).0 * pulses_per_mm
         });
         let inputs = self.inputs.iter().rev().find(|(from, _)| *from <= time);
         let inputs = inputs.map_or(AxisStatus(0), |(_, status)| *status);
-        Placed { pulses: piece.pulses + way, status: piece.status | inputs, motion: piece.motion }
+        AxisState {
+            pulses: piece.pulses + way,
+            status: piece.status | inputs,
+            motion: piece.motion,
+        }
     }
 }
 
@@ -172,14 +153,14 @@ mod tests {
     use palpate_model::units::{MmPerS, MmPerS2, Position};
 
     #[test]
-    fn the_past_is_looked_up_as_it_was() {
+    fn position_and_status_are_looked_up_at_any_past_time() {
         let mut track = Track::at_rest(100);
         let ms = Nanos::from_millis;
         let profile = Profile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
-        track.inputs(ms(500), AxisStatus::MOTOR_ON);
-        track.moves(ms(1_000), 100.0, profile, -400.0);
-        track.brakes(ms(2_000));
-        track.rest(ms(2_500), -700);
+        track.set_inputs(ms(500), AxisStatus::MOTOR_ON);
+        track.begin_motion(ms(1_000), 100.0, profile, -400.0);
+        track.begin_braking(ms(2_000));
+        track.begin_rest(ms(2_500), -700);
         assert_eq!(track.at(ms(400)).pulses, 100.0);
         assert_eq!(track.at(ms(400)).status, AxisStatus(0));
         let moving = track.at(ms(1_500));
@@ -195,24 +176,24 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_nobody_watches_ends() {
+    fn motion_that_is_no_longer_watched_ends() {
         let mut track = Track::at_rest(100);
         let ms = Nanos::from_millis;
         let speed = (MmPerS(2.0), MmPerS2(20.0));
         let profile = |to| Profile::to_rest(Position(0.0), Position(to), speed.0, speed.1);
-        track.ends();
+        track.finish_motion();
         assert_eq!(track.at(ms(500)).pulses, 100.0);
-        track.moves(ms(1_000), 100.0, profile(10.0), -400.0);
-        track.shortened(profile(1.0));
-        track.ends();
+        track.begin_motion(ms(1_000), 100.0, profile(10.0), -400.0);
+        track.shorten_motion(profile(1.0));
+        track.finish_motion();
         assert!(track.at(ms(1_300)).status.has(AxisStatus::MOVING));
         let rest = track.at(ms(2_000));
         assert_eq!((rest.pulses, rest.motion), (-300.0, 1));
         assert!(!rest.status.has(AxisStatus::MOVING));
         // A motion that is being braked ends there.
-        track.moves(ms(3_000), -300.0, profile(10.0), 400.0);
-        track.brakes(ms(4_000));
-        track.ends();
+        track.begin_motion(ms(3_000), -300.0, profile(10.0), 400.0);
+        track.begin_braking(ms(4_000));
+        track.finish_motion();
         let rest = track.at(ms(9_000));
         assert!(!rest.status.has(AxisStatus::MOVING));
         // 0.1 mm while it gains speed, 0.9 s at 2 mm/s, 0.1 mm while it brakes.

@@ -1,17 +1,16 @@
-//! The keys of a file with their lines, taken one after the other; what is left over is a mistake too. A key of a table
-//! is called `table.key`.
+//! The keys of a file with their lines, taken one after the other; a key that is not taken is a mistake too. A key of a
+//! table is called `table.key`.
 
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{MmPerS, MmPerS2, Position};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Something wrong in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// Its line, from 1; 0 for the file as a whole.
     pub line: usize,
-    /// What is wrong and what would be right, in words.
+    /// What is wrong and what is right, in words.
     pub message: String,
 }
 
@@ -40,22 +39,18 @@ struct Field {
     is_taken: bool,
 }
 
-/// What a slide can do and may do.
-pub(super) struct Limits {
+pub(super) struct SlideLimits {
     /// End of the travel from home.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
-    /// Acceleration of every move.
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
 }
 
 /// Words for where positive positions of a drive lead: from home into the tissue, or the other way.
 pub(super) const DIRECTIONS: [(&str, bool); 2] = [("forward", false), ("reverse", true)];
 
-/// The keys of a file.
 pub struct Fields {
     all: Vec<Field>,
     mistakes: Vec<Mistake>,
@@ -67,7 +62,7 @@ fn line_of(text: &str, span: &Range<usize>) -> usize {
 }
 
 impl Fields {
-    /// Reads a text; what is no TOML is the only mistake then.
+    /// Reads a text; if it is not TOML, that is the only mistake.
     pub fn read(text: &str) -> Result<Self, Mistake> {
         let document = DeTable::parse(text).map_err(|err| Mistake {
             line: err.span().map_or(0, |span| line_of(text, &span)),
@@ -76,29 +71,26 @@ impl Fields {
                 err.message().trim().replace('\n', ", ")
             ),
         })?;
+        let field = |key: String, span: Range<usize>, value: &DeValue<'_>| Field {
+            key,
+            line: line_of(text, &span),
+            value: value_of(value),
+            is_taken: false,
+        };
         let mut all = Vec::new();
         for (key, value) in document.get_ref().iter() {
-            let (name, line) = (key.get_ref().to_string(), line_of(text, &key.span()));
             match value.get_ref() {
-                DeValue::Table(table) => {
-                    for (key, value) in table.iter() {
-                        all.push(Field {
-                            key: format!("{name}.{}", key.get_ref()),
-                            line: line_of(text, &key.span()),
-                            value: value_of(value.get_ref()),
-                            is_taken: false,
-                        });
-                    }
-                }
-                value => {
-                    all.push(Field { key: name, line, value: value_of(value), is_taken: false })
-                }
+                DeValue::Table(table) => all.extend(table.iter().map(|(inner, value)| {
+                    let name = format!("{}.{}", key.get_ref(), inner.get_ref());
+                    field(name, inner.span(), value.get_ref())
+                })),
+                other => all.push(field(key.get_ref().to_string(), key.span(), other)),
             }
         }
         Ok(Self { all, mistakes: Vec::new() })
     }
 
-    /// Tells a mistake at a key, or at the file where the key is missing.
+    /// Adds a mistake at a key, or at the file where the key is missing.
     pub fn mistake(&mut self, key: &str, message: &str) {
         let line = self.all.iter().find(|field| field.key == key).map_or(0, |field| field.line);
         self.mistakes.push(Mistake { line, message: format!("{key}: {message}") });
@@ -110,64 +102,63 @@ impl Fields {
         Some(field.value.clone())
     }
 
-    /// A text, if it is there.
+    /// Reads a value, if the key is there; one that does not fit is a mistake.
+    fn read_value<T>(
+        &mut self,
+        key: &str,
+        hint: &str,
+        convert: impl Fn(Value) -> Option<T>,
+    ) -> Option<T> {
+        let value = convert(self.take(key)?);
+        if value.is_none() {
+            self.mistake(key, hint);
+        }
+        value
+    }
+
     pub fn text(&mut self, key: &str) -> Option<String> {
-        match self.take(key)? {
+        self.read_value(key, "give a text in quotes", |value| match value {
             Value::Text(text) if !text.trim().is_empty() => Some(text),
-            _ => {
-                self.mistake(key, "give a text in quotes");
-                None
-            }
-        }
+            _ => None,
+        })
     }
 
-    /// A flag, if it is there.
     pub fn flag(&mut self, key: &str) -> Option<bool> {
-        match self.take(key)? {
+        self.read_value(key, "give true or false, without quotes", |value| match value {
             Value::Flag(flag) => Some(flag),
-            _ => {
-                self.mistake(key, "give true or false, without quotes");
-                None
-            }
-        }
+            _ => None,
+        })
     }
 
-    /// A number within bounds, if it is there.
     pub fn number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
-        match self.take(key)? {
-            Value::Number(number) if (least..=most).contains(&number) => Some(number),
-            _ => {
-                self.mistake(key, &format!("give a number from {least} to {most}, without quotes"));
-                None
-            }
-        }
+        let hint = format!("give a number from {least} to {most}, without quotes");
+        self.read_value(key, &hint, |value| match value {
+            Value::Number(number) => Some(number).filter(|n| (least..=most).contains(n)),
+            _ => None,
+        })
     }
 
     /// A whole number within bounds, if it is there.
     pub fn whole(&mut self, key: &str, least: u64, most: u64) -> Option<u64> {
         let (least, most) = (least as f64, most as f64);
-        match self.take(key)? {
+        let hint = format!("give a whole number from {least} to {most}, without quotes");
+        self.read_value(key, &hint, |value| match value {
             Value::Number(number) if (least..=most).contains(&number) && number.fract() == 0.0 => {
                 Some(number as u64)
             }
-            _ => {
-                self.mistake(
-                    key,
-                    &format!("give a whole number from {least} to {most}, without quotes"),
-                );
-                None
-            }
-        }
+            _ => None,
+        })
     }
 
-    /// What the slide can do and may do, whatever drives it.
-    pub(super) fn limits(&mut self) -> Option<Limits> {
+    /// Limits of the slide, for any controller.
+    pub(super) fn limits(&mut self) -> Option<SlideLimits> {
         let travel = self.needed("travel_mm", 1.0, 10_000.0);
         let speed_max = self.needed("speed_max_mm_s", 1e-3, 1000.0);
         let acceleration = self.needed("acceleration_mm_s2", 1e-3, 1e6);
-        // Less is below what a desktop computer's pauses leave at any speed; more is deep for a force nobody saw.
+        // Less is below what a desktop computer's pauses leave at any speed; more is too deep for a force that is not
+        // measured.
         let unseen = self.number("unseen_mm", 0.02, 0.5);
-        Some(Limits {
+        Some(SlideLimits {
             travel: Position(travel?),
             speed_max: MmPerS(speed_max?),
             acceleration: MmPerS2(acceleration?),
@@ -175,10 +166,9 @@ impl Fields {
         })
     }
 
-    /// A number within bounds that must be there.
     pub fn needed(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         if !self.all.iter().any(|field| field.key == key) {
-            self.mistake(key, "is missing; nobody but you can know it");
+            self.mistake(key, "is missing; add it to the file");
             return None;
         }
         self.number(key, least, most)

@@ -1,28 +1,27 @@
 //! The keys of a Galil controller.
 
 use super::RigFile;
+use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
-use super::place::place;
 use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
 use palpate_model::units::Volts;
 
-/// A rig with the controller of a rig file.
 pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (place, settings) = read(name, fields)?;
     let device = GalilDevice::new(place.clone(), settings);
     Some(RigFile::of(vec![place], device))
 }
 
-/// Where the controller is, and how it is wired.
+/// Address and settings of the controller.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
-    let place = place(fields, "");
+    let place = read_address(fields, "");
     let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {
         [letter @ b'A'..=b'H'] => char::from(*letter),
         _ => {
-            fields.mistake("axis", "an axis is a letter from A to H");
+            fields.mistake("axis", "give a letter from A to H");
             'A'
         }
     };
@@ -47,7 +46,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
         let least = 1024.0 * mm_per_pulse;
         fields.mistake(
             "acceleration_mm_s2",
-            &format!("the controller makes no less than {least:.4} mm/s2 with such pulses"),
+            &format!("give at least {least:.4} mm/s2, the least that the controller makes with such pulses"),
         );
     }
     let range = range?;

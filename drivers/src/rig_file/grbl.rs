@@ -1,36 +1,36 @@
 //! The keys of a Grbl board.
 
 use super::RigFile;
+use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
-use super::place::place;
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
-use crate::parts::Parts;
+use crate::parts::SplitRigDevices;
 use crate::wire::Place;
 
 /// A rig with the board and the load cell beside it of a rig file.
 pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
-    // Both are read, so that the mistakes of both are told.
-    let (axis, cell) = (read(name, fields), super::cell::read(fields));
+    // Both are read, so that the mistakes of both are reported.
+    let (axis, cell) = (read(name, fields), super::read_cell(fields));
     let (axis, cell) = (axis?, cell?);
     if axis.0 == cell.0 {
-        fields.mistake("cell.port", "the board is at this port; the load cell has another");
+        fields
+            .mistake("cell.port", "the board is at this port; give another port for the load cell");
         return None;
     }
     let places = vec![axis.0.clone(), cell.0.clone()];
-    Some(RigFile::of(places, Parts::new(axis, cell)))
+    Some(RigFile::of(places, SplitRigDevices::new(axis, cell)))
 }
 
-/// Where the board is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
-    let place = place(fields, "");
+    let place = read_address(fields, "");
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
     if mm_per_pulse.is_some_and(|mm| mm < MM_PER_STEP_MIN) {
         fields.mistake(
             "mm_per_pulse",
-            "Grbl tells places in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
+            "Grbl reports positions in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
         );
     }
     let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
@@ -44,7 +44,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
     if is_closed_home.is_some() && home == Some(HomeSwitch::Probe) {
         fields.mistake(
             "closed_is_home",
-            "a home switch on the probe pin is known by itself; remove this",
+            "a home switch on the probe pin needs no such key; remove this",
         );
     }
     let build_info = fields.text("build_info");

@@ -1,53 +1,43 @@
-//! The description of a rig as a file: what is wired to what, which no device can tell.
+//! The description of a rig as a file: what is wired to what, which no device can report.
 //!
 //! Text in, a [`RigFile`] or every mistake with its line out; [`RigFile::open`] then opens the devices. The keys are
 //! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
 
-mod cell;
+mod address;
 pub mod fields;
 mod galil;
 mod grbl;
-mod place;
-mod stand;
+mod mark10;
 
-pub(crate) use cell::gauge;
 pub use fields::{Fields, Mistake};
 pub(crate) use galil::galil;
 pub(crate) use grbl::grbl;
-pub(crate) use stand::stand;
+pub(crate) use mark10::{gauge, stand};
 
+use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, RigDevice};
 use crate::devices::{DEVICES, Role};
 use crate::rig::Rig;
 use crate::wire::{HostClock, Place};
 use std::fmt;
+use std::sync::Arc;
 use thiserror::Error;
 
-/// A longer rig file is something else.
 pub const BYTES_MAX: usize = 64 * 1024;
 
-/// Opens the devices of a rig file.
 type Opener = dyn Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync;
 
-/// A rig as its file describes it.
 pub struct RigFile {
     places: Vec<Place>,
     open: Box<Opener>,
 }
 
-/// A rig file with mistakes, all of them.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", fields::in_words(.file, .mistakes))]
 pub struct RigFileError {
-    /// The file, as it was given.
     pub file: String,
     /// What is wrong with it, in the order of its lines.
     pub mistakes: Vec<Mistake>,
-}
-
-impl fmt::Display for RigFileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&fields::in_words(&self.file, &self.mistakes))
-    }
 }
 
 impl RigFile {
@@ -55,7 +45,9 @@ impl RigFile {
     pub fn parse(file: &str, text: &str) -> Result<Self, RigFileError> {
         let error = |mistakes| RigFileError { file: file.to_owned(), mistakes };
         if text.len() > BYTES_MAX {
-            let message = format!("more than {BYTES_MAX} bytes are no rig file");
+            let message = format!(
+                "the file has more than {BYTES_MAX} bytes, which is no rig file; check its path"
+            );
             return Err(error(vec![Mistake { line: 0, message }]));
         }
         let mut fields = Fields::read(text).map_err(|mistake| error(vec![mistake]))?;
@@ -74,7 +66,7 @@ impl RigFile {
         Self { places, open }
     }
 
-    /// Where its devices are, that of the axis first.
+    /// Addresses of its devices, that of the axis first.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
@@ -89,6 +81,18 @@ impl fmt::Debug for RigFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("RigFile").field(&self.places).finish()
     }
+}
+
+/// Address and settings of the load cell in the table `[cell]`.
+fn read_cell(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
+    let cells = DEVICES.iter().filter_map(|kind| match kind.role {
+        Role::Cell { read, .. } => Some((kind.word, read)),
+        Role::Axis(_) => None,
+    });
+    let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
+    let place = address::read_address(fields, "cell.");
+    let cell = cell?(fields)?;
+    Some((place?, cell))
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {

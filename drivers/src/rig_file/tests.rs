@@ -35,7 +35,7 @@ fn mistakes(text: &str) -> Vec<(usize, String)> {
 }
 
 #[test]
-fn what_is_not_said_is_usual() {
+fn missing_keys_have_usual_values() {
     let (place, galil) = galil("rigs/bench 2.toml", THESIS);
     assert_eq!(
         place,
@@ -50,7 +50,7 @@ fn what_is_not_said_is_usual() {
 }
 
 #[test]
-fn everything_can_be_said() {
+fn every_key_is_read() {
     let text = THESIS.replace("port = \"/dev/ttyUSB0\"", "address = \"10.0.0.5:23\"")
         + r#"
 name = "left bench"
@@ -81,24 +81,24 @@ sample_us = 500
 }
 
 #[test]
-fn every_mistake_is_told_with_its_line() {
+fn every_mistake_is_reported_with_its_line() {
     let text = THESIS
         .replace("0.015", "\"0.015\"")
         .replace("travel_mm = 150", "travel = 150")
         .replace("\"16 bit\"", "16")
         + "axis = \"Q\"\n";
-    let told = mistakes(&text);
-    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
-    assert_eq!(lines, [0, 4, 5, 8, 9], "{told:?}");
-    assert!(told[0].1.contains("travel_mm"));
-    assert!(told[2].1.contains("'travel'"));
-    assert!(told[3].1.contains("\"12 bit\" or \"16 bit\""));
+    let found = mistakes(&text);
+    let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [0, 4, 5, 8, 9], "{found:?}");
+    assert!(found[0].1.contains("travel_mm"));
+    assert!(found[2].1.contains("'travel'"));
+    assert!(found[3].1.contains("\"12 bit\" or \"16 bit\""));
     let all = RigFile::parse("bench.toml", &text).unwrap_err().to_string();
     assert!(all.contains("bench.toml, line 9: axis: "), "{all}");
 }
 
 #[test]
-fn what_does_not_go_together_is_told() {
+fn keys_that_exclude_each_other_are_mistakes() {
     let both = format!("{THESIS}address = \"10.0.0.5:23\"\n");
     assert!(mistakes(&both)[0].1.contains("not at both"));
     let nowhere = THESIS.replace("port = \"/dev/ttyUSB0\"\n", "");
@@ -110,7 +110,7 @@ fn what_does_not_go_together_is_told() {
 }
 
 #[test]
-fn what_is_no_rig_file_is_told() {
+fn a_text_that_is_no_rig_file_is_a_mistake() {
     assert_eq!(mistakes("device = \"galil")[0].0, 1);
     assert!(mistakes(&"#".repeat(BYTES_MAX + 1))[0].1.contains("no rig file"));
     assert_eq!(mistakes("").len(), 1);
@@ -132,7 +132,7 @@ port = "/dev/ttyACM1"
 "#;
 
 #[test]
-fn a_rig_of_parts_has_two_places() {
+fn rig_of_controller_and_cell_has_two_addresses() {
     let file = RigFile::parse("bench.toml", PARTS).unwrap();
     let ports: Vec<String> = file.places().iter().map(ToString::to_string).collect();
     assert_eq!(ports, ["/dev/ttyACM0 at 115200 baud", "/dev/ttyACM1 at 115200 baud"]);
@@ -145,14 +145,14 @@ fn a_rig_of_parts_has_two_places() {
 }
 
 #[test]
-fn mistakes_of_both_parts_are_told() {
+fn mistakes_of_controller_and_cell_are_reported_together() {
     let text = PARTS.replace("\"probe\"", "\"none\"").replace("\"hx711\"", "\"mark10\"")
         + "board = \"A\"\nreadings_per_second = 60\n";
-    let told = mistakes(&text);
-    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
-    assert_eq!(lines, [0, 7, 12, 13], "{told:?}");
-    assert!(told[0].1.contains("cell.capacity_n: is missing"));
-    assert!(told[2].1.contains("'cell.board' means nothing"));
+    let found = mistakes(&text);
+    let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [0, 7, 12, 13], "{found:?}");
+    assert!(found[0].1.contains("cell.capacity_n: is missing"));
+    assert!(found[2].1.contains("'cell.board' means nothing"));
     let one = PARTS.replace("ttyACM1", "ttyACM0");
     assert!(mistakes(&one)[0].1.contains("another"));
 }
@@ -169,25 +169,25 @@ fn a_stand_is_one_device() {
 fn fractions_of_what_is_whole_are_refused_with_their_line() {
     let text = THESIS.to_owned()
         + "input = 1.9\nserial_number = 1820.7\nsample_us = 976.6\nbaud = 9600.5\n";
-    let told = mistakes(&text);
-    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
-    assert_eq!(lines, [9, 10, 11, 12], "{told:?}");
-    assert!(told[0].1.contains("input: "));
+    let found = mistakes(&text);
+    let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [9, 10, 11, 12], "{found:?}");
+    assert!(found[0].1.contains("input: "));
     let gauge = PARTS.replace("hx711", "mark10")
         + "capacity_n = 25\nfilter = 4.5\nreadings_per_second = 50.5\nbaud = 9600.5\n";
-    let told = mistakes(&gauge);
-    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
-    assert_eq!(lines, [13, 14, 15], "{told:?}");
+    let found = mistakes(&gauge);
+    let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [13, 14, 15], "{found:?}");
     // A whole number may be written with a point.
     let whole = THESIS.to_owned() + "input = 2.0\n";
     assert_eq!(galil("bench.toml", &whole).1.input, 2);
 }
 
 #[test]
-fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
+fn settings_that_a_grbl_board_cannot_have_are_mistakes() {
     let fine = PARTS.replace("0.0025", "0.000625");
-    let told = mistakes(&fine);
-    assert!(told[0].0 == 3 && told[0].1.contains("thousandths"), "{told:?}");
+    let found = mistakes(&fine);
+    assert!(found[0].0 == 3 && found[0].1.contains("thousandths"), "{found:?}");
     let probe = PARTS.replace("\"probe\"\n", "\"probe\"\nclosed_is_home = true\n");
     assert_eq!(mistakes(&probe)[0].0, 8);
     let limit = probe.replace("\"probe\"", "\"limit\"");
@@ -196,11 +196,11 @@ fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
 }
 
 #[test]
-fn how_far_it_may_go_unseen_stands_in_the_file() {
+fn unseen_mm_of_the_file_limits_motion_without_samples() {
     let usual = galil("bench.toml", THESIS).1.unseen;
     assert_eq!(usual, RigDescription::UNSEEN_USUAL);
     let further = THESIS.to_owned() + "unseen_mm = 0.3\n";
     assert_eq!(galil("bench.toml", &further).1.unseen, Position(0.3));
-    let told = mistakes(&(THESIS.to_owned() + "unseen_mm = 5\n"));
-    assert!(told[0].1.contains("unseen_mm: ") && told[0].1.contains("0.02 to 0.5"));
+    let found = mistakes(&(THESIS.to_owned() + "unseen_mm = 5\n"));
+    assert!(found[0].1.contains("unseen_mm: ") && found[0].1.contains("0.02 to 0.5"));
 }

@@ -1,11 +1,10 @@
-//! Settings of the simulated rig that are an amount of something, each with its unit and range.
+//! Settings of the simulated rig that are amounts, each with its unit and range.
 
 use super::settings::SimSettingError;
 use palpate_model::Newtons;
 use std::fmt;
 use std::str::FromStr;
 
-/// A whole number of a unit within a range.
 macro_rules! amount {
     ($(#[$doc:meta])* $name:ident, $word:literal, $usual:literal, $range:expr, $choices:literal) => {
         $(#[$doc])*
@@ -33,12 +32,31 @@ macro_rules! amount {
                     .ok_or_else(|| SimSettingError::new($word, text, $choices))
             }
         }
+
+        #[allow(dead_code, reason = "each amount needs one of them")]
+        impl $name {
+            /// The amount in hundredths of its unit, such as a share from percent. Quotients of whole numbers are the
+            /// nearest doubles to decimal fractions.
+            pub(super) fn hundredths(self) -> f64 {
+                f64::from(self.0) / 100.0
+            }
+
+            /// The amount in thousandths of its unit, such as N from mN.
+            pub(super) fn thousandths(self) -> f64 {
+                f64::from(self.0) / 1000.0
+            }
+
+            /// The amount, unless it is 0.
+            pub(super) fn positive(self) -> Option<f64> {
+                (self.0 > 0).then(|| f64::from(self.0))
+            }
+        }
     };
 }
 
 amount!(
-    /// White noise of the ideal load cell, rms, in whole mN. Without any, every sample would be the same, and the engine
-    /// takes such a cell for a dead one.
+    /// White noise of the ideal load cell, rms, in whole mN. Without any, every sample would be the same, and the
+    /// engine takes such a cell for a dead one.
     SimNoise, "noise", 20, (1..=1000), "1 to 1000 (whole millinewtons; a signal without noise is taken for a dead cell)"
 );
 amount!(
@@ -47,40 +65,40 @@ amount!(
     SimStiffness, "stiffness", 100, (10..=1000), "10 to 1000 (whole percent)"
 );
 amount!(
-    /// How far the rig itself gives way under force, in whole um/N.
+    /// Machine compliance in whole um/N.
     SimCompliance, "compliance", 0, (0..=1000), "0 to 1000 (whole micrometres per newton)"
 );
 
 amount!(
-    /// What the specimen's bath is heated to, in whole °C, from 21 as the rig is switched on; 0 is a rig without one.
+    /// Final temperature of the specimen's bath in whole °C, from 21 as the rig is switched on; 0 is a rig without one.
     SimBath, "bath", 0, (0..=60), "0 to 60 (whole degrees Celsius; 0 for no bath)"
 );
 amount!(
-    /// When digital input 1 goes high, in whole seconds after the rig is switched on; 0 is a rig without inputs.
+    /// The time at which digital input 1 goes high, in whole seconds after the rig is switched on; 0 is a rig without
+    /// inputs.
     SimInput, "input", 0, (0..=86_400), "0 to 86400 (whole seconds; 0 for no input)"
 );
 
 amount!(
-    /// How much softer the simulated tissue is where it has been deeper: the largest share of its elastic force that is
+    /// Softening of the simulated tissue where it has been deeper: the largest share of its elastic force that is
     /// lost, in whole percent. Tissue that lost more than 90 would not come back by itself.
     SimSoftening, "softening", 0, (0..=90), "0 to 90 (whole percent)"
 );
 amount!(
-    /// Percent of the greatest depth by which the surface recedes in the end, where that is far beyond a centimetre. One
-    /// that recedes further than 30 is no longer found where a second cycle looks for it.
+    /// Percent of the greatest depth by which the surface recedes in the end, where that is far beyond a centimetre.
+    /// One that recedes further than 30 is no longer found where a second cycle looks for it.
     SimPreconditioning, "preconditioning", 0, (0..=30), "0 to 30 (whole percent)"
 );
 
 amount!(
-    /// Samples a second that the controller takes, one a tick. Each has the same noise. A tick of either clock divides by
-    /// each of the choices into whole nanoseconds.
+    /// Samples a second that the controller takes, one a tick. Each has the same noise. A tick of either clock
+    /// divides by each of the choices into whole nanoseconds.
     SimRate, "rate", 1000, RATES, "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)"
 );
 
 const RATES: [u32; 8] = [1000, 2000, 4000, 5000, 8000, 10_000, 16_000, 20_000];
 
 impl SimRate {
-    /// Samples where the usual rig takes one.
     #[must_use]
     pub const fn per_usual_tick(self) -> u64 {
         self.0 as u64 / 1000
@@ -88,59 +106,9 @@ impl SimRate {
 }
 
 impl SimNoise {
-    /// The noise in N.
     #[must_use]
     pub fn newtons(self) -> Newtons {
-        // A quotient of whole numbers is the nearest double to the decimal fraction.
-        Newtons(f64::from(self.0) / 1000.0)
-    }
-}
-
-impl SimStiffness {
-    /// As a share: 1 is usual.
-    #[must_use]
-    pub fn share(self) -> f64 {
-        f64::from(self.0) / 100.0
-    }
-}
-
-impl SimSoftening {
-    /// The share, 0 to 0.9.
-    #[must_use]
-    pub fn share(self) -> f64 {
-        f64::from(self.0) / 100.0
-    }
-}
-
-impl SimPreconditioning {
-    /// The share, 0 to 0.3.
-    #[must_use]
-    pub fn share(self) -> f64 {
-        f64::from(self.0) / 100.0
-    }
-}
-
-impl SimBath {
-    /// In °C; none without a bath.
-    #[must_use]
-    pub fn celsius(self) -> Option<f64> {
-        (self.0 > 0).then(|| f64::from(self.0))
-    }
-}
-
-impl SimInput {
-    /// In s; none without an input.
-    #[must_use]
-    pub fn seconds(self) -> Option<f64> {
-        (self.0 > 0).then(|| f64::from(self.0))
-    }
-}
-
-impl SimCompliance {
-    /// In mm/N.
-    #[must_use]
-    pub fn mm_per_newton(self) -> f64 {
-        f64::from(self.0) / 1000.0
+        Newtons(self.thousandths())
     }
 }
 
@@ -158,7 +126,6 @@ const TENTHS_MIN: u32 = 50;
 const TENTHS_MAX: u32 = 2000;
 
 impl SimThickness {
-    /// In mm.
     #[must_use]
     pub fn mm(self) -> f64 {
         f64::from(self.tenths) / 10.0
@@ -180,20 +147,16 @@ impl fmt::Display for SimThickness {
 impl FromStr for SimThickness {
     type Err = SimSettingError;
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let refused = || {
-            let choices = "5 to 200 (millimetres, to a tenth)";
-            SimSettingError::new("thickness", text, choices)
-        };
-        let tenths = 10.0 * text.parse::<f64>().map_err(|_| refused())?;
+        let tenths = text.parse::<f64>().ok().map(|mm| 10.0 * mm);
         // A decimal number misses its tenth by rounding only.
-        let is_tenth = (tenths - tenths.round()).abs() < 1e-9;
-        let is_inside = (f64::from(TENTHS_MIN)..=f64::from(TENTHS_MAX)).contains(&tenths.round());
-        if is_tenth && is_inside {
-            let tenths = tenths.round() as u32;
-            Ok(Self { tenths })
-        } else {
-            Err(refused())
-        }
+        let is_tenth = |tenths: &f64| (tenths - tenths.round()).abs() < 1e-9;
+        let whole = tenths.filter(is_tenth).map(|tenths| tenths.round() as u32);
+        whole
+            .filter(|tenths| (TENTHS_MIN..=TENTHS_MAX).contains(tenths))
+            .map(|tenths| Self { tenths })
+            .ok_or_else(|| {
+                SimSettingError::new("thickness", text, "5 to 200 (millimetres, to a tenth)")
+            })
     }
 }
 
@@ -206,8 +169,8 @@ mod tests {
     fn amounts_are_read_within_their_range() {
         assert_eq!(SimNoise::default().newtons(), Newtons(0.02));
         assert_eq!("50".parse::<SimNoise>().unwrap().newtons(), Newtons(0.05));
-        assert_eq!("50".parse::<SimStiffness>().unwrap().share(), 0.5);
-        assert_eq!("40".parse::<SimCompliance>().unwrap().mm_per_newton(), 0.04);
+        assert_eq!("50".parse::<SimStiffness>().unwrap().hundredths(), 0.5);
+        assert_eq!("40".parse::<SimCompliance>().unwrap().thousandths(), 0.04);
         assert_eq!("12.3".parse::<SimThickness>().unwrap().mm(), 12.3);
         let err = "0".parse::<SimNoise>().unwrap_err();
         assert_eq!((err.setting, err.value.as_str()), ("noise", "0"));

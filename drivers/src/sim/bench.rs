@@ -1,4 +1,4 @@
-//! What stands before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
+//! The bench before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
 //! cell. The rig gives way in between: the probe is not quite where the axis is.
 
 use super::random::Random;
@@ -18,24 +18,19 @@ const SOLVED_MM: f64 = 1e-12;
 /// Four to eight steps are usual; a search that takes more is stuck at the rounding of the force.
 const SOLVE_STEPS_MAX: usize = 60;
 
-/// What the probe and the cell feel at a tick.
+/// Forces at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
-    /// True position of the probe's tip.
-    pub probe: Position,
-    /// Force on the probe.
+pub struct BenchForces {
     pub on_probe: Newtons,
     /// Force on the load cell: the probe's and the weights'.
     pub on_cell: Newtons,
 }
 
-/// The bench of one rig.
 #[derive(Clone, Debug)]
 pub struct Bench {
     settings: SimSettings,
     specimen: Option<Tissue>,
     base: Position,
-    /// Of the specimen clipped in last.
     body: ModifiedKelvin,
     weights: Newtons,
     probe: Position,
@@ -55,17 +50,20 @@ impl Bench {
         }
     }
 
-    /// What the probe would meet first: the specimen's surface, or without a specimen the base.
+    /// The first surface before the probe: the specimen's, or without a specimen the base.
     pub fn surface(&self) -> Position {
         self.specimen.as_ref().map_or(self.base, Tissue::surface)
     }
 
-    /// Front of the base.
+    /// True position of the probe's tip.
+    pub fn probe(&self) -> Position {
+        self.probe
+    }
+
     pub fn base(&self) -> Position {
         self.base
     }
 
-    /// Parameters of the specimen clipped in last.
     pub fn body(&self) -> ModifiedKelvin {
         self.body
     }
@@ -88,18 +86,18 @@ impl Bench {
     }
 
     /// The axis has moved straight to a true position in a time step.
-    pub fn advance(&mut self, axis: Position, dt: Seconds) -> Felt {
-        let compliance = self.settings.compliance.mm_per_newton();
-        self.probe = if compliance > 0.0 { self.balanced(axis, dt, compliance) } else { axis };
+    pub fn advance(&mut self, axis: Position, dt: Seconds) -> BenchForces {
+        let compliance = self.settings.compliance.thousandths();
+        self.probe = if compliance > 0.0 { self.solve_probe(axis, dt, compliance) } else { axis };
         let on_probe = self.push(self.probe, dt);
-        Felt { probe: self.probe, on_probe, on_cell: on_probe + self.weights }
+        BenchForces { on_probe, on_cell: on_probe + self.weights }
     }
 
     /// Where the force that bends the rig is the force that tissue and base have there:
     /// `probe = axis - compliance F(probe)` at the end of the step. Found by bisection with false-position
     /// steps in the bracket (the Illinois rule, Dowell & Jarratt, BIT 11 (1971) 168-174), for the force
     /// within a step grows with depth.
-    fn balanced(&self, axis: Position, dt: Seconds, compliance: f64) -> Position {
+    fn solve_probe(&self, axis: Position, dt: Seconds, compliance: f64) -> Position {
         let miss = |probe: f64| {
             let force = self.clone().push(Position(probe), dt).0;
             probe + compliance * force - axis.0
@@ -132,12 +130,9 @@ impl Bench {
         Position(at)
     }
 
-    /// Moves the probe and returns the force on it.
     fn push(&mut self, probe: Position, dt: Seconds) -> Newtons {
-        let tissue = match &mut self.specimen {
-            Some(tissue) => tissue.advance(probe, dt),
-            None => Newtons(0.0),
-        };
+        let tissue =
+            self.specimen.as_mut().map_or(Newtons(0.0), |tissue| tissue.advance(probe, dt));
         let into_base = probe.distance_from(self.base).max(0.0);
         tissue + Newtons(BASE_STIFFNESS * into_base)
     }

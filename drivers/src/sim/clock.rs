@@ -48,7 +48,6 @@ pub struct ReportLink {
 }
 
 impl ReportLink {
-    /// The link of a rig with this seed.
     pub fn new(seed: u64) -> Self {
         Self { random: Random::new(seed, Cause::Link), newest: None }
     }
@@ -90,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_even() {
+    fn ticks_have_equal_distances() {
         let mut clock = TickClock::new(40, 976_000);
         assert_eq!(clock.advance(), (40, Nanos(0)));
         assert_eq!(clock.advance(), (41, Nanos(976_000)));

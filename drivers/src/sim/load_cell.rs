@@ -40,10 +40,7 @@ pub fn calibration(profile: SimProfile) -> Calibration {
 
 /// The converter of this profile's cell.
 pub fn adc(profile: SimProfile) -> Option<AdcDescription> {
-    match profile {
-        SimProfile::Lab => Some(LAB_ADC),
-        SimProfile::Ideal => None,
-    }
+    (profile == SimProfile::Lab).then_some(LAB_ADC)
 }
 
 /// White noise of the signal at rest, rms.
@@ -109,8 +106,8 @@ impl LoadCell {
         let noise = self.noise.normal();
         match &mut self.error {
             CellError::Ideal { noise: rms } => {
-                let felt = Newtons(force.0 + rms.0 * noise);
-                self.curve.volts_from_newtons(felt)
+                let noisy = Newtons(force.0 + rms.0 * noise);
+                self.curve.volts_from_newtons(noisy)
             }
             CellError::Lab { drift, drift_per_tick, wander_step, wander, ticks } => {
                 *ticks += 1;

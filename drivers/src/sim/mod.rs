@@ -22,8 +22,7 @@ pub use amounts::{
     SimStiffness, SimThickness,
 };
 pub use bench::Bench;
-pub use load_cell::calibration;
-pub use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
+pub use load_cell::{LoadCell, calibration, counts_from_volts, volts_from_counts};
 pub use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;
@@ -31,7 +30,7 @@ pub use slider::SWITCH_MARGIN_MM;
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
 use palpate_model::calibration::Calibration;
-use palpate_model::rig::{Fault, HandAction, Reading, RigCommand, RigDescription, SensorReading};
+use palpate_model::rig::{HandAction, Reading, RigCommand, RigDescription, SensorReading};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{MmPerS, MmPerS2, Nanos, Newtons, Position, Seconds};
 use sensors::Sensors;
@@ -40,7 +39,6 @@ use std::collections::VecDeque;
 
 /// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
 pub const MM_PER_PULSE: f64 = 0.015;
-/// Stroke of the slide.
 pub const TRAVEL: Position = Position(150.0);
 /// 2 counts/s, the resolution of `SP` at a nominal millisecond in Galil's DMC command reference.
 const SPEED_QUANTUM: MmPerS = MmPerS(2.0 * MM_PER_PULSE);
@@ -53,7 +51,7 @@ const COMMANDS_MAX: usize = 64;
 /// Changes whenever equal settings no longer give equal events.
 const SIMULATOR_VERSION: u32 = 1;
 
-/// What is really so on a simulated rig, for demonstrations and tests. No decision of a run may
+/// True values of a simulated rig, for demonstrations and tests. No decision of a run may
 /// use it: a rig on wires has no such thing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
@@ -69,9 +67,8 @@ pub struct Truth {
     pub base: Position,
     /// Where the pulse counter reads zero, in mm from the edge of the home switch.
     pub counter_zero: Position,
-    /// The specimen clipped in last.
+    /// Parameters of the specimen mounted last.
     pub body: ModifiedKelvin,
-    /// Force on the probe.
     pub force: Newtons,
 }
 
@@ -87,7 +84,6 @@ impl Truth {
     }
 }
 
-/// The simulated rig.
 #[derive(Clone, Debug)]
 pub struct SimRig {
     description: RigDescription,
@@ -99,7 +95,9 @@ pub struct SimRig {
     bench: Bench,
     load_cell: LoadCell,
     sensors: Sensors,
-    truth: Truth,
+    newest_tick: u64,
+    /// Force on the probe at that tick.
+    force: Newtons,
     /// Time of the newest event handed out: the host's present.
     now: Nanos,
     /// Commands under way, with their arrival at the controller.
@@ -127,15 +125,6 @@ impl SimRig {
         let bench = Bench::new(&settings, slider.counter_zero());
         // The controller was switched on up to a minute and a half before the host looked.
         let tick_count = machine.between(1.0, 1e5) as u64;
-        let truth = Truth {
-            tick: tick_count,
-            position: slider.counter_zero(),
-            surface: bench.surface(),
-            base: bench.base(),
-            counter_zero: slider.counter_zero(),
-            body: bench.body(),
-            force: Newtons(0.0),
-        };
         Self {
             tick,
             clock: TickClock::new(tick_count, description.tick_nanos),
@@ -144,7 +133,8 @@ impl SimRig {
             sensors: Sensors::new(&settings),
             slider,
             bench,
-            truth,
+            newest_tick: tick_count,
+            force: Newtons(0.0),
             description,
             settings,
             now: Nanos::ZERO,
@@ -154,19 +144,22 @@ impl SimRig {
         }
     }
 
-    /// The settings that rebuild this rig.
-    pub fn settings(&self) -> SimSettings {
-        self.settings
-    }
-
     /// What the laboratory's calibration of this rig's load cell says.
     pub fn calibration(&self) -> Calibration {
         calibration(self.settings.profile)
     }
 
-    /// What is really so at the tick of the newest event; see [`Truth`].
+    /// The true values at the tick of the newest event; see [`Truth`].
     pub fn truth(&self) -> Truth {
-        self.truth
+        Truth {
+            tick: self.newest_tick,
+            position: self.bench.probe(),
+            surface: self.bench.surface(),
+            base: self.bench.base(),
+            counter_zero: self.slider.counter_zero(),
+            body: self.bench.body(),
+            force: self.force,
+        }
     }
 
     /// One tick of the controller: commands that have arrived, motion, tissue, sample.
@@ -175,7 +168,7 @@ impl SimRig {
         self.slider.begin_tick(tick);
         if std::mem::take(&mut self.is_overrun) {
             let detail = format!("input buffer full, keep below {COMMANDS_MAX} commands at once");
-            self.report(at, RigEventBody::Fault(Fault::CommandRefused { detail }));
+            self.report(at, RigEventBody::refusal(detail));
         }
         while let Some(&(arrival, command)) = self.commands.front() {
             if arrival > at {
@@ -189,16 +182,9 @@ impl SimRig {
             self.report(at, answer);
         }
         let axis = self.slider.end_tick(tick);
-        let felt = self.bench.advance(axis.position, self.tick);
-        let (counts, volts) = self.load_cell.read(felt.on_cell);
-        self.truth = Truth {
-            tick,
-            position: felt.probe,
-            surface: self.bench.surface(),
-            counter_zero: self.slider.counter_zero(),
-            force: felt.on_probe,
-            ..self.truth
-        };
+        let forces = self.bench.advance(axis.position, self.tick);
+        let (counts, volts) = self.load_cell.read(forces.on_cell);
+        (self.newest_tick, self.force) = (tick, forces.on_probe);
         let reading =
             Reading { tick, counts, volts, pulses: axis.pulses, status: axis.status, age: None };
         self.report(at, RigEventBody::Reading(reading));
@@ -249,8 +235,6 @@ impl Rig for SimRig {
     /// Acts at the next tick.
     fn by_hand(&mut self, action: HandAction) {
         self.bench.by_hand(action);
-        self.truth.surface = self.bench.surface();
-        self.truth.body = self.bench.body();
     }
 }
 

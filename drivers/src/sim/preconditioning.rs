@@ -31,9 +31,8 @@ const HEALING: f64 = 600.0;
 /// Forces in N up to here are none: what rounding leaves of a body that has relaxed.
 const FREE: f64 = 1e-9;
 
-/// How far the surface has receded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Set {
+pub(super) struct SurfaceRecession {
     share: f64,
     /// Greatest depth so far behind where the surface was at first, in mm.
     depth_max: f64,
@@ -43,18 +42,17 @@ pub(super) struct Set {
     set: f64,
 }
 
-impl Set {
-    /// Nothing has pressed the specimen yet.
+impl SurfaceRecession {
     pub fn new(preconditioning: SimPreconditioning) -> Self {
-        Self { share: preconditioning.share(), depth_max: 0.0, depth: 0.0, set: 0.0 }
+        Self { share: preconditioning.hundredths(), depth_max: 0.0, depth: 0.0, set: 0.0 }
     }
 
-    /// How far the surface has receded, in mm.
+    /// Recession of the surface, in mm.
     pub fn get(&self) -> f64 {
         self.set
     }
 
-    /// Where the set is heading, in mm.
+    /// Limit of the set, in mm.
     fn limit(&self) -> f64 {
         let x = self.depth_max;
         self.share * x * x * x / (x * x + DEEP * DEEP)
@@ -89,11 +87,9 @@ mod tests {
 
     struct Press {
         tissue: Tissue,
-        /// First surface.
         surface: Position,
     }
 
-    /// What one cycle looked like.
     #[derive(Clone, Copy, Debug)]
     struct Cycle {
         peak: f64,
@@ -172,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rest_restores_part_of_it() {
+    fn rest_restores_part_of_the_recession() {
         let mut press = Press::new(10);
         let fresh = press.cycle(30.0, 5.0);
         for _ in 0..8 {
@@ -254,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn none_is_none_to_the_last_bit() {
+    fn without_preconditioning_forces_stay_the_same_to_the_last_bit() {
         let mut with = Press::new(0);
         let plain = Tissue::new(&mut Random::new(4, Cause::Tissue), &SimSettings::default());
         let mut without = Press { surface: plain.surface(), tissue: plain };

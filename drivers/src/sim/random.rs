@@ -6,24 +6,17 @@
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// What a generator is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// Where the slider stands at power-on, and the controller's count.
     Machine = 1,
-    /// Surface and stiffness of the tissue.
     Tissue = 2,
-    /// White noise of the load cell.
     Noise = 3,
-    /// Slow drift of the load cell.
     Drift = 4,
-    /// Jitter of the link to the host.
     Link = 5,
-    /// Noise added by a faulty stand-in.
     Fault = 6,
 }
 
-/// The generator of one cause.
 #[derive(Clone, Debug)]
 pub struct Random(Pcg64);
 
@@ -31,8 +24,8 @@ impl Random {
     /// The generator of `cause` under `seed`.
     pub fn new(seed: u64, cause: Cause) -> Self {
         let cause = cause as u64;
-        let high = scrambled(seed ^ scrambled(cause));
-        let low = scrambled(high);
+        let high = scramble(seed ^ scramble(cause));
+        let low = scramble(high);
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), u128::from(cause)))
     }
 
@@ -40,7 +33,7 @@ impl Random {
     pub fn of_specimen(seed: u64, specimen: u64) -> Self {
         match specimen {
             0 => Self::new(seed, Cause::Tissue),
-            _ => Self::new(seed ^ scrambled(specimen), Cause::Tissue),
+            _ => Self::new(seed ^ scramble(specimen), Cause::Tissue),
         }
     }
 
@@ -49,7 +42,6 @@ impl Random {
         StandardUniform.sample(&mut self.0)
     }
 
-    /// Uniform between two numbers.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
@@ -69,7 +61,7 @@ impl Random {
 
 /// The finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014): neighbouring seeds become
 /// unrelated states.
-fn scrambled(seed: u64) -> u64 {
+fn scramble(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -83,8 +75,8 @@ mod tests {
     #[test]
     fn the_scrambler_is_splitmix64() {
         // First two outputs of SplitMix64 from state 0 (the reference program's test values).
-        assert_eq!(scrambled(0), 0xe220_a839_7b1d_cdaf);
-        assert_eq!(scrambled(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
+        assert_eq!(scramble(0), 0xe220_a839_7b1d_cdaf);
+        assert_eq!(scramble(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The sensors of a simulated rig beside its load cell: a bath that is slowly heated, and a switch somebody closes.
+//! Other sensors of a simulated rig: a bath that is slowly heated, and a switch.
 
 use super::amounts::{SimBath, SimInput};
 use super::settings::SimSettings;
@@ -11,56 +11,58 @@ const ROOM_CELSIUS: f64 = 21.0;
 /// Time constant of the bath in s: a litre under a heater of some hundred watts.
 const HEATING_SECS: f64 = 120.0;
 
-/// Values that the thermometer tells apart within a degree.
+/// Resolution of the thermometer: steps per degree.
 const VALUES_PER_DEGREE: f64 = 20.0;
 
-/// A sensor is told when it has changed, and once in this time in any case.
-const TELL_EVERY: Nanos = Nanos::from_millis(1000);
+/// A sensor is reported when it has changed, and once in this time in any case.
+const REPORT_EVERY: Nanos = Nanos::from_millis(1000);
 
-/// What is told of them, by the rig's time.
+/// The sensors and what was reported last, by the rig's time.
 #[derive(Clone, Debug)]
 pub struct Sensors {
     bath: SimBath,
     input: SimInput,
-    told: Vec<(Nanos, SensorReading)>,
+    last_reported: Vec<(Nanos, SensorReading)>,
 }
 
 impl Sensors {
-    /// The sensors that settings ask for.
     pub fn new(settings: &SimSettings) -> Self {
-        Self { bath: settings.bath, input: settings.input, told: Vec::new() }
+        Self { bath: settings.bath, input: settings.input, last_reported: Vec::new() }
     }
 
-    /// Which there are.
     pub fn described(settings: &SimSettings) -> RigSensors {
         RigSensors {
-            digital_inputs: settings.input.seconds().map_or(0, |_| 1),
-            has_bath: settings.bath.celsius().is_some(),
+            digital_inputs: u8::from(settings.input.positive().is_some()),
+            has_bath: settings.bath.positive().is_some(),
         }
     }
 
-    /// What is new at a time since the rig was switched on.
+    /// New readings at a time since the rig was switched on.
     pub fn take(&mut self, now: Nanos) -> Vec<SensorReading> {
         let secs = now.seconds().0;
-        let bath = self.bath.celsius().map(|end| {
+        let bath = self.bath.positive().map(|end| {
             let celsius = end - (end - ROOM_CELSIUS) * (-secs / HEATING_SECS).exp();
             let celsius = (celsius * VALUES_PER_DEGREE).round() / VALUES_PER_DEGREE;
             SensorReading::Bath { celsius }
         });
-        let input = self.input.seconds().map(|closes| {
+        let input = self.input.positive().map(|closes| {
             let is_high = secs >= closes;
             SensorReading::DigitalInput { number: 1, is_high }
         });
-        let mut news = Vec::new();
+        let mut changed = Vec::new();
         for (index, reading) in bath.into_iter().chain(input).enumerate() {
-            match self.told.get_mut(index) {
-                Some((at, told)) if *told == reading && now.since(*at) < TELL_EVERY => continue,
-                Some(told) => *told = (now, reading),
-                None => self.told.push((now, reading)),
+            match self.last_reported.get_mut(index) {
+                Some((at, last_reported))
+                    if *last_reported == reading && now.since(*at) < REPORT_EVERY =>
+                {
+                    continue;
+                }
+                Some(last_reported) => *last_reported = (now, reading),
+                None => self.last_reported.push((now, reading)),
             }
-            news.push(reading);
+            changed.push(reading);
         }
-        news
+        changed
     }
 }
 
@@ -83,7 +85,7 @@ mod tests {
         assert_eq!(sensors.take(Nanos::from_millis(1)), []);
         // By hand: 37 - 16 / e = 31.114.
         let [SensorReading::Bath { celsius }, switch] = sensors.take(at(120))[..] else {
-            panic!("both are told")
+            panic!("both are reported")
         };
         assert!((celsius - 31.1).abs() < 1e-9, "{celsius}");
         assert_eq!(switch, high(true));

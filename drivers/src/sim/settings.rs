@@ -1,32 +1,35 @@
-//! What makes one simulated rig differ from another; with these values it can be rebuilt.
+//! The settings that make a simulated rig; with them it can be rebuilt.
 
 use super::amounts::{
     SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
     SimStiffness, SimThickness,
 };
 use std::collections::BTreeMap;
-use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How much of a laboratory the simulated load cell shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SimProfile {
-    /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
-    #[default]
-    Lab,
-    /// A straight cell without drift or converter, and white noise: 0.02 N rms unless set otherwise.
-    Ideal,
+palpate_model::named! {
+    /// Realism of the simulated load cell.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum SimProfile {
+        /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
+        #[default]
+        Lab = "lab",
+        /// A straight cell without drift or converter, and white noise: 0.02 N rms unless set otherwise.
+        Ideal = "ideal",
+    }
 }
 
-/// The controller's sample clock.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum SimClock {
-    /// 1000 us per tick.
-    #[default]
-    Nominal,
-    /// 976 us per tick: what a Galil controller makes of its nominal millisecond (`TM 1000`).
-    Galil,
+palpate_model::named! {
+    /// The controller's sample clock.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum SimClock {
+        /// 1000 us per tick.
+        #[default]
+        Nominal = "nominal",
+        /// 976 us per tick: what a Galil controller makes of its nominal millisecond (`TM 1000`).
+        Galil = "galil",
+    }
 }
 
 impl SimClock {
@@ -40,32 +43,22 @@ impl SimClock {
     }
 }
 
-/// Everything that determines a simulated rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SimSettings {
-    /// How real the load cell is.
     pub profile: SimProfile,
-    /// Seed of every random number the rig uses.
     pub seed: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
-    /// Samples a second.
     pub rate: SimRate,
-    /// What the tissue loses by having been deeper.
     pub softening: SimSoftening,
-    /// White noise of the ideal load cell.
     pub noise: SimNoise,
-    /// How stiff the tissue is.
     pub stiffness: SimStiffness,
-    /// How far behind the surface a stiff base stands.
+    /// Distance of the stiff base from the surface.
     pub thickness: SimThickness,
-    /// How far the rig itself gives way.
     pub compliance: SimCompliance,
-    /// How far loading moves the tissue's surface.
+    /// Recession of the tissue's surface by loading.
     pub preconditioning: SimPreconditioning,
-    /// What its bath is heated to.
     pub bath: SimBath,
-    /// When its digital input goes high.
     pub input: SimInput,
 }
 
@@ -73,11 +66,8 @@ pub struct SimSettings {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the simulated rig's {setting} cannot be '{value}'; give {choices}")]
 pub struct SimSettingError {
-    /// Which setting.
     pub setting: &'static str,
-    /// What was given.
     pub value: String,
-    /// What is accepted.
     pub choices: &'static str,
 }
 
@@ -103,55 +93,44 @@ impl SimSettings {
             ("seed".to_owned(), self.seed.to_string()),
             ("clock".to_owned(), self.clock.to_string()),
         ]);
-        let unusual = [
-            unusual("rate", self.rate),
-            unusual("softening", self.softening),
-            unusual("noise", self.noise),
-            unusual("stiffness", self.stiffness),
-            unusual("thickness", self.thickness),
-            unusual("compliance", self.compliance),
-            unusual("preconditioning", self.preconditioning),
-            unusual("bath", self.bath),
-            unusual("input", self.input),
+        let usual = Self::default();
+        let amounts = [
+            ("rate", self.rate.to_string(), usual.rate.to_string()),
+            ("softening", self.softening.to_string(), usual.softening.to_string()),
+            ("noise", self.noise.to_string(), usual.noise.to_string()),
+            ("stiffness", self.stiffness.to_string(), usual.stiffness.to_string()),
+            ("thickness", self.thickness.to_string(), usual.thickness.to_string()),
+            ("compliance", self.compliance.to_string(), usual.compliance.to_string()),
+            (
+                "preconditioning",
+                self.preconditioning.to_string(),
+                usual.preconditioning.to_string(),
+            ),
+            ("bath", self.bath.to_string(), usual.bath.to_string()),
+            ("input", self.input.to_string(), usual.input.to_string()),
         ];
-        map.extend(unusual.into_iter().flatten());
+        // Usual values are left out: rigs are described as they always were.
+        let unusual = amounts.into_iter().filter(|(_, value, usual)| value != usual);
+        map.extend(unusual.map(|(name, value, _)| (name.to_owned(), value)));
         map
     }
 }
 
-/// A setting with its name, unless it is the usual one: rigs are described as they always were.
-fn unusual<T: Default + PartialEq + fmt::Display>(
-    name: &str,
-    value: T,
-) -> Option<(String, String)> {
-    (value != T::default()).then(|| (name.to_owned(), value.to_string()))
+impl FromStr for SimProfile {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|profile| profile.name() == text);
+        found.ok_or_else(|| SimSettingError::new("profile", text, "'lab' or 'ideal'"))
+    }
 }
 
-/// A setting that is one of some words.
-macro_rules! words {
-    ($name:ident, $setting:literal, $choices:literal, $($variant:ident = $word:literal),+) => {
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self {
-                    $(Self::$variant => $word,)+
-                })
-            }
-        }
-
-        impl FromStr for $name {
-            type Err = SimSettingError;
-            fn from_str(text: &str) -> Result<Self, Self::Err> {
-                match text {
-                    $($word => Ok(Self::$variant),)+
-                    _ => Err(SimSettingError::new($setting, text, $choices)),
-                }
-            }
-        }
-    };
+impl FromStr for SimClock {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|clock| clock.name() == text);
+        found.ok_or_else(|| SimSettingError::new("clock", text, "'nominal' or 'galil'"))
+    }
 }
-
-words!(SimProfile, "profile", "'lab' or 'ideal'", Lab = "lab", Ideal = "ideal");
-words!(SimClock, "clock", "'nominal' or 'galil'", Nominal = "nominal", Galil = "galil");
 
 #[cfg(test)]
 mod tests {

@@ -9,6 +9,7 @@
 //! the profile itself while the controller reports whole pulses. At rest it stands on the pulse.
 
 use super::random::Random;
+use crate::rig::axis_status;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{
     Ack, AxisStatus, Course, Fault, MoveTo, Oscillation, Profile, RigCommand, RigDescription, Sine,
@@ -26,7 +27,6 @@ pub const SWITCH_MARGIN_MM: f64 = 2.0;
 /// Targets and counts fit the controller's 32-bit position register.
 const PULSES_MAX: u64 = 1 << 31;
 
-/// A motion under way.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     course: Course,
@@ -37,18 +37,15 @@ struct Motion {
     is_reported: bool,
 }
 
-/// What the axis is at one tick.
+/// State of the axis at one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisSample {
     /// Reported position: whole pulses at or below the commanded position.
     pub pulses: i64,
-    /// Status bits.
     pub status: AxisStatus,
-    /// True position of the probe.
     pub position: Position,
 }
 
-/// The controller axis with the slide on it.
 #[derive(Clone, Debug)]
 pub struct Slider {
     mm_per_pulse: f64,
@@ -60,7 +57,6 @@ pub struct Slider {
     reverse_limit: f64,
     forward_limit: f64,
     is_motor_on: bool,
-    /// Counted position.
     position: Position,
     motion: Option<Motion>,
     /// A move ended at this very tick, so the axis was still moving when last reported.
@@ -110,29 +106,18 @@ impl Slider {
 
     /// Executes one command at a tick. The acknowledgement carries what was really set.
     pub fn execute(&mut self, tick: u64, command: RigCommand) -> Result<Ack, Fault> {
-        let command = match command {
-            RigCommand::EnableMotor => {
-                self.is_motor_on = true;
-                command
-            }
-            RigCommand::MoveTo(wanted) => RigCommand::MoveTo(self.start_move(tick, wanted)?),
+        let mut made = command;
+        match command {
+            RigCommand::EnableMotor => self.is_motor_on = true,
+            RigCommand::MoveTo(wanted) => made = RigCommand::MoveTo(self.start_move(tick, wanted)?),
             RigCommand::Oscillate(wanted) => {
-                RigCommand::Oscillate(self.start_oscillation(tick, wanted)?)
+                made = RigCommand::Oscillate(self.start_oscillation(tick, wanted)?);
             }
-            RigCommand::Stop => {
-                self.stop(tick);
-                command
-            }
-            RigCommand::Halt => {
-                self.halt(tick);
-                command
-            }
-            RigCommand::DefinePosition { pulses } => {
-                self.define(pulses)?;
-                command
-            }
-        };
-        Ok(Ack { command })
+            RigCommand::Stop => self.stop(tick),
+            RigCommand::Halt => self.halt(tick),
+            RigCommand::DefinePosition { pulses } => self.define(pulses)?,
+        }
+        Ok(Ack { command: made })
     }
 
     /// Ends a tick: moves the probe, looks at the switches and reports.
@@ -141,10 +126,7 @@ impl Slider {
             self.motion = Some(Motion { is_reported: true, ..motion });
             let since = self.since(motion, tick);
             self.position = motion.course.position(since);
-            let speed = motion.course.velocity(since).0;
-            let closing = (speed > 0.0 && self.is_forward_limit_closed())
-                || (speed < 0.0 && self.is_reverse_limit_closed());
-            if closing {
+            if self.is_blocked(motion.course.velocity(since).0) {
                 self.stop(tick);
             }
         }
@@ -158,21 +140,25 @@ impl Slider {
     /// Whether a motion may begin, or why it may not.
     fn check_begin(&self) -> Result<(), Fault> {
         if !self.is_motor_on {
-            return Err(refused("begin not valid with the motor off, enable it first"));
+            return Err(refusal("begin not valid with the motor off, enable it first"));
         }
         if self.motion.is_some() || self.is_just_ended {
-            return Err(refused(
+            return Err(refusal(
                 "begin not valid while the axis moves, wait until it reports rest",
             ));
         }
         Ok(())
     }
 
-    fn check_direction(&self, way: f64) -> Result<(), Fault> {
-        if (way > 0.0 && self.is_forward_limit_closed())
+    /// Whether the limit switch in a direction is closed.
+    fn is_blocked(&self, way: f64) -> bool {
+        (way > 0.0 && self.is_forward_limit_closed())
             || (way < 0.0 && self.is_reverse_limit_closed())
-        {
-            return Err(refused(
+    }
+
+    fn check_direction(&self, way: f64) -> Result<(), Fault> {
+        if self.is_blocked(way) {
+            return Err(refusal(
                 "begin not possible towards a closed limit switch, move the other way",
             ));
         }
@@ -182,53 +168,50 @@ impl Slider {
     fn start_move(&mut self, tick: u64, wanted: MoveTo) -> Result<MoveTo, Fault> {
         self.check_begin()?;
         if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refusal(format!(
                 "target {} pulses is out of range, stay within {PULSES_MAX}",
                 wanted.target_pulses
             )));
         }
-        let speed = rounded_down(wanted.speed.0, self.speed_quantum);
+        let speed = round_down(wanted.speed.0, self.speed_quantum);
         if !(speed > 0.0 && speed <= self.speed_max * (1.0 + 1e-12)) {
-            return Err(refused(&format!(
+            return Err(refusal(format!(
                 "speed {} is out of range, choose from {} to {} mm/s",
                 wanted.speed, self.speed_quantum, self.speed_max
             )));
         }
-        let acceleration = acceleration_made(wanted.acceleration)?;
+        let acceleration = achievable_acceleration(wanted.acceleration)?;
         let speed = MmPerS(speed);
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
         self.check_direction(target.distance_from(self.position))?;
         let made = MoveTo { target_pulses: wanted.target_pulses, speed, acceleration };
-        self.motion = Some(Motion {
-            course: Course::Move(Profile::to_rest(self.position, target, speed, acceleration)),
-            start_tick: tick,
-            target_pulses: Some(wanted.target_pulses),
-            is_reported: false,
-        });
+        let profile = Profile::to_rest(self.position, target, speed, acceleration);
+        self.begin(tick, Course::Move(profile), wanted.target_pulses);
         Ok(made)
     }
 
     fn start_oscillation(&mut self, tick: u64, wanted: Oscillation) -> Result<Oscillation, Fault> {
         self.check_begin()?;
-        let made = Oscillation { acceleration: acceleration_made(wanted.acceleration)?, ..wanted };
+        let made =
+            Oscillation { acceleration: achievable_acceleration(wanted.acceleration)?, ..wanted };
         let start = self.pulses_at(self.position);
         let far = made.amplitude_pulses.saturating_mul(2);
         if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refusal(format!(
                 "an amplitude of {} pulses from {start} is out of range, stay within {PULSES_MAX}",
                 made.amplitude_pulses
             )));
         }
         let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
-        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(|why| refused(&why))?;
+        sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refusal)?;
         self.check_direction(made.amplitude_pulses as f64)?;
-        self.motion = Some(Motion {
-            course: Course::Sine(sine),
-            start_tick: tick,
-            target_pulses: Some(start),
-            is_reported: false,
-        });
+        self.begin(tick, Course::Sine(sine), start);
         Ok(made)
+    }
+
+    fn begin(&mut self, tick: u64, course: Course, target: i64) {
+        let target_pulses = Some(target);
+        self.motion = Some(Motion { course, start_tick: tick, target_pulses, is_reported: false });
     }
 
     /// Replaces the motion by its deceleration; a move already ending early goes on as it is.
@@ -262,10 +245,10 @@ impl Slider {
 
     fn define(&mut self, pulses: i64) -> Result<(), Fault> {
         if self.motion.is_some() {
-            return Err(refused("position cannot be defined while the axis moves, stop it first"));
+            return Err(refusal("position cannot be defined while the axis moves, stop it first"));
         }
         if pulses.unsigned_abs() > PULSES_MAX {
-            return Err(refused(&format!(
+            return Err(refusal(format!(
                 "position {pulses} pulses is out of range, stay within {PULSES_MAX}"
             )));
         }
@@ -276,7 +259,7 @@ impl Slider {
     }
 
     fn status(&self) -> AxisStatus {
-        let bits = [
+        axis_status([
             (self.motion.is_some(), AxisStatus::MOVING),
             (
                 self.is_just_halted || self.motion.is_some_and(|m| m.target_pulses.is_none()),
@@ -286,10 +269,7 @@ impl Slider {
             (self.is_forward_limit_closed(), AxisStatus::FORWARD_LIMIT),
             (self.is_reverse_limit_closed(), AxisStatus::REVERSE_LIMIT),
             (self.is_motor_on, AxisStatus::MOTOR_ON),
-        ];
-        bits.into_iter()
-            .filter(|(is_set, _)| *is_set)
-            .fold(AxisStatus::default(), |all, (_, bit)| all | bit)
+        ])
     }
 
     fn true_position(&self) -> Position {
@@ -319,12 +299,12 @@ impl Slider {
 }
 
 /// The acceleration that the controller sets for a wish.
-fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
-    let made = rounded_down(wanted.0, ACCELERATION_QUANTUM.0);
+fn achievable_acceleration(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
+    let made = round_down(wanted.0, ACCELERATION_QUANTUM.0);
     if made > 0.0 && made.is_finite() {
         Ok(MmPerS2(made))
     } else {
-        Err(refused(&format!(
+        Err(refusal(format!(
             "acceleration {wanted} is out of range, choose at least {ACCELERATION_QUANTUM}"
         )))
     }
@@ -332,10 +312,10 @@ fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
 
 /// The largest multiple of a quantum not above a wish. A wish that misses a multiple only by
 /// decimal rounding (1e-6 of a quantum) gets that multiple.
-fn rounded_down(wanted: f64, quantum: f64) -> f64 {
+fn round_down(wanted: f64, quantum: f64) -> f64 {
     (wanted / quantum + 1e-6).floor() * quantum
 }
 
-fn refused(detail: &str) -> Fault {
-    Fault::CommandRefused { detail: detail.to_owned() }
+fn refusal(detail: impl Into<String>) -> Fault {
+    Fault::CommandRefused { detail: detail.into() }
 }

@@ -1,14 +1,14 @@
 //! The tissue the probe meets: a surface somewhere, and behind it the thesis's viscoelastic body.
 //!
 //! Where it has been deeper the tissue may be softer, and loading may move its surface; the laws are
-//! [`Softening`]'s and [`Set`]'s, not a fitted family's.
+//! [`Softening`]'s and [`SurfaceRecession`]'s, not a fitted family's.
 //!
 //! Depth is taken as straight between two ticks, for which the body's step is exact, also in the
 //! tick of first contact. Tissue pushes and cannot pull: where the body's force would be negative
 //! the probe has lifted off and the cell feels nothing, while the body goes on relaxing.
 
 use super::amounts::SimPreconditioning;
-use super::preconditioning::Set;
+use super::preconditioning::SurfaceRecession;
 use super::random::Random;
 use super::settings::SimSettings;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -42,7 +42,7 @@ struct Softening {
     /// `(eta - 1) p(x)` at the newest tick, in N.
     drive: f64,
     /// `y` at the newest tick, in N.
-    lost: f64,
+    lost_force: f64,
 }
 
 impl Softening {
@@ -55,9 +55,9 @@ impl Softening {
         let returned = (stored - energy(body, depth)) / (SOFTENING_ENERGY + stored);
         let drive = -self.share * returned.tanh() * body.elastic(Depth(depth)).0;
         let decay = (-dt / body.tau_eps).exp();
-        self.lost = decay * self.lost + (1.0 - decay) * 0.5 * (self.drive + drive);
+        self.lost_force = decay * self.lost_force + (1.0 - decay) * 0.5 * (self.drive + drive);
         self.drive = drive;
-        self.lost
+        self.lost_force
     }
 }
 
@@ -67,14 +67,13 @@ fn energy(body: &ModifiedKelvin, x: f64) -> f64 {
     x * x * (mu1 / 2.0 + x * (mu2 / 3.0 + x * mu3 / 4.0))
 }
 
-/// One specimen.
 #[derive(Clone, Debug)]
 pub struct Tissue {
     surface: Position,
     body: ModifiedKelvin,
     state: KelvinState,
     softening: Option<Softening>,
-    set: Option<Set>,
+    recession: Option<SurfaceRecession>,
     force: Newtons,
 }
 
@@ -82,7 +81,7 @@ impl Tissue {
     /// A specimen drawn around the thesis's identified body (its equation 3.5), as stiff as the settings say.
     pub fn new(random: &mut Random, settings: &SimSettings) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
-        let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.share();
+        let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.hundredths();
         let (relaxation, viscosity) =
             (random.around_one(TIME_SPREAD), random.around_one(TIME_SPREAD));
         let thesis = ModifiedKelvin::THESIS;
@@ -96,21 +95,21 @@ impl Tissue {
             },
             // The probe powers up far outside; the first step places it.
             state: KelvinState::at_rest_from(Depth(-SURFACE_MM)),
-            softening: (settings.softening.share() > 0.0).then(|| Softening {
-                share: settings.softening.share(),
+            softening: (settings.softening.hundredths() > 0.0).then(|| Softening {
+                share: settings.softening.hundredths(),
                 depth_max: 0.0,
                 drive: 0.0,
-                lost: 0.0,
+                lost_force: 0.0,
             }),
-            set: (settings.preconditioning != SimPreconditioning::default())
-                .then(|| Set::new(settings.preconditioning)),
+            recession: (settings.preconditioning != SimPreconditioning::default())
+                .then(|| SurfaceRecession::new(settings.preconditioning)),
             force: Newtons(0.0),
         }
     }
 
     /// True position of the surface, where loading has moved it to.
     pub fn surface(&self) -> Position {
-        self.surface.moved_by(self.set.map_or(0.0, |set| set.get()))
+        self.surface.moved_by(self.recession.map_or(0.0, |recession| recession.get()))
     }
 
     /// The body's true parameters.
@@ -128,8 +127,8 @@ impl Tissue {
     /// The probe has moved straight to a true position in a time step; returns the force there.
     pub fn advance(&mut self, probe: Position, dt: Seconds) -> Newtons {
         let mut depth = probe.depth_from(self.surface);
-        if let Some(set) = &mut self.set {
-            depth = Depth(depth.0 - set.advance(depth.0, self.force.0, dt.0));
+        if let Some(recession) = &mut self.recession {
+            depth = Depth(depth.0 - recession.advance(depth.0, self.force.0, dt.0));
         }
         let mut force = self.state.step(&self.body, depth, dt).0;
         if let Some(softening) = &mut self.softening {

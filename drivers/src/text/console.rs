@@ -1,61 +1,53 @@
-//! Question and answer, one at a time, while a device is opened.
+//! Question and answer, one at a time, while a device that speaks in lines is set up.
 
-use super::error::DeviceError;
+use super::error::{DeviceError, describe_unknown_device};
 use super::lines::{Lines, Taken};
-use crate::wire::{HostClock, Link, TappedLink};
+use crate::wire::{HostClock, Link, SetupConsole};
 use palpate_model::Nanos;
-use std::collections::VecDeque;
+use palpate_model::rig::RawBytes;
+use std::io;
 use std::sync::Arc;
 
-/// So much of what came is kept to tell who it is that answers.
-const HEARD_MAX: usize = 512;
+/// Count of the newest bytes that identify an unexpected device.
+const RECEIVED_MAX: usize = 512;
 
 /// A link to a device that speaks in lines, with nothing else going on.
 pub struct TextConsole<'a> {
-    /// The link and what was exchanged over it.
-    pub link: TappedLink<'a>,
-    /// What it is called in errors.
+    console: SetupConsole<'a, Lines, Taken>,
+    /// Its name in errors.
     device: &'static str,
-    lines: Lines,
-    ready: VecDeque<(Nanos, String)>,
-    /// The newest bytes that came.
-    pub heard: Vec<u8>,
 }
 
 impl<'a> TextConsole<'a> {
-    /// On a link. `name` stands in the log, `device` in errors.
+    /// `name` stands in the log, `device` in errors.
     pub fn new(
         link: &'a mut dyn Link,
         clock: &'a HostClock,
         name: &Arc<str>,
         device: &'static str,
     ) -> Self {
-        Self {
-            link: TappedLink::new(link, clock, name),
-            device,
-            lines: Lines::default(),
-            ready: VecDeque::new(),
-            heard: Vec::new(),
-        }
+        Self { console: SetupConsole::open(link, clock, name, Lines::take), device }
     }
 
-    /// The host's clock.
     pub fn now(&self) -> Nanos {
-        self.link.now()
+        self.console.now()
     }
 
-    /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), DeviceError> {
-        self.link.write(text.as_bytes()).map_err(|err| DeviceError::lost(self.device, &err))
+        let result = self.console.write(text);
+        result.map_err(|err| self.link_error(&err))
     }
 
     /// The next whole line with its arrival; `None` when none comes within a time. Garbled ones are passed over.
     pub fn line(&mut self, within: Nanos) -> Result<Option<(Nanos, String)>, DeviceError> {
-        let start = self.now();
-        while self.ready.is_empty() && self.now().since(start) < within {
-            self.read()?;
+        let until = self.now() + within;
+        loop {
+            match self.console.next(until).map_err(|err| self.link_error(&err))? {
+                Some((at, Taken::Line(line))) => return Ok(Some((at, line))),
+                Some((_, Taken::Garbled)) => {}
+                None => return Ok(None),
+            }
         }
-        Ok(self.ready.pop_front())
     }
 
     /// The first line that means something to `read`, within a time; others are passed over.
@@ -65,10 +57,9 @@ impl<'a> TextConsole<'a> {
         mut read: impl FnMut(&str) -> Option<T>,
     ) -> Result<Option<T>, DeviceError> {
         let start = self.now();
-        while let Some(left) = within.0.checked_sub(self.now().since(start).0) {
-            let Some((_, line)) = self.line(Nanos(left))? else {
-                break;
-            };
+        while let Some(rest) = within.0.checked_sub(self.now().since(start).0)
+            && let Some((_, line)) = self.line(Nanos(rest))?
+        {
             if let Some(found) = read(&line) {
                 return Ok(Some(found));
             }
@@ -76,30 +67,33 @@ impl<'a> TextConsole<'a> {
         Ok(None)
     }
 
-    /// Throws away what comes until nothing has come for `quiet`. A device that never falls silent is left after ten
-    /// times as long.
+    /// Throws away what comes until nothing has come for `quiet`, or for ten times as long.
     pub fn drain(&mut self, quiet: Nanos) -> Result<(), DeviceError> {
-        let (start, mut newest) = (self.now(), self.now());
-        while self.now().since(newest) < quiet && self.now().since(start) < Nanos(10 * quiet.0) {
-            if self.read()? > 0 {
-                newest = self.now();
-            }
-        }
-        self.ready.clear();
-        self.lines.clear();
-        Ok(())
+        let result = self.console.drain(quiet).map(|_| ());
+        result.map_err(|err| self.link_error(&err))
     }
 
-    fn read(&mut self) -> Result<usize, DeviceError> {
-        let bytes = self.link.read().map_err(|err| DeviceError::lost(self.device, &err))?;
-        let at = self.now();
-        self.heard.extend_from_slice(&bytes);
-        self.heard.drain(..self.heard.len().saturating_sub(HEARD_MAX));
-        for byte in &bytes {
-            if let Some(Taken::Line(line)) = self.lines.take(*byte) {
-                self.ready.push_back((at, line));
-            }
+    /// The newest text that the device has sent.
+    pub fn received(&self) -> String {
+        String::from_utf8_lossy(&self.console.last_received(RECEIVED_MAX)).into_owned()
+    }
+
+    /// The error of a device that does not answer as expected: it is silent, which the hint is for, or another one.
+    pub fn no_answer(&self, hint: &'static str) -> DeviceError {
+        let (device, received) = (self.device, self.received());
+        if received.is_empty() {
+            DeviceError::Silent { device, hint }
+        } else {
+            DeviceError::Other { device, found: describe_unknown_device(&received) }
         }
-        Ok(bytes.len())
+    }
+
+    /// Bytes exchanged, by the host's clock.
+    pub fn into_raw(self) -> Vec<RawBytes> {
+        self.console.raw
+    }
+
+    fn link_error(&self, err: &io::Error) -> DeviceError {
+        DeviceError::Lost { device: self.device, detail: err.to_string() }
     }
 }

@@ -2,19 +2,16 @@
 
 /// Digits of a reading: force gauges show five, 24-bit converters seven.
 const DIGITS_MAX: usize = 8;
-/// Digits behind the point.
 const DECIMALS_MAX: usize = 5;
 
-/// A number as it was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Decimal {
+pub struct FixedDecimal {
     /// Its digits without the point, signed.
     pub digits: i32,
-    /// How many of them stand behind the point.
     pub decimals: u8,
 }
 
-impl Decimal {
+impl FixedDecimal {
     /// Reads digits with at most a minus before and a point within them: `+` is never sent (Model 7i user's guide, page
     /// 30, `OPOL`).
     #[must_use]
@@ -34,13 +31,11 @@ impl Decimal {
         Some(Self { digits: sign * joined.parse::<i32>().ok()?, decimals: part.len() as u8 })
     }
 
-    /// What its last digit is worth.
     #[must_use]
     pub fn step(self) -> f64 {
         10_f64.powi(-i32::from(self.decimals))
     }
 
-    /// Its value.
     #[must_use]
     pub fn value(self) -> f64 {
         // Divided by a whole number, so that 4.285 is the double nearest to it.

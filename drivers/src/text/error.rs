@@ -1,79 +1,59 @@
-//! Why a device that speaks in lines cannot be used, in words.
+//! Why a device that speaks in lines cannot be used.
 
-use crate::devices::{DeviceKind, lines_of};
+use crate::devices::{DeviceKind, split_lines};
 use crate::galil;
-use std::io;
 use thiserror::Error;
 
-/// A device cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DeviceError {
-    /// Nothing comes.
     #[error("the {device} does not answer; {hint}")]
-    Silent {
-        /// What was expected.
-        device: &'static str,
-        /// What to look at.
-        hint: &'static str,
-    },
-    /// Something else answers.
-    #[error("this is no {device} but {found}; check which cable goes where")]
-    Other {
-        /// What was expected.
-        device: &'static str,
-        /// What it is, or what it said.
-        found: String,
-    },
-    /// Another one of its kind.
+    Silent { device: &'static str, hint: &'static str },
+    #[error("the device is {found}, not a {device}; check the cables")]
+    Other { device: &'static str, found: String },
     #[error(
-        "the {device} has serial number {found} but the rig file says {expected}; check which cable goes where, or correct the file"
+        "the {device} has serial number {found}, the rig file says {expected}; check the cables, or correct the file"
     )]
-    OtherSerial {
-        /// What was expected.
-        device: &'static str,
-        /// What it told.
-        found: String,
-        /// What the rig file says.
-        expected: String,
-    },
+    OtherSerial { device: &'static str, found: String, expected: String },
     /// It cannot do what is needed, or is not set up for it.
     #[error("the {device} cannot be used: {detail}")]
-    Unfit {
-        /// What was expected.
-        device: &'static str,
-        /// Why, and what to do.
-        detail: String,
-    },
-    /// The link went while the device was opened.
+    Unfit { device: &'static str, detail: String },
     #[error("the link to the {device} was lost while it was opened ({detail}); check the cable")]
-    Lost {
-        /// What was expected.
-        device: &'static str,
-        /// What the operating system said.
-        detail: String,
-    },
+    Lost { device: &'static str, detail: String },
 }
 
 impl DeviceError {
-    /// The link is gone.
-    pub(crate) fn lost(device: &'static str, err: &io::Error) -> Self {
-        Self::Lost { device, detail: err.to_string() }
+    pub(crate) fn unfit(device: &'static str, detail: impl Into<String>) -> Self {
+        Self::Unfit { device, detail: detail.into() }
+    }
+
+    /// Compares a serial number or a name with that of the rig file, if it has one.
+    pub(crate) fn check_serial(
+        device: &'static str,
+        found: Option<&str>,
+        expected: Option<&str>,
+    ) -> Result<(), Self> {
+        match expected {
+            Some(expected) if found != Some(expected) => Err(Self::OtherSerial {
+                device,
+                found: found.unwrap_or("(not reported)").to_owned(),
+                expected: expected.to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 }
 
-/// Longest piece of what a stranger said that is told.
+/// Longest quotation of an unexpected answer.
 const QUOTE_MAX: usize = 60;
 
-/// What a device is that answered otherwise than expected: by its name where its words give it away.
-#[must_use]
-pub fn stranger(said: &[u8]) -> String {
-    let text = String::from_utf8_lossy(said);
-    let known = DeviceKind::of_lines(&lines_of(&text)).map(|(kind, _)| kind.title);
-    let known = known.or_else(|| is_prompts(&text).then_some(galil::KIND.title));
+/// Names a device that answers unexpectedly, or quotes it where it is not recognised.
+pub(super) fn describe_unknown_device(text: &str) -> String {
+    let known = DeviceKind::recognise_lines(&split_lines(text)).map(|(kind, _)| kind.title);
+    let known = known.or_else(|| is_prompts(text).then_some(galil::KIND.title));
     known.map_or_else(
         || {
             let quote: String = text.chars().take(QUOTE_MAX).collect();
-            format!("something that says {quote:?}")
+            format!("an unknown device that sends {quote:?}")
         },
         str::to_owned,
     )
@@ -90,8 +70,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn strangers_are_called_by_their_names() {
-        for (said, name) in [
+    fn unexpected_devices_are_recognised_by_their_lines() {
+        for (text, name) in [
             ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
             ("error:8\r\n", "Grbl"),
             ("?:", "Galil"),
@@ -100,9 +80,9 @@ mod tests {
             ("-18.78 lbF\r\n", "Mark-10 gauge"),
             ("H,100,palpate-hx711,1,80,128,a*1234\r\n", "HX711"),
         ] {
-            assert!(stranger(said.as_bytes()).contains(name), "{said:?}");
+            assert!(describe_unknown_device(text).contains(name), "{text:?}");
         }
-        let other = stranger(b"\x00\xffhello\r\n");
+        let other = describe_unknown_device("\0\u{fffd}hello\r\n");
         assert!(other.contains("hello") && !other.contains('\0'), "{other}");
     }
 }

@@ -3,7 +3,6 @@
 /// Longest line of any device read with this: the settings of a force gauge are half as long.
 const LINE_MAX: usize = 160;
 
-/// What a byte completed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Taken {
     /// A line without its end; never empty.
@@ -20,7 +19,6 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// The next byte.
     pub fn take(&mut self, byte: u8) -> Option<Taken> {
         match byte {
             b'\r' | b'\n' => self.end(),
@@ -36,12 +34,10 @@ impl Lines {
         }
     }
 
-    /// Bytes of a line that has not ended.
     pub fn pending(&self) -> usize {
         self.line.len()
     }
 
-    /// Forgets what has come of a line.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -66,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn any_end_ends_a_line() {
+    fn cr_or_lf_or_both_end_a_line() {
         let two = [Taken::Line("4.285 N".into()), Taken::Line("*10".into())];
         for text in ["4.285 N\r\n*10\r\n", "4.285 N\r*10\r", "\n4.285 N\n\n*10\n"] {
             assert_eq!(all(text.as_bytes()), two, "{text:?}");

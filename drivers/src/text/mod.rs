@@ -4,10 +4,9 @@ mod console;
 mod decimal;
 mod error;
 mod lines;
-mod opened;
 
+pub use crate::cell::OpenedCell;
 pub use console::TextConsole;
-pub use decimal::Decimal;
-pub use error::{DeviceError, stranger};
+pub use decimal::FixedDecimal;
+pub use error::DeviceError;
 pub use lines::{Lines, Taken};
-pub use opened::OpenedCell;

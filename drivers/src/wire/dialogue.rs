@@ -1,35 +1,40 @@
-//! What a protocol is to the thread that owns the link.
+//! The interface between a protocol and the thread that owns its link.
 
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
-use palpate_model::rig::RigCommand;
+use palpate_model::rig::{Ack, RigCommand};
+use std::collections::VecDeque;
 
-/// How a link has behaved, for the operator and the log.
+/// Commands that wait in a dialogue; as many as may wait on the way to it.
+pub(crate) const ORDERS_MAX: usize = 64;
+/// Without samples being taken for so long, palpate hangs and the axis is stopped.
+pub(crate) const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
+pub(crate) const OVERTAKEN: &str = "a stop came first, so it was not begun";
+pub(crate) const TOO_MANY_COMMANDS: &str = "too many commands at once";
+
+/// Statistics of a link, for the operator and the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkStats {
     /// Questions asked and answered since the link was opened.
     pub answers: u64,
     /// Shortest time from writing a question to the end of its answer.
     pub round_trip_min: Nanos,
-    /// Mean of it.
     pub round_trip_mean: Nanos,
-    /// Longest.
     pub round_trip_max: Nanos,
     /// Questions that may wait for their answers at once.
     pub in_flight: usize,
-    /// How far the middle of a question was at most from the time at which a device's clock, as it was known before, said
-    /// that it was answered.
+    /// Largest distance of the middle of a question from the time of its answer by the device's clock, as that was
+    /// known before.
     pub deviation_max: Nanos,
     /// Samples that a device took and overwrote before they were fetched.
     pub lost: u64,
-    /// How often the order of questions and answers was lost and found again.
+    /// Count of resynchronisations of questions and answers.
     pub resynchronised: u64,
     /// Whether the system grants the link's thread real time, so that other programs do not make a stop late.
     pub is_real_time: bool,
 }
 
 impl LinkStats {
-    /// Takes one measured round trip.
     pub fn push(&mut self, round_trip: Nanos) {
         let sum = self.round_trip_mean.0 as f64 * self.answers as f64 + round_trip.0 as f64;
         self.round_trip_min =
@@ -46,9 +51,41 @@ impl LinkStats {
     }
 }
 
+/// Commands are answered in the order in which they came, in whatever order they are done.
+#[derive(Clone, Debug, Default)]
+pub struct AnswerQueue {
+    owed: VecDeque<(u64, Option<RigEventBody>)>,
+    count: u64,
+}
+
+impl AnswerQueue {
+    pub fn owe(&mut self) -> u64 {
+        self.count += 1;
+        self.owed.push_back((self.count, None));
+        self.count
+    }
+
+    /// Answers a command. Returns the answers that may be given now, in order: those with none missing before them.
+    fn answer(&mut self, number: u64, body: RigEventBody) -> Vec<RigEventBody> {
+        if let Some((_, answer)) = self.owed.iter_mut().find(|(owed, _)| *owed == number) {
+            *answer = Some(body);
+        }
+        let ready = self.owed.iter().take_while(|(_, answer)| answer.is_some()).count();
+        self.owed.drain(..ready).filter_map(|(_, answer)| answer).collect()
+    }
+
+    pub fn acknowledge(&mut self, number: u64, command: RigCommand) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::Ack(Ack { command }))
+    }
+
+    pub fn refuse(&mut self, number: u64, detail: impl Into<String>) -> Vec<RigEventBody> {
+        self.answer(number, RigEventBody::refusal(detail))
+    }
+}
+
 /// A protocol in progress. Times never go backwards. It must neither wait nor read a clock.
 pub trait Dialogue: Send {
-    /// When the rig's owner last asked for reports. Who is not asked should let the device stop by itself.
+    /// The rig's owner has asked for reports. Without such calls the dialogue stops the axis.
     fn attended(&mut self, at: Nanos);
 
     /// A command from the host. Commands that stop are written before all that wait, and motions that wait are not
@@ -56,18 +93,19 @@ pub trait Dialogue: Send {
     fn command(&mut self, now: Nanos, command: RigCommand);
 
     /// A command that a stop has overtaken before it got here; the stop comes next. A motion is not begun.
-    fn overtaken(&mut self, now: Nanos, command: RigCommand);
+    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
+        self.command(now, command);
+    }
 
-    /// Bytes have arrived.
     fn received(&mut self, now: Nanos, bytes: &[u8]);
 
     /// Whole lines to be written now, if there are any.
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>>;
 
-    /// When it wants to be asked again at the latest.
+    /// When it must be asked again at the latest.
     fn next_at(&self, now: Nanos) -> Nanos;
 
-    /// The next thing it has to report, with its arrival.
+    /// The next report, with its arrival.
     fn take_event(&mut self) -> Option<(Nanos, RigEventBody)>;
 
     /// Why the link counts as dead although it is open, such as silence.
@@ -78,12 +116,11 @@ pub trait Dialogue: Send {
         None
     }
 
-    /// How far [`Dialogue::host_time`] may be wrong at a time of the host.
+    /// Largest error of [`Dialogue::host_time`] at a time of the host.
     fn uncertainty(&self, _at: Nanos) -> Option<Nanos> {
         None
     }
 
-    /// How the link behaves.
     fn stats(&self) -> LinkStats;
 }
 
@@ -92,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn round_trips_are_summed_up() {
+    fn round_trips_have_minimum_mean_and_maximum() {
         let mut stats = LinkStats::default();
         for trip in [3_000, 1_000, 2_000] {
             stats.push(Nanos(trip));
@@ -101,5 +138,14 @@ mod tests {
         assert_eq!(stats.round_trip_mean, Nanos(2_000));
         assert_eq!(stats.round_trip_max, Nanos(3_000));
         assert_eq!(stats.jitter(), Nanos(1_000));
+    }
+
+    #[test]
+    fn answers_come_in_the_order_of_the_commands() {
+        let mut answers = AnswerQueue::default();
+        let (first, second) = (answers.owe(), answers.owe());
+        assert_eq!(answers.acknowledge(second, RigCommand::Stop), []);
+        let both = answers.refuse(first, "no");
+        assert!(matches!(both[..], [RigEventBody::Fault(_), RigEventBody::Ack(_)]));
     }
 }

@@ -1,6 +1,6 @@
-//! The immediate stop around whoever holds a rig: for a program that panics.
+//! The immediate stop without the owner of the rig: for a program that panics.
 
-use super::line::Numbered;
+use super::link_thread::NumberedCommand;
 use palpate_model::rig::RigCommand;
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
@@ -9,48 +9,40 @@ use std::sync::mpsc::SyncSender;
 use std::thread::ThreadId;
 use std::time::Duration;
 
-/// How often it is looked whether a stop has been written.
+/// Between two checks whether a stop has been written.
 const LOOK_EVERY: Duration = Duration::from_micros(200);
 
-/// Stops of a link, counted.
 #[derive(Debug, Default)]
-pub(super) struct Standing {
+pub(super) struct StopCounters {
     /// Handed to the link's thread.
     pub sent: AtomicU64,
-    /// The newest of which every byte is written.
     pub written: AtomicU64,
 }
 
 /// Sends the immediate stop over a link from any thread, without a lock and without the rig.
 #[derive(Clone, Debug)]
 pub struct HaltHandle {
-    stops: SyncSender<Numbered>,
-    standing: Arc<Standing>,
-    owner: ThreadId,
+    pub(super) stops: SyncSender<NumberedCommand>,
+    pub(super) counters: Arc<StopCounters>,
+    /// The thread that owns the link.
+    pub(super) owner: ThreadId,
 }
 
 impl HaltHandle {
-    pub(super) fn new(
-        stops: SyncSender<Numbered>,
-        standing: Arc<Standing>,
-        owner: ThreadId,
-    ) -> Self {
-        Self { stops, standing, owner }
-    }
-
-    /// How many stops are on the wire.
+    /// Count of stops that are on the wire.
     pub fn written(&self) -> u64 {
-        self.standing.written.load(Ordering::Acquire)
+        self.counters.written.load(Ordering::Acquire)
     }
 
-    /// Hands the immediate stop to the link's thread and waits about so long until it is written. Whether it is.
+    /// Hands the immediate stop to the link's thread and waits until it is written, for `patience` at most. Returns
+    /// whether it is.
     ///
     /// On the link's own thread it does nothing: there the farewell stops the axis, see [`after_farewell`].
     pub fn halt(&self, patience: Duration) -> bool {
         if self.is_own_thread() {
             return false;
         }
-        let number = self.standing.sent.fetch_add(1, Ordering::AcqRel) + 1;
+        let number = self.counters.sent.fetch_add(1, Ordering::AcqRel) + 1;
         self.stops.try_send((number, RigCommand::Halt)).is_ok() && self.is_written(number, patience)
     }
 
@@ -59,7 +51,7 @@ impl HaltHandle {
         std::thread::current().id() == self.owner
     }
 
-    /// Waits about so long until so many stops are written. Whether they are.
+    /// Waits until so many stops are written, for `patience` at most. Returns whether they are.
     pub fn is_written(&self, number: u64, patience: Duration) -> bool {
         let looks = patience.as_micros() / LOOK_EVERY.as_micros();
         for _ in 0..=looks {
@@ -72,21 +64,20 @@ impl HaltHandle {
     }
 }
 
-/// What is left to be done when a link's thread has panicked.
-type Deferred = Box<dyn FnOnce()>;
+/// Work to be done when the thread of a link has panicked.
+type DeferredWork = Box<dyn FnOnce()>;
 
 thread_local! {
     static OWNS_LINK: Cell<bool> = const { Cell::new(false) };
-    static DEFERRED: RefCell<Option<Deferred>> = const { RefCell::new(None) };
+    static DEFERRED: RefCell<Option<DeferredWork>> = const { RefCell::new(None) };
 }
 
-/// This thread is the only one that has a link.
-pub(super) fn owns_link() {
+pub(super) fn mark_link_owner() {
     OWNS_LINK.set(true);
 }
 
-/// The farewell was written while this thread panics.
-pub(super) fn farewell_said() {
+/// Called when this thread panics and has written the farewell.
+pub(super) fn run_deferred_work() {
     if let Some(deferred) = DEFERRED.take() {
         deferred();
     }

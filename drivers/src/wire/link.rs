@@ -1,4 +1,4 @@
-//! Ways for bytes: a serial port, a TCP connection.
+//! Connections that carry bytes: a serial port, a TCP connection, a pair of sockets within one program.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -6,6 +6,7 @@ use serialport::SerialPort;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 /// A connection to a device. An error means that it is gone.
@@ -21,26 +22,17 @@ pub trait Link: Send {
 /// this long is stuck.
 pub const WRITE_MAX: Duration = Duration::from_millis(250);
 
-fn gone() -> io::Error {
+fn hung_up_error() -> io::Error {
     io::Error::new(ErrorKind::UnexpectedEof, "the device has hung up")
 }
 
-/// A serial port.
-pub struct SerialLink(Box<dyn SerialPort>);
-
-impl SerialLink {
-    /// A port that was opened.
-    #[must_use]
-    pub fn new(port: Box<dyn SerialPort>) -> Self {
-        Self(port)
-    }
-}
+pub struct SerialLink(pub Box<dyn SerialPort>);
 
 impl Link for SerialLink {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.0.set_timeout(wait)?;
         match self.0.read(buffer) {
-            Ok(0) => Err(gone()),
+            Ok(0) => Err(hung_up_error()),
             Ok(count) => Ok(count),
             Err(err) if matches!(err.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
             Err(err) => Err(err),
@@ -53,17 +45,33 @@ impl Link for SerialLink {
     }
 }
 
-/// A TCP connection, each write sent at once.
-pub struct TcpLink(TcpStream);
+/// A link over a socket.
+pub struct SocketLink<S>(S);
+
+/// A TCP connection that sends each write at once.
+pub type TcpLink = SocketLink<TcpStream>;
+
+/// One end of a wire within the program, for tests and demonstrations; dropping it unplugs the other end.
+pub type MemoryLink = SocketLink<UnixStream>;
+
+/// Both ends of a wire.
+pub fn pair() -> (MemoryLink, MemoryLink) {
+    let (one, other) = UnixStream::pair().expect("the operating system has a pair of sockets");
+    for end in [&one, &other] {
+        end.set_nonblocking(true).expect("a new socket takes its settings");
+    }
+    (SocketLink(one), SocketLink(other))
+}
 
 impl TcpLink {
-    /// A connection that was opened.
     pub fn new(stream: TcpStream) -> io::Result<Self> {
         stream.set_nodelay(true)?;
         stream.set_nonblocking(true)?;
         Ok(Self(stream))
     }
+}
 
+impl<S: AsFd> SocketLink<S> {
     /// Waits for one of `flags`. `poll` counts nanoseconds where a socket's own timeout counts the kernel's ticks.
     fn wait(&self, flags: PollFlags, wait: Duration) -> io::Result<()> {
         let timeout = Timespec {
@@ -78,11 +86,11 @@ impl TcpLink {
     }
 }
 
-impl Link for TcpLink {
+impl<S: AsFd + Read + Write + Send> Link for SocketLink<S> {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         self.wait(PollFlags::IN, wait)?;
         match self.0.read(buffer) {
-            Ok(0) => Err(gone()),
+            Ok(0) => Err(hung_up_error()),
             Ok(count) => Ok(count),
             Err(err) if matches!(err.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 Ok(0)
@@ -92,13 +100,13 @@ impl Link for TcpLink {
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let mut left = bytes;
+        let mut rest = bytes;
         let mut is_second_try = false;
-        while !left.is_empty() {
-            match self.0.write(left) {
-                Ok(0) => return Err(gone()),
+        while !rest.is_empty() {
+            match self.0.write(rest) {
+                Ok(0) => return Err(hung_up_error()),
                 Ok(count) => {
-                    left = &left[count..];
+                    rest = &rest[count..];
                     is_second_try = false;
                 }
                 Err(err) if err.kind() == ErrorKind::Interrupted => {}
@@ -113,5 +121,34 @@ impl Link for TcpLink {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WAIT: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn bytes_of_one_end_arrive_at_the_other_until_it_is_unplugged() {
+        let (mut here, mut there) = pair();
+        let mut buffer = [0_u8; 4];
+        assert_eq!(there.read(&mut buffer, WAIT).unwrap(), 0);
+        here.write(b"STA\r;").unwrap();
+        assert_eq!(there.read(&mut buffer, WAIT).unwrap(), 4);
+        assert_eq!(&buffer, b"STA\r");
+        drop(here);
+        // Bytes written before still arrive.
+        assert_eq!(there.read(&mut buffer, WAIT).unwrap(), 1);
+        assert!(there.read(&mut buffer, WAIT).is_err());
+        assert!(there.write(b"x").is_err());
+    }
+
+    #[test]
+    fn write_to_a_link_that_is_never_read_times_out() {
+        let (mut here, _there) = pair();
+        let result = here.write(&vec![b'x'; 1 << 24]);
+        assert_eq!(result.unwrap_err().kind(), ErrorKind::TimedOut);
     }
 }

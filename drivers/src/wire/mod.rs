@@ -1,30 +1,31 @@
 //! Bytes to a device and back: links, and the thread that owns one.
 //!
 //! Nothing here knows what the bytes mean: that is a [`Dialogue`], a state machine with the time handed in, so that
-//! every protocol can be tested without a port, a thread or a clock. [`Line`] runs one on a link.
+//! every protocol can be tested without a port, a thread or a clock. [`LinkThread`] runs one on a link.
 
-mod answers;
-mod caller_time;
+mod address;
 mod dialogue;
 mod halt;
-mod line;
 mod link;
-mod memory;
-mod place;
-mod tapped;
+mod link_thread;
+mod setup_console;
 
-pub use answers::Answers;
-pub use caller_time::CallerTime;
-pub use dialogue::{Dialogue, LinkStats};
+pub use address::{Place, WireError};
+pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
+pub use dialogue::{AnswerQueue, Dialogue, LinkStats};
 pub use halt::{HaltHandle, after_farewell};
-pub use line::{Line, LineSettings};
-pub use link::{Link, SerialLink, TcpLink};
-pub use memory::{MemoryLink, pair};
-pub use place::{Place, WireError};
-pub use tapped::TappedLink;
+pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, pair};
+pub use link_thread::LinkThread;
+pub use setup_console::SetupConsole;
 
 use palpate_model::Nanos;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Reads the computer's monotonic clock. Drivers are handed one and never read a clock by themselves.
 pub type HostClock = Arc<dyn Fn() -> Nanos + Send + Sync>;
+
+/// Locks what two threads share. After a panic of the other thread, which is reported as a lost link, the data can
+/// still be used.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

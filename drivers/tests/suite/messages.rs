@@ -15,7 +15,7 @@ fn detail() -> String {
 }
 
 #[test]
-fn what_a_rig_and_its_ports_refuse_is_worded() {
+fn messages_of_rigs_and_ports_name_what_is_wrong() {
     let file = || "bench.toml".to_owned();
     let port = || "/dev/ttyUSB0".to_owned();
     let address = || "192.0.2.1:23".to_owned();
@@ -37,7 +37,7 @@ fn what_a_rig_and_its_ports_refuse_is_worded() {
 }
 
 #[test]
-fn what_a_galil_controller_refuses_is_worded() {
+fn messages_of_a_galil_controller_name_what_is_wrong() {
     let error = GalilError { code: 6, words: "number out of range".into() };
     let revision = || "DMC4143 Rev 1.3a".to_owned();
     assert_messages! {
@@ -54,7 +54,7 @@ fn what_a_galil_controller_refuses_is_worded() {
 }
 
 #[test]
-fn what_a_grbl_board_and_a_load_cell_refuse_is_worded() {
+fn messages_of_a_grbl_board_and_a_load_cell_name_what_is_wrong() {
     let (device, expected) = ("HX711", || "78".to_owned());
     assert_messages! {
         GrblOpenError::Lost { detail: detail() } => ["no such device"],

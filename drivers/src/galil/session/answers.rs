@@ -1,87 +1,83 @@
-//! What an answer means: it belongs to the oldest question that has none.
+//! Answers: each belongs to the oldest question without one.
 
 use super::Outgoing;
-use super::{Asked, Halting, RESET, Session};
-use crate::galil::protocol::{Reply, error_of, packed};
-use crate::galil::recording::{Look, Out};
-use crate::galil::sampling::{Sampled, Sampler};
-use crate::galil::timing::Timing;
+use super::{ExpectedReply, PendingStop, RESET, Session};
+use crate::galil::clock_alignment::ClockAlignment;
+use crate::galil::order::OrderStep;
+use crate::galil::protocol::{GalilReply, parse_error};
+use crate::galil::recording::{RecordingOutput, RecordingStatus};
+use crate::galil::sampling::{SampleOutcome, Sampler};
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
 
-/// At so many `?` to a stop `AB 1` is sent in its place; one more, and it counts as refused.
+/// After so many `?` to a stop, `AB 1` is sent in its place; after one more it counts as refused.
 const REFUSALS_MAX: u32 = 3;
 
 impl Session {
-    pub(super) fn on_reply(&mut self, now: Nanos, reply: &Reply) {
-        if self.search.is_some() {
-            return self.on_reply_while_searching(now, reply);
+    pub(super) fn on_reply(&mut self, now: Nanos, reply: &GalilReply) {
+        if self.resync.is_some() {
+            return self.on_reply_while_resynchronising(now, reply);
         }
-        let Some((asked, sent)) = self.expected.pop_front() else {
-            return self.lose_order(now);
+        let Some((expects, sent)) = self.expected.pop_front() else {
+            return self.resynchronise(now);
         };
         self.answered_at = now;
-        match asked {
-            Asked::Sample => self.on_answer(now, sent, reply, None),
-            Asked::Marked(is_begun) => self.on_answer(now, sent, reply, Some(is_begun)),
-            Asked::Elements => self.on_elements(now, reply),
-            Asked::Segment => {
+        match expects {
+            ExpectedReply::Sample => self.on_answer(now, sent, reply, None),
+            ExpectedReply::Marked(is_begun) => self.on_answer(now, sent, reply, Some(is_begun)),
+            ExpectedReply::Elements => self.on_elements(now, reply),
+            ExpectedReply::Segment => {
                 if !reply.is_accepted && self.sine.take().is_some() {
-                    self.end_sine(now, "the controller takes no more of it");
+                    self.end_sine(now, "the controller refuses further increments");
                 }
             }
-            Asked::Renewal => {
-                // A refusal is a program that is gone, which a reset explains; the clock will tell.
+            ExpectedReply::Renewal => {
+                // A refusal means that the program is gone, as after a reset, which the clock shows.
                 if !reply.bytes.is_empty() {
-                    self.lose_order(now);
+                    self.resynchronise(now);
                 }
             }
-            Asked::Part => {
+            ExpectedReply::Part => {
                 let settings = self.settings.clone();
-                // Answers of an order that a stop has ended belong to nobody.
+                // Answers to an order that a stop has ended are dropped.
                 if let Some((_, order)) = &mut self.order {
                     let next = order.take(reply, &settings);
-                    self.go_on(now, next);
+                    self.apply_step(now, next);
                 }
             }
-            Asked::Stop(halting) if reply.is_accepted && reply.bytes.is_empty() => {
-                if let Some(number) = halting.number {
-                    self.acknowledge(now, number, halting.command);
+            ExpectedReply::Stop(stop) if reply.is_accepted && reply.bytes.is_empty() => {
+                if let Some(number) = stop.number {
+                    self.acknowledge(now, number, stop.command);
                 }
             }
-            Asked::Stop(halting) if reply.is_accepted => {
-                self.confirm_later(halting);
-                self.lose_order(now);
+            ExpectedReply::Stop(stop) if reply.is_accepted => {
+                self.confirm_later(stop);
+                self.resynchronise(now);
             }
-            Asked::Stop(halting) => self.on_refused_stop(now, halting),
-            Asked::Why => {
-                if let Some((number, _)) = self.order.take() {
-                    let why = error_of(reply).map(|err| err.to_string());
-                    let why = why.unwrap_or_else(|| "it does not say why".into());
-                    self.refuse(now, number, why);
-                }
+            ExpectedReply::Stop(stop) => self.on_refused_stop(now, stop),
+            ExpectedReply::RefusalReason => {
+                let why = parse_error(reply).map(|err| err.to_string());
+                let why = why.unwrap_or_else(|| "the controller gives no reason".into());
+                self.apply_step(now, OrderStep::Refused(why));
             }
-            Asked::Marker(_) => {}
+            ExpectedReply::Marker(_) => {}
         }
     }
 
     /// A `?` to a stop: it was garbled on the way there, or its `:` on the way back. It is sent again at once, at the
     /// third `?` as the stop that asks for least, and only then given up.
-    fn on_refused_stop(&mut self, now: Nanos, halting: Halting) {
-        let refusals = halting.refusals + 1;
-        let again = Asked::Stop(Halting { refusals, ..halting });
+    fn on_refused_stop(&mut self, now: Nanos, stop: PendingStop) {
+        let refusals = stop.refusals + 1;
+        let again = ExpectedReply::Stop(PendingStop { refusals, ..stop });
         match refusals {
-            0..REFUSALS_MAX => self.urge(halting.command, again),
-            REFUSALS_MAX => self.urge(RigCommand::Halt, again),
+            0..REFUSALS_MAX => self.send_urgent(stop.command, again),
+            REFUSALS_MAX => self.send_urgent(RigCommand::Halt, again),
             _ => {
-                let detail = format!("it refuses {:?}", halting.command);
-                match halting.number {
+                let detail = format!("it refuses {:?}", stop.command);
+                match stop.number {
                     Some(number) => self.refuse(now, number, detail),
-                    None => {
-                        let fault = Fault::CommandRefused { detail };
-                        self.report_in_order(now, RigEventBody::Fault(fault));
-                    }
+                    None => self.report_in_order(now, RigEventBody::refusal(detail)),
                 }
             }
         }
@@ -92,106 +88,100 @@ impl Session {
         &mut self,
         now: Nanos,
         sent: Nanos,
-        reply: &Reply,
+        reply: &GalilReply,
         marked: Option<bool>,
     ) {
         self.stats.push(now.since(sent));
         let is_whole = reply.is_accepted && reply.begins_with_volts();
         let Some(numbers) = reply.numbers().filter(|_| is_whole) else {
-            return self.lose_order(now);
+            return self.resynchronise(now);
         };
         let Some(recording) = &mut self.recording else {
             // Without a recording `_RD` means nothing; a question with it may still be on its way.
-            let poll = Look::read(&numbers).map_or(numbers, |look| look.poll.to_vec());
+            let poll =
+                RecordingStatus::read(&numbers).map_or(numbers, |status| status.poll.to_vec());
             return self.on_sample(now, Some(sent), &poll, marked == Some(true));
         };
-        let Some(look) = Look::read(&numbers) else {
-            return self.lose_order(now);
+        let Some(status) = RecordingStatus::read(&numbers) else {
+            return self.resynchronise(now);
         };
-        if self.sampler.is_reset(look.time) {
-            if self.sampler.doubts(look.time as u64) {
+        if self.sampler.is_reset(status.time) {
+            if self.sampler.doubts(status.time as u64) {
                 // A sample that shows what a command has done is not thrown away.
                 if marked.is_some() {
-                    self.lose_order(now);
+                    self.resynchronise(now);
                 }
                 return;
             }
-            return self.end_recording(now, sent, &look, false);
+            return self.end_recording(now, sent, &status, false);
         }
-        match recording.look(look, sent, marked) {
-            Ok(()) => {
-                self.stats.lost = recording.lost;
-                self.timing.push(look.time as u64, self.pace.tick, sent, now);
-                self.fetch(now);
-            }
-            Err(_) => self.end_recording(now, sent, &look, marked == Some(true)),
+        if !recording.take_status(status, sent, marked) {
+            return self.end_recording(now, sent, &status, marked == Some(true));
         }
+        self.stats.lost = recording.samples_lost;
+        self.timing.push(status.time as u64, self.pace.tick, sent, now);
+        self.fetch(now);
     }
 
-    /// A recording that has ended by itself, because of a reset or for whatever else.
-    fn end_recording(&mut self, now: Nanos, sent: Nanos, look: &Look, is_begun: bool) {
-        self.give_up_recording(now);
-        // What waited has been told meanwhile, and its clock was right: that takes nothing from the doubt in this one.
-        self.sampler.doubts(look.time as u64);
-        self.on_sample(now, Some(sent), &look.poll, is_begun);
+    /// A recording that has ended by itself, such as by a reset.
+    fn end_recording(&mut self, now: Nanos, sent: Nanos, status: &RecordingStatus, is_begun: bool) {
+        self.abandon_recording(now);
+        // What waited has been reported meanwhile with a right clock; this clock stays doubtful all the same.
+        self.sampler.doubts(status.time as u64);
+        self.on_sample(now, Some(sent), &status.poll, is_begun);
         if !self.is_reset {
             let detail =
                 "the controller has stopped recording, and samples were lost; open the rig again";
-            let fault = Fault::CommandRefused { detail: detail.into() };
-            self.report(now, RigEventBody::Fault(fault));
+            self.report(now, RigEventBody::refusal(detail));
         }
     }
 
-    /// From here on samples are polled.
-    pub(super) fn give_up_recording(&mut self, now: Nanos) {
+    pub(super) fn abandon_recording(&mut self, now: Nanos) {
         let Some(mut recording) = self.recording.take() else {
             return;
         };
         self.question = Sampler::question(&self.settings);
         for out in recording.drain() {
-            self.put_out(now, out);
+            self.emit(now, out);
         }
     }
 
-    /// Asks for elements that are there, and tells what waited when there are none.
+    /// Asks for elements that are there, and reports what waited when there are none.
     pub(super) fn fetch(&mut self, now: Nanos) {
         let Some(recording) = &mut self.recording else {
             return;
         };
         if let Some(commands) = recording.fetch() {
-            for text in packed(&commands) {
-                let asked = vec![Asked::Elements; text.matches(';').count() + 1];
-                self.fetches.push_back(Outgoing { text, asked });
-            }
+            self.fetches.extend(Outgoing::packed(&commands, ExpectedReply::Elements));
         } else if !recording.is_fetching() {
-            for out in recording.settled() {
-                self.put_out(now, out);
+            for out in recording.release_settled() {
+                self.emit(now, out);
             }
         }
     }
 
-    pub(super) fn on_elements(&mut self, now: Nanos, reply: &Reply) {
+    pub(super) fn on_elements(&mut self, now: Nanos, reply: &GalilReply) {
         let Some(recording) = &mut self.recording else {
-            // Of a recording that was given up.
+            // An answer for a recording that was abandoned.
             return;
         };
         let column = reply.numbers().filter(|_| reply.is_accepted);
         let out = column.and_then(|column| recording.take(now, column, &self.settings));
         let Some(out) = out else {
-            return self.lose_order(now);
+            return self.resynchronise(now);
         };
         for out in out {
-            self.put_out(now, out);
+            self.emit(now, out);
         }
-        if self.search.is_none() {
+        if self.resync.is_none() {
             self.fetch(now);
         }
     }
 
-    pub(super) fn put_out(&mut self, now: Nanos, out: Out) {
+    pub(super) fn emit(&mut self, now: Nanos, out: RecordingOutput) {
         match out {
-            Out::Event(event) => self.report(now, event),
-            Out::Sample(poll, is_begun) => self.on_sample(now, None, &poll, is_begun),
+            RecordingOutput::Event(event) => self.report(now, event),
+            RecordingOutput::Sample(poll, is_begun) => self.on_sample(now, None, &poll, is_begun),
         }
     }
 
@@ -205,33 +195,33 @@ impl Session {
     ) {
         let is_begun = is_begun || self.is_motion_begun;
         match self.sampler.take(numbers, is_begun) {
-            Some(Sampled::Reading(reading)) => {
+            Some(SampleOutcome::Reading(reading)) => {
                 self.is_motion_begun = false;
                 if let Some(sent) = sent {
                     self.timing.push(reading.tick, self.pace.tick, sent, now);
                 }
                 self.report(now, RigEventBody::Reading(reading));
             }
-            Some(Sampled::Same | Sampled::Doubtful) => self.is_motion_begun = is_begun,
-            Some(Sampled::Reset) => {
+            Some(SampleOutcome::Same | SampleOutcome::Doubtful) => self.is_motion_begun = is_begun,
+            Some(SampleOutcome::Reset) => {
                 self.is_motion_begun = false;
                 self.on_reset(now);
             }
-            None => self.lose_order(now),
+            None => self.resynchronise(now),
         }
     }
 
     /// A sine that cannot go on: the axis is stopped.
     pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
-        self.urge(RigCommand::Stop, Asked::Stop(Halting::QUIET));
-        let fault = Fault::CommandRefused { detail: format!("the sine was broken off: {why}") };
-        self.report_in_order(now, RigEventBody::Fault(fault));
+        self.send_urgent(RigCommand::Stop, ExpectedReply::Stop(PendingStop::QUIET));
+        let detail = format!("the sine was broken off: {why}");
+        self.report_in_order(now, RigEventBody::refusal(detail));
     }
 
     /// The controller has forgotten its settings: nothing may move before it is opened again.
     pub(super) fn on_reset(&mut self, now: Nanos) {
         self.is_reset = true;
-        self.timing = Timing::default();
+        self.timing = ClockAlignment::default();
         self.sine = None;
         self.has_watchdog = false;
         self.beginning = None;

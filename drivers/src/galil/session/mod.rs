@@ -2,122 +2,118 @@
 //! stops before everything.
 
 mod answers;
-mod search;
+mod resync;
 mod writing;
 
+use super::clock_alignment::ClockAlignment;
 use super::connect::Connected;
-use super::order::Order;
-use super::protocol::{Incoming, LINE_MAX, Parser};
-use super::recording::{self, Recording};
+use super::order::GalilOrder;
+use super::protocol::{GalilMessage, GalilParser, LINE_MAX, pack_lines};
+use super::recording::{self, ArrayRecording};
 use super::sampling::Sampler;
 use super::settings::GalilSettings;
-use super::sine::Feed;
-use super::timing::Timing;
+use super::sine::SineFeed;
 use crate::rig::RigEventBody;
-use crate::wire::{Answers, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, TOO_MANY_COMMANDS};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
-use search::{MARKERS_MAX, QUIET, Search};
+use resync::{MARKERS_MAX, QUIET, Resynchronisation};
 use std::collections::VecDeque;
 
 /// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
 
-/// Why a motion is not begun.
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
-/// Why nothing is done any more.
 const RESET: &str = "the controller was reset; open the rig again";
 
 /// A stop that is sent until the controller has accepted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Halting {
-    /// The command it answers; `None` for a stop that nobody waits for.
+struct PendingStop {
+    /// The command it answers; `None` for a stop without a command.
     number: Option<u64>,
     command: RigCommand,
-    /// How often it came back with `?`, which may be a spoilt `:`.
+    /// Count of `?` answers, which may be spoilt `:`.
     refusals: u32,
 }
 
-impl Halting {
-    /// One that nobody waits for.
+impl PendingStop {
     const QUIET: Self = Self { number: None, command: RigCommand::Stop, refusals: 0 };
 }
 
-/// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
-    /// A sample.
+enum ExpectedReply {
     Sample,
     /// A sample behind a command; `true` behind the begin of a motion.
     Marked(bool),
-    /// Elements of a recorded array.
     Elements,
     /// Increments of a sine, which a stop or a limit may have ended before.
     Segment,
     /// The watchdog's variable.
     Renewal,
-    /// A part of the order under way.
     Part,
-    /// A command that stops.
-    Stop(Halting),
+    Stop(PendingStop),
     /// `TC1`, after a refusal of the order under way.
-    Why,
-    /// A number that must come back.
+    RefusalReason,
     Marker(u32),
 }
 
-/// A line to be written.
 #[derive(Clone, Debug, PartialEq)]
 struct Outgoing {
     pub text: String,
-    pub asked: Vec<Asked>,
+    pub expects: Vec<ExpectedReply>,
 }
 
-/// How fast the link was when the controller was set up.
+impl Outgoing {
+    fn one(command: &str, expects: ExpectedReply) -> Self {
+        Self { text: format!("{command}\r"), expects: vec![expects] }
+    }
+
+    /// Commands in as few lines as hold them; each expects the same.
+    fn packed(commands: &[String], expects: ExpectedReply) -> impl Iterator<Item = Self> {
+        pack_lines(commands).into_iter().map(move |text| {
+            let count = text.matches(';').count() + 1;
+            Self { text, expects: vec![expects; count] }
+        })
+    }
+}
+
+/// Speed of the link, measured when the controller was set up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    /// Between two questions.
+pub struct PollPace {
     pub every: Nanos,
-    /// Questions that may wait for answers at once.
     pub in_flight: usize,
-    /// Length of a sample of the controller.
     pub tick: Nanos,
 }
 
-/// The dialogue.
 #[derive(Clone, Debug)]
 pub struct Session {
     settings: GalilSettings,
-    pace: Pace,
+    pace: PollPace,
     has_watchdog: bool,
     question: String,
-    parser: Parser,
+    parser: GalilParser,
     sampler: Sampler,
-    recording: Option<Recording>,
-    sine: Option<Feed>,
-    timing: Timing,
-    expected: VecDeque<(Asked, Nanos)>,
+    recording: Option<ArrayRecording>,
+    sine: Option<SineFeed>,
+    timing: ClockAlignment,
+    expected: VecDeque<(ExpectedReply, Nanos)>,
     urgent: VecDeque<Outgoing>,
     lines: VecDeque<Outgoing>,
     fetches: VecDeque<Outgoing>,
     /// The part of an order that begins something, and when it may go out.
     beginning: Option<(Outgoing, Nanos)>,
     orders: VecDeque<(u64, RigCommand)>,
-    order: Option<(u64, Order)>,
-    answers: Answers,
+    order: Option<(u64, GalilOrder)>,
+    answers: AnswerQueue,
     is_motion_begun: bool,
-    search: Option<Search>,
+    resync: Option<Resynchronisation>,
     /// Stops whose answers went by while the order was being looked for.
-    unconfirmed: Vec<Halting>,
-    /// Why nothing but stops is done any more.
+    unconfirmed: Vec<PendingStop>,
     is_reset: bool,
-    /// When somebody took samples last; the beginning counts.
-    attended: Nanos,
-    /// When the axis was stopped last because nobody took samples.
+    /// Time of the newest request for samples; the start counts.
+    attended_at: Nanos,
+    /// Time of the newest stop because no samples were taken.
     abandoned_at: Option<Nanos>,
-    asked_at: Option<Nanos>,
+    polled_at: Option<Nanos>,
     renewed_at: Option<Nanos>,
     answered_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -125,10 +121,9 @@ pub struct Session {
 }
 
 impl Session {
-    /// With a controller that was set up just now.
     #[must_use]
     pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
-        let recording = connected.plan.map(Recording::new);
+        let recording = connected.plan.map(ArrayRecording::new);
         let question = match &recording {
             Some(_) => recording::question(&settings),
             None => Sampler::question(&settings),
@@ -138,11 +133,11 @@ impl Session {
             sampler: Sampler::new(settings.clone()),
             recording,
             sine: None,
-            timing: Timing::default(),
+            timing: ClockAlignment::default(),
             settings,
             pace: connected.pace,
             has_watchdog: connected.has_watchdog,
-            parser: Parser::default(),
+            parser: GalilParser::default(),
             expected: VecDeque::new(),
             urgent: VecDeque::new(),
             lines: VecDeque::new(),
@@ -150,14 +145,14 @@ impl Session {
             beginning: None,
             orders: VecDeque::new(),
             order: None,
-            answers: Answers::default(),
+            answers: AnswerQueue::default(),
             is_motion_begun: false,
-            search: None,
+            resync: None,
             unconfirmed: Vec::new(),
             is_reset: false,
-            attended: now,
+            attended_at: now,
             abandoned_at: None,
-            asked_at: None,
+            polled_at: None,
             renewed_at: None,
             answered_at: now,
             events: VecDeque::new(),
@@ -178,17 +173,13 @@ impl Session {
     }
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
-        self.answers.acknowledge(number, command);
-        self.tell_answers(now);
+        for answer in self.answers.acknowledge(number, command) {
+            self.report_in_order(now, answer);
+        }
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
-        self.answers.refuse(number, detail);
-        self.tell_answers(now);
-    }
-
-    fn tell_answers(&mut self, now: Nanos) {
-        while let Some(answer) = self.answers.take() {
+        for answer in self.answers.refuse(number, detail) {
             self.report_in_order(now, answer);
         }
     }
@@ -196,7 +187,7 @@ impl Session {
 
 impl Dialogue for Session {
     fn attended(&mut self, at: Nanos) {
-        self.attended = at;
+        self.attended_at = at;
         self.abandoned_at = None;
     }
 
@@ -209,28 +200,23 @@ impl Dialogue for Session {
         if self.is_reset {
             self.refuse(now, number, RESET);
         } else if self.orders.len() >= ORDERS_MAX {
-            self.refuse(now, number, "too many commands at once");
+            self.refuse(now, number, TOO_MANY_COMMANDS);
         } else {
             self.orders.push_back((number, command));
         }
     }
 
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        // The stop that comes next ends it, if it is a motion.
-        self.command(now, command);
-    }
-
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        if let Some(search) = self.search.as_mut().filter(|_| !bytes.is_empty()) {
-            search.last_byte = now;
+        if let Some(resync) = self.resync.as_mut().filter(|_| !bytes.is_empty()) {
+            resync.last_byte = now;
         }
         for byte in bytes {
             match self.parser.take(*byte) {
-                Some(Incoming::Reply(reply)) => self.on_reply(now, &reply),
+                Some(GalilMessage::Reply(reply)) => self.on_reply(now, &reply),
                 // What programs of the controller say is in the log of raw bytes.
-                Some(Incoming::Unasked(_)) => {}
-                Some(Incoming::Flood) if self.search.is_none() => self.lose_order(now),
-                Some(Incoming::Flood) | None => {}
+                Some(GalilMessage::Unsolicited(_)) => {}
+                Some(GalilMessage::Flood) if self.resync.is_none() => self.resynchronise(now),
+                Some(GalilMessage::Flood) | None => {}
             }
         }
     }
@@ -238,31 +224,31 @@ impl Dialogue for Session {
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
         let is_overdue =
             self.expected.front().is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
-        if is_overdue && self.search.is_none() {
-            self.lose_order(now);
+        if is_overdue && self.resync.is_none() {
+            self.resynchronise(now);
         }
         let line = self.next_line(now)?;
         debug_assert!(line.text.len() <= LINE_MAX, "{}", line.text);
-        for asked in line.asked {
-            self.expected.push_back((asked, now));
+        for expects in line.expects {
+            self.expected.push_back((expects, now));
         }
         Some(line.text.into_bytes())
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
-        if self.search.is_some() {
+        if self.resync.is_some() {
             // Often enough to see that the line has become quiet.
             return now + Nanos(QUIET.0 / 10);
         }
         // While answers are on their way nothing is due; their bytes end the wait.
         let is_waiting = self.samples_in_flight() >= self.pace.in_flight
-            || self.recording.as_ref().is_some_and(Recording::is_fetching);
+            || self.recording.as_ref().is_some_and(ArrayRecording::is_fetching);
         let due = match &self.beginning {
             Some((_, due)) => *due,
             None if is_waiting => now + QUIET,
-            None => self.asked_at.map_or(now, |at| at + self.pace.every),
+            None => self.polled_at.map_or(now, |at| at + self.pace.every),
         };
-        let feed_due = self.sine.as_ref().and_then(Feed::due);
+        let feed_due = self.sine.as_ref().and_then(SineFeed::due);
         feed_due.map_or(due, |feed| feed.min(due)).max(now)
     }
 
@@ -271,7 +257,7 @@ impl Dialogue for Session {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        self.search?.is_over(now).then(|| {
+        self.resync?.is_over(now).then(|| {
             format!(
                 "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
             )

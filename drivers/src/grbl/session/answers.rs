@@ -1,12 +1,14 @@
-//! What the board says, and what follows from it.
+//! Lines of the board and what follows from them.
 
 use super::Session;
-use crate::grbl::error::{Alarm, Refusal};
-use crate::grbl::protocol::{CYCLE_START, State, Status};
+use crate::grbl::error::GrblCode;
+use crate::grbl::protocol::{CYCLE_START, GrblState, GrblStatus};
 use crate::grbl::times::STOP_MAX;
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};
+
+const LOCKED: &str = "the board is locked; look at the axis, then open the rig again";
 
 impl Session {
     pub(super) fn on_ok(&mut self, now: Nanos) {
@@ -25,16 +27,16 @@ impl Session {
             let started = Nanos(now.0.saturating_sub(self.facts.round_trip.0 / 2)).max(written);
             motion.started = Some(started);
             let from = sign * motion.from as f64;
-            let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
+            let pulses_per_mm = sign * motion.direction() / self.settings.mm_per_pulse;
             let (profile, owed, wanted) = (motion.profile, motion.owed.take(), motion.wanted);
-            self.track().moves(started, from, profile, pulses_per_mm);
+            self.track().begin_motion(started, from, profile, pulses_per_mm);
             if let Some(number) = owed {
                 self.acknowledge(now, number, RigCommand::MoveTo(wanted));
             }
         }
     }
 
-    pub(super) fn on_refusal(&mut self, now: Nanos, refusal: &Refusal) {
+    pub(super) fn on_refusal(&mut self, now: Nanos, refusal: &GrblCode) {
         if self.open.take().is_none() {
             self.stats.resynchronised += 1;
             return;
@@ -46,32 +48,29 @@ impl Session {
             self.motion = None;
             self.refuse(now, number, refusal.to_string());
         } else if motion.cancelled.is_none() {
-            self.fault(
-                now,
-                format!("a part of a motion was refused and the axis is stopped: {refusal}"),
-            );
-            self.cancel(now);
+            let why = format!("a part of a motion was refused, so the axis is stopped: {refusal}");
+            self.end(now, &why);
         }
     }
 
-    pub(super) fn on_alarm(&mut self, now: Nanos, alarm: &Alarm) {
-        if self.halt.is_some() {
+    pub(super) fn on_alarm(&mut self, now: Nanos, alarm: &GrblCode) {
+        if self.reset_pending.is_some() {
             return;
         }
-        self.state = State::Alarm;
+        self.state = GrblState::Alarm;
         self.lock(now, &alarm.to_string());
         self.fault(now, alarm.to_string());
     }
 
     pub(super) fn on_hello(&mut self, now: Nanos) {
-        self.heard = now;
-        self.asked = None;
+        self.heard_at = now;
+        self.queried_at = None;
         // Nothing is in motion after a reset.
-        self.state = State::Idle;
-        if let Some(halt) = self.halt.take() {
+        self.state = GrblState::Idle;
+        if let Some(reset_pending) = self.reset_pending.take() {
             let here = self.track().at(now).pulses.round() as i64;
-            self.track().rest(now, here);
-            for (number, command) in halt.owed {
+            self.track().begin_rest(now, here);
+            for (number, command) in reset_pending.owed {
                 self.acknowledge(now, number, command);
             }
         } else {
@@ -82,59 +81,57 @@ impl Session {
     }
 
     /// Machine position of the axis in steps of the board.
-    fn steps_of(&self, status: &Status) -> Option<i64> {
+    fn steps_of(&self, status: &GrblStatus) -> Option<i64> {
         let mm = status.machine.as_ref()?.get(self.settings.index())?;
         Some((mm * self.facts.steps_per_mm).round() as i64)
     }
 
-    pub(super) fn on_status(&mut self, now: Nanos, status: &Status) {
-        self.heard = now;
-        let asked = self.asked.take();
-        if let Some(asked) = asked {
-            self.stats.push(now.since(asked));
+    pub(super) fn on_status(&mut self, now: Nanos, status: &GrblStatus) {
+        self.heard_at = now;
+        let queried_at = self.queried_at.take();
+        if let Some(queried_at) = queried_at {
+            self.stats.push(now.since(queried_at));
         }
         self.state = status.state;
-        if self.halt.is_some() {
+        if self.reset_pending.is_some() {
             return;
         }
-        let asked = asked.unwrap_or(now);
+        let queried_at = queried_at.unwrap_or(now);
         // A stop is done when nothing moves, and no jog is on its way that would.
         let is_at_rest = !status.state.is_moving() && self.open.is_none();
         let braking = self.motion.as_ref().map_or(Nanos::ZERO, |motion| {
             Nanos((motion.wanted.speed.0 / motion.wanted.acceleration.0 * 1e9) as u64)
         });
-        let is_jog = status.state == State::Jog;
+        let is_jog = status.state == GrblState::Jog;
         // An axis that brakes slowly is braking still.
         let is_slow = |at| is_jog && now.since(at) > STOP_MAX && now.since(at) < braking;
         let (confirmed, waiting): (Vec<_>, Vec<_>) = std::mem::take(&mut self.stops)
             .into_iter()
-            .partition(|(_, _, at)| *at <= asked && (is_at_rest || is_slow(*at)));
+            .partition(|(_, _, at)| *at <= queried_at && (is_at_rest || is_slow(*at)));
         self.stops = waiting;
         for (number, command, _) in confirmed {
             self.acknowledge(now, number, command);
         }
         let Some(steps) = self.steps_of(status) else {
-            return self.lock_with(now, "it reports no machine position; set $10=1");
+            return self.lock_and_report(now, "the board reports no machine position; set $10=1");
         };
         self.on_pins(now, status, steps);
         match status.state {
-            State::Idle => self.on_idle(now, asked, steps),
-            State::Jog => self.on_jog(now, asked, steps),
-            State::Alarm if self.locked.is_some() => {}
-            State::Alarm => {
-                self.lock_with(now, "it is locked; look at the axis, then open the rig again")
-            }
+            GrblState::Idle => self.on_idle(now, queried_at, steps),
+            GrblState::Jog => self.on_jog(now, queried_at, steps),
+            GrblState::Alarm if self.locked.is_some() => {}
+            GrblState::Alarm => self.lock_and_report(now, LOCKED),
             other => {
                 let why = format!(
-                    "it is in state {other:?}, which palpate never asks for; press reset and open the rig again"
+                    "the board is in state {other:?}, which palpate never commands; press reset and open the rig again"
                 );
-                self.lock_with(now, &why);
+                self.lock_and_report(now, &why);
             }
         }
     }
 
-    /// What the pins mean, and a stop at those at which Grbl does not stop.
-    fn on_pins(&mut self, now: Nanos, status: &Status, steps: i64) {
+    /// Takes the pins, and stops at those at which Grbl does not stop.
+    fn on_pins(&mut self, now: Nanos, status: &GrblStatus, steps: i64) {
         let is_known = self.track().at(now).status;
         let pulses = self.pulses(steps);
         let mut inputs = self.ends.inputs(&self.settings, status, is_known, pulses);
@@ -148,8 +145,8 @@ impl Session {
                 "the hold button of the board is pressed, so the axis is stopped",
             ),
             Some(true) if is_far => {
-                // Of one under way the samples tell it.
-                if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+                // For a motion under way the samples show it.
+                if let Some(number) = self.take_unacknowledged() {
                     self.refuse(now, number, "the far limit switch is closed");
                 }
                 self.cancel(now);
@@ -157,23 +154,23 @@ impl Session {
             // Whichever end it is.
             Some(false) if is_closing => self.end(
                 now,
-                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; look at it",
+                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; check the switch",
             ),
             _ => {}
         }
         if self.is_motor_on {
             inputs = inputs | AxisStatus::MOTOR_ON;
         }
-        self.track().inputs(now, inputs);
+        self.track().set_inputs(now, inputs);
     }
 
-    fn on_idle(&mut self, now: Nanos, asked: Nanos, steps: i64) {
+    fn on_idle(&mut self, now: Nanos, queried_at: Nanos, steps: i64) {
         let Some(motion) = &self.motion else {
             if steps != self.steps {
                 let by = self.pulses(steps - self.steps);
                 self.steps = steps;
                 let here = self.pulses(steps);
-                self.track().rest(now, here);
+                self.track().begin_rest(now, here);
                 self.fault(
                     now,
                     format!("the axis has moved by {by} pulses by itself; home it again"),
@@ -185,7 +182,7 @@ impl Session {
             return;
         }
         match (motion.cancelled, motion.started) {
-            (Some(cancelled), _) if asked >= cancelled => {
+            (Some(cancelled), _) if queried_at >= cancelled => {
                 self.urgent.push_back(vec![CYCLE_START]);
                 if motion.is_doubtful
                     && let Some(motion) = &mut self.motion
@@ -196,12 +193,12 @@ impl Session {
                     return;
                 }
             }
-            (None, Some(started)) if asked > started + Nanos::from_millis(20) => {
+            (None, Some(started)) if queried_at > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
-                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or mend the link");
+                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or repair the link");
                 } else if steps != motion.to {
                     let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
-                    self.fault(now, format!("the axis ended at {there} where {wanted} was commanded, in its own pulses; home it again"));
+                    self.fault(now, format!("the axis ended at {there} of its own pulses instead of {wanted}; home it again"));
                 }
             }
             _ => return,
@@ -209,10 +206,10 @@ impl Session {
         self.steps = steps;
         self.motion = None;
         let here = self.pulses(steps);
-        self.track().rest(now, here);
+        self.track().begin_rest(now, here);
     }
 
-    fn on_jog(&mut self, now: Nanos, asked: Nanos, steps: i64) {
+    fn on_jog(&mut self, now: Nanos, queried_at: Nanos, steps: i64) {
         let Some(motion) = &self.motion else {
             if self.open.is_none() {
                 self.cancel(now);
@@ -223,19 +220,19 @@ impl Session {
             return;
         }
         // The report is of a time between its question and now.
-        let early = self.track().at(asked).pulses;
+        let early = self.track().at(queried_at).pulses;
         let late = self.track().at(now).pulses;
         let here = self.pulses(steps) as f64;
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
-            self.fault(now, format!("the axis is at {here:.0} where {late:.0} was expected, in its own pulses, and is stopped; check the cable and home it"));
+            self.fault(now, format!("the axis is at {here:.0} of its own pulses instead of {late:.0}, so it is stopped; check the cable and home it"));
             return self.cancel(now);
         }
-        let sampled = asked + Nanos(self.facts.round_trip.0 / 2);
-        if let Some(ahead) = motion.ahead(sampled, steps, self.settings.mm_per_pulse) {
+        let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);
+        if let Some(ahead) = motion.lead(sampled, steps, self.settings.mm_per_pulse) {
             let step = self.settings.mm_per_pulse / motion.wanted.speed.0;
-            self.pace.told(asked, now, ahead.0, step);
+            self.feed_correction.update(queried_at, now, ahead.0, step);
         }
     }
 }

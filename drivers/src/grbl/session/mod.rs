@@ -1,87 +1,77 @@
 //! The dialogue with a board that has been set up: ways cut into short jogs, status asked for now and then, stops
 //! before everything.
 //!
-//! A jog that Grbl has is done whether anybody is there or not. So it gets no more way than it needs to keep its speed:
+//! Grbl finishes a jog that it has, even when the link is gone. So it gets no more way than it needs to keep its speed:
 //! when the link dies, the axis comes to rest by itself. The newest jog in the planner ends at rest (gnea/grbl,
 //! planner.c), so what is sent ahead is the way of braking and a little more.
 
 mod answers;
 mod stopping;
 
-use super::motion::Motion;
-use super::pace::Pace;
-use super::pins::Ends;
-use super::protocol::{self, Incoming, Parser, QUERY, State};
-use super::settings::{Facts, GrblSettings};
+use super::feed_correction::FeedCorrection;
+use super::motion::JogMotion;
+use super::pins::EndSwitches;
+use super::protocol::{self, GrblState, Incoming, Parser, QUERY};
+use super::settings::{BoardParameters, GrblSettings};
 use super::times::{POLL, POLL_CLOSELY, REPORT_MAX, RESET_MAX, SILENCE_MAX};
 use crate::parts::Track;
 use crate::rig::RigEventBody;
-use crate::wire::{Answers, Dialogue, LinkStats};
+use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, TOO_MANY_COMMANDS, lock};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, MoveTo, RigCommand};
+use palpate_model::rig::{MoveTo, RigCommand};
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
 const FEED_MIN: f64 = 1.0;
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
 
-/// Why a motion is not begun.
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
-
-/// What happens with an axis, shared with whoever needs its past.
+/// The track of an axis, shared with the load cell, which looks up its past.
 pub type SharedTrack = Arc<Mutex<Track>>;
 
-/// A reset whose welcome is to come.
-struct Halt {
-    /// The stops that it does.
+struct PendingReset {
     owed: Vec<(u64, RigCommand)>,
     begun: Nanos,
     written: Nanos,
 }
 
-/// The dialogue.
 pub struct Session {
     settings: GrblSettings,
-    facts: Facts,
+    facts: BoardParameters,
     track: SharedTrack,
     parser: Parser,
     /// The jog whose `ok` is to come.
     open: Option<Nanos>,
     urgent: VecDeque<Vec<u8>>,
     orders: VecDeque<(u64, RigCommand)>,
-    answers: Answers,
-    motion: Option<Motion>,
-    pace: Pace,
-    ends: Ends,
+    answers: AnswerQueue,
+    motion: Option<JogMotion>,
+    feed_correction: FeedCorrection,
+    ends: EndSwitches,
     /// Where it rests, in steps of the board.
     steps: i64,
-    /// What the board's steps, in the direction of the rig, are more than the host's pulses.
+    /// Offset of the board's steps, in the direction of the rig, from the host's pulses.
     zero: i64,
     is_motor_on: bool,
-    asked: Option<Nanos>,
+    queried_at: Option<Nanos>,
     polled: Option<Nanos>,
-    heard: Nanos,
-    looked: Nanos,
-    /// Stops that a status after them will confirm.
+    heard_at: Nanos,
+    looked_at: Nanos,
+    /// Stops that a status after them confirms.
     stops: Vec<(u64, RigCommand, Nanos)>,
-    halt: Option<Halt>,
-    /// The newest state that is known.
-    state: State,
-    /// Why nothing but stops is done any more.
+    reset_pending: Option<PendingReset>,
+    state: GrblState,
+    /// Why only stops are still executed.
     locked: Option<String>,
-    attended: Nanos,
+    attended_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
 }
 
 impl Session {
-    /// With a board that was set up just now.
     #[must_use]
     pub fn new(
         settings: GrblSettings,
-        facts: Facts,
+        facts: BoardParameters,
         track: SharedTrack,
         stats: LinkStats,
         now: Nanos,
@@ -95,28 +85,28 @@ impl Session {
             open: None,
             urgent: VecDeque::new(),
             orders: VecDeque::new(),
-            answers: Answers::default(),
+            answers: AnswerQueue::default(),
             motion: None,
-            pace: Pace::default(),
-            ends: Ends::default(),
+            feed_correction: FeedCorrection::default(),
+            ends: EndSwitches::default(),
             zero: 0,
             is_motor_on: false,
-            asked: None,
+            queried_at: None,
             polled: None,
-            heard: now,
-            looked: now,
+            heard_at: now,
+            looked_at: now,
             stops: Vec::new(),
-            halt: None,
-            state: State::Idle,
+            reset_pending: None,
+            state: GrblState::Idle,
             locked: None,
-            attended: now,
+            attended_at: now,
             events: VecDeque::new(),
             stats,
         }
     }
 
     fn track(&self) -> MutexGuard<'_, Track> {
-        self.track.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.track)
     }
 
     fn report(&mut self, now: Nanos, body: RigEventBody) {
@@ -124,23 +114,18 @@ impl Session {
     }
 
     fn fault(&mut self, now: Nanos, detail: impl Into<String>) {
-        let detail = detail.into();
-        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        self.report(now, RigEventBody::refusal(detail));
     }
 
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
-        self.answers.acknowledge(number, command);
-        self.tell_answers(now);
+        for answer in self.answers.acknowledge(number, command) {
+            self.report(now, answer);
+        }
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
-        self.answers.refuse(number, detail);
-        self.tell_answers(now);
-    }
-
-    fn tell_answers(&mut self, now: Nanos) {
-        while let Some(body) = self.answers.take() {
-            self.report(now, body);
+        for answer in self.answers.refuse(number, detail) {
+            self.report(now, answer);
         }
     }
 
@@ -168,53 +153,54 @@ impl Session {
         }
     }
 
-    fn begin_move(&mut self, now: Nanos, number: u64, wanted: MoveTo) {
+    /// The target of a move in steps of the board and its feed in mm/min, or why the board cannot make it.
+    fn plan_move(&self, wanted: &MoveTo) -> Result<(i64, f64), String> {
         if !self.is_motor_on {
-            return self.refuse(now, number, "the motor is off; enable it first");
+            return Err("the motor is off; enable it first".into());
         }
         let settings = &self.settings;
         let scale = 1.0 / (settings.mm_per_pulse * self.facts.steps_per_mm);
         let feed = wanted.speed.0 * scale * 60.0;
         if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || feed < FEED_MIN {
-            let (speed, most) = (wanted.speed, settings.speed_max);
-            let least = FEED_MIN / 60.0;
-            return self.refuse(
-                now,
-                number,
-                format!("a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"),
-            );
+            let (speed, least, most) = (wanted.speed, FEED_MIN / 60.0, settings.speed_max);
+            return Err(format!(
+                "a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"
+            ));
         }
         if (wanted.acceleration.0 / settings.acceleration.0 - 1.0).abs() > 1e-6 {
             let (wanted, own) = (wanted.acceleration, settings.acceleration);
-            return self.refuse(
-                now,
-                number,
-                format!("an acceleration of {wanted} is not the {own} that the board is set to"),
-            );
+            return Err(format!("an acceleration of {wanted} differs from the {own} of the board"));
         }
-        let to = self.settings.sign() * (wanted.target_pulses + self.zero);
+        let to = settings.sign() * (wanted.target_pulses + self.zero);
         // Grbl reads eight digits of a number.
         if (to as f64 / self.facts.steps_per_mm).abs() > 9_999.0 {
-            return self.refuse(now, number, "the target is more than ten metres away");
+            return Err("the target is more than ten metres away".into());
         }
+        Ok((to, feed))
+    }
+
+    fn begin_move(&mut self, now: Nanos, number: u64, wanted: MoveTo) {
+        let (to, feed) = match self.plan_move(&wanted) {
+            Ok(planned) => planned,
+            Err(why) => return self.refuse(now, number, why),
+        };
         if to == self.steps {
             // Grbl makes nothing of a way that is none; a sample shows it as a motion all the same.
-            let profile = Motion::profile(0.0, &wanted);
+            let profile = JogMotion::profile(0.0, &wanted);
             let here = self.pulses(self.steps) as f64;
-            self.track().moves(now, here, profile, 0.0);
-            self.track().rest(now, here as i64);
+            self.track().begin_motion(now, here, profile, 0.0);
+            self.track().begin_rest(now, here as i64);
             return self.acknowledge(now, number, RigCommand::MoveTo(wanted));
         }
-        self.pace.begin();
+        self.feed_correction.begin();
         let mm_per_pulse = self.settings.mm_per_pulse;
-        let motion = Motion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
-        self.ends.leave(self.is_outwards(&motion));
+        let motion = JogMotion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
+        self.ends.begin_motion(self.is_outwards(&motion));
         self.motion = Some(motion);
     }
 
-    /// Into the tissue.
-    fn is_outwards(&self, motion: &Motion) -> bool {
-        motion.side() * self.settings.sign() as f64 > 0.0
+    fn is_outwards(&self, motion: &JogMotion) -> bool {
+        motion.direction() * self.settings.sign() as f64 > 0.0
     }
 
     fn poll_every(&self, now: Nanos) -> Nanos {
@@ -228,12 +214,12 @@ impl Session {
     }
 
     fn take_query(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let is_free = self.asked.is_none_or(|asked| now.since(asked) > REPORT_MAX);
+        let is_free = self.queried_at.is_none_or(|queried_at| now.since(queried_at) > REPORT_MAX);
         let is_due = self.polled.is_none_or(|at| now.since(at) >= self.poll_every(now));
         if !is_free || !is_due {
             return None;
         }
-        self.asked = Some(now);
+        self.queried_at = Some(now);
         self.polled = Some(now);
         Some(vec![QUERY])
     }
@@ -247,7 +233,7 @@ impl Session {
         let steps_per_mm = self.facts.steps_per_mm;
         let motion = self.motion.as_mut().filter(|motion| motion.cancelled.is_none())?;
         let end = motion.next_chunk(now, self.settings.mm_per_pulse)?;
-        let feed = motion.feed * self.pace.feed();
+        let feed = motion.feed * self.feed_correction.feed();
         let line = protocol::jog(axis, end as f64 / steps_per_mm, feed);
         self.open = Some(now);
         Some(line.into_bytes())
@@ -256,7 +242,7 @@ impl Session {
 
 impl Dialogue for Session {
     fn attended(&mut self, at: Nanos) {
-        self.attended = at;
+        self.attended_at = at;
     }
 
     fn command(&mut self, now: Nanos, command: RigCommand) {
@@ -267,15 +253,10 @@ impl Dialogue for Session {
         if let Some(why) = self.locked.clone() {
             self.refuse(now, number, why);
         } else if self.orders.len() >= ORDERS_MAX {
-            self.refuse(now, number, "too many commands at once");
+            self.refuse(now, number, TOO_MANY_COMMANDS);
         } else {
             self.orders.push_back((number, command));
         }
-    }
-
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        // The stop that comes next ends it, if it is a motion.
-        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
@@ -321,19 +302,19 @@ impl Dialogue for Session {
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
         // A board that a limit switch has locked says nothing before it is reset, and nothing moves.
-        if let Some(halt) = &self.halt
-            && now.since(halt.begun) > RESET_MAX
+        if let Some(reset_pending) = &self.reset_pending
+            && now.since(reset_pending.begun) > RESET_MAX
         {
             let silence = RESET_MAX.0 as f64 * 1e-9;
             return Some(format!(
-                "the board has not answered a reset for {silence} s; the axis comes to rest by itself, unless somebody else moves it: use the emergency stop"
+                "the board has not answered a reset for {silence} s; the axis comes to rest by itself unless something else moves it; use the emergency stop"
             ));
         }
         let is_unsure = self.locked.is_none() || self.state.is_moving();
-        let is_silent = now.since(self.heard) > SILENCE_MAX && is_unsure;
+        let is_silent = now.since(self.heard_at) > SILENCE_MAX && is_unsure;
         is_silent.then(|| {
             let silence = SILENCE_MAX.0 as f64 * 1e-9;
-            format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
+            format!("the board has sent nothing for {silence} s; the axis comes to rest by itself; check cable and power")
         })
     }
 
@@ -343,8 +324,8 @@ impl Dialogue for Session {
 }
 
 impl Drop for Session {
-    /// However its thread ends, such as with a port that is gone: what the board was given ends in the track too.
+    /// When the thread ends, such as when the port is gone, jogs that the board has end in the track too.
     fn drop(&mut self) {
-        self.leave(self.looked);
+        self.settle_track(self.looked_at);
     }
 }

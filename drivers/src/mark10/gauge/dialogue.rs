@@ -1,34 +1,32 @@
-//! A gauge in progress: it sends readings by itself, nothing is asked.
+//! A gauge in progress: it sends readings by itself.
 //!
 //! The language has no checksum. A reading counts only with the unit and as many digits behind the point as when the
 //! gauge was opened; a digit lost or changed before the point is not seen here, only as a jump of the force.
 
-use crate::cell::{CellProtocol, CellReports, CellSample, LineCell};
-use crate::mark10::protocol::{ForceUnit, GaugeLine, Reading};
+use crate::cell::{CellProtocol, CellReports, LineCell, silence_max};
+use crate::mark10::protocol::{ForceUnit, GaugeForce, GaugeLine, GaugeReading};
 use palpate_model::Nanos;
-use palpate_model::units::{Newtons, Volts};
+use palpate_model::rig::AdcDescription;
+use palpate_model::units::Newtons;
 
-/// A gauge is gone when so many readings in a row have not come, and at least a second.
-const READINGS_MISSED: f64 = 5.0;
-const SILENCE_MIN: Nanos = Nanos::from_millis(1_000);
 /// Gauges show no number beyond 110 % of their capacity: a guess, to be checked on the device.
 const RANGE: f64 = 1.1;
 
-/// How readings become counts.
+pub(crate) const BEYOND_RANGE: &str =
+    "the force is beyond the gauge's range; take the load off before it is damaged";
+
+/// Conversion of readings to counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GaugeScale {
-    /// Unit of every reading.
     pub unit: ForceUnit,
-    /// Digits behind the point of every reading.
     pub decimals: u8,
     /// Largest count of its range.
     pub counts_max: i32,
 }
 
 impl GaugeScale {
-    /// That of a gauge that gives such readings.
     #[must_use]
-    pub fn new(like: Reading, capacity: Newtons) -> Self {
+    pub fn new(like: GaugeReading, capacity: Newtons) -> Self {
         let per_count = like.unit.newtons() * like.number.step();
         // Saturates for a capacity beyond all counts.
         let counts_max = (RANGE * capacity.0 / per_count).round() as i32;
@@ -39,60 +37,59 @@ impl GaugeScale {
     pub fn volts_per_count(&self) -> f64 {
         self.unit.newtons() * 10_f64.powi(-i32::from(self.decimals))
     }
+
+    pub(crate) fn adc(&self) -> AdcDescription {
+        AdcDescription {
+            counts_min: -self.counts_max,
+            counts_max: self.counts_max,
+            volts_per_count: self.volts_per_count(),
+        }
+    }
+
+    /// Counts of a force. An overload is the end of the range on the side of the last counts, so that every limit sees
+    /// it. `None` for a reading with another unit or resolution.
+    pub(crate) fn counts(&self, force: GaugeForce, last: i32) -> Option<i32> {
+        match force {
+            GaugeForce::Reading(GaugeReading { number, unit }) => {
+                let is_same = unit == self.unit && number.decimals == self.decimals;
+                is_same.then_some(number.digits)
+            }
+            GaugeForce::Overload if last < 0 => Some(-self.counts_max),
+            GaugeForce::Overload => Some(self.counts_max),
+        }
+    }
+
+    pub(crate) const fn is_beyond_range(&self, counts: i32) -> bool {
+        counts.saturating_abs() >= self.counts_max
+    }
 }
 
-/// A gauge that sends readings.
 pub type GaugeDialogue = LineCell<GaugeReadings>;
 
-/// What its lines mean.
 pub struct GaugeReadings {
     scale: GaugeScale,
     silence_max: Nanos,
     counts: i32,
-    is_beyond: bool,
 }
 
 impl GaugeDialogue {
     /// Goes on with a gauge that sends so many readings a second, from `now`.
     #[must_use]
     pub fn new(scale: GaugeScale, per_second: f64, now: Nanos) -> Self {
-        let readings = GaugeReadings {
-            scale,
-            silence_max: SILENCE_MIN.max(Nanos((READINGS_MISSED * 1e9 / per_second) as u64)),
-            counts: 0,
-            is_beyond: false,
-        };
-        Self::on(readings, now)
+        let readings = GaugeReadings { scale, silence_max: silence_max(per_second), counts: 0 };
+        Self::start(readings, now)
     }
 }
 
 impl CellProtocol for GaugeReadings {
     fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
-        let counts = match GaugeLine::parse(line) {
-            GaugeLine::Reading(Reading { number, unit })
-                if unit == self.scale.unit && number.decimals == self.scale.decimals =>
-            {
-                number.digits
-            }
-            // The end of the range on the side where it was, so that every limit sees it.
-            GaugeLine::Overload if self.counts < 0 => -self.scale.counts_max,
-            GaugeLine::Overload => self.scale.counts_max,
-            _ => return false,
+        let force = GaugeLine::parse(line).force();
+        let Some(counts) = force.and_then(|force| self.scale.counts(force, self.counts)) else {
+            return false;
         };
         self.counts = counts;
-        let is_beyond = counts.saturating_abs() >= self.scale.counts_max;
-        if is_beyond && !self.is_beyond {
-            reports.trouble(
-                "the force is beyond the gauge's range; take the load off before it is damaged",
-            );
-        }
-        self.is_beyond = is_beyond;
-        reports.sample(CellSample {
-            at: now,
-            device_time: None,
-            counts,
-            volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
-        });
+        reports.set_beyond_range(self.scale.is_beyond_range(counts), BEYOND_RANGE);
+        reports.push_counts(now, None, counts, self.scale.volts_per_count());
         true
     }
 
@@ -108,10 +105,11 @@ impl CellProtocol for GaugeReadings {
 mod tests {
     use super::*;
     use crate::cell::CellDialogue;
-    use crate::mark10::protocol::Decimal;
+    use crate::mark10::protocol::FixedDecimal;
 
     fn dialogue() -> GaugeDialogue {
-        let like = Reading { number: Decimal::parse("0.000").unwrap(), unit: ForceUnit::Newton };
+        let like =
+            GaugeReading { number: FixedDecimal::parse("0.000").unwrap(), unit: ForceUnit::Newton };
         GaugeDialogue::new(GaugeScale::new(like, Newtons(25.0)), 250.0, Nanos::ZERO)
     }
 
@@ -128,7 +126,8 @@ mod tests {
 
     #[test]
     fn pounds_are_converted() {
-        let like = Reading { number: Decimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
+        let like =
+            GaugeReading { number: FixedDecimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
         let scale = GaugeScale::new(like, Newtons(500.0));
         let mut dialogue = GaugeDialogue::new(scale, 10.0, Nanos::ZERO);
         dialogue.received(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn other_units_other_digits_and_rubbish_are_counted() {
+    fn lines_with_other_units_or_digits_count_as_garbled() {
         let mut dialogue = dialogue();
         for line in ["4.285 mN", "4.28 N", "4285 N", "4.285N", "*10", "RS", "4.2\u{7f}5 N"] {
             dialogue.received(Nanos(5), format!("{line}\r\n").as_bytes());
@@ -158,12 +157,12 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_told() {
+    fn silent_gauge_counts_as_gone() {
         let mut dialogue = dialogue();
         let at = Nanos::from_millis(500);
         dialogue.received(at, b"0.000 N\r\n");
-        assert_eq!(dialogue.is_dead(at + SILENCE_MIN), None);
-        let later = at + SILENCE_MIN + Nanos(1);
+        assert_eq!(dialogue.is_dead(at + silence_max(1e3)), None);
+        let later = at + silence_max(1e3) + Nanos(1);
         assert!(dialogue.is_dead(later).unwrap().contains("silent"));
     }
 }

@@ -3,11 +3,12 @@
 mod dialogue;
 mod open;
 
+pub(crate) use dialogue::BEYOND_RANGE;
 pub use dialogue::{GaugeDialogue, GaugeScale};
-pub(crate) use open::{check, check_list, commands, filters};
+pub(crate) use open::{ask_text, check, filters, set_up};
 
 use super::protocol::GaugeLine;
-use crate::devices::{DeviceKind, Role, first};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file::{Fields, gauge};
 use palpate_model::units::{Newtons, Volts};
 use std::sync::Arc;
@@ -21,10 +22,10 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
         emulation: None,
     },
     recognise: |lines| {
-        first(lines, |line| {
+        find_line(lines, |line| {
             matches!(
                 GaugeLine::parse(line),
-                GaugeLine::Reading(_) | GaugeLine::List(_) | GaugeLine::Error(_)
+                GaugeLine::Reading(_) | GaugeLine::List(_) | GaugeLine::Error
             )
         })
     },
@@ -34,15 +35,15 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
 pub const RATES: [u16; 8] = [1, 2, 5, 10, 25, 50, 125, 250];
 /// Largest exponent of a filter: 1024 samples.
 pub const FILTER_MAX: u8 = 10;
-/// What a gauge is told when its line is closed.
+/// Ends the readings that a gauge sends by itself.
 pub const FAREWELL: &[u8] = b"AOUT0\r";
 
-/// What palpate has to know of a gauge, and how it is to be set.
+/// Settings of a gauge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GaugeSettings {
-    /// Serial number that it must have, as it tells it; any without.
+    /// Serial number that it must have, as it reports it; any without.
     pub serial_number: Option<String>,
-    /// Largest force of its range, as on its label; a gauge does not tell it.
+    /// Largest force of its range, as on its label; a gauge does not report it.
     pub capacity: Newtons,
     /// Readings a second that it is to send, one of [`RATES`].
     pub per_second: u16,

@@ -1,7 +1,7 @@
 //! The motorised stands ESM301 and ESM303 with a gauge on them, driven by a computer (option "PC Control").
 //!
-//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `open.rs`, what happens once. [`StandRig`]
-//! puts a session on a link.
+//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `open.rs`, what happens once.
+//! [`StandRig`] puts a session on a link.
 //!
 //! # How it moves
 //!
@@ -11,25 +11,27 @@
 //!
 //! # Where it is
 //!
-//! The stand tells its travel some hundred times a second at best, and nobody says how it accelerates. So what is
-//! reported is the commanded course, from the sample in which the stand is first seen to move, as long as the
-//! stand's own travel agrees with it within [`REST_TOLERANCE_MM`] and the way of [`LAG`] at the speed of the move; if it
-//! does not, the stand's travel is reported, and the check of the path ends the run. What the stand told is in the log.
+//! The stand reports its travel some hundred times a second at best, and its acceleration is not published. So what
+//! is reported is the commanded course, from the sample in which the stand is first seen to move, as long as the
+//! stand's own travel agrees with it within [`REST_TOLERANCE_MM`] and the way of [`LAG`] at the speed of the move; if
+//! it does not, the stand's travel is reported, and the check of the path ends the run. The stand's own values are in
+//! the log.
 
 mod open;
 pub mod protocol;
-mod rig;
 mod session;
 
 pub use open::{ConnectedStand, connect};
-pub use rig::{StandDevice, StandRig, open};
-pub use session::{Pace, StandSession};
+pub use session::{StandPace, StandSession};
 
 use super::gauge::GaugeSettings;
 use super::protocol::GaugeLine;
-use crate::devices::{DeviceKind, Role, first};
+use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
+use crate::devices::{DeviceKind, Role, find_line};
 use crate::rig_file;
+use crate::wire::{HostClock, Link, LinkThread, Place};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
+use std::sync::Arc;
 
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "mark10-stand",
@@ -39,14 +41,14 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     // A travel alone may be that of any caliper.
     recognise: |lines| {
         let is_reading = |line: &str| matches!(GaugeLine::parse(line), GaugeLine::Reading(_));
-        first(lines, is_reading)?;
-        first(lines, |line| protocol::travel(line).is_some())
+        find_line(lines, is_reading)?;
+        find_line(lines, |line| protocol::travel(line).is_some())
     },
 };
 
 /// Smallest step of a travel limit, and so of a move.
 pub const MM_PER_PULSE: f64 = 0.01;
-/// How far from its target the stand may come to rest, in mm. A guess, to be measured on the device.
+/// Largest distance from its target at which the stand may come to rest, in mm. A guess, to be measured on the device.
 pub const REST_TOLERANCE_MM: f64 = 0.05;
 /// By how long the stand may be behind or before the commanded course: two samples on a slow converter, and its
 /// acceleration. A guess, to be measured on the device.
@@ -54,18 +56,15 @@ pub const LAG: Seconds = Seconds(0.15);
 /// And by which share of the way that is made its speed may be off. A guess.
 pub const SPEED_TOLERANCE: f64 = 0.005;
 
-/// What palpate has to know of a stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StandSettings {
-    /// Name of the rig, for the operator.
     pub name: String,
     /// End of the travel from home. Home is where the stand's travel reads zero.
     pub travel: Position,
-    /// Fastest speed.
     pub speed_max: MmPerS,
     /// Acceleration of the commanded course; the stand's own is not known and cannot be set.
     pub acceleration: MmPerS2,
-    /// How far the probe may go while no sample comes.
+    /// Longest way of the probe without a sample.
     pub unseen: Position,
     /// Whether up is into the tissue; down without.
     pub is_upwards: bool,
@@ -78,4 +77,38 @@ impl StandSettings {
     pub fn pulses(&self, travel_hundredths: i64) -> i64 {
         if self.is_upwards { travel_hundredths } else { -travel_hundredths }
     }
+}
+
+pub type StandRig = DeviceRig<StandDevice>;
+
+#[derive(Clone)]
+pub struct StandDevice {
+    pub place: Place,
+    pub settings: StandSettings,
+}
+
+impl RigDevice for StandDevice {
+    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+        open(self.place.open()?, &self.settings, clock)
+    }
+}
+
+/// Sets up the stand behind a link and begins to take samples.
+pub fn open(
+    mut link: Box<dyn Link>,
+    settings: &StandSettings,
+    clock: &HostClock,
+) -> Result<Opened, OpenError> {
+    let device: Arc<str> = "stand".into();
+    let connected = connect(link.as_mut(), clock, settings, &device)?;
+    let session = StandSession::new(settings.clone(), &connected, clock());
+    let farewell = protocol::STOP.into();
+    Ok(Opened {
+        lines: vec![LinkThread::start(link, session, clock, device, farewell)?],
+        description: connected.description,
+        // The gauge reads newtons, each of which counts as a volt.
+        newtons_per_volt: Some(1.0),
+        link: None,
+        raw: connected.raw,
+    })
 }

@@ -1,14 +1,14 @@
-//! What happens once when a stand is opened: it is stopped, kept to its travel, its gauge set up. Nothing moves.
+//! Opening a stand: it is stopped, its travel is limited, its gauge is set up. Nothing moves.
 
-use super::protocol::{Force, Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
-use super::session::{Pace, TICK};
+use super::protocol::{Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
+use super::session::{StandPace, TICK};
 use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, StandSettings};
 use crate::mark10::gauge::{self, GaugeScale};
-use crate::mark10::protocol::{GaugeLine, GaugeList, Reading};
-use crate::text::{DeviceError, TextConsole, stranger};
+use crate::mark10::protocol::{GaugeForce, GaugeLine, GaugeList, GaugeReading};
+use crate::text::{DeviceError, TextConsole};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::{AdcDescription, RawBytes, RigDescription};
+use palpate_model::rig::{RawBytes, RigDescription};
 use palpate_model::units::{MmPerS, Volts};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,6 @@ const DEVICE: &str = "Mark-10 stand";
 const ANSWER_MAX: Nanos = Nanos::from_millis(500);
 /// A line without a byte for so long has nothing more to say, at any latency of a USB converter.
 const QUIET: Nanos = Nanos::from_millis(60);
-/// Samples by which the link is measured.
 const MEASURED: usize = 20;
 /// Speeds are written in tenths of mm/min (ESM301 user's guide, page 24).
 const SPEED_QUANTUM: MmPerS = MmPerS(0.1 / 60.0);
@@ -28,22 +27,16 @@ const EVERY_MIN: Nanos = Nanos::from_millis(2);
 /// Other questions take samples away: they come further apart by this.
 const BETWEEN: f64 = 1.5;
 
-/// A stand that was set up.
 #[derive(Clone, Debug)]
 pub struct ConnectedStand {
-    /// What it makes of the rig.
     pub description: RigDescription,
-    /// How its readings become counts.
+    /// Conversion of its readings to counts.
     pub scale: GaugeScale,
-    /// How to ask it.
-    pub pace: Pace,
-    /// The link as it was measured.
+    pub pace: StandPace,
     pub stats: LinkStats,
-    /// What was exchanged.
     pub raw: Vec<RawBytes>,
 }
 
-/// Sets a stand up.
 pub fn connect(
     link: &mut dyn Link,
     clock: &HostClock,
@@ -52,7 +45,7 @@ pub fn connect(
 ) -> Result<ConnectedStand, DeviceError> {
     gauge::check(&settings.gauge)?;
     let mut console = TextConsole::new(link, clock, name, DEVICE);
-    // Out of whatever was half said: a stop, the channel to the gauge closed, a gauge that sends by itself.
+    // Ends half a command: a stop, the channel to the gauge closed, readings that the gauge sends by itself ended.
     console.write(&format!("\\{STOP}{}", to_gauge("AOUT0")))?;
     console.drain(QUIET)?;
     // Millimetres, and the mode that keeps to travel limits.
@@ -61,29 +54,29 @@ pub fn connect(
         console.drain(Nanos(QUIET.0 / 3))?;
     }
     if sample(&mut console)?.is_none() {
-        return Err(nobody(&console));
+        return Err(no_answer_error(&console));
     }
     let (list, serial) = set_up_gauge(&mut console, settings)?;
     let has_status = check_status(&mut console)?;
-    let (like, travel) = sample(&mut console)?.ok_or_else(|| nobody(&console))?;
+    let (like, travel) = sample(&mut console)?.ok_or_else(|| no_answer_error(&console))?;
     set_limits(&mut console, settings, travel)?;
     let (stats, pace) = measure(&mut console, has_status)?;
     let scale = GaugeScale::new(like, settings.gauge.capacity);
-    let told = format!(
+    let devices = format!(
         "Mark-10 stand with gauge{serial}, firmware {}{}",
         list.firmware,
         gauge::filters(&list)
     );
     Ok(ConnectedStand {
-        description: describe(settings, scale, pace, &told),
+        description: describe(settings, scale, pace, &devices),
         scale,
         pace,
         stats,
-        raw: console.link.raw,
+        raw: console.into_raw(),
     })
 }
 
-fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, DeviceError> {
+fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, DeviceError> {
     console.write("n")?;
     let mut pair = Pair::default();
     let mut is_over = false;
@@ -91,8 +84,8 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, Devic
     let found = console.find(ANSWER_MAX, |line| {
         is_inches |= line.ends_with(" in");
         match pair.take(line)? {
-            (Force::Reading(reading), travel) => Some((reading, travel)),
-            (Force::Overload, _) => {
+            (GaugeForce::Reading(reading), travel) => Some((reading, travel)),
+            (GaugeForce::Overload, _) => {
                 is_over = true;
                 None
             }
@@ -103,70 +96,42 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(Reading, i64)>, Devic
     }
     if is_inches {
         return Err(unfit(
-            "it goes on counting in inches; switch it to millimetres and PC control on",
+            "it keeps counting in inches; switch it to millimetres and PC control on",
         ));
     }
     Ok(found)
 }
 
-fn nobody(console: &TextConsole<'_>) -> DeviceError {
-    if console.heard.is_empty() {
-        return DeviceError::Silent {
-            device: DEVICE,
-            hint: "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
-        };
-    }
-    let heard = String::from_utf8_lossy(&console.heard).into_owned();
-    let is_part = heard.lines().any(|line| {
+fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
+    let is_part = |line: &str| {
         super::protocol::travel(line).is_some()
             || matches!(GaugeLine::parse(line), GaugeLine::Reading(_))
-    });
-    if is_part {
+    };
+    if console.received().lines().any(is_part) {
         return unfit(
-            "it does not give force and travel together; check the cable to its gauge and the travel option",
+            "it does not send force and travel together; check the cable to its gauge and the travel option",
         );
     }
-    DeviceError::Other { device: DEVICE, found: stranger(&console.heard) }
+    console.no_answer(
+        "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
+    )
 }
 
-/// The gauge's settings and, behind words, its serial number.
+/// The settings of the gauge and, after a blank, its serial number.
 fn set_up_gauge(
     console: &mut TextConsole<'_>,
     settings: &StandSettings,
 ) -> Result<(GaugeList, String), DeviceError> {
-    for command in gauge::commands(&settings.gauge) {
-        console.write(&to_gauge(&command))?;
-        console.drain(Nanos(QUIET.0 / 3))?;
-    }
-    console.write(&to_gauge("LIST"))?;
-    let list = console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
-        GaugeLine::List(list) => Some(list),
-        _ => None,
-    })?;
-    let list = list.ok_or_else(|| {
+    let list = gauge::set_up(console, &settings.gauge, to_gauge)?.ok_or_else(|| {
         unfit("its gauge does not answer LIST; it must be of Series 5 or 7, at 115200 baud over RS-232")
     })?;
-    gauge::check_list(&list, &settings.gauge)?;
-    console.write(&to_gauge("RS"))?;
-    let serial = console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
-        GaugeLine::Other(text) => Some(Some(text)),
-        GaugeLine::Error(_) => Some(None),
-        _ => None,
-    })?;
-    let serial = serial.flatten();
-    if let Some(expected) = &settings.gauge.serial_number
-        && serial.as_ref() != Some(expected)
-    {
-        return Err(DeviceError::OtherSerial {
-            device: "gauge on the stand",
-            found: serial.unwrap_or_else(|| "none that it tells".into()),
-            expected: expected.clone(),
-        });
-    }
+    let serial = gauge::ask_text(console, to_gauge, "RS")?;
+    let expected = settings.gauge.serial_number.as_deref();
+    DeviceError::check_serial("gauge on the stand", serial.as_deref(), expected)?;
     Ok((list, serial.map(|s| format!(" {s}")).unwrap_or_default()))
 }
 
-/// Whether it tells its state, and that it keeps to limits if it does.
+/// Whether it reports its state; if it does, it must keep to travel limits.
 fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     console.write("p")?;
     let status = console.find(ANSWER_MAX, Status::parse)?;
@@ -178,7 +143,6 @@ fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     Ok(status.is_some())
 }
 
-/// The travel with a margin, read back.
 fn set_limits(
     console: &mut TextConsole<'_>,
     settings: &StandSettings,
@@ -206,26 +170,31 @@ fn set_limits(
 fn measure(
     console: &mut TextConsole<'_>,
     has_status: bool,
-) -> Result<(LinkStats, Pace), DeviceError> {
+) -> Result<(LinkStats, StandPace), DeviceError> {
     let mut stats = LinkStats { in_flight: 1, ..LinkStats::default() };
     for _ in 0..MEASURED {
         let start = console.now();
         if sample(console)?.is_none() {
-            return Err(nobody(console));
+            return Err(no_answer_error(console));
         }
         stats.push(console.now().since(start));
     }
     let every = stats.round_trip_mean.max(EVERY_MIN);
-    Ok((stats, Pace { every, has_status }))
+    Ok((stats, StandPace { every, has_status }))
 }
 
-fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str) -> RigDescription {
+fn describe(
+    settings: &StandSettings,
+    scale: GaugeScale,
+    pace: StandPace,
+    devices: &str,
+) -> RigDescription {
     let step = Volts(scale.volts_per_count());
     let ticks = pace.every.0 as f64 / TICK.0 as f64;
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{told}, {:.0} samples a second; without a watchdog of its own: it stops at the target of the move under way, at most {:.0} mm on; positions within {REST_TOLERANCE_MM} mm and {} s of the commanded course",
+            "{devices}, {:.0} samples a second; without a watchdog of its own: it stops at the target of the move under way, at most {:.0} mm on; positions within {REST_TOLERANCE_MM} mm and {} s of the commanded course",
             1e9 / pace.every.0 as f64,
             settings.travel.0,
             LAG.0
@@ -237,11 +206,7 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
         speed_quantum: SPEED_QUANTUM,
         speed_max: settings.speed_max,
         acceleration: settings.acceleration,
-        adc: Some(AdcDescription {
-            counts_min: -scale.counts_max,
-            counts_max: scale.counts_max,
-            volts_per_count: step.0,
-        }),
+        adc: Some(scale.adc()),
         noise_expected: settings.gauge.noise_expected(step),
         pulse_lag: LAG,
         cell_delay: palpate_model::units::Seconds(0.0),
@@ -252,5 +217,5 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
 }
 
 fn unfit(detail: &str) -> DeviceError {
-    DeviceError::Unfit { device: DEVICE, detail: detail.to_owned() }
+    DeviceError::unfit(DEVICE, detail)
 }

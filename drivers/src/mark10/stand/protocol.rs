@@ -1,19 +1,17 @@
-//! What the stand is told and what it says (ESM301 user's guide, page 24; ESM303 user's guide, pages 31 and 32).
+//! Commands to the stand and its answers (ESM301 user's guide, page 24; ESM303 user's guide, pages 31 and 32).
 //!
 //! Commands are single small letters, some with a number of a fixed form, and have no end. The guides do not show the
-//! answers. What is taken here, and is to be confirmed on a device: every answer is a line that ends with CR LF; `n` gives
-//! the reading of the gauge, then the travel, a line each; numbers may have a unit behind them; commands that set
-//! something are silent. Lower and upper limits say that travel grows upwards.
+//! answers. What is taken here, and is to be confirmed on a device: every answer is a line that ends with CR LF; `n`
+//! gives the reading of the gauge, then the travel, a line each; numbers may have a unit behind them; commands that
+//! set something are silent. Lower and upper limits say that travel grows upwards.
 
-use crate::mark10::protocol::{Decimal, GaugeLine, Reading};
+use crate::mark10::protocol::{FixedDecimal, GaugeForce, GaugeLine};
 
-/// Stop.
 pub const STOP: &str = "s";
 /// Highest speed that can be written, in tenths of mm/min.
 const SPEED_MAX: i64 = 99_999;
 /// Furthest limit that can be written, in hundredths of mm.
 const LIMIT_MAX: i64 = 99_999;
-/// Millimetres of an inch.
 const INCH: f64 = 25.4;
 
 /// `e0200.3`: the speed in tenths of mm/min; `None` when it has no such form.
@@ -37,33 +35,19 @@ pub const fn ask_limit(is_upper: bool) -> &'static str {
     if is_upper { "v" } else { "w" }
 }
 
-/// Commands for the gauge on the stand.
 #[must_use]
 pub fn to_gauge(command: &str) -> String {
     format!("/{command}\r\\")
 }
 
-/// What the crosshead does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Crosshead {
-    /// `U`.
-    Up,
-    /// `D`.
-    Down,
-    /// `S`.
-    Stopped,
-}
-
 /// The answer to `p`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status {
-    /// What it does.
-    pub crosshead: Crosshead,
-    /// Whether it keeps to its travel limits (`L`); `None` when it does not tell.
+    /// The crosshead goes up (`U`) or down (`D`); `S` is stopped.
+    pub is_moving: bool,
+    /// Whether it keeps to its travel limits (`L`); `None` when it does not report it.
     pub is_limit_mode: Option<bool>,
-    /// Upper limit switch.
     pub is_at_upper: bool,
-    /// Lower limit switch.
     pub is_at_lower: bool,
 }
 
@@ -74,10 +58,9 @@ impl Status {
         let is_filler = |c: char| matches!(c, ' ' | ',' | ';' | '\t');
         let letters: String = line.chars().filter(|c| !is_filler(*c)).collect();
         let mut rest = letters.chars();
-        let crosshead = match rest.next()? {
-            'U' => Crosshead::Up,
-            'D' => Crosshead::Down,
-            'S' => Crosshead::Stopped,
+        let is_moving = match rest.next()? {
+            'U' | 'D' => true,
+            'S' => false,
             _ => return None,
         };
         let rest = rest.as_str();
@@ -90,7 +73,7 @@ impl Status {
             return None;
         }
         Some(Self {
-            crosshead,
+            is_moving,
             is_limit_mode,
             is_at_upper: rest == "UL",
             is_at_lower: rest == "DL",
@@ -102,7 +85,7 @@ impl Status {
 #[must_use]
 pub fn travel(line: &str) -> Option<i64> {
     let (number, unit) = line.trim().split_once(' ')?;
-    let number = Decimal::parse(number)?.value();
+    let number = FixedDecimal::parse(number)?.value();
     match unit.trim() {
         "mm" => Some((number * 100.0).round() as i64),
         "in" => Some((number * INCH * 100.0).round() as i64),
@@ -114,36 +97,23 @@ pub fn travel(line: &str) -> Option<i64> {
 #[must_use]
 pub fn number(line: &str) -> Option<f64> {
     let number = line.trim().split(' ').next()?;
-    Decimal::parse(number).map(Decimal::value)
+    FixedDecimal::parse(number).map(FixedDecimal::value)
 }
 
 /// Reads the two lines of `n` out of lines that come one by one.
 #[derive(Clone, Debug, Default)]
 pub struct Pair {
-    force: Option<Force>,
-}
-
-/// The gauge's part of `n`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Force {
-    /// A reading.
-    Reading(Reading),
-    /// Beyond the gauge's range.
-    Overload,
+    force: Option<GaugeForce>,
 }
 
 impl Pair {
     /// The next line: a force and the travel behind it make a pair. Others are thrown away, as is a force that another
     /// one follows: a gauge that still sends by itself.
-    pub fn take(&mut self, line: &str) -> Option<(Force, i64)> {
+    pub fn take(&mut self, line: &str) -> Option<(GaugeForce, i64)> {
         if let Some(travel) = travel(line) {
             return self.force.take().map(|force| (force, travel));
         }
-        self.force = match GaugeLine::parse(line) {
-            GaugeLine::Reading(reading) => Some(Force::Reading(reading)),
-            GaugeLine::Overload => Some(Force::Overload),
-            _ => None,
-        };
+        self.force = GaugeLine::parse(line).force();
         None
     }
 }
@@ -153,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn commands_of_the_guide() {
+    fn commands_have_the_form_of_the_guide() {
         // ESM301 user's guide, page 24; ESM303 user's guide, page 31.
         assert_eq!(set_speed(2003).as_deref(), Some("e0200.3"));
         assert_eq!(set_limit(false, -752).as_deref(), Some("g-007.52"));
@@ -169,19 +139,18 @@ mod tests {
     }
 
     #[test]
-    fn letters_of_the_status() {
+    fn status_is_read_from_its_letters() {
         let parsed = |line: &str| {
             Status::parse(line)
-                .map(|s| (s.crosshead, s.is_limit_mode, s.is_at_upper, s.is_at_lower))
+                .map(|s| (s.is_moving, s.is_limit_mode, s.is_at_upper, s.is_at_lower))
         };
-        use Crosshead::{Down, Stopped, Up};
         for line in ["SLUL", "S L UL", "S,L,UL"] {
-            assert_eq!(parsed(line), Some((Stopped, Some(true), true, false)), "{line}");
+            assert_eq!(parsed(line), Some((false, Some(true), true, false)), "{line}");
         }
-        assert_eq!(parsed("UL"), Some((Up, Some(true), false, false)));
-        assert_eq!(parsed("DM"), Some((Down, Some(false), false, false)));
-        assert_eq!(parsed("S"), Some((Stopped, None, false, false)));
-        assert_eq!(parsed("SDL"), Some((Stopped, None, false, true)));
+        assert_eq!(parsed("UL"), Some((true, Some(true), false, false)));
+        assert_eq!(parsed("DM"), Some((true, Some(false), false, false)));
+        assert_eq!(parsed("S"), Some((false, None, false, false)));
+        assert_eq!(parsed("SDL"), Some((false, None, false, true)));
         for wrong in ["", "L", "X", "SX", "4.285 N", "SLU"] {
             assert_eq!(parsed(wrong), None, "{wrong}");
         }
@@ -207,6 +176,6 @@ mod tests {
         .collect();
         assert_eq!(found, [318, -752]);
         assert_eq!(pair.take("OVER"), None);
-        assert_eq!(pair.take("0.01 mm"), Some((Force::Overload, 1)));
+        assert_eq!(pair.take("0.01 mm"), Some((GaugeForce::Overload, 1)));
     }
 }

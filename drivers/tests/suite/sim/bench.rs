@@ -30,10 +30,10 @@ fn read(rig: &mut SimRig) -> f64 {
 
 #[test]
 fn weights_rest_on_the_cell_until_they_are_taken_off() {
-    // Through a box, as a runner holds its rig.
+    // As a trait object, as a runner holds its rig.
     let mut boxed: Box<dyn Rig> = Box::new(rig_with("100", "0"));
     boxed.by_hand(HandAction::LoadCell { mass_g: 1000.0 });
-    let volts = next_reading(&mut boxed).1.volts.0;
+    let volts = next_reading(boxed.as_mut()).1.volts.0;
     // 0.15 V/N and six times 0.02 N of noise.
     assert!((volts - 1.28 - 0.15 * 9.80665).abs() < 0.018, "{volts}");
     let mut rig = rig_with("100", "0");
@@ -46,8 +46,8 @@ fn weights_rest_on_the_cell_until_they_are_taken_off() {
     ] {
         rig.by_hand(HandAction::LoadCell { mass_g });
         // Four standard errors of 0.02 N over 1000 samples.
-        let felt = read(&mut rig);
-        assert!((felt - newtons).abs() < 2.6e-3, "{mass_g} g: {felt}");
+        let force = read(&mut rig);
+        assert!((force - newtons).abs() < 2.6e-3, "{mass_g} g: {force}");
         assert_eq!(rig.truth().force, Newtons(0.0));
     }
 }

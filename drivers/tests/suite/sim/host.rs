@@ -31,7 +31,7 @@ pub fn oscillate(amplitude_pulses: i64, period_ticks: u32, cycles: u32) -> RigCo
 }
 
 /// The next sample; panics on a fault.
-pub fn next_reading<R: Rig>(rig: &mut R) -> (Nanos, Reading) {
+pub fn next_reading<R: Rig + ?Sized>(rig: &mut R) -> (Nanos, Reading) {
     loop {
         let event = rig.next_event(FOREVER).unwrap();
         match event.body {

@@ -199,8 +199,8 @@ fn a_sine_is_the_sine_of_its_command_on_either_clock() {
     for clock in [SimClock::Nominal, SimClock::Galil] {
         let mut rig = SimRig::new(settings(SimProfile::Ideal, 14, clock));
         let start = run_move(&mut rig, 700, 3.0).last().unwrap().pulses;
-        let asked = oscillate(40, 1500, 3);
-        assert_eq!(answer_to(&mut rig, asked), Ok(asked));
+        let command = oscillate(40, 1500, 3);
+        assert_eq!(answer_to(&mut rig, command), Ok(command));
         // The command began at the tick of its acknowledgement, whose sample came right after.
         let first = loop {
             let (_, reading) = next_reading(&mut rig);
@@ -280,7 +280,7 @@ fn settings_are_rounded_down_and_read_back() {
 }
 
 #[test]
-fn refusals_say_why() {
+fn refusals_give_a_reason() {
     let mut rig = ideal(8);
     let why = |rig: &mut SimRig, command| answer_to(rig, command).unwrap_err();
     assert!(why(&mut rig, move_to(100, 1.0)).contains("motor off"));
@@ -302,8 +302,8 @@ fn refusals_say_why() {
         (oscillate(i64::MIN, 1000, 1), "out of range"),
         (oscillate(-(1 << 30) - 1, u32::MAX, 1), "out of range"),
     ] {
-        let said = why(&mut rig, command);
-        assert!(said.contains(word), "{command:?}: {said}");
+        let message = why(&mut rig, command);
+        assert!(message.contains(word), "{command:?}: {message}");
     }
     answer_to(&mut rig, move_to(100, 1.0)).unwrap();
     let define = RigCommand::DefinePosition { pulses: 0 };

@@ -50,7 +50,7 @@ fn equal_seeds_give_equal_events_and_others_differ() {
 }
 
 #[test]
-fn how_often_the_host_looks_changes_nothing() {
+fn events_do_not_depend_on_how_often_the_host_looks() {
     let mut eager = SimRig::new(settings(SimProfile::Lab, 23, SimClock::Galil));
     let mut patient = eager.clone();
     let mut seen = 0;

@@ -111,7 +111,7 @@ fn a_restart_is_told_and_values_come_again() {
     assert!(cell.dialogue.is_dead(now()).is_some());
     let samples = bench.run(cell.dialogue.as_mut(), 1_000);
     assert!(!samples.is_empty());
-    assert!(cell.dialogue.take_trouble().expect("a trouble").contains("started anew"));
+    assert!(cell.dialogue.take_trouble().expect("a trouble").contains("restarted"));
 }
 
 #[test]

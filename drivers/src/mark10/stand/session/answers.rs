@@ -1,16 +1,16 @@
-//! What an answer means: it belongs to the one question that is open.
+//! Answers: each belongs to the one open question.
 
-use super::{Asked, GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandSession};
+use super::{GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandQuestion, StandSession};
 use crate::mark10::stand::protocol::{Status, number};
 use crate::text::Taken;
 use palpate_model::Nanos;
 
 impl StandSession {
     fn answered(&mut self, now: Nanos) {
-        if let Some((_, sent)) = self.asked.take() {
+        if let Some((_, sent)) = self.question.take() {
             self.stats.push(now.since(sent));
         }
-        self.lost = 0;
+        self.lost_answers = 0;
         if !self.stop_due {
             for command in std::mem::take(&mut self.unconfirmed) {
                 self.acknowledge(now, command);
@@ -19,41 +19,35 @@ impl StandSession {
     }
 
     fn on_line(&mut self, now: Nanos, line: &str) {
-        let Some((asked, sent)) = self.asked else {
+        let Some((question, sent)) = self.question else {
             return;
         };
-        match asked {
-            Asked::Sample => {
+        match question {
+            StandQuestion::Sample => {
                 if let Some((force, travel)) = self.pair.take(line) {
                     self.answered(now);
-                    // It was taken somewhere between question and answer.
+                    // It was taken at a time between question and answer.
                     let at = Nanos(sent.0 + now.since(sent).0 / 2);
                     self.on_sample(now, at, force, travel);
                 }
             }
-            Asked::Status => {
+            StandQuestion::Status => {
                 if let Some(status) = Status::parse(line) {
                     self.answered(now);
                     self.status = Some(status);
                 }
             }
-            Asked::Speed(tenths) => {
+            StandQuestion::Value { what, per_unit, expected } => {
                 if let Some(found) = number(line) {
                     self.answered(now);
-                    self.check(now, (found * 10.0).round() as i64 == tenths, line, "speed");
-                }
-            }
-            Asked::Limit(hundredths) => {
-                if let Some(found) = number(line) {
-                    self.answered(now);
-                    let is_right = (found * 100.0).round() as i64 == hundredths;
-                    self.check(now, is_right, line, "travel limit");
+                    let is_right = (found * per_unit).round() as i64 == expected;
+                    self.check(now, is_right, line, what);
                 }
             }
         }
     }
 
-    /// What was set and read back while a move is set up.
+    /// Checks a value that was set and read back for a move.
     fn check(&mut self, now: Nanos, is_right: bool, line: &str, what: &str) {
         if !is_right && let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
@@ -67,36 +61,34 @@ impl StandSession {
 
     /// The answer did not come, or came and made no sense.
     pub(super) fn lose_answer(&mut self, now: Nanos, quiet: Nanos) {
-        self.asked = None;
-        self.lost += if quiet == QUIET_LOST { 2 } else { 1 };
+        self.question = None;
+        self.lost_answers += if quiet == QUIET_LOST { 2 } else { 1 };
         self.stats.resynchronised += 1;
         self.lines.clear();
         self.quiet_until = Some(now + quiet);
         self.quiet = quiet;
         if let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
-            self.refuse(
-                now,
-                "its answer was lost or garbled, so it was not begun; check the cable",
-            );
+            let why = "its answer was lost or garbled, so it was not begun; check the cable";
+            self.refuse(now, why);
         }
         // It stops at its limit by itself; no reason to wait for that.
-        self.stop_due |= self.is_going() && self.lost >= GARBLED_MAX;
+        self.stop_due |= self.is_going() && self.lost_answers >= GARBLED_MAX;
     }
 
     pub(super) fn on_taken(&mut self, now: Nanos, taken: Taken) {
-        if self.asked.is_none() {
+        if self.question.is_none() {
             return;
         }
         self.lines_since += 1;
         if let Taken::Line(line) = taken {
             self.on_line(now, &line);
         }
-        let lines = match self.asked {
-            Some((Asked::Sample, _)) => 2,
+        let lines = match self.question {
+            Some((StandQuestion::Sample, _)) => 2,
             _ => 1,
         };
-        if self.asked.is_some() && self.lines_since >= lines {
+        if self.question.is_some() && self.lines_since >= lines {
             self.lose_answer(now, QUIET);
         }
     }

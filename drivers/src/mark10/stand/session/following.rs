@@ -1,34 +1,25 @@
-//! From the stand's travel and force to a sample: where the axis is told to be, and whether it moves.
+//! From the stand's travel and force to a sample: the reported position of the axis, and whether it moves.
 
-use super::{Going, Motion, STILL, STILL_PULSES, StandSession, TICK, pulses_of};
-use crate::mark10::stand::protocol::{Crosshead, Force};
+use super::{Motion, STILL, STILL_PULSES, StandMove, StandSession, TICK, pulses_of};
+use crate::mark10::gauge::BEYOND_RANGE;
+use crate::mark10::protocol::GaugeForce;
 use crate::mark10::stand::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, SPEED_TOLERANCE};
-use crate::rig::RigEventBody;
+use crate::rig::{RigEventBody, axis_status};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{Age, AxisStatus, Fault, MoveTo, Profile, Reading};
 use palpate_model::units::{Seconds, Volts};
 
 impl StandSession {
-    pub(super) fn on_sample(&mut self, now: Nanos, at: Nanos, force: Force, travel: i64) {
+    pub(super) fn on_sample(&mut self, now: Nanos, at: Nanos, force: GaugeForce, travel: i64) {
         if travel != self.travel {
             self.travel_changed = now;
         }
         self.travel = travel;
-        let counts = match force {
-            Force::Reading(reading)
-                if reading.unit == self.scale.unit
-                    && reading.number.decimals == self.scale.decimals =>
-            {
-                reading.number.digits
-            }
-            Force::Overload if self.counts < 0 => -self.scale.counts_max,
-            Force::Overload => self.scale.counts_max,
-            // Another unit or another resolution: somebody has pressed a key of the gauge.
-            Force::Reading(_) => {
-                let tick = self.tick.unwrap_or(0);
-                return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
-            }
+        // Another unit or another resolution: a key of the gauge has been pressed.
+        let Some(counts) = self.scale.counts(force, self.counts) else {
+            let tick = self.tick.unwrap_or(0);
+            return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
         };
         self.counts = counts;
         self.look_for_overload(now);
@@ -37,27 +28,23 @@ impl StandSession {
             return;
         }
         self.tick = Some(tick);
-        let (pulses, moving) = self.follow(now, tick);
-        let mut status = AxisStatus::MOTOR_ON | moving;
-        if self.settings.pulses(travel) <= 0 {
-            status = status | AxisStatus::HOME;
-        }
+        let (pulses, moving) = self.locate(now, tick);
         let (upper, lower) =
             self.status.map_or((false, false), |status| (status.is_at_upper, status.is_at_lower));
         let (forward, reverse) =
             if self.settings.is_upwards { (upper, lower) } else { (lower, upper) };
-        if forward {
-            status = status | AxisStatus::FORWARD_LIMIT;
-        }
-        if reverse {
-            status = status | AxisStatus::REVERSE_LIMIT;
-        }
+        let inputs = axis_status([
+            (true, AxisStatus::MOTOR_ON),
+            (self.settings.pulses(travel) <= 0, AxisStatus::HOME),
+            (forward, AxisStatus::FORWARD_LIMIT),
+            (reverse, AxisStatus::REVERSE_LIMIT),
+        ]);
         let reading = Reading {
             tick,
             counts: Some(counts),
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
-            status,
+            status: inputs | moving,
             age: Some(Age { by: now.since(at), within: now.since(at) }),
         };
         self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
@@ -66,28 +53,25 @@ impl StandSession {
 
     /// A reading at the end of the range stands for all that is beyond it, and no limit of force may see it.
     fn look_for_overload(&mut self, now: Nanos) {
-        let is_beyond = self.counts.saturating_abs() >= self.scale.counts_max;
+        let is_beyond = self.scale.is_beyond_range(self.counts);
         if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
             self.stop_due |= self.is_going();
-            self.refuse(
-                now,
-                "the force is beyond the gauge's range; take the load off before it is damaged",
-            );
+            self.refuse(now, BEYOND_RANGE);
         }
         self.is_beyond = is_beyond;
     }
 
-    /// Where the axis is told to be at a sample, and whether it moves.
-    fn follow(&mut self, now: Nanos, tick: u64) -> (i64, AxisStatus) {
+    /// The reported position of the axis at a sample, and whether it moves.
+    fn locate(&mut self, now: Nanos, tick: u64) -> (i64, AxisStatus) {
         let none = AxisStatus(0);
-        let true_pulses = self.told(self.travel);
+        let true_pulses = self.reported_pulses(self.travel);
         match self.motion.clone() {
             Motion::Rest | Motion::Setting(..) => (self.at_rest(true_pulses), none),
-            Motion::LetGo(going, since) => {
-                // A move that a stop has ended at once is told too, or nobody would know that it is over.
-                let is_over = going.target == going.from || self.stopped_at.is_some();
-                if !is_over && self.travel == going.from && !self.has_status_moved() {
-                    if now.since(since) > self.still(going.command) {
+            Motion::LetGo(stand_move, since) => {
+                // A move that a stop has ended at once is reported too, or its end would not be seen.
+                let is_over = stand_move.target == stand_move.from || self.stopped_at.is_some();
+                if !is_over && self.travel == stand_move.from && !self.has_status_moved() {
+                    if now.since(since) > self.still_limit(stand_move.command) {
                         self.motion = Motion::Rest;
                         self.stop_due = true;
                         self.refuse(
@@ -97,8 +81,8 @@ impl StandSession {
                     }
                     return (self.at_rest(true_pulses), none);
                 }
-                let command = going.command;
-                let from = self.at_rest(self.told(going.from));
+                let command = stand_move.command;
+                let from = self.at_rest(self.reported_pulses(stand_move.from));
                 let course = Profile::to_rest(
                     position_from_pulses(from, MM_PER_PULSE),
                     position_from_pulses(command.target_pulses, MM_PER_PULSE),
@@ -106,11 +90,11 @@ impl StandSession {
                     command.acceleration,
                 );
                 self.rests_at = None;
-                // A state that was told before it began is old.
+                // A state reported before it began is old.
                 self.status = None;
                 let stopped_tick = self.stopped_at.map(|_| tick);
                 self.motion = Motion::Moving {
-                    going,
+                    stand_move,
                     course: stopped_tick.map_or(course, |_| course.stopped_at(Seconds(0.0))),
                     start_tick: tick,
                     stopped_tick,
@@ -118,8 +102,8 @@ impl StandSession {
                 let stopping = stopped_tick.map_or(none, |_| AxisStatus::STOPPING);
                 (from, AxisStatus::MOVING | stopping)
             }
-            Motion::Moving { going, course, start_tick, stopped_tick } => {
-                self.follow_course(now, tick, going, course, (start_tick, stopped_tick))
+            Motion::Moving { stand_move, course, start_tick, stopped_tick } => {
+                self.follow_course(now, tick, stand_move, course, (start_tick, stopped_tick))
             }
         }
     }
@@ -128,17 +112,17 @@ impl StandSession {
         &mut self,
         now: Nanos,
         tick: u64,
-        going: Going,
+        stand_move: StandMove,
         course: Profile,
         (start_tick, stopped_tick): (u64, Option<u64>),
     ) -> (i64, AxisStatus) {
-        let true_pulses = self.told(self.travel);
+        let true_pulses = self.reported_pulses(self.travel);
         let secs = |from: u64| Seconds((tick - from) as f64 * TICK.0 as f64 * 1e-9);
         let is_off = |pulses: i64, tolerance_mm: f64| {
             (true_pulses - pulses).abs() as f64 * MM_PER_PULSE > tolerance_mm
         };
-        let is_still = self.is_still(now, going.command);
-        let target = going.command.target_pulses;
+        let is_still = self.is_still(now, stand_move.command);
+        let target = stand_move.command.target_pulses;
         if stopped_tick.is_none() {
             let since = secs(start_tick);
             let is_over = since.0 >= course.duration().0;
@@ -151,16 +135,18 @@ impl StandSession {
             let is_cut_short = self.stopped_at.is_some() || is_still && !is_there;
             if !is_cut_short {
                 let here = pulses_of(course.position(since));
-                let way = (here - self.told(going.from)).abs() as f64 * MM_PER_PULSE;
+                let way =
+                    (here - self.reported_pulses(stand_move.from)).abs() as f64 * MM_PER_PULSE;
                 let tolerance =
-                    REST_TOLERANCE_MM + going.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
-                // The truth, where it is not the course: who checks the path sees it.
-                let told = if is_off(here, tolerance) { true_pulses } else { here };
-                return (told, AxisStatus::MOVING);
+                    REST_TOLERANCE_MM + stand_move.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
+                // The measured position where it is off the course: the check of the path sees it.
+                let reported = if is_off(here, tolerance) { true_pulses } else { here };
+                return (reported, AxisStatus::MOVING);
             }
             let course = course.stopped_at(since);
             let here = pulses_of(course.position(Seconds(0.0)));
-            self.motion = Motion::Moving { going, course, start_tick, stopped_tick: Some(tick) };
+            self.motion =
+                Motion::Moving { stand_move, course, start_tick, stopped_tick: Some(tick) };
             return (here, AxisStatus::MOVING | AxisStatus::STOPPING);
         }
         if is_still {
@@ -172,25 +158,25 @@ impl StandSession {
         (here, AxisStatus::MOVING | AxisStatus::STOPPING)
     }
 
-    /// Where it was commanded to be as long as it is about there, else where it is.
+    /// The commanded position as long as the axis is near it, else the true one.
     fn at_rest(&self, true_pulses: i64) -> i64 {
         let near =
-            |told: &i64| (told - true_pulses).abs() as f64 * MM_PER_PULSE <= REST_TOLERANCE_MM;
+            |pulses: &i64| (pulses - true_pulses).abs() as f64 * MM_PER_PULSE <= REST_TOLERANCE_MM;
         self.rests_at.filter(near).unwrap_or(true_pulses)
     }
 
     pub(super) fn has_status_moved(&self) -> bool {
-        self.status.is_some_and(|status| status.crosshead != Crosshead::Stopped)
+        self.status.is_some_and(|status| status.is_moving)
     }
 
     /// Longest time without a new travel of a crosshead that moves.
-    fn still(&self, command: MoveTo) -> Nanos {
+    fn still_limit(&self, command: MoveTo) -> Nanos {
         let pulses = STILL_PULSES * MM_PER_PULSE / command.speed.0.max(1e-6);
         Nanos(STILL.0 + (pulses * 1e9) as u64)
     }
 
     fn is_still(&self, now: Nanos, command: MoveTo) -> bool {
-        let is_old = now.since(self.travel_changed) > self.still(command);
+        let is_old = now.since(self.travel_changed) > self.still_limit(command);
         is_old || self.pace.has_status && self.status.is_some() && !self.has_status_moved()
     }
 }

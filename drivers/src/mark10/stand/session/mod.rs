@@ -9,61 +9,55 @@ use super::{MM_PER_PULSE, StandSettings};
 use crate::mark10::gauge::GaugeScale;
 use crate::rig::RigEventBody;
 use crate::text::Lines;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{ATTENDED_MAX, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
 use palpate_model::Nanos;
 use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{Ack, Fault, MoveTo, Profile, RigCommand};
+use palpate_model::rig::{Ack, MoveTo, Profile, RigCommand};
 use palpate_model::units::Position;
 use std::collections::VecDeque;
 
 /// A tick of the rig's clock, which is the host's.
 pub const TICK: Nanos = Nanos::from_millis(1);
-/// An answer later than this was lost.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 /// After a garbled answer the line is left to fall silent for so long.
 const QUIET: Nanos = Nanos::from_millis(40);
-/// After a lost one for longer: it may only be late, and nothing in an answer tells to which question it belongs.
+/// After a lost one for longer: it may only be late, and an answer does not show to which question it belongs.
 const QUIET_LOST: Nanos = Nanos::from_millis(1_000);
-/// So many answers garbled in a row, and the link counts as dead; a lost one counts for two.
+/// The link counts as dead after so many garbled answers in a row; a lost answer counts for two.
 const LOST_MAX: u32 = 3;
-/// And so many, and the crosshead is stopped.
+/// After so many the crosshead is stopped.
 const GARBLED_MAX: u32 = 2;
-/// How often the crosshead's state is asked for, while it moves without a new travel and while it rests.
+/// Interval of questions for the crosshead's state while it moves without a new travel, and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
 const STATUS_RESTING: Nanos = Nanos::from_millis(300);
 /// A stop is repeated as often until the crosshead rests.
 const STOP_AGAIN: Nanos = Nanos::from_millis(100);
-/// Motions end when nobody takes samples for so long: palpate hangs.
-const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
 /// A crosshead that shows no new travel for so long rests, or has not begun; the time of some pulses comes to it.
 const STILL: Nanos = Nanos::from_millis(600);
 const STILL_PULSES: f64 = 4.0;
-/// Commands that wait; as many as may wait on the way here.
-const ORDERS_MAX: usize = 64;
-const OVERTAKEN: &str = "a stop came first, so it was not begun";
 
-/// How fast the link was when the stand was opened.
+/// Speed of the link, measured when the stand was opened.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
-    /// Between two questions.
+pub struct StandPace {
     pub every: Nanos,
     /// Whether the stand answers `p`.
     pub has_status: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
+enum StandQuestion {
     Sample,
     Status,
-    /// The speed as it was set, in tenths of mm/min.
-    Speed(i64),
-    /// A limit as it was set, in hundredths of mm.
-    Limit(i64),
+    /// A value that was set: its name, steps per unit (mm/min or mm), and the steps that were set.
+    Value {
+        what: &'static str,
+        per_unit: f64,
+        expected: i64,
+    },
 }
 
-/// A move that is being set up or made.
 #[derive(Clone, Copy, Debug)]
-struct Going {
+struct StandMove {
     command: MoveTo,
     /// In hundredths of mm of the stand's travel.
     target: i64,
@@ -74,36 +68,33 @@ struct Going {
 enum Motion {
     Rest,
     /// Speed, limit and letter that are still to be written.
-    Setting(Going, VecDeque<(String, Option<Asked>)>),
-    /// Let go, and not seen to move.
-    LetGo(Going, Nanos),
+    Setting(StandMove, VecDeque<(String, Option<StandQuestion>)>),
+    LetGo(StandMove, Nanos),
     /// Seen to move; the course began with that sample.
     Moving {
-        going: Going,
+        stand_move: StandMove,
         course: Profile,
         start_tick: u64,
         stopped_tick: Option<u64>,
     },
 }
 
-/// The dialogue.
 #[derive(Debug)]
 pub struct StandSession {
     settings: StandSettings,
     scale: GaugeScale,
-    pace: Pace,
+    pace: StandPace,
     opened: Nanos,
     lines: Lines,
     pair: Pair,
-    asked: Option<(Asked, Nanos)>,
-    /// Lines that came since.
+    question: Option<(StandQuestion, Nanos)>,
     lines_since: usize,
     next_sample: Nanos,
     status_at: Nanos,
     /// No question before this: a late answer may still be coming.
     quiet_until: Option<Nanos>,
     quiet: Nanos,
-    lost: u32,
+    lost_answers: u32,
     stop_due: bool,
     stopped_at: Option<Nanos>,
     /// Stops that the next answer confirms.
@@ -113,23 +104,21 @@ pub struct StandSession {
     status: Option<Status>,
     travel: i64,
     travel_changed: Nanos,
-    /// Pulses told at the stand's travel zero.
+    /// Reported pulses at the stand's travel zero.
     offset: i64,
-    /// Where it was commanded to rest.
     rests_at: Option<i64>,
     tick: Option<u64>,
-    /// Of the newest sample's time.
+    /// Uncertainty of the newest sample's time.
     uncertainty: Nanos,
     counts: i32,
     /// The newest reading was beyond the gauge's range.
     is_beyond: bool,
-    attended: Option<Nanos>,
+    attended_at: Option<Nanos>,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
 }
 
 impl StandSession {
-    /// With a stand that was set up just now.
     #[must_use]
     pub fn new(settings: StandSettings, connected: &ConnectedStand, now: Nanos) -> Self {
         let ConnectedStand { scale, pace, stats, .. } = *connected;
@@ -140,13 +129,13 @@ impl StandSession {
             opened: now,
             lines: Lines::default(),
             pair: Pair::default(),
-            asked: None,
+            question: None,
             lines_since: 0,
             next_sample: now,
             status_at: now,
             quiet_until: None,
             quiet: QUIET,
-            lost: 0,
+            lost_answers: 0,
             stop_due: false,
             stopped_at: None,
             unconfirmed: Vec::new(),
@@ -161,7 +150,7 @@ impl StandSession {
             uncertainty: Nanos::ZERO,
             counts: 0,
             is_beyond: false,
-            attended: None,
+            attended_at: None,
             events: VecDeque::new(),
             stats: LinkStats { in_flight: 1, ..stats },
         }
@@ -176,12 +165,10 @@ impl StandSession {
     }
 
     fn refuse(&mut self, now: Nanos, detail: impl Into<String>) {
-        let detail = detail.into();
-        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        self.report(now, RigEventBody::refusal(detail));
     }
 
-    /// Pulses as they are told, of a travel of the stand.
-    fn told(&self, travel: i64) -> i64 {
+    fn reported_pulses(&self, travel: i64) -> i64 {
         self.settings.pulses(travel) + self.offset
     }
 
@@ -192,17 +179,22 @@ impl StandSession {
             self.refuse(now, OVERTAKEN);
         }
         for order in waiting {
-            match order {
-                RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => self.refuse(now, OVERTAKEN),
-                other => self.simple(now, other),
-            }
+            self.finish_order(now, order, OVERTAKEN);
         }
         self.stop_due = true;
         self.unconfirmed.push(command);
     }
 
-    /// A command that is done here.
-    fn simple(&mut self, now: Nanos, command: RigCommand) {
+    /// Refuses a motion; does anything else.
+    fn finish_order(&mut self, now: Nanos, command: RigCommand, why: &str) {
+        if command.is_motion() {
+            self.refuse(now, why);
+        } else {
+            self.execute_now(now, command);
+        }
+    }
+
+    fn execute_now(&mut self, now: Nanos, command: RigCommand) {
         if let RigCommand::DefinePosition { pulses } = command {
             if !matches!(self.motion, Motion::Rest) || self.tick.is_none() {
                 return self.refuse(now, "the crosshead moves; a position is defined at rest");
@@ -215,10 +207,7 @@ impl StandSession {
 
     fn begin(&mut self, now: Nanos, command: RigCommand) {
         let RigCommand::MoveTo(to) = command else {
-            if matches!(command, RigCommand::Oscillate(_)) {
-                return self.refuse(now, "the stand moves straight only, not on a sine");
-            }
-            return self.simple(now, command);
+            return self.finish_order(now, command, "the stand moves straight only, not on a sine");
         };
         let target = self.settings.pulses(to.target_pulses - self.offset);
         let tenths = (to.speed.0 * 600.0).round() as i64;
@@ -233,14 +222,15 @@ impl StandSession {
                 ),
             );
         };
-        let going = Going { command: to, target, from: self.travel };
+        let stand_move = StandMove { command: to, target, from: self.travel };
         let letter = if is_upper { "u" } else { "d" };
+        let value = |what, per_unit, expected| StandQuestion::Value { what, per_unit, expected };
         let steps = VecDeque::from([
-            (format!("{speed}a"), Some(Asked::Speed(tenths))),
-            (format!("{limit}{}", ask_limit(is_upper)), Some(Asked::Limit(target))),
+            (format!("{speed}a"), Some(value("speed", 10.0, tenths))),
+            (format!("{limit}{}", ask_limit(is_upper)), Some(value("travel limit", 100.0, target))),
             (letter.to_owned(), None),
         ]);
-        self.motion = Motion::Setting(going, steps);
+        self.motion = Motion::Setting(stand_move, steps);
     }
 
     /// A crosshead whose travel grows moves; asking would only cost samples.
@@ -259,9 +249,13 @@ impl StandSession {
         matches!(self.motion, Motion::LetGo(..) | Motion::Moving { .. })
     }
 
-    /// Asks for an answer.
-    fn ask(&mut self, now: Nanos, text: impl Into<Vec<u8>>, asked: Asked) -> Option<Vec<u8>> {
-        self.asked = Some((asked, now));
+    fn ask(
+        &mut self,
+        now: Nanos,
+        text: impl Into<Vec<u8>>,
+        question: StandQuestion,
+    ) -> Option<Vec<u8>> {
+        self.question = Some((question, now));
         self.lines_since = 0;
         self.pair = Pair::default();
         Some(text.into())
@@ -282,7 +276,7 @@ fn pulses_of(position: Position) -> i64 {
 
 impl Dialogue for StandSession {
     fn attended(&mut self, at: Nanos) {
-        self.attended = Some(at);
+        self.attended_at = Some(at);
     }
 
     fn command(&mut self, now: Nanos, command: RigCommand) {
@@ -290,13 +284,9 @@ impl Dialogue for StandSession {
             return self.stop(now, command);
         }
         if self.orders.len() >= ORDERS_MAX {
-            return self.refuse(now, "too many commands at once");
+            return self.refuse(now, TOO_MANY_COMMANDS);
         }
         self.orders.push_back(command);
-    }
-
-    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
-        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
@@ -312,7 +302,7 @@ impl Dialogue for StandSession {
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
-        let is_unattended = self.attended.is_some_and(|at| now.since(at) > ATTENDED_MAX);
+        let is_unattended = self.attended_at.is_some_and(|at| now.since(at) > ATTENDED_MAX);
         let is_stopped = self.stopped_at.is_some();
         let is_again =
             self.stopped_at.is_some_and(|at| now.since(at) >= STOP_AGAIN && self.is_going());
@@ -322,7 +312,7 @@ impl Dialogue for StandSession {
         if !self.is_going() {
             self.stopped_at = None;
         }
-        if let Some((_, sent)) = self.asked {
+        if let Some((_, sent)) = self.question {
             if now.since(sent) <= ANSWER_MAX {
                 return None;
             }
@@ -335,7 +325,7 @@ impl Dialogue for StandSession {
             return None;
         }
         self.quiet_until = None;
-        // Before the first sample nobody knows which way a target is.
+        // Before the first sample the direction to a target is not known.
         if matches!(self.motion, Motion::Rest)
             && self.tick.is_some()
             && let Some(command) = self.orders.pop_front()
@@ -344,44 +334,39 @@ impl Dialogue for StandSession {
         } else if self.is_going()
             && let Some(command) = self.orders.pop_front()
         {
-            match command {
-                RigCommand::MoveTo(_) | RigCommand::Oscillate(_) => {
-                    self.refuse(now, "the crosshead still moves; stop it first");
-                }
-                other => self.simple(now, other),
-            }
+            self.finish_order(now, command, "the crosshead still moves; stop it first");
         }
-        if let Motion::Setting(going, steps) = &mut self.motion
-            && let Some((text, asked)) = steps.pop_front()
+        if let Motion::Setting(stand_move, steps) = &mut self.motion
+            && let Some((text, question)) = steps.pop_front()
         {
-            if let Some(asked) = asked {
-                return self.ask(now, text, asked);
+            if let Some(question) = question {
+                return self.ask(now, text, question);
             }
-            let going = *going;
-            self.motion = Motion::LetGo(going, now);
-            // What it said before the letter is old.
+            let stand_move = *stand_move;
+            self.motion = Motion::LetGo(stand_move, now);
+            // A state reported before the letter is old.
             self.status = None;
             self.stopped_at = None;
             self.travel_changed = now;
             self.next_sample = now;
             self.status_at = now;
-            self.acknowledge(now, RigCommand::MoveTo(going.command));
-            let is_there = going.target == going.from;
+            self.acknowledge(now, RigCommand::MoveTo(stand_move.command));
+            let is_there = stand_move.target == stand_move.from;
             return Some(if is_there { Vec::new() } else { text.into() });
         }
         if self.is_status_due(now) {
             self.status_at = now;
-            return self.ask(now, "p", Asked::Status);
+            return self.ask(now, "p", StandQuestion::Status);
         }
         if now >= self.next_sample {
             self.next_sample = now + self.pace.every;
-            return self.ask(now, "n", Asked::Sample);
+            return self.ask(now, "n", StandQuestion::Sample);
         }
         None
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
-        match self.asked {
+        match self.question {
             Some((_, sent)) => sent + ANSWER_MAX,
             None => self.next_sample.max(now),
         }
@@ -392,8 +377,8 @@ impl Dialogue for StandSession {
     }
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
-        (self.lost >= LOST_MAX && !self.stop_due).then(|| {
-            "the stand gives no sensible answers any more; it stops at its travel limit; check cable and power"
+        (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
+            "the stand no longer gives sensible answers; it stops at its travel limit; check cable and power"
                 .into()
         })
     }

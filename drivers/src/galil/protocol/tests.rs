@@ -3,22 +3,21 @@
 use super::*;
 use palpate_model::random::SplitMix;
 
-fn all(bytes: &[u8]) -> Vec<Incoming> {
-    let mut parser = Parser::default();
+fn all(bytes: &[u8]) -> Vec<GalilMessage> {
+    let mut parser = GalilParser::default();
     bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
 }
 
-fn reply(text: &str, is_accepted: bool) -> Incoming {
-    Incoming::Reply(Reply { is_accepted, bytes: text.into() })
+fn reply(text: &str, is_accepted: bool) -> GalilMessage {
+    GalilMessage::Reply(GalilReply { is_accepted, bytes: text.into() })
 }
 
-/// What a controller sent, and what it means.
 type Transcript = (&'static str, &'static [u8], &'static [(&'static str, bool)]);
 
 const TRANSCRIPTS: [Transcript; 25] = [
     // DMC-1700/1800 user manual, page 79: "the DMC-1700/1800 returns a : if the instruction was accepted".
     ("accepted", b":", &[("", true)]),
-    // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 tells why.
+    // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 gives the reason.
     (
         "refused, then TC1",
         b"?1 Unrecognized command\r\n:",
@@ -60,7 +59,7 @@ const TRANSCRIPTS: [Transcript; 25] = [
         b" 1.0000\r\n 2.0000\r\n\x1a:",
         &[(" 1.0000\r\n 2.0000", true)],
     ),
-    // DMC-1700/1800 user manual, page 80: TC and TC0 tell the number alone.
+    // DMC-1700/1800 user manual, page 80: TC and TC0 give the number alone.
     ("refused, then TC0", b"?1\r\n:", &[("", false), ("1", true)]),
     // TC1 of a limit switch (DMC-40x0 command reference, `TC`).
     (
@@ -91,7 +90,7 @@ const TRANSCRIPTS: [Transcript; 25] = [
         b" 1.0000 2.0000 3.0000\r\n:",
         &[(" 1.0000 2.0000 3.0000", true)],
     ),
-    // `GalilController.cpp` of EPICS: WH tells the handle, or the serial port.
+    // `GalilController.cpp` of EPICS: WH gives the handle, or the serial port.
     ("WH, network", b"IHA\r\n:", &[("IHA", true)]),
     ("WH, serial", b"RS232\r\n:", &[("RS232", true)]),
     // The same: TH, one line for each handle.
@@ -105,8 +104,8 @@ const TRANSCRIPTS: [Transcript; 25] = [
     ),
     // The same: what begins with a limit's operand reads 1 while the switch is open.
     ("MG _LFA", b" 1.0000\r\n:", &[(" 1.0000", true)]),
-    // `GalilConnector.cpp` of EPICS: a download gives a prompt for `\` and one for `DL`, and a `?` before them for every
-    // line that is refused.
+    // `GalilConnector.cpp` of EPICS: a download gives a prompt for `\` and one for `DL`, and a `?` before them for
+    // every line that is refused.
     ("DL", b"::", &[("", true), ("", true)]),
     (
         "DL with a wrong line",
@@ -124,29 +123,29 @@ const TRANSCRIPTS: [Transcript; 25] = [
 /// What the driver writes while it records, byte for byte: DMC-1700/1800 user manual, page 159, gives the arguments.
 #[test]
 fn a_record_question_and_its_answer_belong_together() {
-    use crate::galil::recording::{Look, question};
+    use crate::galil::recording::{RecordingStatus, question};
     use crate::galil::settings::tests::thesis;
     let text = question(&thesis());
     assert_eq!(text, "MG @AN[1]{F2.4},_TDA,_RPA,_TSA,_SCA,_RD,TIME");
     // With a stop before it, it still is a line.
     assert!(format!("STA;{text}\r").len() <= LINE_MAX);
     let answer = all(b" 0.3051 120 121 143 0 17 5000\r\n:");
-    let [Incoming::Reply(reply)] = answer.as_slice() else {
+    let [GalilMessage::Reply(reply)] = answer.as_slice() else {
         panic!("{answer:?}");
     };
-    let look = Look::read(&reply.numbers().unwrap()).unwrap();
-    assert_eq!((look.time, look.next), (5000, 17));
-    assert_eq!(look.poll, [0.3051, 120.0, 121.0, 143.0, 0.0, 5000.0]);
+    let status = RecordingStatus::read(&reply.numbers().unwrap()).unwrap();
+    assert_eq!((status.time, status.next), (5000, 17));
+    assert_eq!(status.poll, [0.3051, 120.0, 121.0, 143.0, 0.0, 5000.0]);
 }
 
 #[test]
 fn transcripts_are_understood_split_at_every_byte() {
     for (name, bytes, meaning) in TRANSCRIPTS {
-        let expected: Vec<Incoming> = meaning.iter().map(|(t, ok)| reply(t, *ok)).collect();
+        let expected: Vec<GalilMessage> = meaning.iter().map(|(t, ok)| reply(t, *ok)).collect();
         for at in 0..=bytes.len() {
-            let mut parser = Parser::default();
+            let mut parser = GalilParser::default();
             let (first, second) = bytes.split_at(at);
-            let mut got: Vec<Incoming> = first.iter().filter_map(|b| parser.take(*b)).collect();
+            let mut got: Vec<GalilMessage> = first.iter().filter_map(|b| parser.take(*b)).collect();
             got.extend(second.iter().filter_map(|b| parser.take(*b)));
             assert_eq!(got, expected, "{name}, split at {at}");
         }
@@ -154,12 +153,15 @@ fn transcripts_are_understood_split_at_every_byte() {
 }
 
 #[test]
-fn text_nobody_asked_for_is_told_apart_byte_by_byte() {
+fn unsolicited_text_is_separated_byte_by_byte() {
     // DMC-41x3 user manual, page 45: with CW 1 the top bit of unsolicited characters is set.
     let marked = |text: &str| text.bytes().map(|byte| byte | 0x80).collect::<Vec<u8>>();
     let bytes =
         [&b" 1.00"[..], &marked("?55 i=v"), &b"00\r"[..], &marked("ar\r\n"), &b"\n:"[..]].concat();
-    assert_eq!(all(&bytes), [Incoming::Unasked("?55 i=var".into()), reply(" 1.0000", true)]);
+    assert_eq!(
+        all(&bytes),
+        [GalilMessage::Unsolicited("?55 i=var".into()), reply(" 1.0000", true)]
+    );
 }
 
 #[test]
@@ -186,26 +188,26 @@ fn numbers_are_read_as_any_firmware_writes_them() {
 #[test]
 fn lines_hold_eighty_characters() {
     let commands: Vec<String> = (0..40).map(|i| format!("SPA={i}")).collect();
-    let lines = packed(&commands);
+    let lines = pack_lines(&commands);
     assert!(lines.len() > 1 && lines.iter().all(|line| line.len() <= LINE_MAX));
     let joined: Vec<&str> = lines.iter().flat_map(|line| line.trim_end().split(';')).collect();
     assert_eq!(joined, commands);
-    let one = packed(&["BGA".into(), "MG _BGA".into()]);
+    let one = pack_lines(&["BGA".into(), "MG _BGA".into()]);
     assert_eq!(one, ["BGA;MG _BGA\r"]);
 }
 
 #[test]
-fn a_refusal_tells_what_to_do() {
-    let err = error_of(&Reply {
+fn refusal_has_a_remedy() {
+    let err = parse_error(&GalilReply {
         is_accepted: true,
         bytes: b"22 Begin not possible due to Limit Switch".to_vec(),
     })
     .unwrap();
     assert_eq!(err.code, 22);
     assert!(err.to_string().contains("move the other way"), "{err}");
-    let number = error_of(&Reply { is_accepted: true, bytes: b" 6".to_vec() });
+    let number = parse_error(&GalilReply { is_accepted: true, bytes: b" 6".to_vec() });
     assert_eq!(number.map(|err| err.code), Some(6));
-    assert_eq!(error_of(&Reply { is_accepted: true, bytes: b"what".to_vec() }), None);
+    assert_eq!(parse_error(&GalilReply { is_accepted: true, bytes: b"what".to_vec() }), None);
 }
 
 #[test]
@@ -214,42 +216,42 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
     let streams = streams.and_then(|text| text.parse().ok()).unwrap_or(2_000);
     let mut random = SplitMix::seeded(7);
     for _ in 0..streams {
-        let mut parser = Parser::default();
+        let mut parser = GalilParser::default();
         let length = 1 + random.below(300);
         let bytes: Vec<u8> = (0..length).map(|_| random.below(256) as u8).collect();
         let mut whole = parser.clone();
-        let got: Vec<Incoming> = bytes.iter().filter_map(|b| whole.take(*b)).collect();
+        let got: Vec<GalilMessage> = bytes.iter().filter_map(|b| whole.take(*b)).collect();
         // Any split gives the same.
         let cut = random.below(length);
-        let mut parts: Vec<Incoming> =
+        let mut parts: Vec<GalilMessage> =
             bytes[..cut].iter().filter_map(|b| parser.take(*b)).collect();
         parts.extend(bytes[cut..].iter().filter_map(|b| parser.take(*b)));
         assert_eq!(got, parts);
         for incoming in got {
-            if let Incoming::Reply(reply) = incoming {
+            if let GalilMessage::Reply(reply) = incoming {
                 let numbers = reply.numbers().unwrap_or_default();
                 assert!(numbers.iter().all(|number| number.is_finite()));
-                let _ = (reply.text(), error_of(&reply));
+                let _ = (reply.text(), parse_error(&reply));
             }
         }
     }
-    let mut parser = Parser::default();
+    let mut parser = GalilParser::default();
     let mut floods = 0;
     for byte in std::iter::repeat_n(b'x', 3 * REPLY_MAX) {
-        floods += usize::from(parser.take(byte) == Some(Incoming::Flood));
-        assert!(parser.pending() <= REPLY_MAX);
+        floods += usize::from(parser.take(byte) == Some(GalilMessage::Flood));
+        assert!(parser.reply.len() <= REPLY_MAX);
     }
     assert_eq!(floods, 2);
     for byte in std::iter::repeat_n(b'x' | 0x80, 3 * REPLY_MAX) {
         assert_eq!(parser.take(byte), None);
     }
-    assert!(parser.unasked.len() <= UNASKED_MAX);
+    assert!(parser.unsolicited.len() <= UNSOLICITED_MAX);
 }
 
 #[test]
-fn a_signal_with_a_digit_lost_is_none() {
+fn signal_with_a_lost_digit_is_refused() {
     let is_whole = |text: &str| {
-        let reply = Reply { is_accepted: true, bytes: text.into() };
+        let reply = GalilReply { is_accepted: true, bytes: text.into() };
         reply.begins_with_volts()
     };
     for whole in [" 0.3050 120 120", "-0.3050-120", "10.0000,1", " 00.3050 1", "\r\n 1.2345"] {

@@ -8,7 +8,7 @@ fn all(bytes: &[u8]) -> Vec<Incoming> {
     bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
 }
 
-fn status(text: &str) -> Status {
+fn status(text: &str) -> GrblStatus {
     let Some(Incoming::Status(status)) = all(text.as_bytes()).pop() else {
         panic!("{text}");
     };
@@ -29,8 +29,8 @@ fn meaning() -> Vec<Incoming> {
         message("VER:v1.1d.20161014:Some string"),
         message("OPT:VL"),
         Incoming::Ok,
-        Incoming::Refused(Refusal::parse("9")),
-        Incoming::Alarm(Alarm::parse("1")),
+        Incoming::Refused(GrblCode::parse(false, "9")),
+        Incoming::Alarm(GrblCode::parse(true, "1")),
         message("MSG:Reset to continue"),
         Incoming::Setting(0, 10.0),
         Incoming::Setting(11, 0.01),
@@ -39,21 +39,19 @@ fn meaning() -> Vec<Incoming> {
         Incoming::Other(">G54G20:ok".into()),
         Incoming::Other("$N0=G54".into()),
         message("PRB:0.000,0.000,0.000:0"),
-        Incoming::Status(Status {
-            state: State::Hold(true),
+        Incoming::Status(GrblStatus {
+            state: GrblState::Hold(true),
             machine: Some(vec![0.0, -10.0, 5.0]),
             work: None,
-            offset: None,
             pins: "XP".into(),
-            free: None,
         }),
     ]
 }
 
 #[test]
-fn the_welcome_of_grblhal_is_one() {
-    let said = all(b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n");
-    assert_eq!(said, [Incoming::Hello("1.1f".into())]);
+fn welcome_of_grblhal_is_recognised() {
+    let lines = all(b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n");
+    assert_eq!(lines, [Incoming::Hello("1.1f".into())]);
 }
 
 #[test]
@@ -74,12 +72,10 @@ fn status_reports_have_fields_in_any_order() {
     let full = status(
         "<Jog|WPos:-2.500,0.000,11.000|Ov:100,100,100|WCO:0.000,1.551,5.664|Bf:15,128|F:500>\n",
     );
-    assert_eq!(full.state, State::Jog);
+    assert_eq!(full.state, GrblState::Jog);
     assert_eq!(full.work, Some(vec![-2.5, 0.0, 11.0]));
-    assert_eq!(full.offset, Some(vec![0.0, 1.551, 5.664]));
-    assert_eq!(full.free, Some((15, 128)));
     assert!(!full.has_pin('X'));
-    assert_eq!(status("<Hold:1|MPos:1,2,3,4|New>\r\n").state, State::Hold(false));
+    assert_eq!(status("<Hold:1|MPos:1,2,3,4|New>\r\n").state, GrblState::Hold(false));
     for bad in
         ["<Idle>", "<|MPos:0,0,0>", "<Idle|MPos:0,x,0>", "<Idle|MPos:0,nan,0>", "<Idle|MPos:0,0,0"]
     {
@@ -89,7 +85,7 @@ fn status_reports_have_fields_in_any_order() {
 }
 
 #[test]
-fn older_forms_are_read() {
+fn lines_of_older_firmware_are_read() {
     let got =
         all(b"error: Bad number format\r\n$100=250.000 (x, step/mm)\r\nALARM: Hard limit\r\n");
     assert!(

@@ -1,6 +1,6 @@
 //! Keeps a board at the host's pace. Grbl makes its steps by a clock of its own; that of an Arduino with a resonator is
-//! off by half a percent, in a ramp of 80 s by 0.4 s: more than the jogs that are sent ahead last. So feeds are told
-//! that much higher or lower, by what status reports say of the way done.
+//! off by half a percent, in a ramp of 80 s by 0.4 s: more than the jogs that are sent ahead last. So feeds are sent
+//! that much higher or lower, according to the way in status reports.
 
 use palpate_model::Nanos;
 
@@ -11,49 +11,45 @@ const GRAIN: f64 = 0.005;
 /// Share of what a motion is ahead by that is made good in a second. Jogs are sent up to 0.4 s ahead: two seconds are
 /// slow enough not to overshoot.
 const GAIN: f64 = 0.5;
-/// Of what it is ahead by over a second, the share that is laid to the clock: an eighth of the gain's square is smooth.
+/// Share of a second's lead that is attributed to the clock: an eighth of the gain's square is smooth.
 const DRIFT_GAIN: f64 = GAIN * GAIN / 8.0;
 /// Resonators are right to half a percent (Murata Ceralock, CSTCE series); what seems more is something else.
 const DRIFT_MAX: f64 = 0.01;
-/// The most by which a feed is changed.
 const CHANGE_MAX: f64 = 0.02;
-/// Reports that are further apart tell of a pause of the computer.
+/// Reports that are further apart come from a pause of the computer.
 const APART_MAX: f64 = 0.5;
 
-/// What is known of the board's clock.
+/// Rate and lead of the board's clock.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pace {
-    /// By how much it is too fast.
+pub struct FeedCorrection {
     drift: f64,
-    /// By how many s the motion under way is ahead of its profile, of late.
+    /// Lead of the motion under way over its profile, in s.
     ahead: f64,
-    told: Option<Nanos>,
+    last_report: Option<Nanos>,
 }
 
-impl Pace {
-    /// A motion begins.
+impl FeedCorrection {
     pub fn begin(&mut self) {
-        (self.ahead, self.told) = (0.0, None);
+        (self.ahead, self.last_report) = (0.0, None);
     }
 
     /// A report, asked for and answered at these times: the axis is ahead of its profile by so many s, as far as steps
-    /// of so many s can tell.
-    pub fn told(&mut self, asked: Nanos, now: Nanos, ahead: f64, step: f64) {
-        if now.since(asked) > LATE_MAX {
+    /// of so many s can show.
+    pub fn update(&mut self, queried_at: Nanos, now: Nanos, ahead: f64, step: f64) {
+        if now.since(queried_at) > LATE_MAX {
             return;
         }
         let passed = self
-            .told
-            .replace(asked)
-            .map_or(0.0, |last| (asked.since(last).0 as f64 * 1e-9).min(APART_MAX));
-        // Of coarse steps less is believed, by the share of the variance that is not theirs.
+            .last_report
+            .replace(queried_at)
+            .map_or(0.0, |last| (queried_at.since(last).0 as f64 * 1e-9).min(APART_MAX));
+        // The coarser the steps, the less the report counts: by the share of the variance that is not theirs.
         let trust = GRAIN * GRAIN / (GRAIN * GRAIN + step * step / 12.0);
         self.ahead = trust * ahead;
         let drift = self.drift + DRIFT_GAIN * self.ahead * passed;
         self.drift = drift.clamp(-DRIFT_MAX, DRIFT_MAX);
     }
 
-    /// What a feed is to be multiplied with.
     pub fn feed(&self) -> f64 {
         1.0 - (self.drift + GAIN * self.ahead).clamp(-CHANGE_MAX, CHANGE_MAX)
     }
@@ -68,14 +64,14 @@ mod tests {
     fn a_clock_that_is_off_is_found_within_one_ramp_and_kept() {
         for fast in [0.995, 1.0, 1.005] {
             let mut random = SplitMix::seeded(7);
-            let mut pace = Pace::default();
+            let mut pace = FeedCorrection::default();
             for (motion, worst) in [0.030, 0.008].into_iter().enumerate() {
                 pace.begin();
                 // The start is known to 20 ms; jogs take effect 0.4 s after they were sent.
                 let mut ahead = 0.005;
                 let mut sent = [pace.feed(); 4];
                 for tenth in 0..800_u64 {
-                    let asked = Nanos::from_millis(100 * (tenth + 1));
+                    let queried_at = Nanos::from_millis(100 * (tenth + 1));
                     sent.rotate_left(1);
                     sent[3] = pace.feed();
                     ahead += (fast * sent[0] - 1.0) * 0.1;
@@ -84,7 +80,12 @@ mod tests {
                         "{fast}, motion {motion}: {ahead} s after {tenth}"
                     );
                     let noise = 0.002 * random.normal();
-                    pace.told(asked, asked + Nanos::from_millis(6), ahead + noise, 0.0033);
+                    pace.update(
+                        queried_at,
+                        queried_at + Nanos::from_millis(6),
+                        ahead + noise,
+                        0.0033,
+                    );
                 }
                 assert!(ahead.abs() < 0.004, "{fast}: {ahead}");
             }
@@ -94,13 +95,13 @@ mod tests {
 
     #[test]
     fn late_answers_and_wild_reports_move_little() {
-        let mut pace = Pace::default();
+        let mut pace = FeedCorrection::default();
         pace.begin();
         let ms = Nanos::from_millis;
-        pace.told(ms(100), ms(300), 0.1, 0.003);
+        pace.update(ms(100), ms(300), 0.1, 0.003);
         assert_eq!(pace.feed(), 1.0);
         for at in 1..100 {
-            pace.told(ms(100 * at), ms(100 * at + 5), 1.0, 0.003);
+            pace.update(ms(100 * at), ms(100 * at + 5), 1.0, 0.003);
         }
         assert!((pace.feed() - (1.0 - CHANGE_MAX)).abs() < 1e-12);
         pace.begin();

@@ -9,21 +9,20 @@ fn cell(keys: &str) -> PlainNumbers {
 }
 
 /// After the line that was under way when it was opened.
-fn numbers(keys: &str, decimals: u8) -> LineCell<Numbers> {
+fn numbers(keys: &str, decimals: u8) -> LineCell<PlainNumberReader> {
     let cell = cell(keys);
     let step = 10_f64.powi(-i32::from(decimals));
-    let numbers = Numbers {
+    let numbers = PlainNumberReader {
         decimals,
         counts_max: (cell.full_scale / step).round() as i32,
         per_count: step * cell.volts_per_unit(),
         clock: BoardClock::new(cell.nanos_per_tick.unwrap_or(1)),
-        silence_max: SILENCE_MIN,
+        silence_max: silence_max(1e3),
         is_begun: false,
-        is_beyond: false,
         cell,
     };
-    let mut line = LineCell::on(numbers, Nanos::ZERO);
-    // Half of a line is a number too, and nobody's.
+    let mut line = LineCell::start(numbers, Nanos::ZERO);
+    // Half of a line may be a number too.
     line.received(Nanos::ZERO, b"99\r\n");
     assert_eq!((line.take_sample(), line.garbled()), (None, 0));
     line
@@ -110,12 +109,12 @@ fn times_of_the_board_neither_wrap_nor_go_back() {
     }
     // It counts from the beginning: that is no wrap of 49 days.
     line.received(ms(2_000), b"1,3\r\n");
-    assert!(line.take_trouble().unwrap().contains("started anew"));
+    assert!(line.take_trouble().unwrap().contains("restarted"));
     assert!(line.take_sample().unwrap().device_time.unwrap() > times[1]);
 }
 
 #[test]
-fn end_of_the_range_is_told_once_and_silence_ends_it() {
+fn end_of_the_range_is_reported_once_and_silence_ends_it() {
     let mut line = numbers("unit = \"N\"\nfull_scale = 25\n", 2);
     let ms = Nanos::from_millis;
     line.received(ms(1), b"24.99\r\n25.00\r\n-25.01\r\n1.00\r\n");
@@ -130,23 +129,23 @@ fn end_of_the_range_is_told_once_and_silence_ends_it() {
 }
 
 #[test]
-fn mistakes_in_the_rig_file_are_told() {
-    let told = |keys: &str| {
+fn mistakes_in_the_rig_file_are_reported() {
+    let found = |keys: &str| {
         let mut fields = Fields::read(&format!("[cell]\n{keys}")).unwrap();
         assert_eq!(PlainNumbers::read(&mut fields), None, "{keys}");
         let mistakes = fields.finish();
         mistakes.iter().map(|it| it.message.clone()).collect::<Vec<_>>().join("; ")
     };
-    assert!(told("full_scale = 1\n").contains("cell.unit"));
-    assert!(told("unit = \"N\"\n").contains("cell.full_scale"));
-    let volts = told("unit = \"N\"\nfull_scale = 25\nfull_scale_v = 5\n");
-    assert!(volts.contains("only counts"), "{volts}");
-    assert!(told("unit = \"N\"\nfull_scale = 25\ntime_column = \"s\"\n").contains("\"us\""));
+    assert!(found("full_scale = 1\n").contains("cell.unit"));
+    assert!(found("unit = \"N\"\n").contains("cell.full_scale"));
+    let volts = found("unit = \"N\"\nfull_scale = 25\nfull_scale_v = 5\n");
+    assert!(volts.contains("counts only"), "{volts}");
+    assert!(found("unit = \"N\"\nfull_scale = 25\ntime_column = \"s\"\n").contains("\"us\""));
 }
 
 #[test]
 fn lines_of_numbers_give_it_away_and_one_number_does_not() {
-    let of = |lines: &[&str]| DeviceKind::of_lines(lines).map(|(kind, _)| kind.word);
+    let of = |lines: &[&str]| DeviceKind::recognise_lines(lines).map(|(kind, _)| kind.word);
     assert_eq!(of(&["345", "12345", "12344"]), Some("plain-numbers"));
     assert_eq!(of(&["345", "12345"]), None);
     assert_eq!(of(&["1", "2", "ok"]), None);

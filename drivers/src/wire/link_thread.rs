@@ -1,9 +1,9 @@
 //! The thread that owns a link, and the handle by which a rig talks to it.
 
-use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
-use super::halt::{HaltHandle, Standing, farewell_said, owns_link};
+use super::halt::{HaltHandle, StopCounters, mark_link_owner, run_deferred_work};
 use super::link::Link;
+use super::{HostClock, lock};
 use crate::device::OpenError;
 use crate::priority::{self, Granted};
 use crate::rig::{RigEvent, RigEventBody};
@@ -12,7 +12,7 @@ use palpate_model::rig::{Age, Fault, RawBytes, RigCommand};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -25,27 +25,18 @@ const COMMANDS_MAX: usize = 64;
 const REPORTS_MAX: usize = 16_384;
 /// Bytes of the raw tap that may wait, in pieces.
 const PIECES_MAX: usize = 65_536;
-/// So much of what a device sends is read at once.
+/// Longest read, in bytes.
 const CHUNK: usize = 4096;
 
-/// What a line is called and when it is closed.
-#[derive(Clone, Debug)]
-pub struct LineSettings {
-    /// The device's name in the log of raw bytes, such as `controller`; the thread is called so too.
-    pub device: Arc<str>,
-    /// Bytes written when the line is closed, such as a stop.
-    pub farewell: Vec<u8>,
-}
-
 /// A command with the number of stops that were sent before it.
-pub(super) type Numbered = (u64, RigCommand);
+pub(super) type NumberedCommand = (u64, RigCommand);
 
 #[derive(Default)]
 struct Reports {
     events: VecDeque<RigEvent>,
     raw: Vec<RawBytes>,
     stats: LinkStats,
-    /// Somebody has asked for reports since the thread looked.
+    /// Reports were asked for since the thread looked.
     is_attended: bool,
     is_over: bool,
 }
@@ -70,26 +61,28 @@ impl Reports {
 
 type Shared = Arc<(Mutex<Reports>, Condvar)>;
 
-/// A dialogue on a link, in a thread of its own. Dropped it says farewell and closes the link.
-pub struct Line {
+/// A dialogue on a link, in a thread of its own. Dropping it writes the farewell and closes the link.
+pub struct LinkThread {
     device: Arc<str>,
-    /// Stops: looked at before anything that waits.
-    stops: SyncSender<Numbered>,
-    commands: SyncSender<Numbered>,
-    /// Stops sent and stops written, shared with those who may have to send one when nobody else can.
-    standing: Arc<Standing>,
+    /// Taken before commands that wait.
+    stops: SyncSender<NumberedCommand>,
+    commands: SyncSender<NumberedCommand>,
+    /// Stops sent and stops written, shared with halt handles.
+    counters: Arc<StopCounters>,
     reports: Shared,
     is_closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Line {
-    /// Starts the thread.
+impl LinkThread {
+    /// `device` is the name of the device in the log of raw bytes and of the thread; `farewell` is written when the
+    /// link is closed, such as a stop.
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,
         clock: &HostClock,
-        settings: LineSettings,
+        device: Arc<str>,
+        farewell: Vec<u8>,
     ) -> Result<Self, OpenError> {
         let (stops, urgent) = sync_channel(COMMANDS_MAX);
         let (commands, queued) = sync_channel(COMMANDS_MAX);
@@ -102,18 +95,18 @@ impl Line {
             Condvar::new(),
         ));
         let is_closing = Arc::new(AtomicBool::new(false));
-        let device = Arc::clone(&settings.device);
-        let standing = Arc::new(Standing::default());
-        let mut owner = Owner {
+        let counters = Arc::new(StopCounters::default());
+        let mut owner = LinkOwner {
             link,
             dialogue,
             clock: Arc::clone(clock),
-            settings,
+            device: Arc::clone(&device),
+            farewell,
             urgent,
             queued,
             arrived: VecDeque::new(),
             is_real_time: false,
-            standing: Arc::clone(&standing),
+            counters: Arc::clone(&counters),
             stops_taken: 0,
             events: Vec::new(),
             raw: Vec::new(),
@@ -123,47 +116,46 @@ impl Line {
         let thread = std::thread::Builder::new()
             .name(device.to_string())
             .spawn(move || {
-                owns_link();
-                let _in = tracing::info_span!("device", name = &*owner.settings.device).entered();
+                mark_link_owner();
+                let _in = tracing::info_span!("device", name = &*owner.device).entered();
                 tracing::info!("connected");
                 owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
                 owner.run(&closing);
             })
-            .map_err(|err| OpenError::thread(&err))?;
-        Ok(Self { device, stops, commands, standing, reports, is_closing, thread: Some(thread) })
+            .map_err(|err| OpenError::Thread(err.to_string()))?;
+        Ok(Self { device, stops, commands, counters, reports, is_closing, thread: Some(thread) })
     }
 
-    /// What the device is called in the log of raw bytes.
+    /// The device's name in the log of raw bytes.
     pub fn device(&self) -> &str {
         &self.device
     }
 
     /// Hands over a command without waiting. One that finds no room is given back.
     pub fn send(&mut self, command: RigCommand) -> Result<(), RigCommand> {
-        let (way, number) = if command.is_stopping() {
-            let before = self.standing.sent.fetch_add(1, Ordering::AcqRel);
+        let (queue, number) = if command.is_stopping() {
+            let before = self.counters.sent.fetch_add(1, Ordering::AcqRel);
             (&self.stops, before + 1)
         } else {
-            (&self.commands, self.standing.sent.load(Ordering::Acquire))
+            (&self.commands, self.counters.sent.load(Ordering::Acquire))
         };
-        way.try_send((number, command)).map_err(|err| {
-            let (TrySendError::Full((_, command)) | TrySendError::Disconnected((_, command))) = err;
-            command
-        })
+        queue.try_send((number, command)).map_err(|_| command)
     }
 
-    /// What sends the immediate stop when the rig's owner cannot any more.
+    /// Sends the immediate stop when the owner of the rig no longer can.
     pub fn halt_handle(&self) -> Option<HaltHandle> {
-        let thread = self.thread.as_ref()?.thread().id();
-        Some(HaltHandle::new(self.stops.clone(), Arc::clone(&self.standing), thread))
+        Some(HaltHandle {
+            stops: self.stops.clone(),
+            counters: Arc::clone(&self.counters),
+            owner: self.thread.as_ref()?.thread().id(),
+        })
     }
 
     /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
     pub fn next_event(&self, until: Nanos, wait: Duration) -> Option<RigEvent> {
-        let (reports, came) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reports = lock(&self.reports.0);
         reports.is_attended = true;
-        let (mut reports, _) = came
+        let (mut reports, _) = (self.reports.1)
             .wait_timeout_while(reports, wait, |reports| {
                 reports.events.is_empty() && !reports.is_over
             })
@@ -174,23 +166,16 @@ impl Line {
         reports.events.pop_front()
     }
 
-    /// The bytes exchanged since this was last asked.
+    /// The bytes exchanged since the last call.
     pub fn take_raw(&self) -> Vec<RawBytes> {
-        let (reports, _) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
-        std::mem::take(&mut reports.raw)
+        std::mem::take(&mut lock(&self.reports.0).raw)
     }
 
-    /// How the link behaves.
     pub fn stats(&self) -> LinkStats {
-        let (reports, _) = &*self.reports;
-        let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
-        reports.stats
+        lock(&self.reports.0).stats
     }
-}
 
-impl Line {
-    /// Says farewell, closes the link and gives the bytes that nobody has taken.
+    /// Writes the farewell, closes the link and returns the bytes that were not taken.
     #[must_use]
     pub fn close(mut self) -> Vec<RawBytes> {
         self.end();
@@ -206,53 +191,50 @@ impl Line {
     }
 }
 
-impl Drop for Line {
+impl Drop for LinkThread {
     fn drop(&mut self) {
         self.end();
     }
 }
 
 /// The thread's side.
-struct Owner<D> {
+struct LinkOwner<D> {
     link: Box<dyn Link>,
     dialogue: D,
     clock: HostClock,
-    settings: LineSettings,
-    urgent: Receiver<Numbered>,
-    queued: Receiver<Numbered>,
+    device: Arc<str>,
+    farewell: Vec<u8>,
+    urgent: Receiver<NumberedCommand>,
+    queued: Receiver<NumberedCommand>,
     /// Taken out of `queued`, not looked at.
-    arrived: VecDeque<Numbered>,
+    arrived: VecDeque<NumberedCommand>,
     is_real_time: bool,
-    standing: Arc<Standing>,
+    counters: Arc<StopCounters>,
     /// The number of the newest stop that the dialogue has.
     stops_taken: u64,
-    /// To be handed over.
     events: Vec<RigEvent>,
-    /// The same of bytes.
     raw: Vec<RawBytes>,
     reports: Shared,
 }
 
-impl<D> Drop for Owner<D> {
-    /// However the thread ends, nobody waits for it. If it panics the farewell stops what moves, since nobody else has
-    /// the link; what was to be said of the panic is said after that.
+impl<D> Drop for LinkOwner<D> {
+    /// However the thread ends, no caller waits for it in vain. If it panics, the farewell stops what moves, since no
+    /// other thread has the link; the work that was deferred is done after that.
     fn drop(&mut self) {
         if std::thread::panicking() {
-            let _ = self.link.write(&self.settings.farewell);
-            farewell_said();
-            let failed = lost("the driver has failed; open the rig again");
+            let _ = self.link.write(&self.farewell);
+            run_deferred_work();
+            let failed = link_lost("the driver has failed; open the rig again");
             self.events.push(RigEvent::new((self.clock)(), failed));
         }
-        let (reports, came) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reports = lock(&self.reports.0);
         reports.take(&mut self.events, &mut self.raw);
         reports.is_over = true;
-        came.notify_all();
+        self.reports.1.notify_all();
     }
 }
 
-/// Why a link failed.
-fn in_words(err: &io::Error) -> String {
+fn describe_error(err: &io::Error) -> String {
     match err.kind() {
         io::ErrorKind::BrokenPipe
         | io::ErrorKind::UnexpectedEof
@@ -264,38 +246,37 @@ fn in_words(err: &io::Error) -> String {
     }
 }
 
-fn lost(detail: impl Into<String>) -> RigEventBody {
+fn link_lost(detail: impl Into<String>) -> RigEventBody {
     RigEventBody::Fault(Fault::LinkLost { detail: detail.into() })
 }
 
-impl<D: Dialogue> Owner<D> {
+impl<D: Dialogue> LinkOwner<D> {
     fn run(&mut self, is_closing: &AtomicBool) {
         let ending = loop {
             if is_closing.load(Ordering::Relaxed) {
-                let farewell = self.settings.farewell.clone();
-                // Nobody is left who could be told.
+                let farewell = self.farewell.clone();
+                // The link may be gone already; then nothing can be written.
                 let _ = self.write(farewell);
                 tracing::info!("closed");
                 return;
             }
             if let Err(err) = self.turn() {
-                break in_words(&err);
+                break describe_error(&err);
             }
             if let Some(why) = self.dialogue.is_dead((self.clock)()) {
                 break why;
             }
         };
         tracing::warn!("link lost: {ending}");
-        self.events.push(RigEvent::new((self.clock)(), lost(ending)));
+        self.events.push(RigEvent::new((self.clock)(), link_lost(ending)));
     }
 
-    /// Commands, lines, bytes: once.
     fn turn(&mut self) -> io::Result<()> {
         self.take_stops();
         self.arrived.extend(self.queued.try_iter());
         while let Some((_, command)) = self.arrived.pop_front() {
             self.dialogue.command((self.clock)(), command);
-            // A stop may have come while this was looked at.
+            // A stop may have come meanwhile.
             self.take_stops();
         }
         loop {
@@ -305,7 +286,7 @@ impl<D: Dialogue> Owner<D> {
             };
             self.write(line)?;
         }
-        self.standing.written.store(self.stops_taken, Ordering::Release);
+        self.counters.written.store(self.stops_taken, Ordering::Release);
         let now = (self.clock)();
         let wait = self.dialogue.next_at(now).since(now).min(READ_MAX);
         let mut buffer = [0_u8; CHUNK];
@@ -325,7 +306,7 @@ impl<D: Dialogue> Owner<D> {
         Ok(())
     }
 
-    /// How long before a time of the host a sample of the device was taken.
+    /// Age of a sample of the device at a time of the host.
     fn age(&self, at: Nanos, tick: u64) -> Option<Age> {
         Some(Age {
             by: at.since(self.dialogue.host_time(tick)?),
@@ -335,7 +316,7 @@ impl<D: Dialogue> Owner<D> {
 
     fn take_stops(&mut self) {
         while let Ok((number, stop)) = self.urgent.try_recv() {
-            // What was sent before it is in the queue by now, or was there.
+            // Commands sent before it are in the queue by now.
             self.arrived.extend(self.queued.try_iter());
             while let Some((_, command)) = self.arrived.pop_front_if(|(stops, _)| *stops < number) {
                 self.dialogue.overtaken((self.clock)(), command);
@@ -355,13 +336,13 @@ impl<D: Dialogue> Owner<D> {
     }
 
     fn tap(&mut self, at: Nanos, is_sent: bool, bytes: Vec<u8>) {
-        self.raw.push(RawBytes { at, device: Arc::clone(&self.settings.device), is_sent, bytes });
+        self.raw.push(RawBytes { at, device: Arc::clone(&self.device), is_sent, bytes });
     }
 
-    /// Hands over what there is, unless somebody reads at this moment: who is to write a stop waits for no reader.
+    /// Hands over events and bytes, unless they are being read at this moment: the thread that writes stops never
+    /// waits for a reader.
     fn report(&mut self) {
-        let (reports, came) = &*self.reports;
-        let mut reports = match reports.try_lock() {
+        let mut reports = match self.reports.0.try_lock() {
             Ok(reports) => reports,
             Err(TryLockError::Poisoned(err)) => err.into_inner(),
             Err(TryLockError::WouldBlock) => return,
@@ -370,15 +351,14 @@ impl<D: Dialogue> Owner<D> {
         if std::mem::take(&mut reports.is_attended) {
             self.dialogue.attended((self.clock)());
         }
-        let is_news = !self.events.is_empty();
+        let has_events = !self.events.is_empty();
         reports.take(&mut self.events, &mut self.raw);
         drop(reports);
-        if is_news {
-            came.notify_all();
+        if has_events {
+            self.reports.1.notify_all();
         }
     }
 }
 
 #[cfg(test)]
-#[path = "line_tests.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! Where a device is, and what can be wrong with opening it.
+//! The address of a device, and why a connection to it can fail.
 
 use super::link::{Link, SerialLink, TcpLink};
 use crate::serial::list_ports;
@@ -12,18 +12,10 @@ use thiserror::Error;
 /// A controller in the same laboratory answers within milliseconds.
 const CONNECT_MAX: Duration = Duration::from_secs(3);
 
-/// Where a device is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A serial port, 8 data bits, no parity, one stop bit.
-    Serial {
-        /// Path or name of the port.
-        port: String,
-        /// Bits per second.
-        baud: u32,
-        /// Whether RTS and CTS hold bytes back.
-        has_handshake: bool,
-    },
+    Serial { port: String, baud: u32, has_handshake: bool },
     /// `HOST:PORT`.
     Tcp(String),
 }
@@ -37,57 +29,24 @@ impl fmt::Display for Place {
     }
 }
 
-/// A device cannot be reached.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WireError {
-    /// No such port.
     #[error("there is no serial port {port}; this computer has {present}")]
-    Missing {
-        /// The port asked for.
-        port: String,
-        /// Those there are, in words.
-        present: String,
-    },
-    /// Somebody has it.
+    Missing { port: String, present: String },
     #[error("the serial port {port} is in use by another program; close that program first")]
-    Busy {
-        /// The port.
-        port: String,
-    },
-    /// This account may not.
+    Busy { port: String },
     #[error(
         "this account may not open {port}; add it to the group that owns the port (on Linux mostly `sudo usermod -aG dialout $USER`) and log in again"
     )]
-    Forbidden {
-        /// The port.
-        port: String,
-    },
-    /// Anything else about a port.
+    Forbidden { port: String },
     #[error("the serial port {port} cannot be opened ({detail}); check cable and settings")]
-    Port {
-        /// The port.
-        port: String,
-        /// What the operating system said.
-        detail: String,
-    },
-    /// Not an address.
+    Port { port: String, detail: String },
     #[error("'{address}' is not an address ({detail}); give HOST:PORT, such as 192.168.1.10:23")]
-    Address {
-        /// What was given.
-        address: String,
-        /// What the operating system said.
-        detail: String,
-    },
-    /// Nobody answers.
+    Address { address: String, detail: String },
     #[error(
-        "nothing answers at {address} ({detail}); check that the device is on and its address, and that not all its connections are taken"
+        "no device answers at {address} ({detail}); check power and address of the device, and that it has a free connection"
     )]
-    Unreachable {
-        /// The address.
-        address: String,
-        /// What the operating system said.
-        detail: String,
-    },
+    Unreachable { address: String, detail: String },
 }
 
 impl Place {
@@ -101,7 +60,7 @@ impl Place {
                     .timeout(Duration::from_millis(1))
                     .open()
                     .map_err(|err| port_error(port, &err))?;
-                Ok(Box::new(SerialLink::new(opened)))
+                Ok(Box::new(SerialLink(opened)))
             }
             Self::Tcp(address) => {
                 let wrong =
@@ -110,7 +69,7 @@ impl Place {
                     .to_socket_addrs()
                     .map_err(|err| wrong(err.to_string()))?
                     .next()
-                    .ok_or_else(|| wrong("it stands for no computer".into()))?;
+                    .ok_or_else(|| wrong("no computer has this name".into()))?;
                 let opened = TcpStream::connect_timeout(&resolved, CONNECT_MAX)
                     .and_then(TcpLink::new)
                     .map_err(|err| WireError::Unreachable {
@@ -127,20 +86,20 @@ fn port_error(port: &str, err: &serialport::Error) -> WireError {
     use serialport::ErrorKind as Kind;
     let port = port.to_owned();
     match err.kind() {
-        Kind::Io(ErrorKind::NotFound) => WireError::Missing { port, present: present() },
+        Kind::Io(ErrorKind::NotFound) => WireError::Missing { port, present: port_list() },
         Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
         Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
         // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
         // port"; on Windows a missing port has it too, with other words.
         Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
         Kind::NoDevice if !std::path::Path::new(&port).exists() => {
-            WireError::Missing { port, present: present() }
+            WireError::Missing { port, present: port_list() }
         }
         _ => WireError::Port { port, detail: err.to_string() },
     }
 }
 
-fn present() -> String {
+fn port_list() -> String {
     match list_ports() {
         Ok(ports) if ports.is_empty() => "none".to_owned(),
         Ok(ports) => ports
@@ -165,21 +124,21 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_port_tells_which_there_are() {
+    fn missing_port_error_lists_the_ports_there_are() {
         let err = serial("/dev/there-is-no-such-port");
         assert!(matches!(err, WireError::Missing { .. }), "{err:?}");
         assert!(err.to_string().contains("this computer has"), "{err}");
     }
 
     #[test]
-    fn a_file_is_no_port() {
+    fn file_is_refused_as_a_port() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let err = serial(&file.path().display().to_string());
         assert!(matches!(err, WireError::Port { .. }), "{err:?}");
     }
 
     #[test]
-    fn addresses_are_checked_before_anybody_is_called() {
+    fn addresses_are_checked_before_connecting() {
         for wrong in ["", "localhost", "localhost:x", "127.0.0.1:99999"] {
             let Err(err) = Place::Tcp(wrong.into()).open() else {
                 panic!("'{wrong}' was opened");
@@ -190,12 +149,12 @@ mod tests {
     }
 
     #[test]
-    fn nobody_at_an_address_is_told() {
+    fn refused_connection_names_the_address() {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let address = free.local_addr().unwrap().to_string();
         drop(free);
         let Err(err) = Place::Tcp(address.clone()).open() else {
-            panic!("somebody answered");
+            panic!("a connection was accepted");
         };
         assert!(err.to_string().contains(&address), "{err}");
     }

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use crate::wire::Place;
 
 /// Reads `port`, `baud`, `handshake` and `address`, behind a table's name and a dot or nothing.
-pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
+pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
     let key = |name: &str| format!("{table}{name}");
     let port = fields.text(&key("port"));
     let address = fields.text(&key("address"));
@@ -21,12 +21,18 @@ pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
         }),
         (None, Some(address)) => {
             if baud.is_some() {
-                fields.mistake(&key("baud"), "a controller on a network has no baud rate");
+                fields.mistake(
+                    &key("baud"),
+                    "a controller on a network has no baud rate; remove this",
+                );
             }
             Some(Place::Tcp(address))
         }
         (Some(_), Some(_)) => {
-            fields.mistake(&key("address"), "a device is at a port or at an address, not at both");
+            fields.mistake(
+                &key("address"),
+                "a device is at a port or at an address, not at both; remove one of them",
+            );
             None
         }
         (None, None) => {
@@ -34,7 +40,7 @@ pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
             fields.mistake(
                 &key("port"),
                 &format!(
-                    "where is the {what}? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\""
+                    "the {what} has no address; give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\""
                 ),
             );
             None

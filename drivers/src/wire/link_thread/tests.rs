@@ -2,13 +2,12 @@ use super::*;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::Receiver;
 
-/// Notes what it is told, writes a line for each command and reports every byte as an acknowledgement of a stop.
+/// Notes its commands, writes a line for each command and reports every byte as an acknowledgement of a stop.
 struct Notes {
     heard: Arc<Mutex<Vec<String>>>,
     lines: VecDeque<Vec<u8>>,
     events: VecDeque<(Nanos, RigEventBody)>,
     fails_at: Option<u8>,
-    /// Done just before it fails.
     fails: Box<dyn Fn() + Send>,
 }
 
@@ -99,11 +98,11 @@ fn clock() -> HostClock {
     Arc::new(move || Nanos(count.fetch_add(1_000, Ordering::Relaxed)))
 }
 
-fn settings() -> LineSettings {
-    LineSettings { device: "controller".into(), farewell: b"bye".to_vec() }
+fn start(link: impl Link + 'static, notes: Notes) -> LinkThread {
+    LinkThread::start(Box::new(link), notes, &clock(), "controller".into(), b"bye".to_vec())
+        .unwrap()
 }
 
-/// Generous: a computer with much else to do.
 const WAIT: Duration = Duration::from_secs(20);
 
 fn read(link: &mut impl Link, count: usize) -> Vec<u8> {
@@ -118,14 +117,14 @@ fn read(link: &mut impl Link, count: usize) -> Vec<u8> {
 }
 
 #[test]
-fn stops_overtake_what_waits() {
+fn stops_overtake_waiting_commands() {
     let (here, mut there) = super::super::pair();
     let (release, go_on) = sync_channel::<()>(1);
     let (waits, waiting) = sync_channel(1);
     let notes = Notes::default();
     let heard = Arc::clone(&notes.heard);
     let gate = Gate { inner: here, waits, go_on };
-    let mut line = Line::start(Box::new(gate), notes, &clock(), settings()).unwrap();
+    let mut line = start(gate, notes);
     waiting.recv().unwrap();
     let define = RigCommand::DefinePosition { pulses: 3 };
     line.send(define).unwrap();
@@ -146,9 +145,9 @@ fn stops_overtake_what_waits() {
 }
 
 #[test]
-fn a_stop_waits_for_nobody_who_reads_reports() {
+fn stop_does_not_wait_for_a_reader_of_reports() {
     let (here, mut there) = super::super::pair();
-    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line = start(here, Notes::default());
     let reports = Arc::clone(&line.reports);
     let reading = reports.0.lock().unwrap();
     // Something to report comes first, so that the thread has wanted to hand it over.
@@ -163,9 +162,9 @@ fn a_stop_waits_for_nobody_who_reads_reports() {
 }
 
 #[test]
-fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
+fn events_are_reported_in_order_and_a_lost_link_last() {
     let (here, mut there) = super::super::pair();
-    let line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let line = start(here, Notes::default());
     there.write(b"ab").unwrap();
     let late = Nanos(u64::MAX);
     for _ in 0..2 {
@@ -175,7 +174,7 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
     drop(there);
     let last = line.next_event(late, WAIT).unwrap();
     assert!(matches!(&last.body, RigEventBody::Fault(Fault::LinkLost { .. })), "{last:?}");
-    // Nobody waits for what will not come.
+    // Waiting for events that cannot come ends at once.
     assert_eq!(line.next_event(late, Duration::from_secs(600)), None);
 }
 
@@ -183,18 +182,18 @@ fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
 fn a_driver_that_fails_is_a_lost_link() {
     let (here, mut there) = super::super::pair();
     let notes = Notes { fails_at: Some(b'!'), ..Notes::default() };
-    let line = Line::start(Box::new(here), notes, &clock(), settings()).unwrap();
+    let line = start(here, notes);
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
     assert!(matches!(last.body, RigEventBody::Fault(Fault::LinkLost { .. })));
-    // Nobody else has the link: its farewell stops what moves.
+    // No other thread has the link: its farewell stops what moves.
     assert_eq!(read(&mut there, 3), b"bye");
 }
 
 #[test]
 fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
     let (here, mut there) = super::super::pair();
-    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let mut line = start(here, Notes::default());
     let handle = line.halt_handle().unwrap();
     assert!(handle.halt(WAIT) && handle.written() == 1);
     assert_eq!(read(&mut there, 5), b"Halt\r");
@@ -212,18 +211,18 @@ fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
 #[test]
 fn what_waits_for_a_farewell_comes_after_it() {
     let (here, mut there) = super::super::pair();
-    let (told, order) = sync_channel(2);
-    let said = told.clone();
+    let (events, order) = sync_channel(2);
+    let deferred = events.clone();
     let notes = Notes {
         fails_at: Some(b'!'),
         fails: Box::new(move || {
-            let said = said.clone();
-            super::super::after_farewell(move || said.send("deferred").unwrap());
+            let deferred = deferred.clone();
+            super::super::after_farewell(move || deferred.send("deferred").unwrap());
         }),
         ..Notes::default()
     };
-    struct Told(super::super::MemoryLink, SyncSender<&'static str>);
-    impl Link for Told {
+    struct EventLink(super::super::MemoryLink, SyncSender<&'static str>);
+    impl Link for EventLink {
         fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
             self.0.read(buffer, wait)
         }
@@ -233,7 +232,7 @@ fn what_waits_for_a_farewell_comes_after_it() {
             self.0.write(bytes)
         }
     }
-    let _line = Line::start(Box::new(Told(here, told)), notes, &clock(), settings()).unwrap();
+    let _line = start(EventLink(here, events), notes);
     there.write(b"!").unwrap();
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "written");
     assert_eq!(order.recv_timeout(WAIT).unwrap(), "deferred");

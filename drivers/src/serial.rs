@@ -12,29 +12,24 @@ pub struct PortInfo {
     pub description: String,
 }
 
-/// The serial ports cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SerialError {
-    /// The operating system did not list its ports.
     #[error(
         "the serial ports of this computer cannot be listed ({detail}); check the permissions of this account and try again"
     )]
-    Listing {
-        /// What the operating system said.
-        detail: String,
-    },
+    Listing { detail: String },
 }
 
 /// The serial ports of this computer in order of their names; empty when there are none.
 pub fn list_ports() -> Result<Vec<PortInfo>, SerialError> {
     let ports = serialport::available_ports()
         .map_err(|err| SerialError::Listing { detail: err.to_string() })?;
-    let mut ports: Vec<PortInfo> = ports.into_iter().map(described).collect();
+    let mut ports: Vec<PortInfo> = ports.into_iter().map(describe_port).collect();
     ports.sort();
     Ok(ports)
 }
 
-fn described(port: SerialPortInfo) -> PortInfo {
+fn describe_port(port: SerialPortInfo) -> PortInfo {
     let description = match port.port_type {
         SerialPortType::UsbPort(usb) => {
             let mut words = vec![format!("USB {:04x}:{:04x}", usb.vid, usb.pid)];
@@ -55,8 +50,8 @@ mod tests {
     use serialport::UsbPortInfo;
 
     #[test]
-    fn a_usb_port_says_who_made_it() {
-        let port = described(SerialPortInfo {
+    fn description_of_a_usb_port_has_its_manufacturer() {
+        let port = describe_port(SerialPortInfo {
             port_name: "/dev/ttyUSB0".to_owned(),
             port_type: SerialPortType::UsbPort(UsbPortInfo {
                 vid: 0x0403,

@@ -7,7 +7,7 @@ fn sampler() -> Sampler {
 
 fn reading(sampler: &mut Sampler, numbers: [f64; 6]) -> Reading {
     match sampler.take(&numbers, false) {
-        Some(Sampled::Reading(reading)) => reading,
+        Some(SampleOutcome::Reading(reading)) => reading,
         other => panic!("{other:?}"),
     }
 }
@@ -50,11 +50,11 @@ fn the_clock_wraps_and_a_reset_is_noticed() {
     let at = |time: f64| [0.3, 0.0, 0.0, 15.0, 1.0, time];
     let newest = 2_147_483_646.0;
     assert_eq!(reading(&mut sampler, at(newest)).tick, 2_147_483_646);
-    assert_eq!(sampler.take(&at(newest), false), Some(Sampled::Same));
+    assert_eq!(sampler.take(&at(newest), false), Some(SampleOutcome::Same));
     assert_eq!(reading(&mut sampler, at(3.0)).tick, (1 << 31) + 3);
     reading(&mut sampler, at(90_000.0));
-    assert_eq!(sampler.take(&at(12.0), false), Some(Sampled::Doubtful));
-    assert_eq!(sampler.take(&at(13.0), false), Some(Sampled::Reset));
+    assert_eq!(sampler.take(&at(12.0), false), Some(SampleOutcome::Doubtful));
+    assert_eq!(sampler.take(&at(13.0), false), Some(SampleOutcome::Reset));
     // Ticks go on all the same.
     assert!(reading(&mut sampler, at(14.0)).tick > (1 << 31) + 90_000);
 }
@@ -65,8 +65,8 @@ fn a_reset_after_many_days_is_no_wrap() {
         let mut sampler = sampler();
         let at = |time: f64| [0.3, 0.0, 0.0, 15.0, 1.0, time];
         reading(&mut sampler, at(newest));
-        assert_eq!(sampler.take(&at(400.0), false), Some(Sampled::Doubtful));
-        assert_eq!(sampler.take(&at(401.0), false), Some(Sampled::Reset));
+        assert_eq!(sampler.take(&at(400.0), false), Some(SampleOutcome::Doubtful));
+        assert_eq!(sampler.take(&at(401.0), false), Some(SampleOutcome::Reset));
     }
 }
 
@@ -76,7 +76,7 @@ fn a_clock_that_lost_a_digit_once_is_no_reset() {
     let at = |time: f64| [0.3, 0.0, 0.0, 15.0, 1.0, time];
     for time in (90_000..90_040).map(f64::from) {
         assert_eq!(reading(&mut sampler, at(time)).tick, time as u64);
-        assert_eq!(sampler.take(&at(9_000.0), false), Some(Sampled::Doubtful));
+        assert_eq!(sampler.take(&at(9_000.0), false), Some(SampleOutcome::Doubtful));
     }
 }
 
@@ -84,14 +84,14 @@ fn a_clock_that_lost_a_digit_once_is_no_reset() {
 fn a_motion_just_begun_counts_as_one() {
     let mut sampler = sampler();
     let numbers = [0.3, 0.0, 0.0, 15.0, 1.0, 9.0];
-    let Some(Sampled::Reading(reading)) = sampler.take(&numbers, true) else {
+    let Some(SampleOutcome::Reading(reading)) = sampler.take(&numbers, true) else {
         panic!("no sample");
     };
     assert!(reading.status.has(AxisStatus::MOVING));
 }
 
 #[test]
-fn what_counts_backwards_is_turned_round() {
+fn reversed_counts_and_limits_are_swapped() {
     let mut sampler = Sampler::new(GalilSettings { is_reversed: true, ..thesis() });
     let turned = reading(&mut sampler, [0.3, -50.0, -50.0, 11.0, 1.0, 9.0]);
     assert_eq!(turned.pulses, 50);
@@ -100,7 +100,7 @@ fn what_counts_backwards_is_turned_round() {
 }
 
 #[test]
-fn answers_that_are_none_are_refused() {
+fn answers_without_the_expected_numbers_are_refused() {
     let mut sampler = sampler();
     for wrong in [
         &[0.3, 0.0, 0.0, 15.0, 1.0][..],

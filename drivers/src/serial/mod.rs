@@ -1,5 +1,0 @@
-//! Serial ports: which there are.
-
-pub mod discovery;
-
-pub use discovery::{PortInfo, SerialError, list_ports};
