@@ -5,13 +5,13 @@ use super::output::Output;
 use super::rig::BenchArgs;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
-use palpate_emulators::bench::Bench;
+use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
-use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
+use palpate_emulators::grbl::{Eeprom, Grbl, EmulatedGrblSettings, HomeWiring};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
-use palpate_emulators::{Device, ScheduledFault};
+use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
 use serde::Serialize;
 use std::io::BufRead;
@@ -202,21 +202,21 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
         })?;
     }
     eeprom.build_info.clone_from(&args.build_info);
-    let board = Grbl::new(GrblSettings {
+    let board = Grbl::new(EmulatedGrblSettings {
         eeprom,
         home: match args.home {
             HomePin::Limit => HomeWiring::Limit,
             HomePin::Probe => HomeWiring::Probe,
         },
         resonator: UNO,
-        ..GrblSettings::default()
+        ..EmulatedGrblSettings::default()
     });
     let seed = args.bench.seed;
     let model = &args.cell;
     // One of those that are emulated: it was checked when the arguments were read.
     let cell = emulated_cell(model, seed)
         .ok_or_else(|| Failure::usage(format!("no emulated load cell is called {model}")))?;
-    let mut device = Bench::new(&args.bench.settings(), Box::new(board), cell);
+    let mut device = EmulatedBench::new(&args.bench.settings(), Box::new(board), cell);
     let mut ready = |places: &str| {
         let (at, cell_at) = places.split_once(", ").unwrap_or((places, ""));
         let object = Ready {
@@ -251,7 +251,7 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
 }
 
 fn emulate(
-    device: &mut dyn Device,
+    device: &mut dyn EmulatedDevice,
     wire: &WireArgs,
     cell_link: Option<Option<PathBuf>>,
     seed: u64,
@@ -283,7 +283,7 @@ fn emulate(
             output.note(&format!("{} {verb}", turn.kind));
         }
         Told::Done(order) => {
-            if let Some(told) = order.told() {
+            if let Some(told) = order.confirmation() {
                 output.note(&told);
             }
         }

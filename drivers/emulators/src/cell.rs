@@ -11,7 +11,7 @@ use palpate_model::units::{Newtons, Volts};
 
 /// What an emulated load cell feels at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
+pub struct CellLoad {
     /// The emulated bridge behind the usual amplifier, as an analog input would read it.
     pub volts: Volts,
     /// Force on the cell as a calibrated gauge would feel it, without noise.
@@ -24,20 +24,20 @@ pub trait EmulatedCell: Send {
     fn receive(&mut self, now: Nanos, bytes: &[u8]);
 
     /// Time has passed, in steps of a millisecond or less; `felt` holds at `now`.
-    fn advance(&mut self, now: Nanos, felt: Felt);
+    fn advance(&mut self, now: Nanos, load: CellLoad);
 
     /// What it has sent since it was last asked.
     fn transmit(&mut self) -> Vec<u8>;
 
     /// A fault of the device itself begins or ends.
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
 }
 
 /// Makes an emulated load cell out of a seed.
-type Program = fn(u64) -> Box<dyn EmulatedCell>;
+type CellFactory = fn(u64) -> Box<dyn EmulatedCell>;
 
 /// Emulated load cells beside an axis that are programs of their own, by their words in a rig file.
-const PROGRAMS: [(&str, Program); 2] = [
+const FACTORIES: [(&str, CellFactory); 2] = [
     ("hx711", |_| Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))),
     ("mark10", |seed| {
         let usual = EmulatedGaugeSettings::default();
@@ -55,7 +55,7 @@ pub fn emulated_cells() -> Vec<&'static str> {
 /// An emulated load cell, by its word in a rig file.
 #[must_use]
 pub fn emulated_cell(word: &str, seed: u64) -> Option<Box<dyn EmulatedCell>> {
-    if let Some((_, program)) = PROGRAMS.iter().find(|(name, _)| *name == word) {
+    if let Some((_, program)) = FACTORIES.iter().find(|(name, _)| *name == word) {
         return Some(program(seed));
     }
     let kind = DEVICES.iter().find(|kind| kind.word == word)?;

@@ -137,14 +137,14 @@ impl fmt::Display for FaultKind {
 /// Faults to come and under way, and the randomness they share.
 #[derive(Clone, Debug)]
 pub struct FaultPlan {
-    coming: Vec<ScheduledFault>,
+    pending: Vec<ScheduledFault>,
     active: Vec<ScheduledFault>,
     random: Random,
 }
 
 /// A fault has begun or ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
+pub struct FaultEvent {
     /// Which.
     pub kind: FaultKind,
     /// Whether it has begun.
@@ -155,26 +155,26 @@ impl FaultPlan {
     /// These faults; which bytes they spoil follows from the seed.
     #[must_use]
     pub fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
-        Self { coming: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
+        Self { pending: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
     }
 
     /// One more.
     pub fn add(&mut self, fault: ScheduledFault) {
-        self.coming.push(fault);
+        self.pending.push(fault);
     }
 
     /// What begins or ends up to a time, the ends first.
-    pub fn advance(&mut self, now: Nanos) -> Vec<Turn> {
-        let turn = |fault: ScheduledFault, is_on| Turn { kind: fault.kind, is_on };
-        let mut turns = Vec::new();
+    pub fn advance(&mut self, now: Nanos) -> Vec<FaultEvent> {
+        let event = |fault: ScheduledFault, is_on| FaultEvent { kind: fault.kind, is_on };
+        let mut events = Vec::new();
         let over = self.active.extract_if(.., |fault| fault.until <= now);
-        turns.extend(over.map(|fault| turn(fault, false)));
-        let begun: Vec<_> = self.coming.extract_if(.., |fault| fault.from <= now).collect();
+        events.extend(over.map(|fault| event(fault, false)));
+        let begun: Vec<_> = self.pending.extract_if(.., |fault| fault.from <= now).collect();
         for fault in begun {
-            turns.push(turn(fault, true));
+            events.push(event(fault, true));
             self.active.push(fault);
         }
-        turns
+        events
     }
 
     /// Whether a fault is under way.
@@ -192,19 +192,19 @@ impl FaultPlan {
     }
 
     /// What becomes of bytes on their way, to the device or from it.
-    pub fn spoil(&mut self, bytes: Vec<u8>, is_to_device: bool) -> Vec<u8> {
+    pub fn corrupt(&mut self, bytes: Vec<u8>, is_to_device: bool) -> Vec<u8> {
         if self.active.is_empty() {
             return bytes;
         }
-        let is_lost =
+        let is_dropped =
             if is_to_device { self.has(LineFault::Deaf) } else { self.has(LineFault::Mute) };
-        if is_lost {
+        if is_dropped {
             return Vec::new();
         }
         let mut bytes = bytes;
         if self.has(LineFault::Partial) && !is_to_device && !bytes.is_empty() {
-            let kept = self.random.between(0.0, bytes.len() as f64) as usize;
-            bytes.truncate(kept);
+            let length = self.random.between(0.0, bytes.len() as f64) as usize;
+            bytes.truncate(length);
         }
         let mut out = Vec::with_capacity(bytes.len());
         for byte in bytes {
@@ -263,34 +263,34 @@ mod tests {
             let fault = format!("{kind}@1:1").parse().unwrap();
             let mut plan = FaultPlan::new(vec![fault], 3);
             assert!(plan.advance(Nanos(999_999_999)).is_empty());
-            assert_eq!(plan.spoil(all.clone(), is_to_device), all);
+            assert_eq!(plan.corrupt(all.clone(), is_to_device), all);
             assert_eq!(plan.advance(Nanos(1_000_000_000)).len(), 1);
-            let spoiled = plan.spoil(all.clone(), is_to_device);
-            assert_ne!(spoiled, all, "{kind}");
+            let corrupted = plan.corrupt(all.clone(), is_to_device);
+            assert_ne!(corrupted, all, "{kind}");
             match kind {
-                "drop" | "partial" => assert!(spoiled.len() < all.len() && !spoiled.is_empty()),
-                "duplicate" => assert!(spoiled.len() > all.len()),
+                "drop" | "partial" => assert!(corrupted.len() < all.len() && !corrupted.is_empty()),
+                "duplicate" => assert!(corrupted.len() > all.len()),
                 "deaf" | "mute" => {
-                    assert!(spoiled.is_empty());
-                    assert_eq!(plan.spoil(all.clone(), !is_to_device), all);
+                    assert!(corrupted.is_empty());
+                    assert_eq!(plan.corrupt(all.clone(), !is_to_device), all);
                 }
                 _ => {}
             }
-            let turns = plan.advance(Nanos(2_000_000_000));
-            assert!(matches!(turns[..], [Turn { is_on: false, .. }]));
-            assert_eq!(plan.spoil(all.clone(), is_to_device), all);
+            let events = plan.advance(Nanos(2_000_000_000));
+            assert!(matches!(events[..], [FaultEvent { is_on: false, .. }]));
+            assert_eq!(plan.corrupt(all.clone(), is_to_device), all);
         }
     }
 
     #[test]
     fn equal_seeds_spoil_equally() {
         let fault = "garbage@0:1".parse().unwrap();
-        let spoiled = |seed| {
+        let corrupted = |seed| {
             let mut plan = FaultPlan::new(vec![fault], seed);
             plan.advance(Nanos(0));
-            plan.spoil(vec![b'x'; 300], false)
+            plan.corrupt(vec![b'x'; 300], false)
         };
-        assert_eq!(spoiled(4), spoiled(4));
-        assert_ne!(spoiled(4), spoiled(5));
+        assert_eq!(corrupted(4), corrupted(4));
+        assert_ne!(corrupted(4), corrupted(5));
     }
 }

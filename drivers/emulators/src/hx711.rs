@@ -4,7 +4,7 @@
 //! of 5 V; HX711 data sheet, Avia Semiconductor, page 3), so that what is calibrated in those volts stays right.
 
 use super::DeviceFault;
-use super::cell::{EmulatedCell, Felt};
+use super::cell::{CellLoad, EmulatedCell};
 use palpate_drivers::hx711::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, line};
 use palpate_model::Nanos;
 
@@ -65,10 +65,10 @@ pub struct EmulatedHx711 {
     newest: [f64; SETTLING as usize],
     count: i32,
     missing_since: Option<Nanos>,
-    is_chip_lost: bool,
+    is_chip_missing: bool,
     is_stuck: bool,
     is_saturated: bool,
-    is_other: bool,
+    is_wrong: bool,
     output: Vec<u8>,
 }
 
@@ -88,8 +88,8 @@ impl EmulatedHx711 {
     }
 
     /// The chip loses its wires, or gets them back.
-    pub fn lose_chip(&mut self, is_lost: bool) {
-        self.is_chip_lost = is_lost;
+    pub fn set_chip_missing(&mut self, is_missing: bool) {
+        self.is_chip_missing = is_missing;
     }
 
     fn period(&self) -> Nanos {
@@ -112,11 +112,11 @@ impl EmulatedHx711 {
                 (false, false) => 10,
             },
             gain: if self.settings.is_half_gain { 64 } else { 128 },
-            board: if self.is_other { "another".into() } else { self.settings.board.clone() },
+            board: if self.is_wrong { "another".into() } else { self.settings.board.clone() },
         }
     }
 
-    fn say(&mut self, message: &Message) {
+    fn send(&mut self, message: &Message) {
         let text = line(message);
         if self.output.len() + text.len() <= OUTPUT_MAX {
             self.output.extend_from_slice(text.as_bytes());
@@ -154,9 +154,9 @@ impl EmulatedHx711 {
         if self.conversions == SETTLING && !self.has_begun {
             self.has_begun = true;
             let header = self.header();
-            self.say(&Message::Started { micros, header });
+            self.send(&Message::Started { micros, header });
         } else if self.conversions > SETTLING {
-            self.say(&Message::Value { micros, count });
+            self.send(&Message::Value { micros, count });
         }
     }
 
@@ -167,7 +167,7 @@ impl EmulatedHx711 {
             self.missing_since = Some(now);
             self.conversions = 0;
             let micros = self.micros(now);
-            self.say(&Message::Missing { micros });
+            self.send(&Message::Missing { micros });
         }
     }
 }
@@ -176,11 +176,11 @@ impl EmulatedCell for EmulatedHx711 {
     fn receive(&mut self, now: Nanos, bytes: &[u8]) {
         if self.started.is_some() && bytes.contains(&b'?') {
             let message = Message::Header { micros: self.micros(now), header: self.header() };
-            self.say(&message);
+            self.send(&message);
         }
     }
 
-    fn advance(&mut self, now: Nanos, felt: Felt) {
+    fn advance(&mut self, now: Nanos, load: CellLoad) {
         if self.started.is_none() {
             if now < self.boot_end {
                 return;
@@ -189,9 +189,9 @@ impl EmulatedCell for EmulatedHx711 {
             self.next = self.boot_end + self.period();
             (self.sum, self.steps) = (0.0, 0);
         }
-        self.sum += felt.volts.0;
+        self.sum += load.volts.0;
         self.steps += 1;
-        if self.is_chip_lost {
+        if self.is_chip_missing {
             self.wait_for_chip(now);
             self.next = now + self.period();
             return;
@@ -208,14 +208,14 @@ impl EmulatedCell for EmulatedHx711 {
         std::mem::take(&mut self.output)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => self.restart(now),
             DeviceFault::Reset => {}
             DeviceFault::Stuck => self.is_stuck = is_on,
             DeviceFault::Saturated => self.is_saturated = is_on,
             DeviceFault::WrongDevice => {
-                self.is_other = is_on;
+                self.is_wrong = is_on;
                 self.restart(now);
             }
         }

@@ -1,6 +1,6 @@
 //! Emulators: programs that answer like a device on a wire, with the simulated bench behind them.
 //!
-//! A [`Device`] is a state machine: bytes and the time go in, bytes come out, and nothing else happens. It
+//! A [`EmulatedDevice`] is a state machine: bytes and the time go in, bytes come out, and nothing else happens. It
 //! never reads a clock, a port or a file, so that equal bytes at equal times give equal answers.
 //! [`serve`] puts one on a pseudo-terminal or a TCP port; [`faults`] spoils its line on command.
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
@@ -20,7 +20,7 @@ pub mod serve;
 mod wire;
 
 pub use faults::{DeviceFault, FaultError, ScheduledFault};
-pub use plant::Plant;
+pub use plant::EmulatedPlant;
 
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
@@ -29,7 +29,7 @@ use palpate_model::rig::HandAction;
 ///
 /// A channel is one connection to it, counted from 0: a serial device has one, a device on a network has one per
 /// client. Times never go backwards.
-pub trait Device: Send {
+pub trait EmulatedDevice: Send {
     /// How many clients may be connected at once.
     fn channels(&self) -> usize {
         1
@@ -56,8 +56,8 @@ pub trait Device: Send {
     }
 
     /// A fault of the device itself begins or ends; [`DeviceFault::Reset`] only begins.
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
 
     /// A person does something at the bench.
-    fn by_hand(&mut self, now: Nanos, action: HandAction);
+    fn apply_hand_action(&mut self, now: Nanos, action: HandAction);
 }

@@ -1,7 +1,7 @@
 //! A load cell that sends lines whoever listens: its rate and its lines are those that its driver gives for it.
 
 use super::DeviceFault;
-use super::cell::{EmulatedCell, Felt};
+use super::cell::{CellLoad, EmulatedCell};
 use palpate_drivers::devices::LineEmulation;
 use palpate_model::Nanos;
 
@@ -37,12 +37,12 @@ impl EmulatedLineCell {
 impl EmulatedCell for EmulatedLineCell {
     fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
 
-    fn advance(&mut self, now: Nanos, felt: Felt) {
+    fn advance(&mut self, now: Nanos, load: CellLoad) {
         while self.next <= now {
             let line = if self.is_other {
                 "21.5 C, 48 %\r\n".to_owned()
             } else {
-                (self.emulation.line)(self.next.since(self.since), felt.volts)
+                (self.emulation.line)(self.next.since(self.since), load.volts)
             };
             if self.output.len() + line.len() <= OUTPUT_MAX {
                 self.output.extend_from_slice(line.as_bytes());
@@ -55,7 +55,7 @@ impl EmulatedCell for EmulatedLineCell {
         std::mem::take(&mut self.output)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => {
                 (self.since, self.next) = (now, now + BOOT);

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 /// One thing asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
+pub enum EmulatorOrder {
     /// A fault that begins now.
     Fault(ScheduledFault),
     /// Weights, specimens.
@@ -30,7 +30,7 @@ pub enum OrderError {
     },
 }
 
-impl Order {
+impl EmulatorOrder {
     /// Reads `load GRAMS`, `mount NUMBER`, `unmount`, or `KIND[:DURATION]` of a fault.
     pub fn parse(text: &str, now: Nanos) -> Result<Self, OrderError> {
         let wrong = |right| OrderError::Number { order: text.to_owned(), right };
@@ -58,7 +58,7 @@ impl Order {
     }
 
     /// What is told when it is done; nothing of a fault, which tells itself when it begins.
-    pub fn told(&self) -> Option<String> {
+    pub fn confirmation(&self) -> Option<String> {
         match self {
             Self::Fault(_) => None,
             Self::Hand(HandAction::LoadCell { mass_g }) => {
@@ -78,13 +78,13 @@ mod tests {
 
     #[test]
     fn orders_are_read_or_refused_with_what_would_do() {
-        let parse = |text| Order::parse(text, Nanos(5));
+        let parse = |text| EmulatorOrder::parse(text, Nanos(5));
         let load = HandAction::LoadCell { mass_g: 140.5 };
-        assert_eq!(parse("load 140.5"), Ok(Order::Hand(load)));
+        assert_eq!(parse("load 140.5"), Ok(EmulatorOrder::Hand(load)));
         let mount = HandAction::Mount { specimen: 3 };
-        assert_eq!(parse("mount 3"), Ok(Order::Hand(mount)));
-        assert_eq!(parse("unmount"), Ok(Order::Hand(HandAction::Unmount)));
-        assert!(matches!(parse("mute:2"), Ok(Order::Fault(_))));
+        assert_eq!(parse("mount 3"), Ok(EmulatorOrder::Hand(mount)));
+        assert_eq!(parse("unmount"), Ok(EmulatorOrder::Hand(HandAction::Unmount)));
+        assert!(matches!(parse("mute:2"), Ok(EmulatorOrder::Fault(_))));
         for (text, part) in [
             ("load", "a mass in g"),
             ("load -1", "a mass in g"),

@@ -8,7 +8,7 @@ use palpate_model::{Newtons, Position, Seconds, Volts};
 ///
 /// Positions given are those of the device's counter, in mm; where its zero is no device can know.
 #[derive(Clone, Debug)]
-pub struct Plant {
+pub struct EmulatedPlant {
     bench: Bench,
     cell: LoadCell,
     /// True position at which the counter reads zero.
@@ -16,7 +16,7 @@ pub struct Plant {
     /// True position of the axis.
     axis: Position,
     force: Newtons,
-    on_cell: Newtons,
+    cell_force: Newtons,
     volts: Volts,
     fault: Option<CellFault>,
 }
@@ -33,7 +33,7 @@ pub enum CellFault {
 /// Beyond the end of every input range, so that each reads its own end.
 const SATURATED: Volts = Volts(12.0);
 
-impl Plant {
+impl EmulatedPlant {
     /// The slide as it is switched on, 5 to 15 mm from home, its counter at zero; the cell is read once per `tick`.
     #[must_use]
     pub fn new(settings: &SimSettings, tick: Seconds) -> Self {
@@ -45,7 +45,7 @@ impl Plant {
             counter_zero,
             axis: counter_zero,
             force: Newtons(0.0),
-            on_cell: Newtons(0.0),
+            cell_force: Newtons(0.0),
             volts: Volts(0.0),
             fault: None,
         };
@@ -56,10 +56,10 @@ impl Plant {
     /// The axis has moved straight to a counted position, in mm, in a time step.
     pub fn advance(&mut self, counted_mm: f64, dt: Seconds) {
         self.axis = self.counter_zero.moved_by(counted_mm);
-        let felt = self.bench.advance(self.axis, dt);
-        self.force = felt.on_probe;
-        self.on_cell = felt.on_cell;
-        let volts = self.cell.signal(felt.on_cell);
+        let load = self.bench.advance(self.axis, dt);
+        self.force = load.on_probe;
+        self.cell_force = load.on_cell;
+        let volts = self.cell.signal(load.on_cell);
         self.volts = match self.fault {
             None => volts,
             Some(CellFault::Stuck) => self.volts,
@@ -73,7 +73,7 @@ impl Plant {
     }
 
     /// A person puts weights on the cell, mounts a specimen or takes it out.
-    pub fn by_hand(&mut self, action: HandAction) {
+    pub fn apply_hand_action(&mut self, action: HandAction) {
         self.bench.by_hand(action);
     }
 
@@ -89,7 +89,7 @@ impl Plant {
 
     /// Force on the cell at the newest step: that on the probe, and weights that a person has put on.
     pub fn on_cell(&self) -> Newtons {
-        self.on_cell
+        self.cell_force
     }
 
     /// True position of the axis, in mm from the edge of the home switch.
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn the_probe_feels_the_tissue_and_the_switches_close_at_the_ends() {
         let dt = Seconds(0.001);
-        let mut plant = Plant::new(&SimSettings::default(), dt);
+        let mut plant = EmulatedPlant::new(&SimSettings::default(), dt);
         let free = plant.volts();
         plant.shift(-100.0);
         plant.advance(100.0, dt);
@@ -138,13 +138,13 @@ mod tests {
         assert!(plant.force().0 > 0.5, "{:?}", plant.force());
         assert!(plant.volts().0 > free.0 + 0.05);
 
-        plant.by_hand(HandAction::Unmount);
+        plant.apply_hand_action(HandAction::Unmount);
         plant.advance(at, dt);
         assert_eq!(plant.force().0, 0.0);
-        plant.by_hand(HandAction::LoadCell { mass_g: 400.0 });
+        plant.apply_hand_action(HandAction::LoadCell { mass_g: 400.0 });
         plant.advance(at, dt);
         assert!(plant.volts().0 > free.0 + 0.05 && plant.force().0 == 0.0);
-        assert!((plant.on_cell().0 - 0.4 * 9.80665).abs() < 0.01);
+        assert!((plant.cell_force().0 - 0.4 * 9.80665).abs() < 0.01);
         plant.spoil(Some(CellFault::Stuck));
         let stuck = plant.volts();
         plant.advance(at - 5.0, dt);

@@ -3,11 +3,11 @@
 //! One thread does everything. It alone of this crate reads a clock: it is a program of its own, the other end of
 //! the wire, and nothing of palpate decides by it.
 
-use super::Device;
-use super::faults::{FaultKind, FaultPlan, ScheduledFault, Turn};
-use super::orders::Order;
+use super::EmulatedDevice;
+use super::faults::{FaultEvent, FaultKind, FaultPlan, ScheduledFault};
+use super::orders::EmulatorOrder;
 use super::pty::Pty;
-use super::wire::Way;
+use super::wire::LineDirection;
 use palpate_model::Nanos;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -25,7 +25,7 @@ use thiserror::Error;
 const SLEEP_MAX: Nanos = Nanos(1_000_000);
 /// So long a client gets to read the last bytes before a pseudo-terminal is closed, with which the system throws away
 /// what was not read.
-const FAREWELL: Nanos = Nanos(500_000_000);
+const FLUSH_MAX: Nanos = Nanos(500_000_000);
 
 /// Where clients find the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,9 +61,9 @@ pub enum Told {
     /// Clients can connect here: a path or an address, or one for each channel with commas between.
     Ready(String),
     /// A fault has begun or ended.
-    Fault(Turn),
+    Fault(FaultEvent),
     /// An order was carried out.
-    Done(Order),
+    Done(EmulatorOrder),
     /// An order was not understood; the sentence says what would be.
     Refused(String),
 }
@@ -87,8 +87,8 @@ pub enum ServeError {
 /// One connection.
 struct Line {
     stream: Option<TcpStream>,
-    to_device: Way,
-    from_device: Way,
+    to_device: LineDirection,
+    from_device: LineDirection,
     unsent: Vec<u8>,
 }
 
@@ -97,8 +97,8 @@ impl Line {
         Self {
             stream: None,
             // The converter's timer is on the way to the host alone.
-            to_device: Way::new(options.baud, Nanos::ZERO),
-            from_device: Way::new(options.baud, options.latency),
+            to_device: LineDirection::new(options.baud, Nanos::ZERO),
+            from_device: LineDirection::new(options.baud, options.latency),
             unsent: Vec::new(),
         }
     }
@@ -125,43 +125,43 @@ impl Plug {
     }
 }
 
-/// Lets clients talk to a device until `stop` is set. `orders` are lines that [`Order::parse`] reads, each
+/// Lets clients talk to a device until `stop` is set. `orders` are lines that [`EmulatorOrder::parse`] reads, each
 /// carried out at once.
 pub fn serve(
-    device: &mut dyn Device,
+    device: &mut dyn EmulatedDevice,
     options: &ServeOptions,
     orders: &Receiver<String>,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Told),
+    notify: &mut dyn FnMut(Told),
 ) -> Result<(), ServeError> {
     let mut server = Server::open(device, options)?;
-    tell(Told::Ready(server.address.clone()));
+    notify(Told::Ready(server.address.clone()));
     while !stop.load(Ordering::Relaxed) {
         for order in orders.try_iter() {
             let now = server.now();
-            match Order::parse(&order, now) {
-                Ok(Order::Fault(fault)) => server.faults.add(fault),
-                Ok(order @ Order::Hand(action)) => {
-                    server.device.by_hand(now, action);
-                    tell(Told::Done(order));
+            match EmulatorOrder::parse(&order, now) {
+                Ok(EmulatorOrder::Fault(fault)) => server.faults.add(fault),
+                Ok(order @ EmulatorOrder::Hand(action)) => {
+                    server.device.apply_hand_action(now, action);
+                    notify(Told::Done(order));
                 }
-                Err(err) => tell(Told::Refused(err.to_string())),
+                Err(err) => notify(Told::Refused(err.to_string())),
             }
         }
-        for turn in server.faults.advance(server.now()) {
-            tell(Told::Fault(turn));
-            server.turn(turn)?;
+        for event in server.faults.advance(server.now()) {
+            notify(Told::Fault(event));
+            server.apply_fault_event(event)?;
         }
         server.wait()?;
         server.accept();
         server.exchange();
     }
-    server.farewell();
+    server.flush_output();
     Ok(())
 }
 
 struct Server<'a> {
-    device: &'a mut dyn Device,
+    device: &'a mut dyn EmulatedDevice,
     options: &'a ServeOptions,
     start: Instant,
     plug: Plug,
@@ -177,7 +177,10 @@ impl<'a> Server<'a> {
         clippy::disallowed_methods,
         reason = "an emulator is the other end of the wire and has a clock of its own"
     )]
-    fn open(device: &'a mut dyn Device, options: &'a ServeOptions) -> Result<Self, ServeError> {
+    fn open(
+        device: &'a mut dyn EmulatedDevice,
+        options: &'a ServeOptions,
+    ) -> Result<Self, ServeError> {
         let lines = (0..device.channels()).map(|_| Line::new(options)).collect();
         let mut server = Self {
             faults: FaultPlan::new(options.faults.clone(), options.seed),
@@ -251,12 +254,12 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    fn turn(&mut self, turn: Turn) -> Result<(), ServeError> {
+    fn apply_fault_event(&mut self, event: FaultEvent) -> Result<(), ServeError> {
         let now = self.now();
-        match turn.kind {
-            FaultKind::Device(fault) => self.device.suffer(now, fault, turn.is_on),
+        match event.kind {
+            FaultKind::Device(fault) => self.device.apply_fault(now, fault, event.is_on),
             FaultKind::Line(_) => {}
-            FaultKind::Disconnect if turn.is_on => {
+            FaultKind::Disconnect if event.is_on => {
                 self.plug = Plug::default();
                 for channel in 0..self.lines.len() {
                     if self.lines[channel].stream.is_some() {
@@ -327,7 +330,7 @@ impl<'a> Server<'a> {
         for channel in 0..self.lines.len() {
             let (bytes, is_gone) = self.read(channel);
             let now = self.now();
-            let bytes = self.faults.spoil(bytes, true);
+            let bytes = self.faults.corrupt(bytes, true);
             let line = &mut self.lines[channel];
             line.to_device.push(now, &bytes, Nanos::ZERO);
             let arrived = if is_gone {
@@ -349,7 +352,7 @@ impl<'a> Server<'a> {
         for channel in 0..self.lines.len() {
             let bytes = self.device.transmit(channel);
             if !bytes.is_empty() {
-                let bytes = self.faults.spoil(bytes, false);
+                let bytes = self.faults.corrupt(bytes, false);
                 let lateness = self.faults.lateness();
                 self.lines[channel].from_device.push(now, &bytes, lateness);
             }
@@ -405,8 +408,8 @@ impl<'a> Server<'a> {
     }
 
     /// Sends what is left and lets the client read it.
-    fn farewell(&mut self) {
-        let until = self.now() + FAREWELL;
+    fn flush_output(&mut self) {
+        let until = self.now() + FLUSH_MAX;
         while self.now() < until {
             for channel in 0..self.lines.len() {
                 self.write(channel);

@@ -12,7 +12,7 @@ const BYTES_MAX: usize = 1 << 20;
 
 /// One direction of a line.
 #[derive(Clone, Debug)]
-pub struct Way {
+pub struct LineDirection {
     nanos_per_byte: u64,
     latency: Nanos,
     free_at: Nanos,
@@ -23,7 +23,7 @@ pub struct Way {
     held_since: Nanos,
 }
 
-impl Way {
+impl LineDirection {
     /// A line of so many bits a second, or as fast as bytes come; a converter that keeps a packet that is not full
     /// for `latency`.
     pub fn new(baud: Option<u32>, latency: Nanos) -> Self {
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn a_plain_line_keeps_nothing_back() {
-        let mut way = Way::new(None, Nanos::ZERO);
+        let mut way = LineDirection::new(None, Nanos::ZERO);
         way.push(Nanos(5), b"abc", Nanos::ZERO);
         assert_eq!(way.next_at(), Some(Nanos(5)));
         assert_eq!(way.take(Nanos(5)), b"abc");
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_slow_line_takes_its_time() {
-        let mut way = Way::new(Some(10_000), Nanos::ZERO);
+        let mut way = LineDirection::new(Some(10_000), Nanos::ZERO);
         way.push(Nanos(0), b"abc", Nanos::ZERO);
         assert_eq!(way.take(Nanos(999_999)), b"");
         assert_eq!(way.take(Nanos(2_000_000)), b"ab");
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn a_converter_waits_for_a_full_packet_or_its_timer() {
-        let mut way = Way::new(None, Nanos(16_000_000));
+        let mut way = LineDirection::new(None, Nanos(16_000_000));
         way.push(Nanos(1_000_000), &[b'x'; 70], Nanos::ZERO);
         assert_eq!(way.take(Nanos(1_000_000)).len(), 62);
         assert_eq!(way.next_at(), Some(Nanos(17_000_000)));
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn what_is_late_is_not_overtaken() {
-        let mut way = Way::new(None, Nanos::ZERO);
+        let mut way = LineDirection::new(None, Nanos::ZERO);
         way.push(Nanos(0), b"a", Nanos(100));
         way.push(Nanos(10), b"b", Nanos::ZERO);
         assert_eq!(way.take(Nanos(99)), b"");

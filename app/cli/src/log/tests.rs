@@ -13,7 +13,7 @@ use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
 use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{self, StandSettings};
 use palpate_drivers::wire::{HostClock, Link, MemoryLink, pair};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, RigCommand, RigDescription};

@@ -1,6 +1,6 @@
 //! One client: the line it writes, what it downloads, and what waits to be sent to it.
 
-use super::input::Input;
+use super::input::InputLine;
 use palpate_model::Nanos;
 use std::collections::VecDeque;
 
@@ -11,7 +11,7 @@ const WAITING_MAX: usize = 1024;
 
 /// What a client's bytes are.
 #[derive(Clone, Debug, Default)]
-pub enum Mode {
+pub enum ClientMode {
     /// Statements.
     #[default]
     Commands,
@@ -39,13 +39,13 @@ pub enum Mode {
 
 /// One client.
 #[derive(Clone, Debug, Default)]
-pub struct Client {
+pub struct GalilClient {
     /// Whether somebody is connected.
     pub is_open: bool,
     /// The line being written.
-    pub input: Input,
+    pub input: InputLine,
     /// What its bytes are.
-    pub mode: Mode,
+    pub mode: ClientMode,
     /// `EO 1`: characters received are sent back.
     pub has_echo: bool,
     /// The controller has closed the connection.
@@ -58,14 +58,14 @@ pub struct Client {
     out: Vec<u8>,
 }
 
-impl Client {
+impl GalilClient {
     /// Somebody who has just connected.
-    pub fn opened(has_echo: bool) -> Self {
+    pub fn connected(has_echo: bool) -> Self {
         Self { is_open: true, has_echo, ..Self::default() }
     }
 
     /// Somebody whose connection the controller has just closed.
-    pub fn hung_up() -> Self {
+    pub fn dropped() -> Self {
         Self { is_hung_up: true, ..Self::default() }
     }
 

@@ -3,16 +3,16 @@
 use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
 use super::scope::axis_of;
-use super::settings::{STEPPER_SPEED_MAX, Setting};
-use super::{Answer, GalilEmulator, Origin};
+use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
+use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 
-/// Words whose arguments are numbers of axes, beside the [`Setting`]s.
+/// Words whose arguments are numbers of axes, beside the [`AxisSetting`]s.
 const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
 
 /// One argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Argument {
+pub enum AxisArgument {
     /// `?`.
     Query,
     /// A number.
@@ -21,16 +21,20 @@ pub enum Argument {
 
 impl GalilEmulator {
     /// Does what a statement says.
-    pub(super) fn execute(&mut self, origin: Origin, text: &str) -> Result<Answer, ErrorCode> {
+    pub(super) fn execute(
+        &mut self,
+        origin: StatementOrigin,
+        text: &str,
+    ) -> Result<StatementAnswer, ErrorCode> {
         if !text.is_ascii() {
             return Err(ErrorCode::UNRECOGNIZED);
         }
         match text.as_bytes() {
             // ^R^V, ^R^S.
-            [0x12, 0x16, ..] => return Ok(Answer::Text(self.revision().to_owned())),
+            [0x12, 0x16, ..] => return Ok(StatementAnswer::Text(self.revision().to_owned())),
             [0x12, 0x13, ..] => {
                 self.reset();
-                return Ok(Answer::Silent);
+                return Ok(StatementAnswer::Silent);
             }
             _ => {}
         }
@@ -41,20 +45,20 @@ impl GalilEmulator {
             return Err(ErrorCode::UNRECOGNIZED);
         };
         let arguments = arguments.trim();
-        if let Some(setting) = Setting::named(word) {
+        if let Some(setting) = AxisSetting::from_word(word) {
             return self.set(setting, arguments);
         }
-        if let Some(answer) = self.move_word(origin, word, arguments) {
+        if let Some(answer) = self.axis_command(origin, word, arguments) {
             return answer;
         }
-        if let Some(answer) = self.transfer_word(origin, word, arguments) {
+        if let Some(answer) = self.transfer_command(origin, word, arguments) {
             return answer;
         }
-        self.system_word(origin, word, arguments)
+        self.system_command(origin, word, arguments)
     }
 
-    /// `name=expression`, `name[index]=expression`, `name=` to be told; `None` when it is a command.
-    fn assignment(&mut self, text: &str) -> Option<Result<Answer, ErrorCode>> {
+    /// `name=expression`, `name[index]=expression`, `name=` to read it; `None` when it is a command.
+    fn assignment(&mut self, text: &str) -> Option<Result<StatementAnswer, ErrorCode>> {
         let mut cursor = Cursor::new(text);
         let name = cursor.take_while(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
         if !name.starts_with(|first: char| first.is_ascii_alphabetic()) {
@@ -82,14 +86,19 @@ impl GalilEmulator {
         Some(self.assign(name, index, cursor.rest()))
     }
 
-    fn assign(&mut self, name: &str, index: Option<f64>, rest: &str) -> Result<Answer, ErrorCode> {
+    fn assign(
+        &mut self,
+        name: &str,
+        index: Option<f64>,
+        rest: &str,
+    ) -> Result<StatementAnswer, ErrorCode> {
         let model = self.settings.model;
         if rest.is_empty() || rest == "?" {
             let value = match index {
                 Some(index) => self.memory.element(name, index)?,
                 None => self.memory.variable(name).ok_or(ErrorCode::VARIABLE)?,
             };
-            return Ok(Answer::Text(self.variable_format.write(value)));
+            return Ok(StatementAnswer::Text(self.variable_format.write(value)));
         }
         let value = evaluate(rest, self)?;
         match index {
@@ -97,14 +106,14 @@ impl GalilEmulator {
             None if is_name(name) && name != "TIME" => self.memory.set(name, value, model)?,
             None => return Err(ErrorCode::VARIABLE),
         }
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
     /// Arguments for axes: `A=1`, `*=1`, or one field per axis.
     pub(super) fn axis_arguments(
         &self,
         arguments: &str,
-    ) -> Result<Vec<(usize, Argument)>, ErrorCode> {
+    ) -> Result<Vec<(usize, AxisArgument)>, ErrorCode> {
         let axes = self.axes.len();
         if let Some((who, value)) = arguments.split_once('=') {
             let who = who.trim();
@@ -143,14 +152,14 @@ impl GalilEmulator {
         Ok(all)
     }
 
-    fn argument(&self, field: &str) -> Result<Argument, ErrorCode> {
+    fn argument(&self, field: &str) -> Result<AxisArgument, ErrorCode> {
         if field == "?" {
-            return Ok(Argument::Query);
+            return Ok(AxisArgument::Query);
         }
         if field.contains('?') {
             return Err(ErrorCode::QUESTION_MARK);
         }
-        evaluate(field, self).map(Argument::Number)
+        evaluate(field, self).map(AxisArgument::Number)
     }
 
     /// Numbers in fields; an empty field is `None`.
@@ -182,37 +191,39 @@ impl GalilEmulator {
             .collect()
     }
 
-    fn set(&mut self, setting: Setting, arguments: &str) -> Result<Answer, ErrorCode> {
-        let mut told = Vec::new();
+    fn set(&mut self, setting: AxisSetting, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+        let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
             match argument {
-                Argument::Query => {
-                    let format =
-                        super::Format { decimals: setting.decimals(), ..self.position_format };
-                    told.push(format.write(self.axes[axis].settings.get(setting)));
+                AxisArgument::Query => {
+                    let format = super::NumberFormat {
+                        decimals: setting.decimals(),
+                        ..self.position_format
+                    };
+                    values.push(format.write(self.axes[axis].settings.get(setting)));
                 }
-                Argument::Number(value) => {
-                    let value = setting.taken(value, self.settings.model, self.clock.tm())?;
-                    if setting == Setting::Speed
+                AxisArgument::Number(value) => {
+                    let value = setting.round(value, self.settings.model, self.clock.tm())?;
+                    if setting == AxisSetting::Speed
                         && self.axes[axis].is_stepper()
                         && value > STEPPER_SPEED_MAX
                     {
                         return Err(ErrorCode::OUT_OF_RANGE);
                     }
-                    if setting == Setting::MotorType && self.axes[axis].is_running() {
+                    if setting == AxisSetting::MotorType && self.axes[axis].is_running() {
                         return Err(ErrorCode::RUNNING);
                     }
                     self.axes[axis].settings.set(setting, value);
                 }
             }
         }
-        Ok(listed(told))
+        Ok(join_values(values))
     }
 }
 
 /// Answers of several axes in one line, parted by commas; each begins with its sign's place.
-pub fn listed(told: Vec<String>) -> Answer {
-    if told.is_empty() { Answer::Done } else { Answer::Text(told.join(",")) }
+pub fn join_values(values: Vec<String>) -> StatementAnswer {
+    if values.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(values.join(",")) }
 }
 
 /// Fields parted by commas that stand in no brackets or parentheses.
@@ -241,7 +252,7 @@ fn is_axis_command(name: &str) -> bool {
         (Some(letter), None) => axis_of(letter).is_some(),
         _ => false,
     };
-    is_axis && (Setting::named(word).is_some() || AXIS_WORDS.contains(&word))
+    is_axis && (AxisSetting::from_word(word).is_some() || AXIS_WORDS.contains(&word))
 }
 
 /// Whether a name before `[` begins with the letters of a command that takes arrays.

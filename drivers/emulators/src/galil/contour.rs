@@ -20,7 +20,7 @@ struct Segment {
 
 /// The contour mode.
 #[derive(Clone, Debug, Default)]
-pub struct Contour {
+pub struct ContourMode {
     /// Axes in the mode; empty while it is off.
     pub axes: Vec<usize>,
     /// Of `DT`; 0 ends the mode with the next `CD`, -1 pauses.
@@ -34,7 +34,7 @@ pub struct Contour {
 
 /// What a sample of the contour mode asks of the axes.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
+pub enum ContourStep {
     /// Nothing to do.
     Idle,
     /// Increments of this sample, in counts, in the order of the axes.
@@ -43,7 +43,7 @@ pub enum Step {
     End,
 }
 
-impl Contour {
+impl ContourMode {
     /// Whether the mode is on.
     pub fn is_on(&self) -> bool {
         !self.axes.is_empty()
@@ -96,23 +96,23 @@ impl Contour {
     }
 
     /// One sample.
-    pub fn sample(&mut self) -> Step {
+    pub fn sample(&mut self) -> ContourStep {
         if !self.is_on() {
-            return Step::Idle;
+            return ContourStep::Idle;
         }
         // `DT -1` holds what is under way where it is.
         if self.current.is_none() && self.interval < 0.0 {
-            return Step::Idle;
+            return ContourStep::Idle;
         }
         if self.current.is_none() {
             self.current = self.buffer.pop_front().map(|segment| (segment, 0));
         }
         let Some((segment, over)) = &mut self.current else {
-            return Step::Idle;
+            return ContourStep::Idle;
         };
         if segment.samples == 0 {
             *self = Self { done: self.done, ..Self::default() };
-            return Step::End;
+            return ContourStep::End;
         }
         let share = 1.0 / f64::from(segment.samples);
         let by = segment.increments.iter().map(|counts| counts * share).collect();
@@ -121,7 +121,7 @@ impl Contour {
             self.current = None;
             self.done = self.done.wrapping_add(1);
         }
-        Step::By(by)
+        ContourStep::By(by)
     }
 
     /// Leaves the mode at once.
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn increments_are_spread_over_their_samples() {
-        let mut contour = Contour::default();
+        let mut contour = ContourMode::default();
         contour.begin(vec![0]);
         assert_eq!(contour.push(vec![1.0], None), Err(ErrorCode::NO_TIME));
         contour.set_interval(2.0).unwrap();
@@ -145,17 +145,26 @@ mod tests {
         contour.push(vec![0.0], Some(0.0)).unwrap();
         assert_eq!(contour.free(), SEGMENTS - 3);
         let steps: Vec<_> = (0..8).map(|_| contour.sample()).collect();
-        let by = |counts: f64| Step::By(vec![counts]);
+        let by = |counts: f64| ContourStep::By(vec![counts]);
         assert_eq!(
             steps,
-            [by(2.0), by(2.0), by(2.0), by(2.0), by(-2.0), by(-2.0), Step::End, Step::Idle]
+            [
+                by(2.0),
+                by(2.0),
+                by(2.0),
+                by(2.0),
+                by(-2.0),
+                by(-2.0),
+                ContourStep::End,
+                ContourStep::Idle
+            ]
         );
         assert!(!contour.is_on());
     }
 
     #[test]
     fn the_buffer_has_an_end() {
-        let mut contour = Contour::default();
+        let mut contour = ContourMode::default();
         contour.begin(vec![0]);
         contour.set_interval(1.0).unwrap();
         for _ in 0..SEGMENTS {

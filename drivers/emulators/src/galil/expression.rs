@@ -2,7 +2,7 @@
 //!
 //! DMC-40x0 user manual, chapter 7: parentheses come first, all operators have equal rank.
 
-use super::format::held;
+use super::format::quantise;
 use palpate_drivers::galil::ErrorCode;
 
 /// Characters of a name (DMC-40x0 user manual: "up to eight").
@@ -84,7 +84,7 @@ impl<'a> Cursor<'a> {
         let mut value = self.primary(scope)?;
         while let Some(operator) = self.operator() {
             let right = self.primary(scope)?;
-            value = held(operator.apply(value, right)?);
+            value = quantise(operator.apply(value, right)?);
         }
         self.depth -= 1;
         Ok(value)
@@ -138,12 +138,12 @@ impl<'a> Cursor<'a> {
                 self.at += 1;
                 let name = self.take_while(|byte| byte.is_ascii_uppercase());
                 let argument = self.bracketed(scope, ErrorCode::BAD_FUNCTION)?;
-                scope.function(name, argument).map(held)
+                scope.function(name, argument).map(quantise)
             }
             b'_' => {
                 self.at += 1;
                 let name = self.take_while(|byte| byte.is_ascii_alphanumeric());
-                scope.operand(name).map(held)
+                scope.operand(name).map(quantise)
             }
             b'$' => {
                 self.at += 1;
@@ -154,7 +154,7 @@ impl<'a> Cursor<'a> {
             }
             b'"' => {
                 self.at += 1;
-                packed(self.quoted()?)
+                pack_text(self.quoted()?)
             }
             byte if byte.is_ascii_digit() || byte == b'.' => self.number(),
             byte if byte.is_ascii_alphabetic() => {
@@ -180,7 +180,7 @@ impl<'a> Cursor<'a> {
 
     fn number(&mut self) -> Result<f64, ErrorCode> {
         let digits = self.take_while(|byte| byte.is_ascii_digit() || byte == b'.');
-        digits.parse().map(held).map_err(|_| ErrorCode::NOT_A_NUMBER)
+        digits.parse().map(quantise).map_err(|_| ErrorCode::NOT_A_NUMBER)
     }
 
     /// What is left.
@@ -202,7 +202,7 @@ pub fn evaluate(text: &str, scope: &dyn Scope) -> Result<f64, ErrorCode> {
 }
 
 /// A string of up to six characters as a number holds it: four bytes before and two behind the point.
-fn packed(text: &str) -> Result<f64, ErrorCode> {
+fn pack_text(text: &str) -> Result<f64, ErrorCode> {
     if text.len() > 6 {
         return Err(ErrorCode::QUOTE);
     }
@@ -212,7 +212,7 @@ fn packed(text: &str) -> Result<f64, ErrorCode> {
 }
 
 /// The characters that a number holds.
-pub fn unpacked(value: f64) -> String {
+pub fn unpack_text(value: f64) -> String {
     let bits = (value * 65_536.0) as u64;
     bits.to_be_bytes()[2..]
         .iter()
@@ -300,7 +300,7 @@ mod tests {
         ] {
             assert_eq!(evaluate(text, &Names), Ok(value), "{text}");
         }
-        assert_eq!(unpacked(packed("GO 12").unwrap()), "GO 12");
+        assert_eq!(unpack_text(pack_text("GO 12").unwrap()), "GO 12");
     }
 
     #[test]

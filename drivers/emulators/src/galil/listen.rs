@@ -1,13 +1,13 @@
 //! What becomes of a byte: echo, statement, line of a download; and what is answered.
 
-use super::client::Mode;
+use super::client::ClientMode;
 use super::input::Statement;
-use super::{Answer, GalilEmulator, Origin};
+use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
     /// Takes one byte of a client, or keeps it while the controller is busy with that client.
-    pub(super) fn feed(&mut self, channel: usize, byte: u8) {
+    pub(super) fn receive_byte(&mut self, channel: usize, byte: u8) {
         if self.boots_until.is_some() || !self.clients[channel].is_open {
             return;
         }
@@ -19,7 +19,7 @@ impl GalilEmulator {
     }
 
     /// Bytes that waited, and lines that paused, as time passes.
-    pub(super) fn feed_waiting(&mut self) {
+    pub(super) fn take_waiting_bytes(&mut self) {
         for channel in 0..self.clients.len() {
             let now = self.now;
             while let Some(byte) = self.clients[channel].take_waiting(now) {
@@ -35,9 +35,9 @@ impl GalilEmulator {
             client.send(&[byte]);
         }
         match client.mode {
-            Mode::Program { .. } => self.take_program(channel, byte),
-            Mode::Values { .. } => self.take_value(channel, byte),
-            Mode::Commands => {
+            ClientMode::Program { .. } => self.take_program_byte(channel, byte),
+            ClientMode::Values { .. } => self.take_value_byte(channel, byte),
+            ClientMode::Commands => {
                 if let Some(statement) = client.input.take(byte) {
                     self.answer(channel, &statement);
                 }
@@ -48,18 +48,18 @@ impl GalilEmulator {
     fn answer(&mut self, channel: usize, statement: &Statement) {
         let answer = match statement {
             Statement::TooLong => Err(ErrorCode::BUFFER_FULL),
-            Statement::Whole(text) if text.is_empty() => Ok(Answer::Done),
-            Statement::Whole(text) => self.execute(Origin::Client(channel), text),
+            Statement::Whole(text) if text.is_empty() => Ok(StatementAnswer::Done),
+            Statement::Whole(text) => self.execute(StatementOrigin::Client(channel), text),
         };
         let bytes = match answer {
-            Ok(Answer::Done) => b":".to_vec(),
-            Ok(Answer::Text(text)) => format!("{text}\r\n:").into_bytes(),
-            Ok(Answer::Open(text)) => format!("{text}:").into_bytes(),
-            Ok(Answer::Bytes(mut bytes)) => {
+            Ok(StatementAnswer::Done) => b":".to_vec(),
+            Ok(StatementAnswer::Text(text)) => format!("{text}\r\n:").into_bytes(),
+            Ok(StatementAnswer::Open(text)) => format!("{text}:").into_bytes(),
+            Ok(StatementAnswer::Bytes(mut bytes)) => {
                 bytes.push(b':');
                 bytes
             }
-            Ok(Answer::Silent) => Vec::new(),
+            Ok(StatementAnswer::Silent) => Vec::new(),
             Err(code) => {
                 self.error = code;
                 b"?".to_vec()
@@ -69,7 +69,7 @@ impl GalilEmulator {
     }
 
     /// Text of a program, of which nobody asked; lines end with CR LF.
-    pub(super) fn say(&mut self, text: &str) {
+    pub(super) fn send_unsolicited(&mut self, text: &str) {
         let mark = if self.is_marked { 0x80 } else { 0 };
         let bytes: Vec<u8> = text.bytes().map(|byte| byte | mark).collect();
         if let Some(client) = self

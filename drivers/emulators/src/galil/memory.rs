@@ -10,7 +10,7 @@ const ARRAYS_MAX: usize = 30;
 
 /// What a program and its clients keep.
 #[derive(Clone, Debug, Default)]
-pub struct Memory {
+pub struct ControllerMemory {
     variables: BTreeMap<String, f64>,
     arrays: BTreeMap<String, Vec<f64>>,
 }
@@ -22,7 +22,7 @@ pub fn is_name(text: &str) -> bool {
         && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
-impl Memory {
+impl ControllerMemory {
     /// A variable.
     pub fn variable(&self, name: &str) -> Option<f64> {
         self.variables.get(name).copied()
@@ -85,7 +85,7 @@ impl Memory {
     }
 
     /// `DA` of one name or of all arrays or variables.
-    pub fn forget(&mut self, name: &str) -> Result<(), ErrorCode> {
+    pub fn deallocate(&mut self, name: &str) -> Result<(), ErrorCode> {
         match name {
             "*" => self.variables.clear(),
             "*[]" | "*[0]" => self.arrays.clear(),
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn memory_is_bounded() {
         let model = GalilModel::Dmc4143;
-        let mut memory = Memory::default();
+        let mut memory = ControllerMemory::default();
         assert_eq!(memory.dimension("a", 8000.0, model), Ok(()));
         assert_eq!(memory.dimension("b", 8000.0, model), Ok(()));
         assert_eq!(memory.dimension("c", 1.0, model), Err(ErrorCode::ARRAY_SPACE));
@@ -159,8 +159,8 @@ mod tests {
             assert_eq!(memory.set(&format!("v{at}"), 1.0, model), Ok(()));
         }
         assert_eq!(memory.set("w", 1.0, model), Err(ErrorCode::TOO_MANY_NAMES));
-        assert_eq!(memory.forget("a[]"), Ok(()));
-        assert_eq!(memory.forget("*"), Ok(()));
+        assert_eq!(memory.deallocate("a[]"), Ok(()));
+        assert_eq!(memory.deallocate("*"), Ok(()));
         assert_eq!(memory.variables().count() + memory.arrays().count(), 1);
     }
 }

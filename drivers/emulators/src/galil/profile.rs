@@ -2,14 +2,14 @@
 
 /// A commanded place that moves, in counts and counts per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Profile {
+pub struct AxisProfile {
     /// Commanded place.
     pub place: f64,
     /// Commanded velocity.
     pub velocity: f64,
 }
 
-impl Profile {
+impl AxisProfile {
     /// One sample towards a target, arriving at rest. Returns whether it has arrived.
     ///
     /// The next speed is the largest from which the way left suffices to stop, so that accelerating, slewing and
@@ -87,7 +87,7 @@ mod tests {
             (100_000.0, 25_000.0, 256_000.0),
         ] {
             let oracle = closed(to, speed, rate);
-            let mut profile = Profile::default();
+            let mut profile = AxisProfile::default();
             let mut samples = 0;
             loop {
                 let is_there = profile.towards(to, speed, rate, rate, DT);
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_stop_ends_on_a_whole_count_at_most_one_further() {
-        let mut profile = Profile::default();
+        let mut profile = AxisProfile::default();
         for _ in 0..777 {
             profile.jog(-1332.0, 4096.0, 4096.0, DT);
         }

@@ -9,7 +9,7 @@ const INTERVAL_MAX: f64 = 8.0;
 
 /// Which number an array records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub enum RecordSource {
     /// `TIME`.
     Time,
     /// An analog input, in counts.
@@ -22,11 +22,11 @@ pub enum Source {
 
 /// What is recorded, where, and how far it is.
 #[derive(Clone, Debug, Default)]
-pub struct Recorder {
+pub struct ArrayRecorder {
     /// Names of `RA`.
     pub arrays: Vec<String>,
     /// Sources of `RD`.
-    pub sources: Vec<Source>,
+    pub sources: Vec<RecordSource>,
     /// Samples from one element to the next; 0 while nothing is recorded.
     interval: u64,
     /// Elements recorded before it ends.
@@ -37,7 +37,7 @@ pub struct Recorder {
     started: u64,
 }
 
-impl Recorder {
+impl ArrayRecorder {
     /// `_RC`.
     pub fn is_running(&self) -> bool {
         self.interval > 0
@@ -61,7 +61,7 @@ impl Recorder {
     }
 
     /// `RD`.
-    pub fn set_sources(&mut self, sources: Vec<Source>) -> Result<(), ErrorCode> {
+    pub fn set_sources(&mut self, sources: Vec<RecordSource>) -> Result<(), ErrorCode> {
         if self.is_running() {
             return Err(ErrorCode::RECORDING);
         }
@@ -124,10 +124,10 @@ impl Recorder {
 mod tests {
     use super::*;
 
-    fn ready() -> Recorder {
-        let mut recorder = Recorder::default();
+    fn ready() -> ArrayRecorder {
+        let mut recorder = ArrayRecorder::default();
         recorder.set_arrays(vec!["a".into(), "b".into()]).unwrap();
-        recorder.set_sources(vec![Source::Time, Source::Analog(0)]).unwrap();
+        recorder.set_sources(vec![RecordSource::Time, RecordSource::Analog(0)]).unwrap();
         recorder
     }
 
@@ -156,12 +156,12 @@ mod tests {
 
     #[test]
     fn mistakes_have_their_numbers() {
-        let mut recorder = Recorder::default();
+        let mut recorder = ArrayRecorder::default();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
         recorder = ready();
         assert_eq!(recorder.start(9.0, None, 5, 0), Err(ErrorCode::OUT_OF_RANGE));
         assert_eq!(recorder.start(1.0, Some(6.0), 5, 0), Err(ErrorCode::TOO_MANY_ELEMENTS));
-        recorder.set_sources(vec![Source::Time]).unwrap();
+        recorder.set_sources(vec![RecordSource::Time]).unwrap();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
     }
 }

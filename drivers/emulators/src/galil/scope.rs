@@ -2,9 +2,9 @@
 
 use super::GalilEmulator;
 use super::analog::INPUTS;
-use super::axis::Prepared;
+use super::axis::PreparedMotion;
 use super::expression::Scope;
-use super::settings::Setting;
+use super::settings::AxisSetting;
 use palpate_drivers::galil::ErrorCode;
 
 /// The axis that a letter stands for.
@@ -25,7 +25,7 @@ fn truth(is_so: bool) -> f64 {
 
 impl GalilEmulator {
     /// An axis's number by its two letters; `None` where there is no such operand.
-    pub(super) fn told(&self, word: [u8; 2], index: usize) -> Option<f64> {
+    pub(super) fn axis_operand(&self, word: [u8; 2], index: usize) -> Option<f64> {
         let axis = self.axes.get(index)?;
         Some(match &word {
             b"BG" => truth(axis.is_running()),
@@ -35,7 +35,7 @@ impl GalilEmulator {
             b"TD" => axis.pulses(),
             // "On a stepper axis the step-count register" (DMC-2x00 user manual, page 117).
             b"DE" if axis.is_stepper() => axis.pulses(),
-            b"TP" | b"DE" => axis.told_position(),
+            b"TP" | b"DE" => axis.encoder_position(),
             b"DP" => axis.reference(),
             b"TE" | b"TT" | b"RL" | b"QS" | b"YR" => 0.0,
             b"TV" => axis.profile.velocity,
@@ -46,16 +46,16 @@ impl GalilEmulator {
             b"HM" => truth(axis.inputs.home),
             b"PA" => self.target(index),
             b"PR" => match axis.prepared {
-                Prepared::Relative(way) => way,
+                PreparedMotion::Relative(way) => way,
                 _ => 0.0,
             },
             b"JG" => match axis.prepared {
-                Prepared::Jog(speed) => speed,
+                PreparedMotion::Jog(speed) => speed,
                 _ => 0.0,
             },
             _ => {
                 let word = std::str::from_utf8(&word).ok()?;
-                axis.settings.get(Setting::named(word)?)
+                axis.settings.get(AxisSetting::from_word(word)?)
             }
         })
     }
@@ -63,13 +63,13 @@ impl GalilEmulator {
     /// Where the axis goes or would go.
     pub(super) fn target(&self, axis: usize) -> f64 {
         match self.axes[axis].prepared {
-            Prepared::Target(target) => target,
+            PreparedMotion::Target(target) => target,
             _ => self.axes[axis].reference(),
         }
     }
 
     /// A number of the controller as a whole.
-    pub(super) fn told_plain(&self, word: [u8; 2]) -> Option<f64> {
+    pub(super) fn controller_operand(&self, word: [u8; 2]) -> Option<f64> {
         Some(match &word {
             b"TM" => self.clock.tm(),
             b"TC" => f64::from(self.error.0),
@@ -98,7 +98,7 @@ impl GalilEmulator {
     }
 
     /// An operand with a number behind its letters.
-    fn told_numbered(&self, word: [u8; 2], number: usize) -> Result<f64, ErrorCode> {
+    fn numbered_operand(&self, word: [u8; 2], number: usize) -> Result<f64, ErrorCode> {
         let thread = || self.threads.get(number).ok_or(ErrorCode::OUT_OF_RANGE);
         match &word {
             b"XQ" => {
@@ -122,7 +122,7 @@ impl GalilEmulator {
                     .copied()
                     .ok_or(ErrorCode::OUT_OF_RANGE)
             }
-            _ => self.told_plain(word).ok_or(ErrorCode::BAD_RESPONSE),
+            _ => self.controller_operand(word).ok_or(ErrorCode::BAD_RESPONSE),
         }
     }
 
@@ -179,17 +179,18 @@ impl Scope for GalilEmulator {
         };
         let (word, rest) = ([*first, *second], rest.unwrap_or(""));
         if let Ok(number) = rest.parse() {
-            return self.told_numbered(word, number);
+            return self.numbered_operand(word, number);
         }
         let mut letters = rest.chars();
         match (letters.next(), letters.next()) {
-            (None, _) => {
-                self.told_plain(word).or_else(|| self.told(word, 0)).ok_or(ErrorCode::BAD_RESPONSE)
-            }
+            (None, _) => self
+                .controller_operand(word)
+                .or_else(|| self.axis_operand(word, 0))
+                .ok_or(ErrorCode::BAD_RESPONSE),
             // The coordinate systems never run.
             (Some('S' | 'T'), None) if &word == b"BG" => Ok(0.0),
             (Some(letter), None) => axis_of(letter)
-                .and_then(|axis| self.told(word, axis))
+                .and_then(|axis| self.axis_operand(word, axis))
                 .ok_or(ErrorCode::BAD_RESPONSE),
             _ => Err(ErrorCode::BAD_RESPONSE),
         }

@@ -3,8 +3,8 @@
 use super::analog::Analog;
 use super::data_record::lengths;
 use super::expression::evaluate;
-use super::format::Format;
-use super::{Answer, GalilEmulator, Origin};
+use super::format::NumberFormat;
+use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 use palpate_model::Nanos;
 
@@ -22,39 +22,39 @@ impl GalilEmulator {
     }
 
     /// All commands that are about no axis and move no data.
-    pub(super) fn system_word(
+    pub(super) fn system_command(
         &mut self,
-        origin: Origin,
+        origin: StatementOrigin,
         word: &str,
         arguments: &str,
-    ) -> Result<Answer, ErrorCode> {
+    ) -> Result<StatementAnswer, ErrorCode> {
         match word {
             "MG" => return self.message(arguments),
-            "TC" => return self.tell_error(arguments),
+            "TC" => return self.query_error(arguments),
             "TB" | "TI" => {
                 let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.told_plain(letters).unwrap_or(0.0);
-                let format = Format { whole: 3, ..self.position_format };
-                return Ok(Answer::Text(format.write(value)));
+                let value = self.controller_operand(letters).unwrap_or(0.0);
+                let format = NumberFormat { whole: 3, ..self.position_format };
+                return Ok(StatementAnswer::Text(format.write(value)));
             }
-            "ID" => return Ok(Answer::Text(self.identity())),
-            "WH" => return Ok(Answer::Text(self.who(origin))),
-            "TH" => return Ok(Answer::Text(self.handles())),
-            "QZ" => return Ok(Answer::Text(lengths(self.settings.model))),
+            "ID" => return Ok(StatementAnswer::Text(self.identity())),
+            "WH" => return Ok(StatementAnswer::Text(self.connection_name(origin))),
+            "TH" => return Ok(StatementAnswer::Text(self.list_handles())),
+            "QZ" => return Ok(StatementAnswer::Text(lengths(self.settings.model))),
             "QR" => return self.query_record(origin),
             "RS" => {
                 self.reset();
-                return Ok(Answer::Silent);
+                return Ok(StatementAnswer::Silent);
             }
             "TM" | "PF" | "VF" | "LZ" if arguments == "?" => {
                 let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.told_plain(letters).unwrap_or(0.0);
-                return Ok(Answer::Text(self.variable_format.write(value)));
+                let value = self.controller_operand(letters).unwrap_or(0.0);
+                return Ok(StatementAnswer::Text(self.variable_format.write(value)));
             }
             "TM" => self.set_tm(arguments)?,
             "PF" | "VF" | "LZ" => self.set_format(word, arguments)?,
             "EO" => {
-                let has_echo = self.one_of(arguments, &[0.0, 1.0])? == 1.0;
+                let has_echo = self.allowed_number(arguments, &[0.0, 1.0])? == 1.0;
                 // Echo is for the serial line.
                 if self.settings.is_serial {
                     self.clients[0].has_echo = has_echo;
@@ -70,7 +70,7 @@ impl GalilEmulator {
                     None => return Err(ErrorCode::FEW_FIELDS),
                 };
             }
-            "CF" => self.unsolicited_to = self.handle_named(origin, arguments)?,
+            "CF" => self.unsolicited_to = self.parse_handle(origin, arguments)?,
             "CN" => self.configure_inputs(arguments)?,
             "AQ" => self.set_analog(arguments)?,
             "SB" | "CB" => self.set_output(word == "SB", arguments)?,
@@ -86,7 +86,9 @@ impl GalilEmulator {
                 _ => return Err(ErrorCode::OUT_OF_RANGE),
             },
             // The addresses that the DMC-30010's answer to `TH` tells too.
-            "IA" if arguments == "?" => return Ok(Answer::Text("127, 0, 0, 1".to_owned())),
+            "IA" if arguments == "?" => {
+                return Ok(StatementAnswer::Text("127, 0, 0, 1".to_owned()));
+            }
             "CO" if !self.settings.model.is_40x0() => return Err(ErrorCode::UNRECOGNIZED),
             // Stored on the controller; nothing here depends on them.
             "CO" | "AO" | "DQ" | "TW" | "TR" | "IA" | "IK" | "SM" | "DH" | "PW" => {
@@ -102,7 +104,7 @@ impl GalilEmulator {
             "NO" => {}
             // Interrupts are for boards on a computer's bus.
             "EI" | "UI" => return Err(ErrorCode::NOT_SUPPORTED),
-            "ED" | "LS" if matches!(origin, Origin::Client(_)) => {
+            "ED" | "LS" if matches!(origin, StatementOrigin::Client(_)) => {
                 return Err(ErrorCode::NOT_SUPPORTED);
             }
             "AM" | "MC" | "WT" | "WC" | "AT" | "AI" | "JP" | "JS" | "IF" | "EN" | "RE" | "ZS" => {
@@ -110,10 +112,10 @@ impl GalilEmulator {
             }
             _ => return Err(ErrorCode::UNRECOGNIZED),
         }
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
-    fn one_of(&self, arguments: &str, allowed: &[f64]) -> Result<f64, ErrorCode> {
+    fn allowed_number(&self, arguments: &str, allowed: &[f64]) -> Result<f64, ErrorCode> {
         match self.numbers(arguments)?.as_slice() {
             [Some(value)] if allowed.contains(value) => Ok(*value),
             [Some(_)] => Err(ErrorCode::OUT_OF_RANGE),
@@ -122,7 +124,7 @@ impl GalilEmulator {
     }
 
     /// `TC`, `TC0`: the number; `TC1`: number and text. Telling clears it.
-    fn tell_error(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn query_error(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         let has_text = match arguments {
             "" | "0" | "?" => false,
             "1" => true,
@@ -130,7 +132,7 @@ impl GalilEmulator {
         };
         let code = std::mem::replace(&mut self.error, ErrorCode(0));
         let text = if has_text { code.text() } else { "" };
-        Ok(Answer::Text(format!("{} {text}", code.0).trim_end().to_owned()))
+        Ok(StatementAnswer::Text(format!("{} {text}", code.0).trim_end().to_owned()))
     }
 
     /// Of this form on 41x3 and 40x0 boards; the words are this emulator's.
@@ -146,9 +148,9 @@ impl GalilEmulator {
         )
     }
 
-    fn who(&self, origin: Origin) -> String {
+    fn connection_name(&self, origin: StatementOrigin) -> String {
         match origin {
-            Origin::Client(channel) if !self.settings.is_serial => {
+            StatementOrigin::Client(channel) if !self.settings.is_serial => {
                 format!("IH{}", handle_letter(channel))
             }
             _ => "RS232".to_owned(),
@@ -156,7 +158,7 @@ impl GalilEmulator {
     }
 
     /// Of the form that a DMC-30010 gave in ESRF BLISS 2.4.0, `controllers/motors/galil`.
-    fn handles(&self) -> String {
+    fn list_handles(&self) -> String {
         let mut text =
             "CONTROLLER IP ADDRESS 127,0,0,1 ETHERNET ADDRESS 00-50-4C-00-07-1C".to_owned();
         if self.settings.is_serial {
@@ -173,11 +175,11 @@ impl GalilEmulator {
         text
     }
 
-    fn query_record(&self, origin: Origin) -> Result<Answer, ErrorCode> {
+    fn query_record(&self, origin: StatementOrigin) -> Result<StatementAnswer, ErrorCode> {
         match origin {
             // Which blocks a client asks for is ignored: all come.
-            Origin::Client(_) => Ok(Answer::Bytes(self.data_record())),
-            Origin::Thread(_) => Err(ErrorCode::NOT_IN_PROGRAM),
+            StatementOrigin::Client(_) => Ok(StatementAnswer::Bytes(self.data_record())),
+            StatementOrigin::Thread(_) => Err(ErrorCode::NOT_IN_PROGRAM),
         }
     }
 
@@ -206,16 +208,20 @@ impl GalilEmulator {
         }
         let (position, variable, removes_zeros) = self.format_numbers;
         let has_zeros = removes_zeros == 0.0;
-        self.position_format = Format::from_number(position, has_zeros);
-        self.variable_format = Format::from_number(variable, has_zeros);
+        self.position_format = NumberFormat::from_number(position, has_zeros);
+        self.variable_format = NumberFormat::from_number(variable, has_zeros);
         Ok(())
     }
 
     /// `A` to `H`, `S` for the serial line, `I` for the connection that asks.
-    fn handle_named(&self, origin: Origin, name: &str) -> Result<Option<usize>, ErrorCode> {
+    fn parse_handle(
+        &self,
+        origin: StatementOrigin,
+        name: &str,
+    ) -> Result<Option<usize>, ErrorCode> {
         let asking = match origin {
-            Origin::Client(channel) => Some(channel),
-            Origin::Thread(_) => None,
+            StatementOrigin::Client(channel) => Some(channel),
+            StatementOrigin::Thread(_) => None,
         };
         match name.as_bytes() {
             b"I" => Ok(asking),
@@ -267,7 +273,7 @@ impl GalilEmulator {
     }
 
     /// `DR n,h`: refused on a serial line, as gclib does.
-    fn push(&mut self, origin: Origin, arguments: &str) -> Result<(), ErrorCode> {
+    fn push(&mut self, origin: StatementOrigin, arguments: &str) -> Result<(), ErrorCode> {
         let (interval, handle) = arguments.split_once(',').unwrap_or((arguments, "I"));
         let interval = evaluate(interval, self)?;
         if interval == 0.0 {
@@ -280,17 +286,17 @@ impl GalilEmulator {
         if !(PUSH_MIN..=30_000.0).contains(&interval) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let to = self.handle_named(origin, handle.trim())?;
+        let to = self.parse_handle(origin, handle.trim())?;
         let to = to.filter(|to| self.clients[*to].is_open);
         self.pushed = Some((interval as u64, to.ok_or(ErrorCode::CLOSED_HANDLE)?));
         Ok(())
     }
 
-    fn burn(&mut self, origin: Origin) -> Result<(), ErrorCode> {
+    fn burn(&mut self, origin: StatementOrigin) -> Result<(), ErrorCode> {
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        if let Origin::Client(channel) = origin {
+        if let StatementOrigin::Client(channel) = origin {
             self.clients[channel].busy_until = Some(self.now + BURN);
         }
         Ok(())
@@ -298,7 +304,7 @@ impl GalilEmulator {
 
     /// `IHT=>-3` closes all other handles, `IHS=>-2` the one that sent it, `IHN=>-2` all but that one, `IHC=>-1` one
     /// (DMC-1400 command reference, `IH`; `GalilConnector.cpp` of EPICS).
-    fn close_handles(&mut self, origin: Origin, arguments: &str) -> Result<(), ErrorCode> {
+    fn close_handles(&mut self, origin: StatementOrigin, arguments: &str) -> Result<(), ErrorCode> {
         let Some((who, how)) = arguments.split_once("=>") else {
             // Opening a connection of its own to another device.
             return Err(ErrorCode::NOT_SUPPORTED);
@@ -307,8 +313,8 @@ impl GalilEmulator {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
         let asking = match origin {
-            Origin::Client(channel) => Some(channel),
-            Origin::Thread(_) => None,
+            StatementOrigin::Client(channel) => Some(channel),
+            StatementOrigin::Thread(_) => None,
         };
         let which: Vec<usize> = match who.trim().as_bytes() {
             b"S" => asking.into_iter().collect(),

@@ -1,12 +1,12 @@
 //! Arrays and programs: made, recorded, sent up and down.
 
-use super::client::Mode;
+use super::client::ClientMode;
 use super::commands::fields;
 use super::expression::evaluate;
 use super::program::{Program, check_line};
-use super::record::Source;
+use super::record::RecordSource;
 use super::scope::axis_of;
-use super::{Answer, GalilEmulator, Origin};
+use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
@@ -19,15 +19,15 @@ const fn ends_download(byte: u8) -> bool {
 
 impl GalilEmulator {
     /// A command about arrays or programs; `None` when it is another one.
-    pub(super) fn transfer_word(
+    pub(super) fn transfer_command(
         &mut self,
-        origin: Origin,
+        origin: StatementOrigin,
         word: &str,
         arguments: &str,
-    ) -> Option<Result<Answer, ErrorCode>> {
+    ) -> Option<Result<StatementAnswer, ErrorCode>> {
         let result = match word {
             "DM" => self.dimension(arguments),
-            "DA" => self.forget(arguments),
+            "DA" => self.deallocate(arguments),
             "LV" => Ok(self.list_variables()),
             "LA" => Ok(self.list_arrays()),
             "LL" => Ok(self.list_labels()),
@@ -45,10 +45,10 @@ impl GalilEmulator {
         Some(result)
     }
 
-    fn dimension(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn dimension(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         if arguments == "?" {
             let free = self.memory.free(self.settings.model) as f64;
-            return Ok(Answer::Text(self.position_format.write(free)));
+            return Ok(StatementAnswer::Text(self.position_format.write(free)));
         }
         for field in fields(arguments) {
             let (name, rest) = field.split_once('[').ok_or(ErrorCode::BRACKETS)?;
@@ -56,39 +56,39 @@ impl GalilEmulator {
             let length = evaluate(length, self)?.trunc();
             self.memory.dimension(name.trim(), length, self.settings.model)?;
         }
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
-    fn forget(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn deallocate(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         for field in fields(arguments) {
-            self.memory.forget(field)?;
+            self.memory.deallocate(field)?;
         }
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
-    fn list_variables(&self) -> Answer {
+    fn list_variables(&self) -> StatementAnswer {
         let lines: Vec<String> = self
             .memory
             .variables()
             .map(|(name, value)| format!("{name}={}", self.variable_format.write(value)))
             .collect();
-        lines_or_nothing(&lines)
+        join_lines(&lines)
     }
 
-    fn list_arrays(&self) -> Answer {
+    fn list_arrays(&self) -> StatementAnswer {
         let lines: Vec<String> =
             self.memory.arrays().map(|(name, length)| format!("{name}[{length}]")).collect();
-        lines_or_nothing(&lines)
+        join_lines(&lines)
     }
 
-    fn list_labels(&self) -> Answer {
+    fn list_labels(&self) -> StatementAnswer {
         let lines: Vec<String> =
             self.program.labels().map(|(name, line)| format!("#{name}={line}")).collect();
-        lines_or_nothing(&lines)
+        join_lines(&lines)
     }
 
     /// `RA force[],pos[]`.
-    fn record_arrays(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn record_arrays(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         let mut names = Vec::new();
         for field in fields(arguments) {
             let name = field.strip_suffix("[]").ok_or(ErrorCode::BRACKETS)?;
@@ -96,21 +96,21 @@ impl GalilEmulator {
             names.push(name.to_owned());
         }
         self.recorder.set_arrays(names)?;
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
     /// `RD _AFX,_TDA`.
-    fn record_sources(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
-        let sources: Result<Vec<Source>, ErrorCode> =
+    fn record_sources(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+        let sources: Result<Vec<RecordSource>, ErrorCode> =
             fields(arguments).into_iter().map(|field| self.source(field)).collect();
         self.recorder.set_sources(sources?)?;
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
-    fn source(&self, field: &str) -> Result<Source, ErrorCode> {
+    fn source(&self, field: &str) -> Result<RecordSource, ErrorCode> {
         let name = field.strip_prefix('_').unwrap_or(field);
         if name == "TIME" {
-            return Ok(Source::Time);
+            return Ok(RecordSource::Time);
         }
         let (Some([first, second]), Some(rest)) =
             (name.as_bytes().first_chunk::<2>(), name.get(2..))
@@ -127,29 +127,29 @@ impl GalilEmulator {
         match (&word, index) {
             // Inputs go by the letters of axes (DMC-1700/1800 user manual, page 159).
             (b"AF", Some(_)) if self.analog.is_none() => Err(ErrorCode::NO_ANALOG),
-            (b"AF", Some(input)) => Ok(Source::Analog(input)),
+            (b"AF", Some(input)) => Ok(RecordSource::Analog(input)),
             (
                 b"DE" | b"TP" | b"TE" | b"SH" | b"RL" | b"TS" | b"SC" | b"TT" | b"RP" | b"TD"
                 | b"TV",
                 Some(axis),
-            ) if axis < self.axes.len() => Ok(Source::Axis(word, axis)),
-            (b"NO", Some(_)) | (b"TI" | b"OP" | b"NO", None) => Ok(Source::Plain(word)),
+            ) if axis < self.axes.len() => Ok(RecordSource::Axis(word, axis)),
+            (b"NO", Some(_)) | (b"TI" | b"OP" | b"NO", None) => Ok(RecordSource::Plain(word)),
             _ => Err(ErrorCode::NO_SOURCE),
         }
     }
 
     /// `RC n,m`, `RC 0`, `RC?`.
-    fn record(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn record(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         if arguments == "?" {
             let is_running = f64::from(u8::from(self.recorder.is_running()));
-            return Ok(Answer::Text(self.position_format.write(is_running)));
+            return Ok(StatementAnswer::Text(self.position_format.write(is_running)));
         }
         let numbers = self.numbers(arguments)?;
         let n = numbers.first().copied().flatten();
         let n = n.ok_or(ErrorCode::FEW_FIELDS)?;
         if n == 0.0 {
             self.recorder.stop();
-            return Ok(Answer::Done);
+            return Ok(StatementAnswer::Done);
         }
         let lengths: Result<Vec<usize>, ErrorCode> = self
             .recorder
@@ -161,7 +161,7 @@ impl GalilEmulator {
         let m = numbers.get(1).copied().flatten();
         let now = self.clock.count();
         self.recorder.start(n, m, shortest, now)?;
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
     /// `name[],start,end,delimiter`: the array, first element, element behind the last, and the rest.
@@ -186,7 +186,7 @@ impl GalilEmulator {
 
     /// `QU name[],start,end,delimiter`: 1 is a comma, 0 a carriage return between values. Whether a line end comes
     /// before the end mark is not confirmed.
-    fn upload(&self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn upload(&self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         let (name, from, to, delimiter) = self.range_of(arguments)?;
         let between = if delimiter == 1.0 { "," } else { "\r\n" };
         let values: Vec<String> = self.memory.array(&name)?[from..to]
@@ -196,46 +196,50 @@ impl GalilEmulator {
         let mut bytes = values.join(between).into_bytes();
         bytes.extend_from_slice(b"\r\n");
         bytes.push(END);
-        Ok(Answer::Bytes(bytes))
+        Ok(StatementAnswer::Bytes(bytes))
     }
 
-    fn upload_program(&self) -> Answer {
+    fn upload_program(&self) -> StatementAnswer {
         let mut bytes = Vec::new();
         for line in &self.program.lines {
             bytes.extend_from_slice(line.as_bytes());
             bytes.extend_from_slice(b"\r\n");
         }
         bytes.push(END);
-        Answer::Bytes(bytes)
+        StatementAnswer::Bytes(bytes)
     }
 
-    fn download_values(&mut self, origin: Origin, arguments: &str) -> Result<Answer, ErrorCode> {
-        let Origin::Client(channel) = origin else {
+    fn download_values(
+        &mut self,
+        origin: StatementOrigin,
+        arguments: &str,
+    ) -> Result<StatementAnswer, ErrorCode> {
+        let StatementOrigin::Client(channel) = origin else {
             return Err(ErrorCode::NOT_IN_PROGRAM);
         };
         let (name, next, end, _) = self.range_of(arguments)?;
         self.clients[channel].mode =
-            Mode::Values { name, next, end, value: Vec::new(), is_wrong: false };
-        Ok(Answer::Silent)
+            ClientMode::Values { name, next, end, value: Vec::new(), is_wrong: false };
+        Ok(StatementAnswer::Silent)
     }
 
-    fn download(&mut self, origin: Origin) -> Result<Answer, ErrorCode> {
-        let Origin::Client(channel) = origin else {
+    fn download(&mut self, origin: StatementOrigin) -> Result<StatementAnswer, ErrorCode> {
+        let StatementOrigin::Client(channel) = origin else {
             return Err(ErrorCode::NOT_IN_PROGRAM);
         };
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        self.clients[channel].mode = Mode::Program { lines: Vec::new(), line: Vec::new() };
-        Ok(Answer::Silent)
+        self.clients[channel].mode = ClientMode::Program { lines: Vec::new(), line: Vec::new() };
+        Ok(StatementAnswer::Silent)
     }
 
     /// A byte of a program. Silence until the end, then two prompts, one of them that of `DL`; a line that is
     /// refused gives its `?` before (`GalilConnector.cpp` of EPICS, galil-io of TMT).
-    pub(super) fn take_program(&mut self, channel: usize, byte: u8) {
+    pub(super) fn take_program_byte(&mut self, channel: usize, byte: u8) {
         let model = self.settings.model;
         let client = &mut self.clients[channel];
-        let Mode::Program { lines, line } = &mut client.mode else {
+        let ClientMode::Program { lines, line } = &mut client.mode else {
             return;
         };
         let is_end = ends_download(byte);
@@ -264,7 +268,7 @@ impl GalilEmulator {
         let finished = is_end.then(|| std::mem::take(lines));
         client.send(answer);
         if let Some(lines) = finished {
-            client.mode = Mode::Commands;
+            client.mode = ClientMode::Commands;
             match Program::new(lines, model) {
                 Ok(program) => {
                     self.program = program;
@@ -279,9 +283,9 @@ impl GalilEmulator {
     }
 
     /// A byte of an array's values, which a comma or a carriage return ends.
-    pub(super) fn take_value(&mut self, channel: usize, byte: u8) {
+    pub(super) fn take_value_byte(&mut self, channel: usize, byte: u8) {
         let client = &mut self.clients[channel];
-        let Mode::Values { name, next, end, value, is_wrong } = &mut client.mode else {
+        let ClientMode::Values { name, next, end, value, is_wrong } = &mut client.mode else {
             return;
         };
         let is_end = ends_download(byte);
@@ -291,7 +295,7 @@ impl GalilEmulator {
             if !text.is_empty() {
                 match text.parse::<f64>() {
                     Ok(number) if number.is_finite() && *next < *end => {
-                        let held = super::format::held(number);
+                        let held = super::format::quantise(number);
                         let is_set = self.memory.set_element(name, *next as f64, held).is_ok();
                         *is_wrong |= !is_set;
                         *next += 1;
@@ -311,13 +315,13 @@ impl GalilEmulator {
         }
         if is_end {
             let is_wrong = *is_wrong;
-            client.mode = Mode::Commands;
+            client.mode = ClientMode::Commands;
             client.send(if is_wrong { b"?" } else { b":" });
         }
     }
 
     /// `XQ #LABEL,thread`, `XQ line,thread`, `XQ`.
-    fn run_program(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn run_program(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         let (place, thread) = arguments.split_once(',').unwrap_or((arguments, "0"));
         let line = match place.trim().strip_prefix('#') {
             Some(label) => self.program.find(label).ok_or(ErrorCode::NO_LABEL)?,
@@ -337,24 +341,24 @@ impl GalilEmulator {
             return Err(ErrorCode::STRAND_BUSY);
         }
         thread.start(line, now);
-        Ok(Answer::Done)
+        Ok(StatementAnswer::Done)
     }
 
-    fn halt(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn halt(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         if arguments.is_empty() {
             self.halt_threads();
-            return Ok(Answer::Done);
+            return Ok(StatementAnswer::Done);
         }
         let number = evaluate(arguments, self)?;
         let is_one = (0.0..self.threads.len() as f64).contains(&number);
         if !is_one {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        self.threads[number as usize] = super::Thread::idle();
-        Ok(Answer::Done)
+        self.threads[number as usize] = super::ProgramThread::idle();
+        Ok(StatementAnswer::Done)
     }
 }
 
-fn lines_or_nothing(lines: &[String]) -> Answer {
-    if lines.is_empty() { Answer::Done } else { Answer::Text(lines.join("\r\n")) }
+fn join_lines(lines: &[String]) -> StatementAnswer {
+    if lines.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(lines.join("\r\n")) }
 }

@@ -74,7 +74,7 @@ impl Eeprom {
     }
 
     /// The numbered settings of another.
-    pub fn take_numbers_of(&mut self, other: &Self) {
+    pub fn copy_numbers_from(&mut self, other: &Self) {
         self.values.clone_from(&other.values);
     }
 
@@ -84,7 +84,7 @@ impl Eeprom {
     }
 
     /// Whether a flag is set.
-    pub fn flag(&self, number: u16) -> bool {
+    pub fn is_set(&self, number: u16) -> bool {
         self.get(number) != 0.0
     }
 
@@ -98,7 +98,7 @@ impl Eeprom {
         }
         match number {
             0 if value < 3.0 => return Err(6),
-            20 if value != 0.0 && !self.flag(22) => return Err(10),
+            20 if value != 0.0 && !self.is_set(22) => return Err(10),
             // Without homing there are no soft limits.
             22 if value == 0.0 => {
                 self.values.insert(20, 0.0);
@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(eeprom.set(22, 1.0), Ok(()));
         assert_eq!(eeprom.set(20, 1.0), Ok(()));
         assert_eq!(eeprom.set(22, 0.0), Ok(()));
-        assert!(!eeprom.flag(20));
+        assert!(!eeprom.is_set(20));
         assert_eq!(eeprom.set(100, 66.667), Ok(()));
         assert!(eeprom.listing().contains("$100=66.667\r\n"));
     }

@@ -1,7 +1,7 @@
 //! The homing cycle of the X axis (gnea/grbl, limits.c): seek, pull off, locate, pull off.
 
 use super::planner::STEP;
-use super::{Grbl, State};
+use super::{Grbl, MachineState};
 
 /// Searches go so many times further than the travel, and than the pull-off (doc/markdown/interface.md, ALARM:9).
 const SEARCH: f64 = 1.5;
@@ -18,7 +18,7 @@ enum Phase {
 
 /// A homing under way.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Homing {
+pub struct HomingCycle {
     phase: Phase,
     /// In mm since the phase began.
     way: f64,
@@ -29,7 +29,7 @@ pub struct Homing {
 
 impl Grbl {
     /// One step of a homing.
-    pub(super) fn home(&mut self, mut homing: Homing) {
+    pub(super) fn home(&mut self, mut homing: HomingCycle) {
         let is_negative = self.eeprom.get(23) as u32 & 1 != 0;
         let towards = if is_negative { -1.0 } else { 1.0 };
         let pull_off = self.eeprom.get(27);
@@ -42,7 +42,7 @@ impl Grbl {
         let is_closed = self.is_limit();
         let is_search = matches!(homing.phase, Phase::Seek | Phase::Locate);
         if is_search && is_closed {
-            return self.next(if homing.phase == Phase::Seek {
+            return self.start_phase(if homing.phase == Phase::Seek {
                 Phase::PullOff
             } else {
                 Phase::Leave
@@ -52,8 +52,8 @@ impl Grbl {
             match homing.phase {
                 Phase::Seek | Phase::Locate => return self.fail(9),
                 _ if is_closed => return self.fail(8),
-                Phase::PullOff => return self.next(Phase::Locate),
-                Phase::Leave => return self.homed(is_negative, pull_off),
+                Phase::PullOff => return self.start_phase(Phase::Locate),
+                Phase::Leave => return self.finish_homing(is_negative, pull_off),
             }
         }
         homing.speed = (homing.speed + self.eeprom.get(120) * STEP).min(rate / 60.0);
@@ -63,8 +63,8 @@ impl Grbl {
         self.homing = Some(homing);
     }
 
-    fn next(&mut self, phase: Phase) {
-        self.homing = Some(Homing { phase, ..Homing::default() });
+    fn start_phase(&mut self, phase: Phase) {
+        self.homing = Some(HomingCycle { phase, ..HomingCycle::default() });
     }
 
     fn fail(&mut self, code: u8) {
@@ -74,14 +74,14 @@ impl Grbl {
     }
 
     /// Machine zero is at the end of the travel that has the greater coordinate (limits.c).
-    fn homed(&mut self, is_negative: bool, pull_off: f64) {
+    fn finish_homing(&mut self, is_negative: bool, pull_off: f64) {
         let mm = if is_negative { pull_off - self.eeprom.get(130) } else { -pull_off };
         let steps = (mm * self.steps_per_mm(0)).round() as i64;
         self.shift += (self.steps[0] - steps) as f64 * self.settings.mm_per_step;
         self.steps[0] = steps;
         self.planner.clear(self.machine());
         self.speed = 0.0;
-        self.state = State::Idle;
-        self.say("ok\r\n");
+        self.state = MachineState::Idle;
+        self.send("ok\r\n");
     }
 }

@@ -1,8 +1,10 @@
 //! What the words of a block mean together, checked in the order in which Grbl does (gnea/grbl, gcode.c, step 3).
 
-use super::gcode::{Flow, Line, Modes, Motion, Offsets, Parsed};
-use super::planner::{AXES, Place};
-use super::words::{AxisUse, Words};
+use super::gcode::{
+    BlockContext, CoordinateOffsets, GcodeMotion, ModalState, ParsedBlock, ProgramFlow,
+};
+use super::planner::{AXES, Coordinates};
+use super::words::{AxisUse, BlockWords};
 
 const MM_PER_INCH: f64 = 25.4;
 
@@ -11,12 +13,12 @@ type Axes = [Option<f64>; AXES];
 
 /// Checks the words against each other.
 pub fn finish(
-    line: Line,
-    mut offsets: Offsets,
-    mut words: Words,
-    flow: Flow,
-) -> Result<Parsed, u8> {
-    let Line { mut block, before, is_jog, here } = line;
+    line: BlockContext,
+    mut offsets: CoordinateOffsets,
+    mut words: BlockWords,
+    flow: ProgramFlow,
+) -> Result<ParsedBlock, u8> {
+    let BlockContext { mut block, before, is_jog, here } = line;
     let scale = if block.is_inch { MM_PER_INCH } else { 1.0 };
     let axes = words.axes().map(|value| value.map(|value| value * scale));
     if axes.iter().any(Option::is_some) {
@@ -57,7 +59,7 @@ pub fn finish(
             return Err(16);
         }
         // A jog leaves everything as it was (doc/markdown/jogging.md).
-        return Ok(Parsed {
+        return Ok(ParsedBlock {
             modes: before,
             offsets,
             dwell: None,
@@ -69,7 +71,7 @@ pub fn finish(
     }
     let has_spindle = block.spindle != before.spindle
         || block.spindle != 5 && block.spindle_speed != before.spindle_speed;
-    Ok(Parsed {
+    Ok(ParsedBlock {
         modes: block,
         offsets,
         dwell,
@@ -77,7 +79,7 @@ pub fn finish(
         motion: stored.or(motion),
         flow,
         waits_for_rest: dwell.is_some()
-            || flow != Flow::Runs
+            || flow != ProgramFlow::Runs
             || matches!(words.non_modal, 10 | 281 | 301)
             || motion.is_some_and(|motion| motion.kind > 80)
             || has_spindle
@@ -86,7 +88,13 @@ pub fn finish(
 }
 
 /// Where the axis words lead, in machine coordinates.
-fn target(block: &Modes, words: &Words, axes: Axes, here: Place, offsets: &Offsets) -> Place {
+fn target(
+    block: &ModalState,
+    words: &BlockWords,
+    axes: Axes,
+    here: Coordinates,
+    offsets: &CoordinateOffsets,
+) -> Coordinates {
     let own = offsets.of(block.system);
     let is_machine = words.non_modal == 53;
     std::array::from_fn(|axis| match axes[axis] {
@@ -99,15 +107,15 @@ fn target(block: &Modes, words: &Words, axes: Axes, here: Place, offsets: &Offse
 
 /// Words that hold for one block: what they store, and the ways of `G28` and `G30`, over a place and to the stored one.
 fn non_modal(
-    offsets: &mut Offsets,
-    words: &mut Words,
+    offsets: &mut CoordinateOffsets,
+    words: &mut BlockWords,
     axes: Axes,
-    block: &Modes,
-    here: Place,
-    target: Place,
-) -> Result<(Option<Motion>, Option<Motion>), u8> {
+    block: &ModalState,
+    here: Coordinates,
+    target: Coordinates,
+) -> Result<(Option<GcodeMotion>, Option<GcodeMotion>), u8> {
     let has_axes = axes.iter().any(Option::is_some);
-    let rapid = |to| Some(Motion { kind: 0, to, feed: block.feed, is_jog: false });
+    let rapid = |to| Some(GcodeMotion { kind: 0, to, feed: block.feed, is_jog: false });
     let mut ways = (None, None);
     match words.non_modal {
         10 => store(offsets, words, axes, block, here)?,
@@ -141,12 +149,12 @@ fn non_modal(
 
 /// The motion that axis words ask for, if there are any.
 fn motion(
-    block: &Modes,
-    words: &Words,
+    block: &ModalState,
+    words: &BlockWords,
     axes: Axes,
-    (here, target): (Place, Place),
+    (here, target): (Coordinates, Coordinates),
     is_jog: bool,
-) -> Result<Option<Motion>, u8> {
+) -> Result<Option<GcodeMotion>, u8> {
     let has_axes = axes.iter().any(Option::is_some);
     if block.motion != 0 && block.feed == 0.0 {
         return Err(22);
@@ -165,7 +173,7 @@ fn motion(
     let way = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
     let length = way.sum::<f64>().sqrt();
     let share = if block.is_inverse && !is_jog { length } else { 1.0 };
-    Ok(has_axes.then_some(Motion {
+    Ok(has_axes.then_some(GcodeMotion {
         kind: block.motion,
         to: target,
         feed: block.feed * share,
@@ -174,7 +182,7 @@ fn motion(
 }
 
 /// A word that nothing has used.
-fn refuse_leftovers(words: &mut Words, is_jog: bool) -> Result<(), u8> {
+fn refuse_leftovers(words: &mut BlockWords, is_jog: bool) -> Result<(), u8> {
     let of_axes = words.axes_for.is_some();
     let used = [("NF", true), ("ST", !is_jog), ("XYZ", of_axes)];
     for letter in used.iter().filter(|(_, is)| *is).flat_map(|(all, _)| all.chars()) {
@@ -188,9 +196,9 @@ fn refuse_leftovers(words: &mut Words, is_jog: bool) -> Result<(), u8> {
 
 /// The feed of a block in mm/min.
 fn feed(
-    block: &Modes,
-    before: Modes,
-    words: &Words,
+    block: &ModalState,
+    before: ModalState,
+    words: &BlockWords,
     is_jog: bool,
     is_motion: bool,
     scale: f64,
@@ -211,7 +219,7 @@ fn feed(
 }
 
 /// Why an arc is refused.
-fn arc(block: &Modes, words: &Words, axes: Axes) -> u8 {
+fn arc(block: &ModalState, words: &BlockWords, axes: Axes) -> u8 {
     let plane = match block.plane {
         17 => [0, 1],
         18 => [2, 0],
@@ -229,11 +237,11 @@ fn arc(block: &Modes, words: &Words, axes: Axes) -> u8 {
 
 /// `G10 L2` and `G10 L20`.
 fn store(
-    offsets: &mut Offsets,
-    words: &mut Words,
+    offsets: &mut CoordinateOffsets,
+    words: &mut BlockWords,
     axes: Axes,
-    block: &Modes,
-    here: Place,
+    block: &ModalState,
+    here: Coordinates,
 ) -> Result<(), u8> {
     if axes.iter().all(Option::is_none) {
         return Err(26);

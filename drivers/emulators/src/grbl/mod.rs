@@ -2,7 +2,7 @@
 //!
 //! Facts are those of the project's documents, gnea/grbl doc/markdown/{interface,commands,jogging,settings}.md, and of
 //! what its sources do (protocol.c, system.c, report.c, planner.c); nothing is copied. [`Grbl`] is the board alone,
-//! moved by [`super::bench::Bench`], which has the slide and the load cell.
+//! moved by [`super::bench::EmulatedBench`], which has the slide and the load cell.
 
 mod eeprom;
 mod gcode;
@@ -18,11 +18,11 @@ mod words;
 pub use eeprom::Eeprom;
 
 use super::DeviceFault;
-use super::bench::{EmulatedAxis, Switches};
-use gcode::{Modes, Offsets};
-use homing::Homing;
+use super::bench::{EmulatedAxis, SlideSwitches};
+use gcode::{CoordinateOffsets, ModalState};
+use homing::HomingCycle;
 use palpate_model::Nanos;
-use planner::{AXES, Place, Planner};
+use planner::{AXES, Coordinates, Planner};
 use std::collections::VecDeque;
 
 /// `RX_BUFFER_SIZE` (serial.h).
@@ -48,7 +48,7 @@ pub enum HomeWiring {
 
 /// What kind of board.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GrblSettings {
+pub struct EmulatedGrblSettings {
     /// What it has stored.
     pub eeprom: Eeprom,
     /// Its switches.
@@ -63,7 +63,7 @@ pub struct GrblSettings {
     pub is_suspending: bool,
 }
 
-impl Default for GrblSettings {
+impl Default for EmulatedGrblSettings {
     fn default() -> Self {
         Self {
             eeprom: Eeprom::slide(),
@@ -78,7 +78,7 @@ impl Default for GrblSettings {
 
 /// Machine state (doc/markdown/interface.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum State {
+enum MachineState {
     #[default]
     Idle,
     Run,
@@ -95,9 +95,9 @@ enum State {
 /// The board.
 #[derive(Clone, Debug, Default)]
 pub struct Grbl {
-    settings: GrblSettings,
+    settings: EmulatedGrblSettings,
     eeprom: Eeprom,
-    state: State,
+    state: MachineState,
     /// After a hard or soft limit nothing but a reset is heard.
     is_waiting_for_reset: bool,
     is_cancelling: bool,
@@ -116,25 +116,25 @@ pub struct Grbl {
     is_comment: Option<u8>,
     is_overlong: bool,
     /// A line that is not answered yet.
-    waiting: Option<lines::Pending>,
+    waiting: Option<lines::PendingLine>,
     tx: Vec<u8>,
     planner: Planner,
-    modes: Modes,
-    offsets: Offsets,
-    probed: (Place, bool),
+    modes: ModalState,
+    offsets: CoordinateOffsets,
+    probe_result: (Coordinates, bool),
     is_probing: bool,
     is_probe_away: bool,
-    homing: Option<Homing>,
+    homing: Option<HomingCycle>,
     steps: [i64; AXES],
     /// What the counter reads less than it did, in mm, not told yet.
     shift: f64,
     speed: f64,
-    switches: Switches,
+    switches: SlideSwitches,
     was_limit: bool,
-    is_asked: bool,
+    is_status_requested: bool,
     /// Of feed, rapids and spindle, in percent.
     overrides: [u16; 3],
-    reports: report::Counters,
+    reports: report::ReportCounters,
     is_wrong: bool,
     /// Time of its own clock that has not been stepped yet, in steps.
     credit: f64,
@@ -145,7 +145,7 @@ pub struct Grbl {
 impl Grbl {
     /// As it is switched on.
     #[must_use]
-    pub fn new(settings: GrblSettings) -> Self {
+    pub fn new(settings: EmulatedGrblSettings) -> Self {
         let mut grbl = Self {
             eeprom: settings.eeprom.clone(),
             is_first_start: settings.is_unused,
@@ -156,7 +156,7 @@ impl Grbl {
         grbl
     }
 
-    fn say(&mut self, text: &str) {
+    fn send(&mut self, text: &str) {
         self.tx.extend_from_slice(text.as_bytes());
     }
 
@@ -165,7 +165,7 @@ impl Grbl {
     }
 
     /// Where it is, in mm of the machine's coordinates.
-    fn machine(&self) -> Place {
+    fn machine(&self) -> Coordinates {
         std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm(axis))
     }
 
@@ -177,7 +177,7 @@ impl Grbl {
     }
 
     fn is_limit(&self) -> bool {
-        let Switches { is_home, is_forward, is_reverse } = self.switches;
+        let SlideSwitches { is_home, is_forward, is_reverse } = self.switches;
         match self.settings.home {
             HomeWiring::Limit => is_home || is_reverse || is_forward,
             HomeWiring::Probe => is_reverse || is_forward,
@@ -197,24 +197,25 @@ impl Grbl {
     }
 
     fn is_moving(&self) -> bool {
-        matches!(self.state, State::Run | State::Jog | State::Home)
-            || (matches!(self.state, State::Hold | State::Door) && !self.planner.is_idle())
+        matches!(self.state, MachineState::Run | MachineState::Jog | MachineState::Home)
+            || (matches!(self.state, MachineState::Hold | MachineState::Door)
+                && !self.planner.is_idle())
     }
 
     fn has_line_under_way(&self) -> bool {
         self.waiting.is_some() || self.homing.is_some() || self.is_probing
     }
 
-    fn tell_status(&mut self) {
-        if self.now >= self.busy_until && std::mem::take(&mut self.is_asked) {
-            self.say_status();
+    fn send_status_if_requested(&mut self) {
+        if self.now >= self.busy_until && std::mem::take(&mut self.is_status_requested) {
+            self.send_status();
         }
     }
 
     /// Blocks that wait begin (`protocol_auto_cycle_start`).
     fn start(&mut self) {
-        if self.state == State::Idle && !self.planner.is_idle() {
-            self.state = State::Run;
+        if self.state == MachineState::Idle && !self.planner.is_idle() {
+            self.state = MachineState::Run;
         }
     }
 
@@ -228,21 +229,21 @@ impl Grbl {
             }
             self.speed = point.speed;
             if self.is_probing && self.is_probe() != self.is_probe_away {
-                self.probed = (self.machine(), true);
+                self.probe_result = (self.machine(), true);
                 self.planner.hold();
             }
         }
         if self.homing.is_none() && self.planner.is_idle() {
             self.speed = 0.0;
             match self.state {
-                State::Jog | State::Run if self.is_cancelling || self.is_probing => {
-                    self.state = State::Idle;
+                MachineState::Jog | MachineState::Run if self.is_cancelling || self.is_probing => {
+                    self.state = MachineState::Idle;
                     self.is_suspended = self.is_cancelling && self.settings.is_suspending;
-                    self.finish_early();
+                    self.finish_cancelled_motion();
                 }
                 // A jog does not go on behind a door.
-                State::Door if self.is_cancelling => self.finish_early(),
-                State::Jog | State::Run => self.state = State::Idle,
+                MachineState::Door if self.is_cancelling => self.finish_cancelled_motion(),
+                MachineState::Jog | MachineState::Run => self.state = MachineState::Idle,
                 _ => {}
             }
         }
@@ -250,29 +251,29 @@ impl Grbl {
         // Opening is a change as well (limits.c, the pin's interrupt).
         let has_changed = is_limit != std::mem::replace(&mut self.was_limit, is_limit);
         if has_changed
-            && self.eeprom.flag(21)
+            && self.eeprom.is_set(21)
             && self.homing.is_none()
-            && self.state != State::Alarm
+            && self.state != MachineState::Alarm
         {
             self.alarm(1, true);
         }
     }
 
     /// A jog was cancelled, or a probing has ended.
-    fn finish_early(&mut self) {
+    fn finish_cancelled_motion(&mut self) {
         self.planner.clear(self.machine());
         self.is_cancelling = false;
         if !std::mem::take(&mut self.is_probing) {
             return;
         }
-        let is_error = !self.probed.1 && matches!(self.modes.motion, 382 | 384);
-        if !self.probed.1 && !is_error {
-            self.probed.0 = self.machine();
+        let is_error = !self.probe_result.1 && matches!(self.modes.motion, 382 | 384);
+        if !self.probe_result.1 && !is_error {
+            self.probe_result.0 = self.machine();
         }
         if is_error {
             self.alarm(5, false);
         }
-        self.waiting = Some(lines::Pending::Probed);
+        self.waiting = Some(lines::PendingLine::ProbeReport);
     }
 }
 
@@ -298,7 +299,7 @@ impl EmulatedAxis for Grbl {
         self.read_lines();
     }
 
-    fn advance(&mut self, now: Nanos, switches: Switches) {
+    fn advance(&mut self, now: Nanos, switches: SlideSwitches) {
         self.now = now;
         self.switches = switches;
         if let Some(at) = self.boots_at {
@@ -315,10 +316,10 @@ impl EmulatedAxis for Grbl {
         }
         self.finish_reset();
         self.read_lines();
-        self.tell_status();
+        self.send_status_if_requested();
     }
 
-    fn place_mm(&self) -> f64 {
+    fn counter_mm(&self) -> f64 {
         self.steps[0] as f64 * self.settings.mm_per_step
     }
 
@@ -326,18 +327,18 @@ impl EmulatedAxis for Grbl {
         std::mem::take(&mut self.tx)
     }
 
-    fn take_shift(&mut self) -> f64 {
+    fn take_counter_shift(&mut self) -> f64 {
         std::mem::take(&mut self.shift)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => {
-                self.shift += self.place_mm();
+                self.shift += self.counter_mm();
                 self.tx.clear();
                 self.planner.clear([0.0; AXES]);
                 self.steps = [0; AXES];
-                self.state = State::Idle;
+                self.state = MachineState::Idle;
                 self.boots_at = Some(now + BOOT);
             }
             DeviceFault::WrongDevice => self.is_wrong = is_on,

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 /// Axes of the board.
 pub const AXES: usize = 3;
 /// A place, in mm.
-pub type Place = [f64; AXES];
+pub type Coordinates = [f64; AXES];
 
 /// Blocks that wait or are under way at most: `BLOCK_BUFFER_SIZE` 16 less the one that is always empty (planner.h).
 pub const BLOCKS_MAX: usize = 15;
@@ -24,11 +24,11 @@ const TINY: f64 = 1e-9;
 
 /// A straight way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
+pub struct MotionBlock {
     /// Where it ends.
-    pub to: Place,
+    pub to: Coordinates,
     /// Its direction, of length one.
-    pub unit: Place,
+    pub unit: Coordinates,
     /// Its length in mm.
     pub length: f64,
     /// Its speed in mm/s.
@@ -41,9 +41,9 @@ pub struct Block {
 
 /// A place of the near future.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub struct PathPoint {
     /// Where.
-    pub place: Place,
+    pub place: Coordinates,
     /// How fast, in mm/s.
     pub speed: f64,
 }
@@ -51,27 +51,27 @@ pub struct Point {
 /// Blocks that wait, and what was made of them.
 #[derive(Clone, Debug, Default)]
 pub struct Planner {
-    blocks: VecDeque<Block>,
-    ahead: VecDeque<Point>,
+    blocks: VecDeque<MotionBlock>,
+    ahead: VecDeque<PathPoint>,
     /// Where the newest segment ends.
-    place: Place,
+    place: Coordinates,
     speed: f64,
     /// Of the first block.
-    left: f64,
+    remaining: f64,
     /// Where the newest block ends.
-    end: Place,
+    end: Coordinates,
     is_holding: bool,
 }
 
 impl Planner {
     /// At rest at a place.
     #[must_use]
-    pub fn at(place: Place) -> Self {
+    pub fn at(place: Coordinates) -> Self {
         Self { place, end: place, ..Self::default() }
     }
 
     /// Where the newest block ends.
-    pub const fn end(&self) -> Place {
+    pub const fn end(&self) -> Coordinates {
         self.end
     }
 
@@ -91,7 +91,7 @@ impl Planner {
     }
 
     /// Adds a way; nothing where there is none. `limits` gives speed and acceleration of each axis.
-    pub fn push(&mut self, to: Place, speed: f64, limits: &[(f64, f64); AXES]) {
+    pub fn push(&mut self, to: Coordinates, speed: f64, limits: &[(f64, f64); AXES]) {
         let way: Vec<f64> = to.iter().zip(self.end).map(|(to, from)| to - from).collect();
         let length = way.iter().map(|way| way * way).sum::<f64>().sqrt();
         if length < TINY {
@@ -113,10 +113,10 @@ impl Planner {
             _ => 0.0,
         };
         if self.blocks.is_empty() {
-            self.left = length;
+            self.remaining = length;
         }
         self.end = to;
-        self.blocks.push_back(Block { to, unit, length, speed, acceleration, entry });
+        self.blocks.push_back(MotionBlock { to, unit, length, speed, acceleration, entry });
     }
 
     /// Brakes, and keeps what is left of the blocks.
@@ -130,12 +130,12 @@ impl Planner {
     }
 
     /// Throws all blocks away, at rest where it is.
-    pub fn clear(&mut self, place: Place) {
+    pub fn clear(&mut self, place: Coordinates) {
         *self = Self::at(place);
     }
 
     /// One step of [`STEP`]: the place now, while something moves.
-    pub fn advance(&mut self) -> Option<Point> {
+    pub fn advance(&mut self) -> Option<PathPoint> {
         while self.ahead.len() + SEGMENT <= AHEAD && self.make_segment() {}
         self.ahead.pop_front()
     }
@@ -154,14 +154,14 @@ impl Planner {
 
     /// The fastest speed at the end of the next step from which every block ahead can be done, the last ending at rest:
     /// the root `w` of `(v + w) dt / 2 + (w^2 - c^2) / (2 a) = way` for each speed `c` at the end of a way.
-    fn fastest(&self, block: &Block) -> f64 {
+    fn fastest(&self, block: &MotionBlock) -> f64 {
         let (v, a) = (self.speed, block.acceleration);
         let half = 0.5 * a * STEP;
         let reach = |way: f64, c: f64| {
             let room = half * half + c * c + 2.0 * a * (way - 0.5 * v * STEP);
             room.max(half * half).sqrt() - half
         };
-        let mut way = self.left;
+        let mut way = self.remaining;
         let mut fastest = f64::INFINITY;
         for next in self.blocks.iter().skip(1) {
             fastest = fastest.min(reach(way, next.entry));
@@ -185,26 +185,26 @@ impl Planner {
         self.speed = w;
         while let Some(block) = self.blocks.front().copied() {
             let is_last = self.blocks.len() == 1;
-            if way < self.left - TINY {
-                self.left -= way;
+            if way < self.remaining - TINY {
+                self.remaining -= way;
                 for axis in 0..AXES {
-                    self.place[axis] = block.to[axis] - block.unit[axis] * self.left;
+                    self.place[axis] = block.to[axis] - block.unit[axis] * self.remaining;
                 }
                 break;
             }
-            way -= self.left;
+            way -= self.remaining;
             self.place = block.to;
             self.blocks.pop_front();
-            self.left = self.blocks.front().map_or(0.0, |next| next.length);
+            self.remaining = self.blocks.front().map_or(0.0, |next| next.length);
             if is_last {
                 self.speed = 0.0;
             }
         }
-        self.ahead.push_back(Point { place: self.place, speed: self.speed });
+        self.ahead.push_back(PathPoint { place: self.place, speed: self.speed });
     }
 }
 
-fn dot(one: &Place, other: &Place) -> f64 {
+fn dot(one: &Coordinates, other: &Coordinates) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
@@ -216,7 +216,7 @@ mod tests {
 
     const LIMITS: [(f64, f64); AXES] = [(25.0, 50.0); AXES];
 
-    fn run(planner: &mut Planner) -> Vec<Point> {
+    fn run(planner: &mut Planner) -> Vec<PathPoint> {
         std::iter::from_fn(|| planner.advance()).collect()
     }
 

@@ -1,6 +1,6 @@
 //! Bytes that are never queued (doc/markdown/commands.md, realtime commands).
 
-use super::{Grbl, State};
+use super::{Grbl, MachineState};
 
 impl Grbl {
     /// A byte that is never queued; `false` for all others.
@@ -8,38 +8,48 @@ impl Grbl {
         match byte {
             // It is known already.
             0x18 if self.is_resetting => {}
-            b'?' => self.is_asked = self.homing.is_none() && !self.is_waiting_for_reset,
+            b'?' => self.is_status_requested = self.homing.is_none() && !self.is_waiting_for_reset,
             0x18 => self.reset(),
             _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
-            0x85 if self.state == State::Jog => {
+            0x85 if self.state == MachineState::Jog => {
                 self.is_cancelling = true;
                 self.planner.hold();
             }
             // A hold of a jog is its end (doc/markdown/jogging.md).
-            b'!' if self.state == State::Jog => {
+            b'!' if self.state == MachineState::Jog => {
                 self.is_cancelling = true;
                 self.planner.hold();
             }
-            b'!' if self.state == State::Run || self.state == State::Idle => {
-                self.state = State::Hold;
+            b'!' if self.state == MachineState::Run || self.state == MachineState::Idle => {
+                self.state = MachineState::Hold;
                 self.planner.hold();
             }
-            0x84 if matches!(self.state, State::Run | State::Idle | State::Hold | State::Jog) => {
-                self.say("[MSG:Check Door]\r\n");
-                self.is_cancelling = self.state == State::Jog;
-                self.state = State::Door;
+            0x84 if matches!(
+                self.state,
+                MachineState::Run | MachineState::Idle | MachineState::Hold | MachineState::Jog
+            ) =>
+            {
+                self.send("[MSG:Check Door]\r\n");
+                self.is_cancelling = self.state == MachineState::Jog;
+                self.state = MachineState::Door;
                 self.planner.hold();
             }
-            b'~' if matches!(self.state, State::Hold | State::Door) && self.planner.is_idle() => {
+            b'~' if matches!(self.state, MachineState::Hold | MachineState::Door)
+                && self.planner.is_idle() =>
+            {
                 self.planner.resume();
-                self.state = State::Idle;
+                self.state = MachineState::Idle;
                 self.start();
             }
-            b'~' if self.state == State::Idle => self.is_suspended = false,
-            0x90..=0x9d => self.override_by(byte),
-            0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
+            b'~' if self.state == MachineState::Idle => self.is_suspended = false,
+            0x90..=0x9d => self.change_override(byte),
+            0xa0 if matches!(
+                self.state,
+                MachineState::Idle | MachineState::Run | MachineState::Hold
+            ) =>
+            {
                 self.modes.has_coolant = !self.modes.has_coolant;
-                self.reports.tell_overrides();
+                self.reports.report_overrides();
             }
             b'!' | b'~' | 0x80.. => {}
             _ => return false,
@@ -48,14 +58,14 @@ impl Grbl {
     }
 
     /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); told, and nothing more.
-    fn override_by(&mut self, byte: u8) {
+    fn change_override(&mut self, byte: u8) {
         let [feed, rapid, spindle] = &mut self.overrides;
         let (value, what) = match byte {
             0x90..=0x94 => (feed, byte - 0x90),
             0x99.. => (spindle, byte - 0x99),
             0x95..=0x97 => {
                 *rapid = [100, 50, 25][usize::from(byte - 0x95)];
-                return self.reports.tell_overrides();
+                return self.reports.report_overrides();
             }
             _ => return,
         };
@@ -67,6 +77,6 @@ impl Grbl {
             _ => value.saturating_sub(1),
         };
         *value = changed.clamp(10, 200);
-        self.reports.tell_overrides();
+        self.reports.report_overrides();
     }
 }

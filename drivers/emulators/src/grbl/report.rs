@@ -1,7 +1,7 @@
 //! Status reports and what the queries print (doc/markdown/interface.md; forms as in report.c).
 
-use super::planner::Place;
-use super::{Grbl, RX_MAX, State};
+use super::planner::Coordinates;
+use super::{Grbl, MachineState, RX_MAX};
 use std::fmt::Write;
 
 /// Reports between two that carry the offset or the overrides: 30 and 20 in motion, 10 at rest (config.h).
@@ -11,44 +11,44 @@ const REST: u32 = 10;
 
 /// Reports still to come before the fields that come now and then.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Counters {
+pub struct ReportCounters {
     offset: u32,
     overrides: u32,
 }
 
-impl Counters {
+impl ReportCounters {
     /// In the next report.
-    pub fn tell_offset(&mut self) {
+    pub fn report_offset(&mut self) {
         self.offset = 0;
     }
 
     /// In the next report.
-    pub fn tell_overrides(&mut self) {
+    pub fn report_overrides(&mut self) {
         self.overrides = 0;
     }
 }
 
-fn list(place: &Place) -> String {
+fn list(place: &Coordinates) -> String {
     format!("{:.3},{:.3},{:.3}", place[0], place[1], place[2])
 }
 
 impl Grbl {
-    pub(super) fn say_status(&mut self) {
+    pub(super) fn send_status(&mut self) {
         let name = match self.state {
-            State::Idle => "Idle",
-            State::Run => "Run",
-            State::Jog => "Jog",
-            State::Hold if self.planner.is_idle() => "Hold:0",
-            State::Hold => "Hold:1",
-            State::Door if self.planner.is_idle() => "Door:0",
-            State::Door => "Door:2",
-            State::Alarm => "Alarm",
-            State::Home => "Home",
-            State::Check => "Check",
-            State::Sleep => "Sleep",
+            MachineState::Idle => "Idle",
+            MachineState::Run => "Run",
+            MachineState::Jog => "Jog",
+            MachineState::Hold if self.planner.is_idle() => "Hold:0",
+            MachineState::Hold => "Hold:1",
+            MachineState::Door if self.planner.is_idle() => "Door:0",
+            MachineState::Door => "Door:2",
+            MachineState::Alarm => "Alarm",
+            MachineState::Home => "Home",
+            MachineState::Check => "Check",
+            MachineState::Sleep => "Sleep",
         };
-        let inch = if self.eeprom.flag(13) { 1.0 / 25.4 } else { 1.0 };
-        let scaled = |place: Place| place.map(|mm| mm * inch);
+        let inch = if self.eeprom.is_set(13) { 1.0 / 25.4 } else { 1.0 };
+        let scaled = |place: Coordinates| place.map(|mm| mm * inch);
         let mask = self.eeprom.get(10) as u32;
         let here = self.machine();
         let offset = self.offsets.of(self.modes.system);
@@ -76,15 +76,15 @@ impl Grbl {
                 text.push('H');
             }
         }
-        self.add_now_and_then(&mut text, list(&scaled(offset)));
+        self.add_periodic_fields(&mut text, list(&scaled(offset)));
         self.reports.offset = self.reports.offset.saturating_sub(1);
         self.reports.overrides = self.reports.overrides.saturating_sub(1);
         text.push_str(">\r\n");
-        self.say(&text);
+        self.send(&text);
     }
 
     /// What only some reports have: the offset of the work coordinates, else the overrides.
-    fn add_now_and_then(&mut self, text: &mut String, offset: String) {
+    fn add_periodic_fields(&mut self, text: &mut String, offset: String) {
         let is_busy = self.is_moving();
         let again = |busy| if is_busy { busy } else { REST };
         if self.reports.offset == 0 {
@@ -110,24 +110,24 @@ impl Grbl {
         }
     }
 
-    pub(super) fn say_probe(&mut self) {
-        let (place, is_found) = self.probed;
-        self.say(&format!("[PRB:{}:{}]\r\n", list(&place), u8::from(is_found)));
+    pub(super) fn send_probe(&mut self) {
+        let (place, is_found) = self.probe_result;
+        self.send(&format!("[PRB:{}:{}]\r\n", list(&place), u8::from(is_found)));
     }
 
-    pub(super) fn say_offsets(&mut self) {
+    pub(super) fn send_offsets(&mut self) {
         let offsets = self.offsets;
         let names = ["G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92"];
         let shift = [offsets.shift];
         let places = offsets.systems.iter().chain(&offsets.stored).chain(&shift);
         for (name, place) in names.iter().zip(places) {
-            self.say(&format!("[{name}:{}]\r\n", list(place)));
+            self.send(&format!("[{name}:{}]\r\n", list(place)));
         }
-        self.say(&format!("[TLO:{:.3}]\r\n", offsets.tool));
-        self.say_probe();
+        self.send(&format!("[TLO:{:.3}]\r\n", offsets.tool));
+        self.send_probe();
     }
 
-    pub(super) fn say_modes(&mut self) {
+    pub(super) fn send_modes(&mut self) {
         let modes = self.modes;
         let motion = match modes.motion {
             probe @ 382.. => format!("38.{}", probe - 380),
@@ -137,15 +137,15 @@ impl Grbl {
         let distance = if modes.is_relative { 91 } else { 90 };
         let feed_mode = if modes.is_inverse { 93 } else { 94 };
         let coolant = if modes.has_coolant { 8 } else { 9 };
-        self.say(&format!(
+        self.send(&format!(
             "[GC:G{motion} G{} G{} G{units} G{distance} G{feed_mode} M{} M{coolant} T{} F{:.0} S{:.0}]\r\n",
             54 + modes.system, modes.plane, modes.spindle, modes.tool, modes.feed, modes.spindle_speed
         ));
     }
 
-    pub(super) fn say_build(&mut self) {
+    pub(super) fn send_build(&mut self) {
         let version = if self.is_wrong { "0.9j.20160303" } else { "1.1h.20190830" };
         let info = self.eeprom.build_info.clone();
-        self.say(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
+        self.send(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
     }
 }

@@ -1,6 +1,6 @@
 //! A block of G-code cut into its words (gnea/grbl, gcode.c, step 2; nuts_bolts.c).
 
-use super::gcode::{Flow, Modes};
+use super::gcode::{ModalState, ProgramFlow};
 use super::planner::AXES;
 
 /// `MAX_INT_DIGITS` (nuts_bolts.c): digits after these are passed over.
@@ -20,8 +20,8 @@ pub fn number(text: &str) -> Option<(f64, &str)> {
     if whole.is_empty() && part.is_empty() {
         return None;
     }
-    let kept = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
-    let value: f64 = format!("0{whole}.{}0", &part[..kept]).parse().ok()?;
+    let decimals_kept = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
+    let value: f64 = format!("0{whole}.{}0", &part[..decimals_kept]).parse().ok()?;
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
     Some((sign * value, rest))
 }
@@ -36,7 +36,7 @@ pub enum AxisUse {
 
 /// Words of one block.
 #[derive(Default)]
-pub struct Words {
+pub struct BlockWords {
     /// Values of the letters from A on.
     pub values: [Option<f64>; 26],
     /// Modal groups that have a word: `G` words in the lower half, `M` words in the upper one.
@@ -48,7 +48,7 @@ pub struct Words {
     pub tool_length: Option<bool>,
 }
 
-impl Words {
+impl BlockWords {
     pub fn value(&self, letter: char) -> Option<f64> {
         self.values[letter as usize - 'A' as usize]
     }
@@ -79,7 +79,12 @@ impl Words {
     }
 }
 
-pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Result<(), u8> {
+pub fn take_g(
+    block: &mut ModalState,
+    words: &mut BlockWords,
+    whole: i64,
+    part: i64,
+) -> Result<(), u8> {
     let mut left = part;
     let group = match whole {
         4 | 10 | 28 | 30 | 53 | 92 => {
@@ -158,9 +163,9 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
 }
 
 pub fn take_m(
-    block: &mut Modes,
-    words: &mut Words,
-    flow: &mut Flow,
+    block: &mut ModalState,
+    words: &mut BlockWords,
+    flow: &mut ProgramFlow,
     whole: i64,
     part: i64,
 ) -> Result<(), u8> {
@@ -170,8 +175,8 @@ pub fn take_m(
     let group = match whole {
         0 | 1 | 2 | 30 => {
             match whole {
-                0 => *flow = Flow::Pauses,
-                2 | 30 => *flow = Flow::Ends,
+                0 => *flow = ProgramFlow::Pauses,
+                2 | 30 => *flow = ProgramFlow::Ends,
                 // A stop that may be chosen is never chosen here.
                 _ => {}
             }
@@ -190,7 +195,7 @@ pub fn take_m(
     words.group(group)
 }
 
-pub fn take_value(words: &mut Words, letter: char, value: f64) -> Result<(), u8> {
+pub fn take_value(words: &mut BlockWords, letter: char, value: f64) -> Result<(), u8> {
     if !matches!(letter, 'F' | 'I'..='L' | 'N' | 'P' | 'R'..='T' | 'X'..='Z') {
         return Err(20);
     }

@@ -6,8 +6,8 @@
 //! unknown letters are passed over.
 
 use super::gauge::{EmulatedGauge, EmulatedGaugeSettings};
-use crate::cell::{EmulatedCell, Felt};
-use crate::{Device, DeviceFault, Plant};
+use crate::cell::{CellLoad, EmulatedCell};
+use crate::{DeviceFault, EmulatedDevice, EmulatedPlant};
 use palpate_drivers::sim::SimSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
@@ -56,10 +56,10 @@ struct Number {
 /// The stand.
 pub struct EmulatedStand {
     settings: EmulatedStandSettings,
-    plant: Plant,
+    plant: EmulatedPlant,
     gauge: EmulatedGauge,
     now: Nanos,
-    is_to_gauge: bool,
+    is_gauge_addressed: bool,
     number: Option<Number>,
     mode: Mode,
     is_inches: bool,
@@ -87,11 +87,11 @@ impl EmulatedStand {
     pub fn new(settings: EmulatedStandSettings) -> Self {
         let tick = Seconds(STEP.0 as f64 * 1e-9);
         Self {
-            plant: Plant::new(&settings.sim, tick),
+            plant: EmulatedPlant::new(&settings.sim, tick),
             gauge: EmulatedGauge::new(settings.gauge.clone()),
             settings,
             now: Nanos::ZERO,
-            is_to_gauge: false,
+            is_gauge_addressed: false,
             number: None,
             mode: Mode::Manual,
             is_inches: false,
@@ -110,7 +110,7 @@ impl EmulatedStand {
     }
 
     /// What really is so, for tests: the plant behind it.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &EmulatedPlant {
         &self.plant
     }
 
@@ -124,7 +124,7 @@ impl EmulatedStand {
         self.velocity != 0.0
     }
 
-    fn say(&mut self, text: &str) {
+    fn send_line(&mut self, text: &str) {
         if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
             self.output.extend_from_slice(text.as_bytes());
             self.output.extend_from_slice(b"\r\n");
@@ -164,19 +164,19 @@ impl EmulatedStand {
         format!("{crosshead} {mode}{switch}")
     }
 
-    fn take(&mut self, byte: u8) {
-        if self.is_to_gauge {
+    fn take_byte(&mut self, byte: u8) {
+        if self.is_gauge_addressed {
             if byte == b'\\' {
-                self.is_to_gauge = false;
+                self.is_gauge_addressed = false;
             } else {
                 self.gauge.receive(self.now, &[byte]);
-                self.pass_on();
+                self.forward_gauge_output();
             }
             return;
         }
         if let Some(mut number) = self.number.take() {
             number.text.push(char::from(byte));
-            if !self.is_whole(&number) {
+            if !self.is_complete(&number) {
                 self.number = Some(number);
             } else {
                 self.set(&number);
@@ -187,7 +187,7 @@ impl EmulatedStand {
     }
 
     /// Whether a number is complete or can no longer become one.
-    fn is_whole(&self, number: &Number) -> bool {
+    fn is_complete(&self, number: &Number) -> bool {
         let digits = number.text.strip_prefix('-').unwrap_or(&number.text);
         let length = match (number.letter, self.is_inches) {
             (b'e', false) | (b'g' | b'h', _) => 6,
@@ -219,20 +219,20 @@ impl EmulatedStand {
 
     fn letter(&mut self, byte: u8) {
         match byte {
-            b'/' => self.is_to_gauge = true,
+            b'/' => self.is_gauge_addressed = true,
             b'n' => {
-                let force = self.gauge.displayed();
+                let force = self.gauge.displayed_reading();
                 let travel = self.length(self.travel());
-                self.say(&format!("{force}\r\n{travel}"));
+                self.send_line(&format!("{force}\r\n{travel}"));
             }
             b'x' => {
                 let travel = self.length(self.travel());
-                self.say(&travel);
+                self.send_line(&travel);
             }
             // Readings without slashes (ESM303 user's guide, page 32).
             b'X' | b'?' => {
-                let force = self.gauge.displayed();
-                self.say(&force);
+                let force = self.gauge.displayed_reading();
+                self.send_line(&force);
             }
             b'e' | b'f' | b'g' | b'h' => {
                 self.number = Some(Number { letter: byte, text: String::new() });
@@ -265,22 +265,22 @@ impl EmulatedStand {
                 } else {
                     format!("{:.1} mm/min", self.speed)
                 };
-                self.say(&text);
+                self.send_line(&text);
             }
             b'v' => {
                 let text = self.length(self.upper);
-                self.say(&text);
+                self.send_line(&text);
             }
             b'w' => {
                 let text = self.length(self.lower);
-                self.say(&text);
+                self.send_line(&text);
             }
             b'p' => {
                 let text = self.status();
-                self.say(&text);
+                self.send_line(&text);
             }
-            b'q' => self.say("0"),
-            b'r' => self.say(&self.cycles.to_string()),
+            b'q' => self.send_line("0"),
+            b'r' => self.send_line(&self.cycles.to_string()),
             _ => {}
         }
     }
@@ -299,7 +299,7 @@ impl EmulatedStand {
         (way * (end - self.travel())).max(0.0)
     }
 
-    fn move_on(&mut self, dt: f64) {
+    fn move_crosshead(&mut self, dt: f64) {
         let way = if self.velocity == 0.0 { self.way } else { self.velocity.signum() };
         if way == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
             return;
@@ -308,14 +308,14 @@ impl EmulatedStand {
         // The fastest speed from which it comes to rest in the room there is; steps of dt make it a little less.
         let brake = ACCELERATION * dt;
         let end_speed = (brake * brake / 4.0 + 2.0 * ACCELERATION * room).sqrt() - brake / 2.0;
-        let wanted = if self.way == way { (self.speed / 60.0).min(end_speed) } else { 0.0 };
+        let target = if self.way == way { (self.speed / 60.0).min(end_speed) } else { 0.0 };
         let speed = self.velocity.abs();
-        let speed = if wanted > speed {
-            (speed + brake).min(wanted)
+        let speed = if target > speed {
+            (speed + brake).min(target)
         } else if room == 0.0 {
             0.0
         } else {
-            (speed - brake).max(wanted)
+            (speed - brake).max(target)
         };
         let step = (speed * dt).min(room);
         self.position += way * step;
@@ -331,17 +331,17 @@ impl EmulatedStand {
         }
     }
 
-    fn pass_on(&mut self) {
-        let said = self.gauge.transmit();
+    fn forward_gauge_output(&mut self) {
+        let bytes = self.gauge.transmit();
         let room = OUTPUT_MAX.saturating_sub(self.output.len());
-        self.output.extend(said.into_iter().take(room));
+        self.output.extend(bytes.into_iter().take(room));
     }
 
     fn restart(&mut self) {
         let fresh = Self::new(self.settings.clone());
         self.zero = self.position;
         (self.velocity, self.way) = (0.0, 0.0);
-        (self.mode, self.is_inches, self.is_to_gauge) = (Mode::Manual, false, false);
+        (self.mode, self.is_inches, self.is_gauge_addressed) = (Mode::Manual, false, false);
         (self.speed, self.programmed) = (fresh.speed, fresh.programmed);
         (self.lower, self.upper) = (fresh.lower, fresh.upper);
         self.number = None;
@@ -349,11 +349,11 @@ impl EmulatedStand {
     }
 }
 
-impl Device for EmulatedStand {
+impl EmulatedDevice for EmulatedStand {
     fn receive(&mut self, now: Nanos, _channel: usize, bytes: &[u8]) {
         self.advance(now);
         for byte in bytes {
-            self.take(*byte);
+            self.take_byte(*byte);
         }
     }
 
@@ -365,11 +365,11 @@ impl Device for EmulatedStand {
         while self.now + STEP <= now {
             self.now = self.now + STEP;
             let dt = STEP.0 as f64 * 1e-9;
-            self.move_on(dt);
+            self.move_crosshead(dt);
             self.plant.advance(-self.position, Seconds(dt));
-            let felt = Felt { volts: self.plant.volts(), force: self.plant.on_cell() };
-            self.gauge.advance(self.now, felt);
-            self.pass_on();
+            let load = CellLoad { volts: self.plant.volts(), force: self.plant.cell_force() };
+            self.gauge.advance(self.now, load);
+            self.forward_gauge_output();
         }
     }
 
@@ -377,14 +377,14 @@ impl Device for EmulatedStand {
         std::mem::take(&mut self.output)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
-        self.gauge.suffer(now, fault, is_on);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.gauge.apply_fault(now, fault, is_on);
         if fault == DeviceFault::Reset && is_on || fault == DeviceFault::WrongDevice {
             self.restart();
         }
     }
 
-    fn by_hand(&mut self, _now: Nanos, action: HandAction) {
-        self.plant.by_hand(action);
+    fn apply_hand_action(&mut self, _now: Nanos, action: HandAction) {
+        self.plant.apply_hand_action(action);
     }
 }

@@ -8,7 +8,7 @@ use palpate_drivers::mark10::gauge::{GaugeDialogue, GaugeScale, GaugeSettings};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
-use palpate_emulators::cell::{EmulatedCell, Felt};
+use palpate_emulators::cell::{CellLoad, EmulatedCell};
 use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_model::Nanos;
@@ -120,7 +120,7 @@ fn told(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
 fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
     let streams = std::env::var("PALPATE_STREAMS");
     let streams = streams.map_or(20_000, |count| count.parse().expect("a number of streams"));
-    let felt = Felt { volts: Volts(1.0), force: Newtons(1.0) };
+    let felt = CellLoad { volts: Volts(1.0), force: Newtons(1.0) };
     let mut emulators: [Box<dyn EmulatedCell>; 2] = [
         Box::new(EmulatedHx711::new(EmulatedHx711Settings::default())),
         Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default())),
@@ -159,11 +159,11 @@ struct Babbler(Dice);
 
 impl EmulatedCell for Babbler {
     fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
-    fn advance(&mut self, _now: Nanos, _felt: Felt) {}
+    fn advance(&mut self, _now: Nanos, _felt: CellLoad) {}
     fn transmit(&mut self) -> Vec<u8> {
         if self.0.below(20) == 0 { self.0.stream() } else { Vec::new() }
     }
-    fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+    fn apply_fault(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
 }
 
 #[test]

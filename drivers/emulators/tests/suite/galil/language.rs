@@ -1,7 +1,7 @@
 //! Terminators, prompts, numbers, errors: byte for byte.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{GalilModel, GalilSettings};
 
 /// Where it is from, what is sent, what comes back. One controller, in this order.

@@ -1,7 +1,7 @@
 //! Programs: download, threads, automatic subroutines, a watchdog, unsolicited text.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::GalilModel;
 
 fn with(program: &str) -> Bench {

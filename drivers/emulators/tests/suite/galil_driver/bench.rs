@@ -6,7 +6,7 @@ use palpate_drivers::galil::{
     connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{self, GalilEmulator};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand, RigDescription};

@@ -8,7 +8,7 @@ use super::wires::opened;
 use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
 use palpate_drivers::wire::Place;
 use palpate_drivers::{Rig, RigEventBody};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
 use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
@@ -50,7 +50,7 @@ struct Watched {
     most: f64,
 }
 
-impl Device for Watched {
+impl EmulatedDevice for Watched {
     fn receive(&mut self, now: Nanos, channel: usize, bytes: &[u8]) {
         self.inner.receive(now, channel, bytes);
         self.heard_at = self.inner.slide().0;
@@ -67,12 +67,12 @@ impl Device for Watched {
         self.inner.transmit(channel)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
-        self.inner.suffer(now, fault, is_on);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.inner.apply_fault(now, fault, is_on);
     }
 
-    fn by_hand(&mut self, now: Nanos, action: HandAction) {
-        self.inner.by_hand(now, action);
+    fn apply_hand_action(&mut self, now: Nanos, action: HandAction) {
+        self.inner.apply_hand_action(now, action);
     }
 }
 

@@ -3,7 +3,7 @@
 use super::bench::{Host, Shared, thesis, to, wired};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{self, GalilEmulator, GalilModel};
 use palpate_model::Nanos;
@@ -186,7 +186,7 @@ fn a_reset_ends_the_recording() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.emulator.suffer(now, DeviceFault::Reset, true);
+        wire.emulator.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     let before = host.readings.len();

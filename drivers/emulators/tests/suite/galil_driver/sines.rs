@@ -89,7 +89,7 @@ fn a_stop_in_the_middle_ends_it() {
 
 #[test]
 fn a_dead_link_lets_the_axis_stand_within_the_lead() {
-    use palpate_emulators::Device;
+    use palpate_emulators::EmulatedDevice;
     let mut host = at_forty(&thesis());
     host.tell(RigCommand::Oscillate(sine(50, 1000, 20)));
     host.pass(1.3);
@@ -117,7 +117,7 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
     host.pass(1.3);
     // For 450 ms nothing is sent, and nothing is read: the buffer is empty, and the watchdog may have stopped the axis.
     {
-        use palpate_emulators::Device;
+        use palpate_emulators::EmulatedDevice;
         let mut wire = host.wire.lock();
         wire.now = wire.now + palpate_model::Nanos::from_millis(450);
         let now = wire.now;

@@ -1,13 +1,13 @@
 //! What the emulated board answers, byte for byte: as gnea/grbl does it (protocol.c, system.c, gcode.c, report.c of 1.1h).
 
-use palpate_emulators::bench::{EmulatedAxis, Switches};
-use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings};
+use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
+use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl};
 use palpate_model::Nanos;
 
 struct Board {
     grbl: Grbl,
     now: Nanos,
-    switches: Switches,
+    switches: SlideSwitches,
 }
 
 impl Board {
@@ -20,9 +20,12 @@ impl Board {
         for (number, value) in values {
             eeprom.set(*number, *value).expect("it takes it");
         }
-        let settings = GrblSettings { eeprom, ..GrblSettings::default() };
-        let mut board =
-            Self { grbl: Grbl::new(settings), now: Nanos::ZERO, switches: Switches::default() };
+        let settings = EmulatedGrblSettings { eeprom, ..EmulatedGrblSettings::default() };
+        let mut board = Self {
+            grbl: Grbl::new(settings),
+            now: Nanos::ZERO,
+            switches: SlideSwitches::default(),
+        };
         board.pass(1);
         board
     }

@@ -26,13 +26,13 @@ fn a_cut_cable_stops_the_axis_within_the_stated_way() {
         host.tell(to(target, speed));
         host.pass(after);
         let mut wire = host.wire.lock();
-        let before = wire.board.place_mm();
+        let before = wire.board.counter_mm();
         wire.is_cut = true;
         wire.pass(Nanos::from_millis(5_000));
-        let way = wire.board.place_mm() - before;
+        let way = wire.board.counter_mm() - before;
         assert!(way > 0.0 && way <= host.connected.worst_case_mm, "{speed}: {way}");
         wire.pass(Nanos::from_millis(1_000));
-        assert_eq!(wire.board.place_mm() - before, way);
+        assert_eq!(wire.board.counter_mm() - before, way);
     }
 }
 
@@ -56,7 +56,7 @@ fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
         let now = wire.lock().now;
         let placed = track.lock().expect("nobody panics with it").at(now);
         assert!(!placed.status.has(AxisStatus::MOVING), "{speed}");
-        let truth = wire.lock().board.place_mm() / 0.0025;
+        let truth = wire.lock().board.counter_mm() / 0.0025;
         assert!(
             (placed.pulses - truth).abs() <= 2.0 + 0.02 * speed / 0.0025,
             "{speed}: {} of {truth}",
@@ -120,7 +120,8 @@ fn a_stop_is_told_when_the_axis_stands() {
 fn a_stop_of_an_axis_that_brakes_slowly_is_answered_within_a_second() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(120, 5.0).expect("it takes it");
-    let wire = wired(grbl::GrblSettings { eeprom, ..grbl::GrblSettings::default() });
+    let wire =
+        wired(grbl::EmulatedGrblSettings { eeprom, ..grbl::EmulatedGrblSettings::default() });
     let acceleration = MmPerS2(5.0);
     let mut host = Host::on(wire, &GrblSettings { acceleration, ..slide() });
     host.tell(RigCommand::MoveTo(MoveTo {
@@ -242,10 +243,10 @@ fn silence_counts_as_death() {
 fn a_limit_switch_that_locks_the_board_is_told() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(21, 1.0).expect("it takes it");
-    let wire = wired(grbl::GrblSettings {
+    let wire = wired(grbl::EmulatedGrblSettings {
         eeprom,
         home: HomeWiring::Probe,
-        ..grbl::GrblSettings::default()
+        ..grbl::EmulatedGrblSettings::default()
     });
     let mut host = Host::on(wire, &GrblSettings { home: HomeSwitch::Probe, ..slide() });
     host.tell(to(90_000, 20.0));
@@ -282,7 +283,7 @@ fn a_drop_of_the_supply_is_noticed() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.board.suffer(now, DeviceFault::Reset, true);
+        wire.board.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| {
         host.faults.contains(&Fault::ControllerReset) || host.session.is_dead(host.now()).is_some()

@@ -30,7 +30,10 @@ fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
 fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
     for resonator in [0.995, 1.005] {
         let mut host = Host::on(
-            wired(grbl::GrblSettings { resonator, ..grbl::GrblSettings::default() }),
+            wired(grbl::EmulatedGrblSettings {
+                resonator,
+                ..grbl::EmulatedGrblSettings::default()
+            }),
             &slide(),
         );
         for (target, worst_s) in [(30_000, 0.03), (0, 0.015)] {
@@ -51,7 +54,8 @@ fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
 
 #[test]
 fn a_board_that_a_cancel_left_suspended_goes_on() {
-    let settings = grbl::GrblSettings { is_suspending: true, ..grbl::GrblSettings::default() };
+    let settings =
+        grbl::EmulatedGrblSettings { is_suspending: true, ..grbl::EmulatedGrblSettings::default() };
     let mut host = Host::on(wired(settings), &slide());
     host.tell(to(8_000, 5.0));
     host.pass(1.0);

@@ -7,8 +7,8 @@ use palpate_emulators::bench::EmulatedAxis;
 use palpate_emulators::grbl::{self, Eeprom};
 use palpate_model::Nanos;
 
-fn board(values: &[(u16, f64)]) -> grbl::GrblSettings {
-    let mut settings = grbl::GrblSettings::default();
+fn board(values: &[(u16, f64)]) -> grbl::EmulatedGrblSettings {
+    let mut settings = grbl::EmulatedGrblSettings::default();
     for (number, value) in values {
         settings.eeprom.set(*number, *value).expect("it takes it");
     }
@@ -18,7 +18,7 @@ fn board(values: &[(u16, f64)]) -> grbl::GrblSettings {
 fn refused(values: &[(u16, f64)], settings: &GrblSettings) -> String {
     let wire = wired(board(values));
     let err = try_connect(&wire, settings).expect_err("refused");
-    assert_eq!(wire.lock().board.place_mm(), 0.0);
+    assert_eq!(wire.lock().board.counter_mm(), 0.0);
     err.to_string()
 }
 
@@ -50,7 +50,7 @@ fn steps_that_are_finer_than_what_grbl_tells_are_refused() {
 #[test]
 fn a_closed_limit_pin_that_both_ends_share_is_refused() {
     for by in [-200.0, 200.0] {
-        let wire = wired(grbl::GrblSettings::default());
+        let wire = wired(grbl::EmulatedGrblSettings::default());
         {
             let mut wire = wire.lock();
             wire.plant.shift(by);
@@ -107,7 +107,7 @@ fn a_board_that_a_limit_has_locked_is_reset_and_opened() {
 
 #[test]
 fn a_board_that_is_held_is_told() {
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().board.receive(Nanos::ZERO, b"!");
     let err = try_connect(&wire, &slide()).expect_err("refused");
     assert!(err.to_string().contains("Hold"), "{err}");
@@ -116,11 +116,14 @@ fn a_board_that_is_held_is_told() {
 
 #[test]
 fn a_board_that_starts_is_waited_for() {
-    let wire = wired(grbl::GrblSettings { is_unused: true, ..grbl::GrblSettings::default() });
+    let wire = wired(grbl::EmulatedGrblSettings {
+        is_unused: true,
+        ..grbl::EmulatedGrblSettings::default()
+    });
     {
         let mut wire = wire.lock();
         let now = wire.now;
-        wire.board.suffer(now, DeviceFault::Reset, true);
+        wire.board.apply_fault(now, DeviceFault::Reset, true);
     }
     let connected = try_connect(&wire, &slide()).expect("it connects");
     assert!(connected.identity.contains("1.1h"), "{}", connected.identity);
@@ -129,16 +132,16 @@ fn a_board_that_starts_is_waited_for() {
 
 #[test]
 fn a_jog_of_somebody_else_is_ended() {
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     {
         let mut wire = wire.lock();
         let now = wire.now;
         wire.board.receive(now, b"$J=G91X50F600\n$J=G9");
         wire.pass(Nanos::from_millis(500));
-        assert!(wire.board.place_mm() > 1.0);
+        assert!(wire.board.counter_mm() > 1.0);
     }
     let connected = try_connect(&wire, &slide()).expect("it connects");
-    let truth = (wire.lock().board.place_mm() / 0.0025).round();
+    let truth = (wire.lock().board.counter_mm() / 0.0025).round();
     assert_eq!(connected.facts.steps as f64, truth);
     assert!(truth < 4_000.0);
 }
@@ -146,7 +149,7 @@ fn a_jog_of_somebody_else_is_ended() {
 #[test]
 fn half_a_line_of_somebody_else_moves_nothing() {
     for half in ["G90G0X50", "$J=G91X50F600", "(a remark G0X50", "$H"] {
-        let wire = wired(grbl::GrblSettings::default());
+        let wire = wired(grbl::EmulatedGrblSettings::default());
         {
             let mut wire = wire.lock();
             let now = wire.now;
@@ -156,21 +159,21 @@ fn half_a_line_of_somebody_else_moves_nothing() {
         let connected = try_connect(&wire, &slide());
         assert!(connected.is_ok(), "{half}: {connected:?}");
         wire.lock().pass(Nanos::from_millis(1_000));
-        assert_eq!(wire.lock().board.place_mm(), 0.0, "{half}");
+        assert_eq!(wire.lock().board.counter_mm(), 0.0, "{half}");
     }
 }
 
 #[test]
 fn another_board_is_noticed() {
-    let mut own = grbl::GrblSettings::default();
+    let mut own = grbl::EmulatedGrblSettings::default();
     own.eeprom.build_info = "LEFT".into();
     let settings = GrblSettings { build_info: Some("RIGHT".into()), ..slide() };
     let err = try_connect(&wired(own), &settings).expect_err("refused");
     assert!(matches!(err, GrblOpenError::OtherBoard { .. }), "{err}");
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     {
         let mut wire = wire.lock();
-        wire.board.suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+        wire.board.apply_fault(Nanos::ZERO, DeviceFault::WrongDevice, true);
         wire.board.receive(Nanos::ZERO, &[0x18]);
     }
     let err = try_connect(&wire, &slide()).expect_err("refused");
@@ -179,20 +182,20 @@ fn another_board_is_noticed() {
 
 #[test]
 fn nobody_and_somebody_else_are_told() {
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().spoil = Box::new(|_| Vec::new());
     assert_eq!(try_connect(&wire, &slide()).unwrap_err(), GrblOpenError::Silent);
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().spoil =
         Box::new(|byte| if byte == b'\n' { vec![byte] } else { vec![b'A' + byte % 16] });
     let err = try_connect(&wire, &slide()).unwrap_err();
     assert!(matches!(err, GrblOpenError::NotGrbl { .. }), "{err}");
-    let wire = wired(grbl::GrblSettings::default());
+    let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().is_cut = true;
     assert!(matches!(try_connect(&wire, &slide()), Err(GrblOpenError::Lost { .. })));
     let eeprom = Eeprom::factory();
     let err = try_connect(
-        &wired(grbl::GrblSettings { eeprom, ..grbl::GrblSettings::default() }),
+        &wired(grbl::EmulatedGrblSettings { eeprom, ..grbl::EmulatedGrblSettings::default() }),
         &slide(),
     );
     assert!(matches!(err, Err(GrblOpenError::SetOtherwise { .. })));

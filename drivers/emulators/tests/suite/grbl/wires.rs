@@ -5,9 +5,9 @@ use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::HostClock;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::ScheduledFault;
-use palpate_emulators::bench::Bench;
+use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::emulated_cell;
-use palpate_emulators::grbl::{Grbl, GrblSettings};
+use palpate_emulators::grbl::{EmulatedGrblSettings, Grbl};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
@@ -58,8 +58,8 @@ fn start_at(
         .name("emulator".into())
         .spawn(move || {
             let cell = emulated_cell(cell, 1).expect("it is emulated");
-            let board = Grbl::new(GrblSettings::default());
-            let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
+            let board = Grbl::new(EmulatedGrblSettings::default());
+            let mut device = EmulatedBench::new(&SimSettings::default(), Box::new(board), cell);
             let options = ServeOptions {
                 place: Place::Ptys(links),
                 baud: None,

@@ -6,7 +6,7 @@ use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{ConnectedStand, StandSession, StandSettings, connect};
 use palpate_drivers::text::DeviceError;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{

@@ -2,7 +2,7 @@
 
 use super::bench::{Host, to};
 use palpate_drivers::wire::Dialogue;
-use palpate_emulators::{Device, DeviceFault};
+use palpate_emulators::{DeviceFault, EmulatedDevice};
 use palpate_model::rig::{Fault, RigCommand};
 
 #[test]
@@ -127,7 +127,7 @@ fn a_key_of_the_gauge_is_noticed() {
 fn an_overload_reads_the_end_of_the_range() {
     let mut host = Host::new();
     let now = host.now();
-    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, true);
     host.pass(0.2);
     assert!((host.newest().volts.0 - 27.5).abs() < 1e-9);
 }
@@ -139,7 +139,7 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     host.pass(1.0);
     let now = host.now();
     let before = host.travel();
-    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, true);
     host.pass(1.0);
     assert!(!host.wire.lock().emulator.is_moving());
     assert!((host.travel() - before).abs() < 0.5, "{}", host.travel());
@@ -151,7 +151,7 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     // Within the range and beyond it again.
     for is_on in [false, true] {
         let now = host.now();
-        host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, is_on);
+        host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, is_on);
         host.pass(0.2);
     }
     assert_eq!(told(&host), 2, "{:?}", host.faults);

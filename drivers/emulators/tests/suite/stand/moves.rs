@@ -1,7 +1,7 @@
 //! Moves, stops, limits.
 
 use super::bench::{Host, Shared, to};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::EmulatedStandSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, HandAction, Oscillation, RigCommand};
@@ -178,7 +178,7 @@ fn pressing_is_felt() {
     assert!(force > 0.3, "{force}");
     assert!((pressed.volts.0 - force).abs() < 0.1, "{pressed:?} {force}");
     let now = host.now();
-    host.wire.lock().emulator.by_hand(now, HandAction::Unmount);
+    host.wire.lock().emulator.apply_hand_action(now, HandAction::Unmount);
     host.pass(0.5);
     assert!(host.newest().volts.0.abs() < 0.02);
 }

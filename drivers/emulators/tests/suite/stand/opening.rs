@@ -6,7 +6,7 @@ use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
 use palpate_drivers::mark10::stand;
 use palpate_drivers::wire::{HostClock, Link, pair};
 use palpate_drivers::{Rig, RigEventBody};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};

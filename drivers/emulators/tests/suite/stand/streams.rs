@@ -3,7 +3,7 @@
 use super::bench::{Host, Shared, to, usual};
 use palpate_drivers::mark10::stand::protocol::{Pair, Status, number, travel};
 use palpate_drivers::text::{Lines, Taken};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use rand_distr::{Distribution, StandardUniform};
