@@ -1,4 +1,4 @@
-//! An emulated axis and an emulated load cell, each on a line of its own, before one slide.
+//! An emulated axis and an emulated load cell on separate lines, with one slide behind both.
 
 use super::cell::{CellLoad, EmulatedCell};
 use super::{DeviceFault, EmulatedDevice, EmulatedPlant};
@@ -7,7 +7,7 @@ use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::HandAction;
 use palpate_model::{Nanos, Seconds};
 
-/// The bench goes on in steps of a millisecond.
+/// Time step of the bench.
 const STEP: Nanos = Nanos::from_millis(1);
 const STEP_SECS: Seconds = Seconds(0.001);
 
@@ -16,30 +16,27 @@ const STEP_SECS: Seconds = Seconds(0.001);
 pub struct SlideSwitches {
     /// At or behind home.
     pub is_home: bool,
-    /// At the far end.
     pub is_forward: bool,
-    /// Behind home.
     pub is_reverse: bool,
 }
 
 /// A motion controller without a load cell. Times never go backwards.
 pub trait EmulatedAxis: Send {
-    /// Bytes have arrived.
     fn receive(&mut self, now: Nanos, bytes: &[u8]);
 
-    /// A millisecond has passed.
+    /// Advances by a millisecond.
     fn advance(&mut self, now: Nanos, switches: SlideSwitches);
 
-    /// Where its counter says it is, in mm of the slide.
+    /// Position by its own counter, in mm of the slide.
     fn counter_mm(&self) -> f64;
 
-    /// By how much, in mm, its counter has begun to read less since this was last asked, wherever the slide stands.
+    /// Decrease of the counter since the last call, in mm, that no motion of the slide explains.
     fn take_counter_shift(&mut self) -> f64;
 
-    /// What it has sent since it was last asked.
+    /// Bytes sent since the last call.
     fn transmit(&mut self) -> Vec<u8>;
 
-    /// A fault of the device itself begins or ends.
+    /// Begins or ends a fault of the device.
     fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
 }
 
@@ -52,8 +49,6 @@ pub struct EmulatedBench {
 }
 
 impl EmulatedBench {
-    /// As it is switched on.
-    #[must_use]
     pub fn new(
         sim: &SimSettings,
         axis: Box<dyn EmulatedAxis>,
@@ -62,7 +57,6 @@ impl EmulatedBench {
         Self { axis, cell, plant: EmulatedPlant::new(sim, STEP_SECS), now: Nanos::ZERO }
     }
 
-    /// The slide, for tests.
     pub fn plant(&self) -> &EmulatedPlant {
         &self.plant
     }
@@ -93,7 +87,7 @@ impl EmulatedDevice for EmulatedBench {
             self.axis.advance(self.now, switches);
             let shift = self.axis.take_counter_shift();
             if shift != 0.0 {
-                self.plant.shift(shift);
+                self.plant.shift_counter(shift);
             }
             self.plant.advance(self.axis.counter_mm(), STEP_SECS);
             let load = CellLoad { volts: self.plant.volts(), force: self.plant.cell_force() };
@@ -107,8 +101,10 @@ impl EmulatedDevice for EmulatedBench {
 
     fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
-            DeviceFault::Stuck => self.plant.spoil(is_on.then_some(CellFault::Stuck)),
-            DeviceFault::Saturated => self.plant.spoil(is_on.then_some(CellFault::Saturated)),
+            DeviceFault::Stuck => self.plant.set_cell_fault(is_on.then_some(CellFault::Stuck)),
+            DeviceFault::Saturated => {
+                self.plant.set_cell_fault(is_on.then_some(CellFault::Saturated))
+            }
             DeviceFault::Reset | DeviceFault::WrongDevice => {
                 self.axis.apply_fault(now, fault, is_on)
             }

@@ -9,11 +9,11 @@ use thiserror::Error;
 /// A fault of the device itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceFault {
-    /// It starts anew, as after a drop of its supply.
+    /// It restarts, as after a drop of its supply.
     Reset,
-    /// The load cell's signal stays where it is.
+    /// The load cell's signal is frozen.
     Stuck,
-    /// The load cell's amplifier is at its end.
+    /// The load cell's amplifier is saturated.
     Saturated,
     /// Another device of its kind answers in its place.
     WrongDevice,
@@ -22,28 +22,25 @@ pub enum DeviceFault {
 /// A fault of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineFault {
-    /// Bytes are changed, or come out of nowhere.
+    /// Bytes are changed or inserted.
     Garbage,
-    /// Bytes are lost.
+    /// Bytes are dropped.
     Drop,
-    /// Bytes come twice.
+    /// Bytes arrive twice.
     Duplicate,
     /// Answers end early.
     Partial,
-    /// Answers come late.
+    /// Answers arrive late.
     Late,
-    /// Nothing reaches the device.
+    /// No byte reaches the device.
     Deaf,
-    /// Nothing comes from the device.
+    /// No byte leaves the device.
     Mute,
 }
 
-/// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The line.
     Line(LineFault),
-    /// The device.
     Device(DeviceFault),
     /// The plug is pulled, and put back at the end.
     Disconnect,
@@ -64,32 +61,27 @@ const KINDS: [(&str, FaultKind); 12] = [
     ("wrong-device", FaultKind::Device(DeviceFault::WrongDevice)),
 ];
 
-/// Share of the bytes that a fault of the line spoils: of a 20-byte command one or two.
-const SPOILED: f64 = 0.08;
-/// How much later answers come: longer than the half second that impatient clients wait.
+/// Share of the bytes that a line fault corrupts: one or two of a 20-byte command.
+const CORRUPTED_SHARE: f64 = 0.08;
+/// Delay of late answers: longer than the half second that impatient clients wait.
 const LATENESS: Nanos = Nanos(700_000_000);
-/// How long a fault lasts that nobody gave a duration.
+/// Duration of a fault that names none.
 const DURATION: Nanos = Nanos(500_000_000);
-/// Latest beginning and longest duration: a day.
+/// Latest start and longest duration: a day.
 const SECONDS_MAX: f64 = 86_400.0;
 
-/// A fault cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the fault '{0}' cannot be read; give KIND@SECONDS or KIND@SECONDS:DURATION with one of {kinds}", kinds = kinds())]
+#[error("'{0}' is not a fault; give KIND@SECONDS or KIND@SECONDS:DURATION with one of {kinds}", kinds = kinds())]
 pub struct FaultError(String);
 
 fn kinds() -> String {
     KINDS.map(|(name, _)| name).join(", ")
 }
 
-/// A fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScheduledFault {
-    /// What.
     pub kind: FaultKind,
-    /// From when.
     pub from: Nanos,
-    /// Until when.
     pub until: Nanos,
 }
 
@@ -134,7 +126,7 @@ impl fmt::Display for FaultKind {
     }
 }
 
-/// Faults to come and under way, and the randomness they share.
+/// Pending and active faults, with the random numbers they share.
 #[derive(Clone, Debug)]
 pub struct FaultPlan {
     pending: Vec<ScheduledFault>,
@@ -145,25 +137,21 @@ pub struct FaultPlan {
 /// A fault has begun or ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultEvent {
-    /// Which.
     pub kind: FaultKind,
-    /// Whether it has begun.
     pub is_on: bool,
 }
 
 impl FaultPlan {
-    /// These faults; which bytes they spoil follows from the seed.
-    #[must_use]
+    /// The seed decides which bytes are corrupted.
     pub fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
         Self { pending: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
     }
 
-    /// One more.
     pub fn add(&mut self, fault: ScheduledFault) {
         self.pending.push(fault);
     }
 
-    /// What begins or ends up to a time, the ends first.
+    /// Faults that begin or end up to `now`, ends first.
     pub fn advance(&mut self, now: Nanos) -> Vec<FaultEvent> {
         let event = |fault: ScheduledFault, is_on| FaultEvent { kind: fault.kind, is_on };
         let mut events = Vec::new();
@@ -177,7 +165,6 @@ impl FaultPlan {
         events
     }
 
-    /// Whether a fault is under way.
     pub fn is_on(&self, kind: FaultKind) -> bool {
         self.active.iter().any(|fault| fault.kind == kind)
     }
@@ -186,12 +173,12 @@ impl FaultPlan {
         self.is_on(FaultKind::Line(fault))
     }
 
-    /// How much later what is sent now arrives.
+    /// Delay of what is sent now.
     pub fn lateness(&self) -> Nanos {
         if self.has(LineFault::Late) { LATENESS } else { Nanos::ZERO }
     }
 
-    /// What becomes of bytes on their way, to the device or from it.
+    /// Passes bytes through the line faults, to the device or from it.
     pub fn corrupt(&mut self, bytes: Vec<u8>, is_to_device: bool) -> Vec<u8> {
         if self.active.is_empty() {
             return bytes;
@@ -208,17 +195,17 @@ impl FaultPlan {
         }
         let mut out = Vec::with_capacity(bytes.len());
         for byte in bytes {
-            if self.has(LineFault::Drop) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Drop) && self.random.unit() < CORRUPTED_SHARE {
                 continue;
             }
-            if self.has(LineFault::Garbage) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Garbage) && self.random.unit() < CORRUPTED_SHARE {
                 out.push(self.random.between(0.0, 256.0) as u8);
                 if self.random.unit() < 0.5 {
                     continue;
                 }
             }
             out.push(byte);
-            if self.has(LineFault::Duplicate) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Duplicate) && self.random.unit() < CORRUPTED_SHARE {
                 out.push(byte);
             }
         }
@@ -231,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn faults_are_read_or_refused_by_name() {
+    fn faults_are_parsed_or_refused_by_name() {
         let fault: ScheduledFault = "stuck@2.5:10".parse().unwrap();
         assert_eq!(fault.kind, FaultKind::Device(DeviceFault::Stuck));
         assert_eq!((fault.from.0, fault.until.0), (2_500_000_000, 12_500_000_000));
@@ -250,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn they_begin_and_end_and_spoil_what_passes() {
+    fn faults_begin_and_end_and_corrupt_bytes() {
         let all: Vec<u8> = (0..200).collect();
         for (kind, is_to_device) in [
             ("garbage", true),
@@ -283,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_seeds_spoil_equally() {
+    fn equal_seeds_corrupt_equally() {
         let fault = "garbage@0:1".parse().unwrap();
         let corrupted = |seed| {
             let mut plan = FaultPlan::new(vec![fault], seed);

@@ -1,33 +1,23 @@
-//! What is asked of an emulator while it runs: a fault, or something that a person would do at the bench.
+//! Orders to a running emulator: a fault, or an action of a person at the bench.
 
 use super::faults::{FaultError, ScheduledFault};
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 use thiserror::Error;
 
-/// One thing asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmulatorOrder {
-    /// A fault that begins now.
     Fault(ScheduledFault),
-    /// Weights, specimens.
     Hand(HandAction),
 }
 
-/// An order cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum OrderError {
-    /// It is no fault, nor anything done by hand.
+    /// Neither a fault nor an action.
     #[error("{0}; or load GRAMS, mount NUMBER, unmount")]
     Unknown(FaultError),
-    /// A number is missing or wrong.
-    #[error("'{order}' cannot be done; give {right}")]
-    Number {
-        /// What was asked.
-        order: String,
-        /// What would be understood.
-        right: &'static str,
-    },
+    #[error("'{order}' is not a valid order; give {right}")]
+    Number { order: String, right: &'static str },
 }
 
 impl EmulatorOrder {
@@ -57,7 +47,7 @@ impl EmulatorOrder {
         }
     }
 
-    /// What is told when it is done; nothing of a fault, which tells itself when it begins.
+    /// The sentence after it is carried out; none for a fault, which is reported when it begins.
     pub fn confirmation(&self) -> Option<String> {
         match self {
             Self::Fault(_) => None,
@@ -67,7 +57,7 @@ impl EmulatorOrder {
             Self::Hand(HandAction::Mount { specimen }) => {
                 Some(format!("specimen {specimen} is mounted"))
             }
-            Self::Hand(HandAction::Unmount) => Some("the specimen is taken out".to_owned()),
+            Self::Hand(HandAction::Unmount) => Some("the specimen is unmounted".to_owned()),
         }
     }
 }
@@ -77,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn orders_are_read_or_refused_with_what_would_do() {
+    fn orders_are_parsed_or_refused_with_the_right_form() {
         let parse = |text| EmulatorOrder::parse(text, Nanos(5));
         let load = HandAction::LoadCell { mass_g: 140.5 };
         assert_eq!(parse("load 140.5"), Ok(EmulatorOrder::Hand(load)));

@@ -1,12 +1,10 @@
-//! What every emulated device moves and feels: the slide of the simulated rig, its bench and its load cell.
+//! The slide, bench and load cell of the simulated rig behind every emulated device.
 
 use palpate_drivers::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
 use palpate_model::rig::HandAction;
 use palpate_model::{Newtons, Position, Seconds, Volts};
 
-/// The slide with the probe, what stands before it, and the signal of the cell.
-///
-/// Positions given are those of the device's counter, in mm; where its zero is no device can know.
+/// Positions passed in are those of the device's counter, in mm; no device knows where its zero is.
 #[derive(Clone, Debug)]
 pub struct EmulatedPlant {
     bench: Bench,
@@ -21,12 +19,9 @@ pub struct EmulatedPlant {
     fault: Option<CellFault>,
 }
 
-/// What is wrong with the cell's signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellFault {
-    /// It stays where it is.
     Stuck,
-    /// The amplifier is at its end.
     Saturated,
 }
 
@@ -34,8 +29,7 @@ pub enum CellFault {
 const SATURATED: Volts = Volts(12.0);
 
 impl EmulatedPlant {
-    /// The slide as it is switched on, 5 to 15 mm from home, its counter at zero; the cell is read once per `tick`.
-    #[must_use]
+    /// Starts 5 to 15 mm from home with the counter at zero; the cell is read once per `tick`.
     pub fn new(settings: &SimSettings, tick: Seconds) -> Self {
         let mut machine = Random::new(settings.seed, Cause::Machine);
         let counter_zero = Position(machine.between(5.0, 15.0));
@@ -53,7 +47,7 @@ impl EmulatedPlant {
         plant
     }
 
-    /// The axis has moved straight to a counted position, in mm, in a time step.
+    /// Moves the axis to a counted position, in mm, within a time step.
     pub fn advance(&mut self, counted_mm: f64, dt: Seconds) {
         self.axis = self.counter_zero.moved_by(counted_mm);
         let load = self.bench.advance(self.axis, dt);
@@ -67,27 +61,26 @@ impl EmulatedPlant {
         };
     }
 
-    /// From now on the counter reads less by so much, in mm, wherever the axis stands.
-    pub fn shift(&mut self, by_mm: f64) {
+    /// Lowers the counter by `by_mm` without motion of the axis.
+    pub fn shift_counter(&mut self, by_mm: f64) {
         self.counter_zero = self.counter_zero.moved_by(by_mm);
     }
 
-    /// A person puts weights on the cell, mounts a specimen or takes it out.
     pub fn apply_hand_action(&mut self, action: HandAction) {
         self.bench.by_hand(action);
     }
 
-    /// The cell's amplified signal at the newest step.
+    /// Amplified signal of the cell.
     pub fn volts(&self) -> Volts {
         self.volts
     }
 
-    /// Force on the probe at the newest step.
+    /// Force on the probe.
     pub fn force(&self) -> Newtons {
         self.force
     }
 
-    /// Force on the cell at the newest step: that on the probe, and weights that a person has put on.
+    /// Force on the cell: that on the probe plus weights.
     pub fn on_cell(&self) -> Newtons {
         self.cell_force
     }
@@ -97,23 +90,20 @@ impl EmulatedPlant {
         self.axis
     }
 
-    /// Whether the home switch is closed.
     pub fn is_home(&self) -> bool {
         self.axis.0 <= 0.0
     }
 
-    /// Whether the limit switch at the far end is closed.
     pub fn is_forward_limit(&self) -> bool {
         self.axis.0 >= TRAVEL.0 + SWITCH_MARGIN_MM
     }
 
-    /// Whether the limit switch behind home is closed.
     pub fn is_reverse_limit(&self) -> bool {
         self.axis.0 <= -SWITCH_MARGIN_MM
     }
 
-    /// The cell's signal goes wrong, or right again with `None`.
-    pub fn spoil(&mut self, fault: Option<CellFault>) {
+    /// Sets or clears a fault of the cell's signal.
+    pub fn set_cell_fault(&mut self, fault: Option<CellFault>) {
         self.fault = fault;
     }
 }
@@ -123,11 +113,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_probe_feels_the_tissue_and_the_switches_close_at_the_ends() {
+    fn probe_feels_tissue_and_switches_close_at_ends() {
         let dt = Seconds(0.001);
         let mut plant = EmulatedPlant::new(&SimSettings::default(), dt);
         let free = plant.volts();
-        plant.shift(-100.0);
+        plant.shift_counter(-100.0);
         plant.advance(100.0, dt);
         let home = 100.0 - plant.axis().0;
         let mut at = 100.0;
@@ -145,11 +135,11 @@ mod tests {
         plant.advance(at, dt);
         assert!(plant.volts().0 > free.0 + 0.05 && plant.force().0 == 0.0);
         assert!((plant.cell_force().0 - 0.4 * 9.80665).abs() < 0.01);
-        plant.spoil(Some(CellFault::Stuck));
+        plant.set_cell_fault(Some(CellFault::Stuck));
         let stuck = plant.volts();
         plant.advance(at - 5.0, dt);
         assert_eq!(plant.volts(), stuck);
-        plant.spoil(Some(CellFault::Saturated));
+        plant.set_cell_fault(Some(CellFault::Saturated));
         plant.advance(home - 0.001, dt);
         assert_eq!(plant.volts(), SATURATED);
         assert!(plant.is_home() && !plant.is_reverse_limit());

@@ -13,20 +13,17 @@ const NEAR: f64 = 1e-6;
 /// documented; so it is some ten samples.
 const SETTLED: f64 = 1e-3;
 
-/// What the axis is about to do or does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisMotion {
-    /// Nothing.
     Rest,
-    /// A place is approached.
+    /// A move to a position.
     Target(f64),
-    /// A speed is kept, with its sign.
+    /// A constant velocity.
     Jog(f64),
     /// Coming to rest at a place, at a rate, with this stop code.
     Stopping(f64, f64, u8),
     /// Until the home switch changes, in a direction; then [`AxisMotion::Stopping`], then a homing goes back.
     Edge {
-        /// 1 or -1.
         side: f64,
         /// State of the input at the start.
         was: bool,
@@ -35,7 +32,6 @@ pub enum AxisMotion {
     },
     /// Second stage of a homing: braked, then slowly back to the edge.
     Back {
-        /// 1 or -1.
         side: f64,
         /// State of the input that ends it.
         until: bool,
@@ -46,7 +42,7 @@ pub enum AxisMotion {
     Contour,
 }
 
-/// What `BG` will start.
+/// The motion that `BG` starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PreparedMotion {
     /// `PA`.
@@ -69,20 +65,18 @@ pub struct AxisInputs {
     pub forward: bool,
     /// Reverse limit switch.
     pub reverse: bool,
-    /// Home switch.
     pub home: bool,
 }
 
-/// What a sample brought about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisEvent {
-    /// A limit, of whichever kind, was met.
+    /// A limit switch or a software limit was met.
     Limit,
-    /// A homing has ended: the place becomes zero.
+    /// A homing has ended: the position becomes zero.
     Homed,
 }
 
-/// What `CN` says of inputs.
+/// Polarity of the inputs (`CN`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputPolarity {
     /// 1 when a high level is a closed limit switch, -1 when a low one is.
@@ -91,16 +85,12 @@ pub struct InputPolarity {
     pub home: f64,
 }
 
-/// One axis.
 #[derive(Clone, Debug)]
 pub struct GalilAxis {
-    /// Its numbers.
     pub settings: AxisSettings,
-    /// Whether it is enabled.
     pub is_on: bool,
-    /// What it does.
     pub motion: AxisMotion,
-    /// What `BG` starts.
+    /// Started by `BG`.
     pub prepared: PreparedMotion,
     /// Commanded place and velocity.
     pub profile: AxisProfile,
@@ -172,7 +162,7 @@ impl GalilAxis {
         let shift = self.filtered - counts;
         self.profile.place = counts;
         self.filtered = counts;
-        // `PA?` tells the place; other motions are as they were prepared.
+        // `PA?` reads the position; other prepared motions stay.
         if let PreparedMotion::Target(target) = &mut self.prepared {
             *target = counts;
         }
@@ -224,12 +214,12 @@ impl GalilAxis {
             PreparedMotion::Target(target) => {
                 (AxisMotion::Target(target), target - self.profile.place)
             }
-            PreparedMotion::Relative(way) => {
-                let target = self.profile.place.round() + way;
+            PreparedMotion::Relative(distance) => {
+                let target = self.profile.place.round() + distance;
                 if target.abs() > COUNTS_MAX {
                     return Err(ErrorCode::OUT_OF_RANGE);
                 }
-                (AxisMotion::Target(target), way)
+                (AxisMotion::Target(target), distance)
             }
             PreparedMotion::Jog(speed) => (AxisMotion::Jog(speed), speed),
             PreparedMotion::Edge { is_homing } => {
@@ -245,7 +235,7 @@ impl GalilAxis {
         Ok(())
     }
 
-    /// Comes to rest at a rate and then has a stop code.
+    /// Brakes at a rate and ends with a stop code.
     pub fn stop(&mut self, rate: AxisSetting, code: u8) {
         if !matches!(self.motion, AxisMotion::Rest | AxisMotion::Stopping(..)) {
             let rate = self.get(rate);
@@ -272,7 +262,7 @@ impl GalilAxis {
         }
     }
 
-    /// One sample of `dt` seconds; limits are left at `limit_rate`.
+    /// One sample of `dt` seconds; the axis brakes at `limit_rate` at a limit.
     pub fn sample(
         &mut self,
         dt: f64,
@@ -341,12 +331,12 @@ impl GalilAxis {
             self.filtered = self.profile.place;
             return;
         }
-        let left = self.profile.place - self.filtered;
+        let remaining = self.profile.place - self.filtered;
         let keeps = (-1.0 / (3.0 * self.get(AxisSetting::Smoothing))).exp();
-        if !self.is_running() && left.abs() < SETTLED {
+        if !self.is_running() && remaining.abs() < SETTLED {
             self.filtered = self.profile.place;
         } else {
-            self.filtered = self.profile.place - keeps * left;
+            self.filtered = self.profile.place - keeps * remaining;
         }
     }
 

@@ -1,4 +1,4 @@
-//! One client: the line it writes, what it downloads, and what waits to be sent to it.
+//! One client: its input line, its download, and the bytes for it.
 
 use super::input::InputLine;
 use palpate_model::Nanos;
@@ -9,10 +9,8 @@ const OUT_MAX: usize = 1 << 20;
 /// Bytes that wait for a controller that is busy.
 const WAITING_MAX: usize = 1024;
 
-/// What a client's bytes are.
 #[derive(Clone, Debug, Default)]
 pub enum ClientMode {
-    /// Statements.
     #[default]
     Commands,
     /// Lines of a program, after `DL`.
@@ -24,7 +22,6 @@ pub enum ClientMode {
     },
     /// Values of an array, after `QD`.
     Values {
-        /// The array.
         name: String,
         /// The next element.
         next: usize,
@@ -32,19 +29,14 @@ pub enum ClientMode {
         end: usize,
         /// The value under way.
         value: Vec<u8>,
-        /// Something was wrong.
         is_wrong: bool,
     },
 }
 
-/// One client.
 #[derive(Clone, Debug, Default)]
 pub struct GalilClient {
-    /// Whether somebody is connected.
     pub is_open: bool,
-    /// The line being written.
     pub input: InputLine,
-    /// What its bytes are.
     pub mode: ClientMode,
     /// `EO 1`: characters received are sent back.
     pub has_echo: bool,
@@ -59,12 +51,11 @@ pub struct GalilClient {
 }
 
 impl GalilClient {
-    /// Somebody who has just connected.
     pub fn connected(has_echo: bool) -> Self {
         Self { is_open: true, has_echo, ..Self::default() }
     }
 
-    /// Somebody whose connection the controller has just closed.
+    /// The controller has just closed the connection.
     pub fn dropped() -> Self {
         Self { is_hung_up: true, ..Self::default() }
     }
@@ -85,17 +76,15 @@ impl GalilClient {
         }
     }
 
-    /// What has to be sent.
     pub fn take_out(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.out)
     }
 
-    /// Whether bytes have to wait.
     pub fn is_busy(&self) -> bool {
         self.busy_until.is_some()
     }
 
-    /// Keeps a byte for later; an input buffer has an end.
+    /// Queues a byte for later, as far as the input buffer has room.
     pub fn wait(&mut self, byte: u8) {
         if self.waiting.len() < WAITING_MAX {
             self.waiting.push_back(byte);

@@ -1,4 +1,4 @@
-//! From a statement to what it does: assignments, then two letters and their arguments.
+//! Carries out statements: assignments, then commands of two letters with their arguments.
 
 use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
@@ -7,20 +7,17 @@ use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
 use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 
-/// Words whose arguments are numbers of axes, beside the [`AxisSetting`]s.
+/// Words whose arguments are numbers of axes, in addition to the [`AxisSetting`]s.
 const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
 
-/// One argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisArgument {
     /// `?`.
     Query,
-    /// A number.
     Number(f64),
 }
 
 impl GalilEmulator {
-    /// Does what a statement says.
     pub(super) fn execute(
         &mut self,
         origin: StatementOrigin,
@@ -115,9 +112,8 @@ impl GalilEmulator {
         arguments: &str,
     ) -> Result<Vec<(usize, AxisArgument)>, ErrorCode> {
         let axes = self.axes.len();
-        if let Some((who, value)) = arguments.split_once('=') {
-            let who = who.trim();
-            let mut letters = who.chars();
+        if let Some((letter, value)) = arguments.split_once('=') {
+            let mut letters = letter.trim().chars();
             if let (Some(letter), None) = (letters.next(), letters.next()) {
                 let argument = self.argument(value.trim())?;
                 if letter == '*' {
@@ -176,7 +172,12 @@ impl GalilEmulator {
             .collect()
     }
 
-    /// A list of axes such as `AC`; no list is all of them.
+    /// The number in the first field.
+    pub(super) fn first_number(&self, arguments: &str) -> Result<f64, ErrorCode> {
+        self.numbers(arguments)?.first().copied().flatten().ok_or(ErrorCode::FEW_FIELDS)
+    }
+
+    /// A list of axes such as `AC`; an empty list is all of them.
     pub(super) fn axis_list(&self, arguments: &str) -> Result<Vec<usize>, ErrorCode> {
         let letters: Vec<char> =
             arguments.chars().filter(|letter| !matches!(letter, ' ' | ',')).collect();
@@ -221,12 +222,12 @@ impl GalilEmulator {
     }
 }
 
-/// Answers of several axes in one line, parted by commas; each begins with its sign's place.
+/// Values of several axes in one line, separated by commas; each begins with the place of its sign.
 pub fn join_values(values: Vec<String>) -> StatementAnswer {
     if values.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(values.join(",")) }
 }
 
-/// Fields parted by commas that stand in no brackets or parentheses.
+/// Fields between commas outside brackets and parentheses.
 pub fn fields(text: &str) -> Vec<&str> {
     let mut depth = 0_i32;
     text.split(|c: char| {

@@ -1,6 +1,6 @@
 //! Contour mode: increments over 2^n samples, between which the controller goes straight.
 //!
-//! DMC-40x0 command reference, `CM`, `CD`, `DT`: a buffer of 511 segments, `_CM` tells the free ones.
+//! DMC-40x0 command reference, `CM`, `CD`, `DT`: a buffer of 511 segments, `_CM` is the number of free ones.
 
 use palpate_drivers::galil::ErrorCode;
 use std::collections::VecDeque;
@@ -10,7 +10,6 @@ pub const SEGMENTS: usize = 511;
 /// `DT n`: 2^n samples, n up to 8.
 const INTERVAL_MAX: f64 = 8.0;
 
-/// One segment.
 #[derive(Clone, Debug, PartialEq)]
 struct Segment {
     increments: Vec<f64>,
@@ -18,7 +17,6 @@ struct Segment {
     samples: u32,
 }
 
-/// The contour mode.
 #[derive(Clone, Debug, Default)]
 pub struct ContourMode {
     /// Axes in the mode; empty while it is off.
@@ -28,18 +26,16 @@ pub struct ContourMode {
     buffer: VecDeque<Segment>,
     /// The segment under way and samples of it that are over.
     current: Option<(Segment, u32)>,
-    /// Segments done, as `_CS` tells.
+    /// Segments done, `_CS`.
     pub done: u32,
 }
 
-/// What a sample of the contour mode asks of the axes.
+/// Motion of the axes in one sample.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ContourStep {
-    /// Nothing to do.
     Idle,
     /// Increments of this sample, in counts, in the order of the axes.
     By(Vec<f64>),
-    /// The mode has ended.
     End,
 }
 
@@ -95,7 +91,6 @@ impl ContourMode {
         self.is_on() && self.buffer.len() > 1
     }
 
-    /// One sample.
     pub fn sample(&mut self) -> ContourStep {
         if !self.is_on() {
             return ContourStep::Idle;
@@ -124,7 +119,6 @@ impl ContourMode {
         ContourStep::By(by)
     }
 
-    /// Leaves the mode at once.
     pub fn cancel(&mut self) {
         *self = Self::default();
     }

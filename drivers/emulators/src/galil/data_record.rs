@@ -6,12 +6,11 @@ use super::axis::{AxisMotion, GalilAxis};
 use super::model::GalilModel;
 use super::settings::AxisSetting;
 
-/// What a record holds beside its axes.
+/// Content of a record apart from its axes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GeneralBlock {
     /// Samples since the reset, of which 16 bits are sent.
     pub sample: u64,
-    /// Digital outputs.
     pub outputs: u16,
     /// Number of the last error.
     pub error: u8,
@@ -83,7 +82,7 @@ pub fn build_record(
         put(at + 8, &counts(axis.encoder_position()));
         put(at + 12, &counts(0.0));
         put(at + 16, &counts(axis.pulses()));
-        // 64 times what TV tells.
+        // 64 times TV.
         put(at + 20, &counts(64.0 * axis.profile.velocity));
         let analog = analog.get(index).copied().unwrap_or(0).to_le_bytes();
         // Torque stays zero: nothing holds a load.

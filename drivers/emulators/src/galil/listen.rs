@@ -1,4 +1,4 @@
-//! What becomes of a byte: echo, statement, line of a download; and what is answered.
+//! Handles each byte of a client: echo, statement or line of a download; and sends the answer.
 
 use super::client::ClientMode;
 use super::input::Statement;
@@ -6,7 +6,7 @@ use super::{GalilEmulator, StatementAnswer, StatementOrigin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
-    /// Takes one byte of a client, or keeps it while the controller is busy with that client.
+    /// Takes one byte of a client, or queues it while the controller is busy with that client.
     pub(super) fn receive_byte(&mut self, channel: usize, byte: u8) {
         if self.boots_until.is_some() || !self.clients[channel].is_open {
             return;
@@ -18,7 +18,7 @@ impl GalilEmulator {
         }
     }
 
-    /// Bytes that waited, and lines that paused, as time passes.
+    /// Takes queued bytes, and notes pauses in lines.
     pub(super) fn take_waiting_bytes(&mut self) {
         for channel in 0..self.clients.len() {
             let now = self.now;
@@ -68,7 +68,7 @@ impl GalilEmulator {
         self.clients[channel].answer(&bytes);
     }
 
-    /// Text of a program, of which nobody asked; lines end with CR LF.
+    /// Sends unsolicited text of a program; lines end with CR LF.
     pub(super) fn send_unsolicited(&mut self, text: &str) {
         let mark = if self.is_marked { 0x80 } else { 0 };
         let bytes: Vec<u8> = text.bytes().map(|byte| byte | mark).collect();

@@ -23,7 +23,6 @@ pub fn is_name(text: &str) -> bool {
 }
 
 impl ControllerMemory {
-    /// A variable.
     pub fn variable(&self, name: &str) -> Option<f64> {
         self.variables.get(name).copied()
     }
@@ -102,7 +101,6 @@ impl ControllerMemory {
         Ok(())
     }
 
-    /// An array.
     pub fn array(&self, name: &str) -> Result<&[f64], ErrorCode> {
         self.arrays.get(name).map(Vec::as_slice).ok_or(ErrorCode::NO_ARRAY)
     }
@@ -121,7 +119,6 @@ impl ControllerMemory {
         position(array.len(), index).map(|at| array[at])
     }
 
-    /// Sets an element.
     pub fn set_element(&mut self, name: &str, index: f64, value: f64) -> Result<(), ErrorCode> {
         let array = self.array_mut(name)?;
         let at = position(array.len(), index)?;

@@ -54,12 +54,9 @@ const HANDLES: usize = 8;
 /// From a reset to the first answer. Not confirmed: long enough to be noticed, short for a test.
 const BOOT: Nanos = Nanos(300_000_000);
 
-/// What makes one emulated controller differ from another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GalilSettings {
-    /// Bench, tissue, cell and seed.
     pub sim: SimSettings,
-    /// Which controller.
     pub model: GalilModel,
     /// Bits of the analog inputs' converter, 12 or 16; `None` without analog inputs.
     pub converter: Option<u32>,
@@ -69,7 +66,6 @@ pub struct GalilSettings {
     pub has_echo: bool,
     /// By how many parts in a million the crystal is fast.
     pub clock_ppm: f64,
-    /// Serial number.
     pub serial_number: u32,
 }
 
@@ -87,14 +83,22 @@ impl Default for GalilSettings {
     }
 }
 
-/// Who gave a statement.
+/// A client or a thread of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum StatementOrigin {
     Client(usize),
     Thread(usize),
 }
 
-/// What a statement is answered with.
+impl StatementOrigin {
+    fn client(self) -> Option<usize> {
+        match self {
+            Self::Client(channel) => Some(channel),
+            Self::Thread(_) => None,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum StatementAnswer {
     /// `:`.
@@ -105,7 +109,6 @@ enum StatementAnswer {
     Open(String),
     /// Bytes, then `:`.
     Bytes(Vec<u8>),
-    /// Nothing yet.
     Silent,
 }
 
@@ -142,87 +145,82 @@ pub struct GalilEmulator {
     outputs: u16,
     /// `DR`: samples between records, and to whom.
     pushed: Option<(u64, usize)>,
-    /// Nothing is answered before.
+    /// No answer before then.
     boots_until: Option<Nanos>,
     now: Nanos,
-    /// Somebody put another controller on the wire.
+    /// Another controller is on the wire.
     is_wrong: bool,
 }
 
 impl GalilEmulator {
     /// A controller just switched on at time zero.
-    #[must_use]
     pub fn new(settings: GalilSettings) -> Self {
-        let clock = SampleClock::new(Nanos::ZERO, settings.clock_ppm);
-        let plant = EmulatedPlant::new(&settings.sim, clock.period());
+        let plant = EmulatedPlant::new(
+            &settings.sim,
+            SampleClock::new(Nanos::ZERO, settings.clock_ppm).period(),
+        );
         let channels = if settings.is_serial { 1 } else { HANDLES };
-        let mut emulator = Self {
-            settings,
-            plant,
-            clock,
-            axes: Vec::new(),
-            polarity: InputPolarity { limit: -1.0, home: -1.0 },
-            other_inputs: [-1.0, 0.0, 0.0],
-            memory: ControllerMemory::default(),
-            recorder: ArrayRecorder::default(),
-            contour: ContourMode::default(),
-            analog: None,
-            program: Program::default(),
-            burned: None,
-            threads: Vec::new(),
-            clients: vec![GalilClient::default(); channels],
-            error: ErrorCode(0),
-            error_at: (0, 0),
-            position_format: NumberFormat::decimal(10, 0),
-            variable_format: NumberFormat::decimal(10, 4),
-            format_numbers: (10.0, 10.4, 1.0),
-            is_marked: false,
-            unsolicited_to: None,
-            outputs: 0,
-            pushed: None,
-            boots_until: None,
-            now: Nanos::ZERO,
-            is_wrong: false,
-        };
-        emulator.initialise();
+        let mut emulator =
+            Self::start(settings, plant, None, vec![GalilClient::default(); channels], Nanos::ZERO);
         if settings.is_serial {
             emulator.clients[0] = GalilClient::connected(settings.has_echo);
         }
         emulator
     }
 
-    /// All that a reset forgets. The slide stays where it stands, at zero counts.
-    fn initialise(&mut self) {
-        if let Some(slide) = self.axes.first() {
-            self.plant.shift(slide.filtered * palpate_drivers::sim::MM_PER_PULSE);
+    /// The state after power-up or a reset, with what survives one. The slide is at zero counts.
+    fn start(
+        settings: GalilSettings,
+        plant: EmulatedPlant,
+        burned: Option<Program>,
+        clients: Vec<GalilClient>,
+        now: Nanos,
+    ) -> Self {
+        let program = burned.clone().unwrap_or_default();
+        let mut threads = vec![ProgramThread::idle(); settings.model.threads()];
+        if let Some(line) = program.find("AUTO") {
+            threads[0].start(line, 0);
         }
-        let axes = self.settings.model.axes();
-        self.clock = SampleClock::new(self.now, self.settings.clock_ppm);
-        self.axes = (0..axes).map(|axis| GalilAxis::new(axis == 0)).collect();
-        self.polarity = InputPolarity { limit: -1.0, home: -1.0 };
-        self.other_inputs = [-1.0, 0.0, 0.0];
-        self.memory = ControllerMemory::default();
-        self.recorder = ArrayRecorder::default();
-        self.contour = ContourMode::default();
-        self.analog = self.settings.converter.map(Analog::new);
-        self.program = self.burned.clone().unwrap_or_default();
-        self.threads = vec![ProgramThread::idle(); self.settings.model.threads()];
-        self.error = ErrorCode(0);
-        self.position_format = NumberFormat::decimal(10, 0);
-        self.variable_format = NumberFormat::decimal(10, 4);
-        self.format_numbers = (10.0, 10.4, 1.0);
-        self.is_marked = false;
-        self.unsolicited_to = self.settings.is_serial.then_some(0);
-        self.outputs = 0;
-        self.pushed = None;
-        if let Some(line) = self.program.find("AUTO") {
-            self.threads[0].start(line, 0);
+        Self {
+            settings,
+            plant,
+            clock: SampleClock::new(now, settings.clock_ppm),
+            axes: (0..settings.model.axes()).map(|axis| GalilAxis::new(axis == 0)).collect(),
+            polarity: InputPolarity { limit: -1.0, home: -1.0 },
+            other_inputs: [-1.0, 0.0, 0.0],
+            memory: ControllerMemory::default(),
+            recorder: ArrayRecorder::default(),
+            contour: ContourMode::default(),
+            analog: settings.converter.map(Analog::new),
+            program,
+            burned,
+            threads,
+            clients,
+            error: ErrorCode(0),
+            error_at: (0, 0),
+            position_format: NumberFormat::decimal(10, 0),
+            variable_format: NumberFormat::decimal(10, 4),
+            format_numbers: (10.0, 10.4, 1.0),
+            is_marked: false,
+            unsolicited_to: settings.is_serial.then_some(0),
+            outputs: 0,
+            pushed: None,
+            boots_until: None,
+            now,
+            is_wrong: false,
         }
     }
 
     /// `RS`, and a reset by fault: connections on a network are dropped.
     fn reset(&mut self) {
-        self.initialise();
+        // The slide stays where it stands.
+        let counts = self.axes[0].filtered;
+        self.plant.shift_counter(counts * palpate_drivers::sim::MM_PER_PULSE);
+        let (burned, clients) = (self.burned.take(), std::mem::take(&mut self.clients));
+        *self = Self {
+            is_wrong: self.is_wrong,
+            ..Self::start(self.settings, self.plant.clone(), burned, clients, self.now)
+        };
         for client in &mut self.clients {
             if self.settings.is_serial {
                 *client = GalilClient::connected(self.settings.has_echo);
@@ -238,17 +236,16 @@ impl GalilEmulator {
         self.clock.period()
     }
 
-    /// The bench behind the controller, for tests and demonstrations.
     pub fn plant(&self) -> &EmulatedPlant {
         &self.plant
     }
 
-    /// Whether an axis, counted from 0, is moving, for tests and demonstrations.
+    /// Whether an axis, counted from 0, is moving, for tests.
     pub fn is_running(&self, axis: usize) -> bool {
         self.axes.get(axis).is_some_and(GalilAxis::is_running)
     }
 
-    /// True position of the slide from home, whatever the counter says, for tests and demonstrations.
+    /// True position of the slide from home, whatever the counter says, for tests.
     pub fn slide(&self) -> Position {
         self.plant.axis()
     }
@@ -311,8 +308,10 @@ impl EmulatedDevice for GalilEmulator {
         match fault {
             DeviceFault::Reset if is_on => self.reset(),
             DeviceFault::Reset => {}
-            DeviceFault::Stuck => self.plant.spoil(is_on.then_some(CellFault::Stuck)),
-            DeviceFault::Saturated => self.plant.spoil(is_on.then_some(CellFault::Saturated)),
+            DeviceFault::Stuck => self.plant.set_cell_fault(is_on.then_some(CellFault::Stuck)),
+            DeviceFault::Saturated => {
+                self.plant.set_cell_fault(is_on.then_some(CellFault::Saturated))
+            }
             DeviceFault::WrongDevice => self.is_wrong = is_on,
         }
     }

@@ -1,4 +1,4 @@
-//! Commands that move, define or tell the place of an axis.
+//! Commands that move an axis, or set or report its position.
 
 use super::axis::{AxisMotion, COUNTS_MAX, PreparedMotion};
 use super::commands::{AxisArgument, join_values};
@@ -42,7 +42,6 @@ impl GalilEmulator {
         let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
             let AxisArgument::Number(value) = argument else {
-                let word = [word.as_bytes()[0], word.as_bytes()[1]];
                 let value = self.axis_operand(word, axis).unwrap_or(0.0);
                 values.push(self.position_format.write(value));
                 continue;
@@ -91,7 +90,7 @@ impl GalilEmulator {
         for axis in axes {
             self.axes[axis].stop(AxisSetting::Deceleration, 4);
         }
-        if arguments.is_empty() && matches!(origin, StatementOrigin::Client(_)) {
+        if arguments.is_empty() && origin.client().is_some() {
             self.halt_threads();
         }
         Ok(StatementAnswer::Done)
@@ -143,7 +142,6 @@ impl GalilEmulator {
     }
 
     fn query_axes(&self, word: &str, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
-        let letters = [word.as_bytes()[0], word.as_bytes()[1]];
         let format = match word {
             "TT" => NumberFormat::decimal(10, 4),
             // Stop codes and switch bytes have three digits.
@@ -153,7 +151,7 @@ impl GalilEmulator {
         let values = self
             .axis_list(arguments)?
             .into_iter()
-            .map(|axis| format.write(self.axis_operand(letters, axis).unwrap_or(0.0)))
+            .map(|axis| format.write(self.axis_operand(word, axis).unwrap_or(0.0)))
             .collect();
         Ok(join_values(values))
     }
@@ -184,10 +182,7 @@ impl GalilEmulator {
                 }
                 self.contour.begin(axes);
             }
-            "DT" => match self.numbers(arguments)?.as_slice() {
-                [Some(n)] => self.contour.set_interval(*n)?,
-                _ => return Err(ErrorCode::FEW_FIELDS),
-            },
+            "DT" => self.contour.set_interval(self.first_number(arguments)?)?,
             _ => self.contour_data(arguments)?,
         }
         Ok(StatementAnswer::Done)
@@ -200,10 +195,7 @@ impl GalilEmulator {
         }
         let is_letter = arguments.starts_with(|c: char| c.is_ascii_uppercase());
         let (list, time) = match arguments.split_once('=') {
-            Some((list, time)) if !is_letter => {
-                let time = self.numbers(time)?.first().copied().flatten();
-                (list.trim(), Some(time.ok_or(ErrorCode::FEW_FIELDS)?))
-            }
+            Some((list, time)) if !is_letter => (list.trim(), Some(self.first_number(time)?)),
             _ => (arguments, None),
         };
         let mut increments = vec![0.0; self.contour.axes.len()];

@@ -7,13 +7,11 @@ use palpate_drivers::galil::ErrorCode;
 /// Subroutines within each other (`TC` 12).
 const STACK_MAX: usize = 16;
 
-/// Where a thread is: line and statement within it.
+/// Line and statement within it.
 pub type StatementPlace = (usize, usize);
 
-/// What a thread waits for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ThreadWait {
-    /// Nothing.
     None,
     /// `WT`, `AT`: a sample.
     Until(u64),
@@ -30,11 +28,9 @@ pub enum ThreadWait {
 /// A thread of the program.
 #[derive(Clone, Debug)]
 pub struct ProgramThread {
-    /// Whether it runs.
     pub is_running: bool,
     /// The next statement.
     pub at: StatementPlace,
-    /// What it waits for.
     pub wait: ThreadWait,
     /// Where subroutines return to, and what was waited for there.
     stack: Vec<(StatementPlace, ThreadWait)>,
@@ -45,7 +41,6 @@ pub struct ProgramThread {
 }
 
 impl ProgramThread {
-    /// One that does not run.
     pub const fn idle() -> Self {
         Self {
             is_running: false,
@@ -188,7 +183,7 @@ pub fn check_line(line: &str) -> Result<(), ErrorCode> {
     Ok(())
 }
 
-/// Statements of a line; `;` within quotes joins nothing, comments are left out.
+/// Statements of a line; `;` within quotes joins nothing, comments are skipped.
 fn split(line: &str) -> Vec<String> {
     let mut all = Vec::new();
     let mut is_quoted = false;

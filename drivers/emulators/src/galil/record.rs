@@ -8,16 +8,16 @@ const ARRAYS_MAX: usize = 8;
 const INTERVAL_MAX: f64 = 8.0;
 
 /// Which number an array records.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RecordSource {
     /// `TIME`.
     Time,
     /// An analog input, in counts.
     Analog(usize),
     /// Two letters and an axis.
-    Axis([u8; 2], usize),
+    Axis(String, usize),
     /// `_TI`, `_OP` and others without an axis.
-    Plain([u8; 2]),
+    Controller(String),
 }
 
 /// What is recorded, where, and how far it is.

@@ -1,4 +1,4 @@
-//! Threads of the application program at a sample.
+//! Runs the threads of the application program at each sample.
 
 use super::expression::evaluate;
 use super::program::{ProgramThread, ThreadWait};
@@ -12,7 +12,7 @@ fn samples_of(ms: f64, tm: f64) -> f64 {
 }
 
 impl GalilEmulator {
-    /// Lets every thread go on, as far as a sample lasts.
+    /// Runs every thread for as long as a sample lasts.
     pub(super) fn run_threads(&mut self) {
         for index in 0..self.threads.len() {
             for _ in 0..self.settings.model.statements_per_sample() {
@@ -24,7 +24,6 @@ impl GalilEmulator {
         }
     }
 
-    /// Whether what a thread waits for has come.
     fn has_wait_ended(&mut self, index: usize) -> bool {
         let is_over = match &self.threads[index].wait {
             ThreadWait::None => true,
@@ -57,7 +56,7 @@ impl GalilEmulator {
         }
     }
 
-    /// An error ends its thread; `#CMDERR` runs in thread 0 if the program has one, else the line is told
+    /// An error ends its thread; `#CMDERR` runs in thread 0 if the program has one, else the line is sent
     /// (gclib.h: `?55 i=var`).
     fn fail(&mut self, index: usize, line: usize, text: &str, code: ErrorCode) {
         self.error = code;
@@ -101,15 +100,12 @@ impl GalilEmulator {
             "JP" | "JS" => self.jump(index, word == "JS", arguments)?,
             "ZS" => self.threads[index].clear_stack(),
             "WT" => {
-                let numbers = self.numbers(arguments)?;
-                let (length, unit) = (numbers.first(), numbers.get(1));
-                let length = length.copied().flatten().ok_or(ErrorCode::FEW_FIELDS)?;
-                let is_samples = unit.copied().flatten() == Some(1.0);
+                let length = self.first_number(arguments)?;
+                let is_samples = self.numbers(arguments)?.get(1) == Some(&Some(1.0));
                 self.wait_samples(index, length, is_samples, self.clock.count())?;
             }
             "AT" => {
-                let number = self.numbers(arguments)?.first().copied().flatten();
-                let number = number.ok_or(ErrorCode::FEW_FIELDS)?;
+                let number = self.first_number(arguments)?;
                 if number == 0.0 {
                     self.threads[index].since = self.clock.count();
                 } else {

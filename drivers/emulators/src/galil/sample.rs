@@ -10,7 +10,6 @@ use palpate_drivers::sim::MM_PER_PULSE;
 use palpate_model::Nanos;
 
 impl GalilEmulator {
-    /// All samples up to a time.
     pub(super) fn run_samples_until(&mut self, now: Nanos) {
         while let Some(at) = self.clock.next_at().filter(|at| *at <= now) {
             self.now = at;
@@ -20,7 +19,7 @@ impl GalilEmulator {
         if self.boots_until.is_some_and(|until| until <= now) {
             self.boots_until = None;
             if self.settings.is_serial {
-                // The answer to the `RS` that was sent, or to nobody.
+                // The answer to `RS`; after a reset by fault no client waits for it.
                 self.clients[0].send(b":");
             }
         }
@@ -59,10 +58,10 @@ impl GalilEmulator {
         self.push_record();
     }
 
-    /// The slide's counter has become smaller by so many counts.
+    /// Accounts for a counter that was lowered by `counts`.
     pub(super) fn shift_counter(&mut self, axis: usize, counts: f64) {
         if axis == 0 {
-            self.plant.shift(counts * MM_PER_PULSE);
+            self.plant.shift_counter(counts * MM_PER_PULSE);
         }
     }
 
@@ -109,7 +108,7 @@ impl GalilEmulator {
             return;
         };
         for index in 0..self.recorder.arrays.len() {
-            let value = self.recorded(self.recorder.sources[index]);
+            let value = self.recorded(&self.recorder.sources[index]);
             let name = &self.recorder.arrays[index];
             // An array that was taken away or made smaller meanwhile records nothing.
             if let Ok(array) = self.memory.array_mut(name)
@@ -121,18 +120,18 @@ impl GalilEmulator {
     }
 
     /// The number that a source gives at this sample.
-    fn recorded(&self, source: RecordSource) -> f64 {
+    fn recorded(&self, source: &RecordSource) -> f64 {
         match source {
             RecordSource::Time => self.clock.count() as f64,
             RecordSource::Analog(input) => self.analog.as_ref().map_or(0.0, |analog| {
-                let counts = analog.counts(input, self.input_volts(input));
-                match analog.range(input) {
+                let counts = analog.counts(*input, self.input_volts(*input));
+                match analog.range(*input) {
                     Some(range) if range.abs() > 2.0 => f64::from(counts),
                     _ => f64::from(counts.cast_signed()),
                 }
             }),
-            RecordSource::Axis(word, axis) => self.axis_operand(word, axis).unwrap_or(0.0),
-            RecordSource::Plain(word) => self.controller_operand(word).unwrap_or(0.0),
+            RecordSource::Axis(word, axis) => self.axis_operand(word, *axis).unwrap_or(0.0),
+            RecordSource::Controller(word) => self.controller_operand(word).unwrap_or(0.0),
         }
     }
 
@@ -179,7 +178,7 @@ impl GalilEmulator {
         }
     }
 
-    /// The answer of a program's statement is text that nobody asked for.
+    /// The answer to a statement of a program is unsolicited text.
     pub(super) fn send_program_output(&mut self, answer: StatementAnswer) {
         match answer {
             StatementAnswer::Text(text) => self.send_unsolicited(&format!("{text}\r\n")),

@@ -1,4 +1,4 @@
-//! The numbers that a command sets for an axis and gives back: their ranges, roundings and first values.
+//! Numbers of an axis that a command sets and reads: ranges, rounding and initial values.
 
 use super::model::GalilModel;
 use palpate_drivers::galil::ErrorCode;
@@ -70,7 +70,6 @@ settings! {
 }
 
 impl AxisSetting {
-    /// Their number.
     pub const COUNT: usize = TABLE.len();
 
     /// The setting that a command of two letters sets.
@@ -78,12 +77,12 @@ impl AxisSetting {
         TABLE.iter().find(|row| row.0 == word).map(|row| row.1)
     }
 
-    /// Digits behind the point when it is asked for.
+    /// Decimals of its answer.
     pub fn decimals(self) -> usize {
         TABLE[self as usize].5
     }
 
-    /// The value that the controller takes for a wish.
+    /// The value that the controller sets when `value` is requested.
     pub fn round(self, value: f64, model: GalilModel, tm: f64) -> Result<f64, ErrorCode> {
         let (_, _, _, min, max, _) = TABLE[self as usize];
         let max = match self {
@@ -117,7 +116,6 @@ pub fn round_speed(value: f64, tm: f64) -> f64 {
     (value / quantum).trunc() * quantum
 }
 
-/// The settings of one axis.
 #[derive(Clone, Debug)]
 pub struct AxisSettings([f64; AxisSetting::COUNT]);
 
@@ -127,7 +125,6 @@ impl AxisSettings {
         Self(std::array::from_fn(|i| TABLE[i].2))
     }
 
-    /// What is set.
     pub fn get(&self, setting: AxisSetting) -> f64 {
         self.0[setting as usize]
     }

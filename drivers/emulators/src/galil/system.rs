@@ -32,8 +32,7 @@ impl GalilEmulator {
             "MG" => return self.message(arguments),
             "TC" => return self.query_error(arguments),
             "TB" | "TI" => {
-                let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.controller_operand(letters).unwrap_or(0.0);
+                let value = self.controller_operand(word).unwrap_or(0.0);
                 let format = NumberFormat { whole: 3, ..self.position_format };
                 return Ok(StatementAnswer::Text(format.write(value)));
             }
@@ -41,14 +40,17 @@ impl GalilEmulator {
             "WH" => return Ok(StatementAnswer::Text(self.connection_name(origin))),
             "TH" => return Ok(StatementAnswer::Text(self.list_handles())),
             "QZ" => return Ok(StatementAnswer::Text(lengths(self.settings.model))),
-            "QR" => return self.query_record(origin),
+            // Which blocks a client asks for is ignored: all come.
+            "QR" if origin.client().is_some() => {
+                return Ok(StatementAnswer::Bytes(self.data_record()));
+            }
+            "QR" => return Err(ErrorCode::NOT_IN_PROGRAM),
             "RS" => {
                 self.reset();
                 return Ok(StatementAnswer::Silent);
             }
             "TM" | "PF" | "VF" | "LZ" if arguments == "?" => {
-                let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.controller_operand(letters).unwrap_or(0.0);
+                let value = self.controller_operand(word).unwrap_or(0.0);
                 return Ok(StatementAnswer::Text(self.variable_format.write(value)));
             }
             "TM" => self.set_tm(arguments)?,
@@ -62,12 +64,10 @@ impl GalilEmulator {
             }
             "CW" => {
                 // A second field, for terminals without hardware handshake, changes nothing here.
-                let mark = self.numbers(arguments)?.first().copied().flatten();
-                self.is_marked = match mark {
-                    Some(1.0) => true,
-                    Some(2.0 | 0.0) => false,
-                    Some(_) => return Err(ErrorCode::OUT_OF_RANGE),
-                    None => return Err(ErrorCode::FEW_FIELDS),
+                self.is_marked = match self.first_number(arguments)? {
+                    1.0 => true,
+                    2.0 | 0.0 => false,
+                    _ => return Err(ErrorCode::OUT_OF_RANGE),
                 };
             }
             "CF" => self.unsolicited_to = self.parse_handle(origin, arguments)?,
@@ -85,7 +85,7 @@ impl GalilEmulator {
                 Some(value) if (0.0..=65_535.0).contains(&value) => self.outputs = value as u16,
                 _ => return Err(ErrorCode::OUT_OF_RANGE),
             },
-            // The addresses that the DMC-30010's answer to `TH` tells too.
+            // As in the DMC-30010's answer to `TH`.
             "IA" if arguments == "?" => {
                 return Ok(StatementAnswer::Text("127, 0, 0, 1".to_owned()));
             }
@@ -104,9 +104,7 @@ impl GalilEmulator {
             "NO" => {}
             // Interrupts are for boards on a computer's bus.
             "EI" | "UI" => return Err(ErrorCode::NOT_SUPPORTED),
-            "ED" | "LS" if matches!(origin, StatementOrigin::Client(_)) => {
-                return Err(ErrorCode::NOT_SUPPORTED);
-            }
+            "ED" | "LS" if origin.client().is_some() => return Err(ErrorCode::NOT_SUPPORTED),
             "AM" | "MC" | "WT" | "WC" | "AT" | "AI" | "JP" | "JS" | "IF" | "EN" | "RE" | "ZS" => {
                 return Err(ErrorCode::PROGRAM_ONLY);
             }
@@ -123,7 +121,7 @@ impl GalilEmulator {
         }
     }
 
-    /// `TC`, `TC0`: the number; `TC1`: number and text. Telling clears it.
+    /// `TC`, `TC0`: the number; `TC1`: number and text. The answer clears it.
     fn query_error(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
         let has_text = match arguments {
             "" | "0" | "?" => false,
@@ -175,20 +173,9 @@ impl GalilEmulator {
         text
     }
 
-    fn query_record(&self, origin: StatementOrigin) -> Result<StatementAnswer, ErrorCode> {
-        match origin {
-            // Which blocks a client asks for is ignored: all come.
-            StatementOrigin::Client(_) => Ok(StatementAnswer::Bytes(self.data_record())),
-            StatementOrigin::Thread(_) => Err(ErrorCode::NOT_IN_PROGRAM),
-        }
-    }
-
     fn set_tm(&mut self, arguments: &str) -> Result<(), ErrorCode> {
-        let Some(tm) = self.numbers(arguments)?.first().copied().flatten() else {
-            return Err(ErrorCode::FEW_FIELDS);
-        };
         // The period is a whole number of 1/16 us (62.5 and 187.5 are among the least ones).
-        let tm = (tm * 16.0).round() / 16.0;
+        let tm = (self.first_number(arguments)? * 16.0).round() / 16.0;
         if tm > 0.0 && !(self.settings.model.tm_min()..=TM_MAX).contains(&tm) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
@@ -219,12 +206,8 @@ impl GalilEmulator {
         origin: StatementOrigin,
         name: &str,
     ) -> Result<Option<usize>, ErrorCode> {
-        let asking = match origin {
-            StatementOrigin::Client(channel) => Some(channel),
-            StatementOrigin::Thread(_) => None,
-        };
         match name.as_bytes() {
-            b"I" => Ok(asking),
+            b"I" => Ok(origin.client()),
             b"S" => Ok(self.settings.is_serial.then_some(0)),
             [letter @ b'A'..=b'H'] if !self.settings.is_serial => {
                 Ok(Some(usize::from(letter - b'A')))
@@ -296,7 +279,7 @@ impl GalilEmulator {
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        if let StatementOrigin::Client(channel) = origin {
+        if let Some(channel) = origin.client() {
             self.clients[channel].busy_until = Some(self.now + BURN);
         }
         Ok(())
@@ -305,18 +288,15 @@ impl GalilEmulator {
     /// `IHT=>-3` closes all other handles, `IHS=>-2` the one that sent it, `IHN=>-2` all but that one, `IHC=>-1` one
     /// (DMC-1400 command reference, `IH`; `GalilConnector.cpp` of EPICS).
     fn close_handles(&mut self, origin: StatementOrigin, arguments: &str) -> Result<(), ErrorCode> {
-        let Some((who, how)) = arguments.split_once("=>") else {
+        let Some((selection, how)) = arguments.split_once("=>") else {
             // Opening a connection of its own to another device.
             return Err(ErrorCode::NOT_SUPPORTED);
         };
         if !["-1", "-2", "-3"].contains(&how.trim()) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let asking = match origin {
-            StatementOrigin::Client(channel) => Some(channel),
-            StatementOrigin::Thread(_) => None,
-        };
-        let which: Vec<usize> = match who.trim().as_bytes() {
+        let asking = origin.client();
+        let closed: Vec<usize> = match selection.trim().as_bytes() {
             b"S" => asking.into_iter().collect(),
             b"T" | b"N" => (0..self.clients.len()).filter(|at| Some(*at) != asking).collect(),
             [letter @ b'A'..=b'H'] => vec![usize::from(letter - b'A')],
@@ -325,7 +305,7 @@ impl GalilEmulator {
         if self.settings.is_serial {
             return Ok(());
         }
-        for channel in which {
+        for channel in closed {
             let client = &mut self.clients[channel];
             if client.is_open {
                 client.is_open = false;

@@ -1,4 +1,4 @@
-//! Arrays and programs: made, recorded, sent up and down.
+//! Arrays and programs: dimension, record, upload and download.
 
 use super::client::ClientMode;
 use super::commands::fields;
@@ -112,28 +112,24 @@ impl GalilEmulator {
         if name == "TIME" {
             return Ok(RecordSource::Time);
         }
-        let (Some([first, second]), Some(rest)) =
-            (name.as_bytes().first_chunk::<2>(), name.get(2..))
-        else {
-            return Err(ErrorCode::NO_SOURCE);
-        };
-        let word = [*first, *second];
+        let (word, rest) = name.split_at_checked(2).ok_or(ErrorCode::NO_SOURCE)?;
         let mut letters = rest.chars();
         let index = match (letters.next(), letters.next()) {
             (None, _) => None,
             (Some(letter), None) => Some(axis_of(letter).ok_or(ErrorCode::NO_SOURCE)?),
             _ => return Err(ErrorCode::NO_SOURCE),
         };
-        match (&word, index) {
+        match (word, index) {
             // Inputs go by the letters of axes (DMC-1700/1800 user manual, page 159).
-            (b"AF", Some(_)) if self.analog.is_none() => Err(ErrorCode::NO_ANALOG),
-            (b"AF", Some(input)) => Ok(RecordSource::Analog(input)),
+            ("AF", Some(_)) if self.analog.is_none() => Err(ErrorCode::NO_ANALOG),
+            ("AF", Some(input)) => Ok(RecordSource::Analog(input)),
             (
-                b"DE" | b"TP" | b"TE" | b"SH" | b"RL" | b"TS" | b"SC" | b"TT" | b"RP" | b"TD"
-                | b"TV",
+                "DE" | "TP" | "TE" | "SH" | "RL" | "TS" | "SC" | "TT" | "RP" | "TD" | "TV",
                 Some(axis),
-            ) if axis < self.axes.len() => Ok(RecordSource::Axis(word, axis)),
-            (b"NO", Some(_)) | (b"TI" | b"OP" | b"NO", None) => Ok(RecordSource::Plain(word)),
+            ) if axis < self.axes.len() => Ok(RecordSource::Axis(word.to_owned(), axis)),
+            ("NO", Some(_)) | ("TI" | "OP" | "NO", None) => {
+                Ok(RecordSource::Controller(word.to_owned()))
+            }
             _ => Err(ErrorCode::NO_SOURCE),
         }
     }
@@ -144,9 +140,7 @@ impl GalilEmulator {
             let is_running = f64::from(u8::from(self.recorder.is_running()));
             return Ok(StatementAnswer::Text(self.position_format.write(is_running)));
         }
-        let numbers = self.numbers(arguments)?;
-        let n = numbers.first().copied().flatten();
-        let n = n.ok_or(ErrorCode::FEW_FIELDS)?;
+        let n = self.first_number(arguments)?;
         if n == 0.0 {
             self.recorder.stop();
             return Ok(StatementAnswer::Done);
@@ -158,7 +152,7 @@ impl GalilEmulator {
             .map(|name| self.memory.array(name).map(<[f64]>::len))
             .collect();
         let shortest = lengths?.into_iter().min().unwrap_or(0);
-        let m = numbers.get(1).copied().flatten();
+        let m = self.numbers(arguments)?.get(1).copied().flatten();
         let now = self.clock.count();
         self.recorder.start(n, m, shortest, now)?;
         Ok(StatementAnswer::Done)
@@ -214,9 +208,7 @@ impl GalilEmulator {
         origin: StatementOrigin,
         arguments: &str,
     ) -> Result<StatementAnswer, ErrorCode> {
-        let StatementOrigin::Client(channel) = origin else {
-            return Err(ErrorCode::NOT_IN_PROGRAM);
-        };
+        let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         let (name, next, end, _) = self.range_of(arguments)?;
         self.clients[channel].mode =
             ClientMode::Values { name, next, end, value: Vec::new(), is_wrong: false };
@@ -224,9 +216,7 @@ impl GalilEmulator {
     }
 
     fn download(&mut self, origin: StatementOrigin) -> Result<StatementAnswer, ErrorCode> {
-        let StatementOrigin::Client(channel) = origin else {
-            return Err(ErrorCode::NOT_IN_PROGRAM);
-        };
+        let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }

@@ -1,7 +1,7 @@
-//! Words of a block of G-code: what it asks for, or why it is refused (gnea/grbl, gcode.c; doc/csv/error_codes_en_US.csv).
-//! Arcs alone are left out: a slide has no plane. They are read, and refused as not supported if nothing else is wrong.
+//! Parses a block of G-code, or refuses it with its error number (gnea/grbl, gcode.c; doc/csv/error_codes_en_US.csv).
+//! Only arcs are missing: a slide has no plane. They are read, and refused as not supported if nothing else is wrong.
 
-use super::meaning::finish;
+use super::block_check::check_block;
 use super::planner::{AXES, Coordinates};
 use super::words::{BlockWords, number, take_g, take_m, take_value};
 
@@ -14,7 +14,7 @@ pub struct ModalState {
     pub plane: u8,
     pub is_inch: bool,
     pub is_relative: bool,
-    /// `G93`: `F` tells how many such blocks a minute has.
+    /// `G93`: `F` is the number of such blocks per minute.
     pub is_inverse: bool,
     /// Of `G54` to `G59`, from 0 on.
     pub system: usize,
@@ -47,8 +47,7 @@ impl Default for ModalState {
 }
 
 impl ModalState {
-    /// What `M2` and `M30` leave of them.
-    #[must_use]
+    /// After `M2` and `M30`.
     pub fn after_end(self) -> Self {
         Self {
             is_inch: self.is_inch,
@@ -61,7 +60,7 @@ impl ModalState {
     }
 }
 
-/// Coordinate systems and places that are stored, in mm of the machine.
+/// Coordinate systems and stored positions, in machine coordinates in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoordinateOffsets {
     /// `G54` to `G59`.
@@ -75,7 +74,7 @@ pub struct CoordinateOffsets {
 }
 
 impl CoordinateOffsets {
-    /// Work coordinates are those of the machine less this.
+    /// Work coordinates are machine coordinates minus this.
     pub fn of(&self, system: usize) -> Coordinates {
         let mut all: Coordinates =
             std::array::from_fn(|axis| self.systems[system][axis] + self.shift[axis]);
@@ -84,23 +83,20 @@ impl CoordinateOffsets {
     }
 }
 
-/// A motion that a block asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GcodeMotion {
     /// 0, 1, or 382 to 385.
     pub kind: u16,
-    /// Where to, in machine coordinates.
+    /// Target in machine coordinates.
     pub to: Coordinates,
     /// mm/min.
     pub feed: f64,
-    /// It was asked for with `$J=`.
+    /// Requested with `$J=`.
     pub is_jog: bool,
 }
 
-/// What becomes of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProgramFlow {
-    /// It goes on.
     Runs,
     /// `M0`.
     Pauses,
@@ -108,22 +104,18 @@ pub enum ProgramFlow {
     Ends,
 }
 
-/// What a block does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParsedBlock {
-    /// Modes after it.
     pub modes: ModalState,
     /// Coordinates after it.
     pub offsets: CoordinateOffsets,
     /// `G4`, in s.
     pub dwell: Option<f64>,
-    /// A first way, of `G28` and `G30`.
+    /// First motion of `G28` and `G30`.
     pub via: Option<GcodeMotion>,
-    /// Its motion, if it has one.
     pub motion: Option<GcodeMotion>,
-    /// What becomes of the program.
     pub flow: ProgramFlow,
-    /// It is done only when all before it is.
+    /// It begins only after all earlier blocks have ended.
     pub waits_for_rest: bool,
 }
 
@@ -146,8 +138,8 @@ pub fn parse(
         if !letter.is_ascii_uppercase() {
             return Err(1);
         }
-        let (value, behind) = number(&rest[1..]).ok_or(2_u8)?;
-        rest = behind;
+        let (value, after) = number(&rest[1..]).ok_or(2_u8)?;
+        rest = after;
         let whole = value.trunc() as i64;
         let part = (100.0 * (value - value.trunc())).round() as i64;
         match letter {
@@ -157,14 +149,13 @@ pub fn parse(
         }
     }
     let line = BlockContext { block, before: modes, is_jog, here };
-    finish(line, *offsets, words, flow)
+    check_block(line, *offsets, words, flow)
 }
 
-/// What a block is read with.
 pub struct BlockContext {
-    /// As the words left them.
+    /// After the words of this block.
     pub block: ModalState,
-    /// As the last block left them.
+    /// After the last block.
     pub before: ModalState,
     /// It came with `$J=`.
     pub is_jog: bool,
@@ -182,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn jogs_are_those_of_the_manual() {
+    fn jogs_match_the_manual() {
         // doc/markdown/jogging.md: examples.
         let to = |line| jog(line).unwrap().motion.unwrap().to;
         assert_eq!(to("X10.0Y-1.5F100"), [12.0, -1.5, 0.0]);
@@ -223,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused_has_the_number_of_the_table() {
+    fn refused_blocks_have_the_error_number_of_the_table() {
         // doc/csv/error_codes_en_US.csv, and which check of gcode.c comes first.
         for (line, error) in [
             ("G1", 22),
@@ -266,13 +257,13 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_shift_and_are_shifted_back() {
+    fn coordinate_offsets_are_set_and_cleared() {
         let mut offsets = CoordinateOffsets::default();
         let mut modes = ModalState::default();
         let mut apply_block = |line: &str, here: Coordinates| {
             let parsed = parse(line, modes, false, here, &offsets).unwrap();
-            (modes, offsets) = (done.modes, done.offsets);
-            done
+            (modes, offsets) = (parsed.modes, parsed.offsets);
+            parsed
         };
         let here = [5.0, 0.0, 0.0];
         assert_eq!(apply_block("G10L20P1X0", here).offsets.systems[0][0], 5.0);

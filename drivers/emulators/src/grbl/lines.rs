@@ -1,4 +1,4 @@
-//! Lines: read out of the buffer one after the other, each answered by `ok` or `error:N`.
+//! Reads lines from the buffer one after the other and answers each with `ok` or `error:N`.
 
 use super::gcode::{self, GcodeMotion, ParsedBlock, ProgramFlow};
 use super::homing::HomingCycle;
@@ -9,18 +9,18 @@ use palpate_model::Nanos;
 /// A line whose answer comes later.
 #[derive(Clone, Debug)]
 pub(super) enum PendingLine {
-    /// Ways that wait for room in the planner.
+    /// Motions that wait for room in the planner.
     Room(Vec<GcodeMotion>),
-    /// All before it is to be done first.
+    /// Waits for all earlier blocks.
     Rest(Box<ParsedBlock>),
-    /// The place of a probe that found nothing is told after its alarm.
+    /// The position of a probe that found nothing is reported after its alarm.
     ProbeReport,
-    /// A dwell, and the ways after it.
+    /// A dwell, and the motions after it.
     Until(Nanos, Vec<GcodeMotion>),
 }
 
 impl Grbl {
-    /// Takes lines while there is nothing to wait for.
+    /// Reads lines until one has to wait.
     pub(super) fn read_lines(&mut self) {
         loop {
             let is_blocked = self.is_waiting_for_reset
@@ -58,7 +58,7 @@ impl Grbl {
     fn take_byte(&mut self, byte: u8) {
         match byte {
             b'\r' | b'\n' => {
-                // What was asked for at once is told before a line is done (protocol.c).
+                // A requested status is sent before a line is executed (protocol.c).
                 self.send_status_if_requested();
                 let line = std::mem::take(&mut self.line);
                 let is_overlong = std::mem::take(&mut self.is_overlong);
@@ -89,7 +89,7 @@ impl Grbl {
         }
     }
 
-    /// Does a line; `false` when its answer comes later.
+    /// Executes a line; `false` when its answer comes later.
     pub(super) fn execute(&mut self, line: &str) -> Result<bool, u8> {
         if line.is_empty() {
             return Ok(true);
@@ -109,7 +109,6 @@ impl Grbl {
         self.apply_block(parsed)
     }
 
-    /// Goes on with a line that had to wait.
     fn continue_line(&mut self, pending: PendingLine) -> Result<bool, u8> {
         match pending {
             PendingLine::Rest(parsed) if self.planner.is_idle() => self.apply_block(*parsed),
@@ -178,7 +177,7 @@ impl Grbl {
     fn queue(&mut self, mut motions: Vec<GcodeMotion>) -> Result<bool, u8> {
         while !motions.is_empty() {
             if self.eeprom.is_set(20) && self.is_beyond(&motions[0]) {
-                // Grbl brakes before it tells; here it stands. The line is done with the reset.
+                // Grbl brakes first; here the axis stands at once. The reset answers the line.
                 self.alarm(2, true);
                 self.is_line_owed = true;
                 return Ok(false);
@@ -193,7 +192,7 @@ impl Grbl {
     }
 
     fn plan(&mut self, motion: GcodeMotion) {
-        // A place between two steps is the nearest step.
+        // A position between two steps is the nearest step.
         let to = std::array::from_fn(|axis| {
             let scale = self.steps_per_mm(axis);
             (motion.to[axis] * scale).round() / scale
@@ -206,10 +205,10 @@ impl Grbl {
         }
     }
 
-    /// Whether a place is outside the travel, which is from 0 to `-$130` (system.c).
+    /// Whether the target is outside the travel, which is from 0 to `-$130` (system.c).
     fn is_beyond(&self, motion: &GcodeMotion) -> bool {
         (0..motion.to.len()).any(|axis| {
-            let travel = self.eeprom.get(130 + axis as u16);
+            let travel = self.eeprom.value(130 + axis as u16);
             motion.to[axis] > 0.0 || motion.to[axis] < -travel
         })
     }
@@ -325,8 +324,8 @@ impl Grbl {
             if !value.is_empty() {
                 self.execute(value)?;
             }
-            let place = self.eeprom.startup.get_mut(key as usize).ok_or(3)?;
-            value.clone_into(place);
+            let stored = self.eeprom.startup.get_mut(key as usize).ok_or(3)?;
+            value.clone_into(stored);
             return Ok(());
         }
         let (value, rest) = words::number(value).ok_or(2)?;

@@ -4,11 +4,11 @@
 //! what its sources do (protocol.c, system.c, report.c, planner.c); nothing is copied. [`Grbl`] is the board alone,
 //! moved by [`super::bench::EmulatedBench`], which has the slide and the load cell.
 
+mod block_check;
 mod eeprom;
 mod gcode;
 mod homing;
 mod lines;
-mod meaning;
 mod planner;
 mod real_time;
 mod report;
@@ -33,7 +33,7 @@ const LINE_MAX: usize = 79;
 const FEED_MIN: f64 = 1.0;
 /// From the reset of an Uno to the first words of its program: its boot loader waits for a new one so long.
 const BOOT: Nanos = Nanos::from_millis(1_500);
-/// An alarm is given so much time to be read, in which nothing else is done (report.c, `report_alarm_message`).
+/// Pause after an alarm, in which no line is read (report.c, `report_alarm_message`).
 const ALARM_PAUSE: Nanos = Nanos::from_millis(500);
 
 /// How the slide's switches are wired.
@@ -46,20 +46,17 @@ pub enum HomeWiring {
     Probe,
 }
 
-/// What kind of board.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmulatedGrblSettings {
-    /// What it has stored.
     pub eeprom: Eeprom,
-    /// Its switches.
     pub home: HomeWiring,
-    /// Way of the slide for a step of the motor, in mm.
+    /// Travel of the slide per step of the motor, in mm.
     pub mm_per_step: f64,
     /// The memory was never written: the first start says `error:7` and fills it.
     pub is_unused: bool,
     /// Rate of its clock. Resonators of Arduinos are right to half a percent.
     pub resonator: f64,
-    /// Every jog cancel is looked at when the jog has just ended: it takes no line until a cycle start.
+    /// Every jog cancel is handled just after the jog has ended, so that no line is read until a cycle start.
     pub is_suspending: bool,
 }
 
@@ -84,7 +81,7 @@ enum MachineState {
     Run,
     Jog,
     Hold,
-    /// The safety door was said to be open.
+    /// After a safety door command.
     Door,
     Alarm,
     Home,
@@ -92,22 +89,20 @@ enum MachineState {
     Sleep,
 }
 
-/// The board.
 #[derive(Clone, Debug, Default)]
 pub struct Grbl {
     settings: EmulatedGrblSettings,
     eeprom: Eeprom,
     state: MachineState,
-    /// After a hard or soft limit nothing but a reset is heard.
+    /// After a hard or soft limit only a reset is accepted.
     is_waiting_for_reset: bool,
     is_cancelling: bool,
     /// A line that a soft limit has ended is answered with the reset.
     is_line_owed: bool,
-    /// Nothing is done before.
+    /// No line is read before then.
     busy_until: Nanos,
-    /// A reset is under way.
     is_resetting: bool,
-    /// Silent until then.
+    /// The boot loader runs until then.
     boots_at: Option<Nanos>,
     is_first_start: bool,
     now: Nanos,
@@ -115,7 +110,7 @@ pub struct Grbl {
     line: Vec<u8>,
     is_comment: Option<u8>,
     is_overlong: bool,
-    /// A line that is not answered yet.
+    /// A line without its answer yet.
     waiting: Option<lines::PendingLine>,
     tx: Vec<u8>,
     planner: Planner,
@@ -126,7 +121,7 @@ pub struct Grbl {
     is_probe_away: bool,
     homing: Option<HomingCycle>,
     steps: [i64; AXES],
-    /// What the counter reads less than it did, in mm, not told yet.
+    /// Decrease of the counter that no motion explains, in mm, not reported yet.
     shift: f64,
     speed: f64,
     switches: SlideSwitches,
@@ -143,8 +138,6 @@ pub struct Grbl {
 }
 
 impl Grbl {
-    /// As it is switched on.
-    #[must_use]
     pub fn new(settings: EmulatedGrblSettings) -> Self {
         let mut grbl = Self {
             eeprom: settings.eeprom.clone(),
@@ -161,10 +154,10 @@ impl Grbl {
     }
 
     fn steps_per_mm(&self, axis: usize) -> f64 {
-        self.eeprom.get(100 + axis as u16).max(1e-3)
+        self.eeprom.value(100 + axis as u16).max(1e-3)
     }
 
-    /// Where it is, in mm of the machine's coordinates.
+    /// Position in machine coordinates, in mm.
     fn machine(&self) -> Coordinates {
         std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm(axis))
     }
@@ -172,7 +165,7 @@ impl Grbl {
     fn limits(&self) -> [(f64, f64); AXES] {
         std::array::from_fn(|axis| {
             let axis = axis as u16;
-            (self.eeprom.get(110 + axis) / 60.0, self.eeprom.get(120 + axis))
+            (self.eeprom.value(110 + axis) / 60.0, self.eeprom.value(120 + axis))
         })
     }
 
@@ -184,7 +177,7 @@ impl Grbl {
         }
     }
 
-    /// The button at the hold pin, which does as `!` when it goes down.
+    /// The button at the hold pin acts like `!` when it goes down.
     pub fn press_hold(&mut self, is_pressed: bool) {
         if is_pressed && !std::mem::replace(&mut self.is_hold_pressed, is_pressed) {
             self.real_time(b'!');
@@ -219,7 +212,7 @@ impl Grbl {
         }
     }
 
-    /// The axis for a millisecond.
+    /// Advances the axis by a millisecond.
     fn step(&mut self) {
         if let Some(homing) = self.homing.take() {
             self.home(homing);
@@ -259,7 +252,7 @@ impl Grbl {
         }
     }
 
-    /// A jog was cancelled, or a probing has ended.
+    /// Ends a cancelled jog or a probing.
     fn finish_cancelled_motion(&mut self) {
         self.planner.clear(self.machine());
         self.is_cancelling = false;
@@ -289,7 +282,7 @@ impl EmulatedAxis for Grbl {
                 continue;
             }
             if self.rx.len() >= RX_MAX {
-                // Where it waits for nothing, it reads faster than bytes can come.
+                // A board that waits for nothing reads faster than bytes arrive.
                 self.read_lines();
             }
             if self.rx.len() < RX_MAX {

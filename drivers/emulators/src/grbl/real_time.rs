@@ -6,17 +6,12 @@ impl Grbl {
     /// A byte that is never queued; `false` for all others.
     pub(super) fn real_time(&mut self, byte: u8) -> bool {
         match byte {
-            // It is known already.
             0x18 if self.is_resetting => {}
             b'?' => self.is_status_requested = self.homing.is_none() && !self.is_waiting_for_reset,
             0x18 => self.reset(),
             _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
-            0x85 if self.state == MachineState::Jog => {
-                self.is_cancelling = true;
-                self.planner.hold();
-            }
-            // A hold of a jog is its end (doc/markdown/jogging.md).
-            b'!' if self.state == MachineState::Jog => {
+            // A hold of a jog ends it (doc/markdown/jogging.md).
+            0x85 | b'!' if self.state == MachineState::Jog => {
                 self.is_cancelling = true;
                 self.planner.hold();
             }
@@ -57,7 +52,7 @@ impl Grbl {
         true
     }
 
-    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); told, and nothing more.
+    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); only reported.
     fn change_override(&mut self, byte: u8) {
         let [feed, rapid, spindle] = &mut self.overrides;
         let (value, what) = match byte {

@@ -1,4 +1,4 @@
-//! Status reports and what the queries print (doc/markdown/interface.md; forms as in report.c).
+//! Status reports and answers to queries (doc/markdown/interface.md; forms as in report.c).
 
 use super::planner::Coordinates;
 use super::{Grbl, MachineState, RX_MAX};
@@ -9,7 +9,7 @@ const OFFSET_BUSY: u32 = 30;
 const OVERRIDES_BUSY: u32 = 20;
 const REST: u32 = 10;
 
-/// Reports still to come before the fields that come now and then.
+/// Reports until the periodic fields are due again.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReportCounters {
     offset: u32,
@@ -17,15 +17,19 @@ pub struct ReportCounters {
 }
 
 impl ReportCounters {
-    /// In the next report.
     pub fn report_offset(&mut self) {
         self.offset = 0;
     }
 
-    /// In the next report.
     pub fn report_overrides(&mut self) {
         self.overrides = 0;
     }
+}
+
+/// A field with the letters that are on; empty if none is.
+fn letters(head: &str, all: &[(bool, char)]) -> String {
+    let on: String = all.iter().filter(|(is_on, _)| *is_on).map(|(_, letter)| *letter).collect();
+    if on.is_empty() { on } else { format!("{head}{on}") }
 }
 
 fn list(place: &Coordinates) -> String {
@@ -49,7 +53,7 @@ impl Grbl {
         };
         let inch = if self.eeprom.is_set(13) { 1.0 / 25.4 } else { 1.0 };
         let scaled = |place: Coordinates| place.map(|mm| mm * inch);
-        let mask = self.eeprom.get(10) as u32;
+        let mask = self.eeprom.value(10) as u32;
         let here = self.machine();
         let offset = self.offsets.of(self.modes.system);
         let mut text = if mask & 1 == 0 {
@@ -64,18 +68,10 @@ impl Grbl {
         }
         let spindle = if self.modes.spindle == 5 { 0.0 } else { self.modes.spindle_speed };
         let _ = write!(text, "|FS:{:.0},{spindle:.0}", self.speed * 60.0 * inch);
-        if self.is_probe() || self.is_limit() || self.is_hold_pressed {
-            text.push_str("|Pn:");
-            if self.is_probe() {
-                text.push('P');
-            }
-            if self.is_limit() {
-                text.push('X');
-            }
-            if self.is_hold_pressed {
-                text.push('H');
-            }
-        }
+        text += &letters(
+            "|Pn:",
+            &[(self.is_probe(), 'P'), (self.is_limit(), 'X'), (self.is_hold_pressed, 'H')],
+        );
         self.add_periodic_fields(&mut text, list(&scaled(offset)));
         self.reports.offset = self.reports.offset.saturating_sub(1);
         self.reports.overrides = self.reports.overrides.saturating_sub(1);
@@ -83,30 +79,24 @@ impl Grbl {
         self.send(&text);
     }
 
-    /// What only some reports have: the offset of the work coordinates, else the overrides.
+    /// Fields of some reports only: the offset of the work coordinates, else the overrides.
     fn add_periodic_fields(&mut self, text: &mut String, offset: String) {
         let is_busy = self.is_moving();
-        let again = |busy| if is_busy { busy } else { REST };
+        let interval = |busy| if is_busy { busy } else { REST };
         if self.reports.offset == 0 {
-            self.reports.offset = again(OFFSET_BUSY);
+            self.reports.offset = interval(OFFSET_BUSY);
             // The overrides follow in the next report.
             self.reports.overrides = self.reports.overrides.max(1);
             let _ = write!(text, "|WCO:{}", offset);
         } else if self.reports.overrides == 0 {
-            self.reports.overrides = again(OVERRIDES_BUSY);
+            self.reports.overrides = interval(OVERRIDES_BUSY);
             let [feed, rapid, of_spindle] = self.overrides;
             let _ = write!(text, "|Ov:{feed},{rapid},{of_spindle}");
-            let accessories: String = [
-                (self.modes.spindle == 3, 'S'),
-                (self.modes.spindle == 4, 'C'),
-                (self.modes.has_coolant, 'F'),
-            ]
-            .into_iter()
-            .filter_map(|(is_on, letter)| is_on.then_some(letter))
-            .collect();
-            if !accessories.is_empty() {
-                let _ = write!(text, "|A:{accessories}");
-            }
+            let modes = self.modes;
+            *text += &letters(
+                "|A:",
+                &[(modes.spindle == 3, 'S'), (modes.spindle == 4, 'C'), (modes.has_coolant, 'F')],
+            );
         }
     }
 

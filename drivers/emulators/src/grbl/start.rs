@@ -1,18 +1,18 @@
-//! How a board starts, locks itself and starts anew.
+//! Start, alarm and reset of the board.
 
 use super::gcode::ModalState;
 use super::planner::AXES;
 use super::{ALARM_PAUSE, Grbl, MachineState, report};
 
 impl Grbl {
-    /// Its supply has come, or the converter has reset it: the position is forgotten (main.c).
+    /// After power-up or a reset by the converter, which clears the position (main.c).
     pub(super) fn power_up(&mut self) {
         self.steps = [0; AXES];
         self.state = if self.eeprom.is_set(22) { MachineState::Alarm } else { MachineState::Idle };
         self.start_over();
     }
 
-    /// What follows every reset: the position stays, lines and blocks go.
+    /// After every reset: the position stays, lines and blocks are dropped.
     pub(super) fn start_over(&mut self) {
         self.is_resetting = false;
         self.busy_until = self.now;
@@ -33,20 +33,15 @@ impl Grbl {
         self.reports = report::ReportCounters::default();
         self.overrides = [100; 3];
         self.planner.clear(self.machine());
-        let mut is_first = false;
-        if std::mem::take(&mut self.is_first_start) {
+        let is_first = std::mem::take(&mut self.is_first_start);
+        if is_first {
             // Observed with 1.1h on an emulated ATmega328P: unused memory is reported, then listed.
             self.send("error:7\r\n");
             let listing = self.eeprom.listing();
             self.send(&listing);
-            is_first = true;
         }
-        let hello = if self.is_wrong {
-            "\r\nGrbl 0.9j ['$' for help]\r\n"
-        } else {
-            "\r\nGrbl 1.1h ['$' for help]\r\n"
-        };
-        self.send(hello);
+        let version = if self.is_wrong { "0.9j" } else { "1.1h" };
+        self.send(&format!("\r\nGrbl {version} ['$' for help]\r\n"));
         if self.eeprom.is_set(21) && self.is_limit() {
             self.send("[MSG:Check Limits]\r\n");
             self.state = MachineState::Alarm;
@@ -62,17 +57,16 @@ impl Grbl {
             }
             for line in self.eeprom.startup.clone() {
                 if !line.is_empty() {
-                    let result_text = match self.execute(&line) {
-                        Ok(_) => "ok".to_owned(),
-                        Err(code) => format!("error:{code}"),
-                    };
+                    let result = self.execute(&line);
+                    let result_text =
+                        result.map_or_else(|code| format!("error:{code}"), |_| "ok".to_owned());
                     self.send(&format!(">{line}:{result_text}\r\n"));
                 }
             }
         }
     }
 
-    /// An alarm, after which the axis stands still at once.
+    /// Raises an alarm; the axis stands still at once.
     pub(super) fn alarm(&mut self, code: u8, is_critical: bool) {
         self.send(&format!("ALARM:{code}\r\n"));
         self.busy_until = self.now + ALARM_PAUSE;
@@ -104,7 +98,7 @@ impl Grbl {
         self.finish_reset();
     }
 
-    /// The welcome, once what came before it was told.
+    /// Sends the welcome once the alarm has had its pause.
     pub(super) fn finish_reset(&mut self) {
         if self.is_resetting && self.now >= self.busy_until {
             if std::mem::take(&mut self.is_line_owed) {

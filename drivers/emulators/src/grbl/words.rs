@@ -1,12 +1,12 @@
-//! A block of G-code cut into its words (gnea/grbl, gcode.c, step 2; nuts_bolts.c).
+//! Splits a block of G-code into words (gnea/grbl, gcode.c, step 2; nuts_bolts.c).
 
 use super::gcode::{ModalState, ProgramFlow};
 use super::planner::AXES;
 
-/// `MAX_INT_DIGITS` (nuts_bolts.c): digits after these are passed over.
+/// `MAX_INT_DIGITS` (nuts_bolts.c): later digits are ignored.
 const DIGITS_MAX: usize = 8;
 
-/// A number at the start of a text, and what is behind it (nuts_bolts.c, `read_float`).
+/// A number at the start of a text, and the text after it (nuts_bolts.c, `read_float`).
 pub fn number(text: &str) -> Option<(f64, &str)> {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let mut has_point = false;
@@ -20,13 +20,12 @@ pub fn number(text: &str) -> Option<(f64, &str)> {
     if whole.is_empty() && part.is_empty() {
         return None;
     }
-    let decimals_kept = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
-    let value: f64 = format!("0{whole}.{}0", &part[..decimals_kept]).parse().ok()?;
+    let decimals = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
+    let value: f64 = format!("0{whole}.{}0", &part[..decimals]).parse().ok()?;
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
     Some((sign * value, rest))
 }
 
-/// What the axis words of a block are for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum AxisUse {
     Motion,
@@ -53,7 +52,7 @@ impl BlockWords {
         self.values[letter as usize - 'A' as usize]
     }
 
-    /// The value of a letter that is used up by it.
+    /// Takes the value of a letter, so that it counts as used.
     pub fn take(&mut self, letter: char) -> Option<f64> {
         self.values[letter as usize - 'A' as usize].take()
     }
@@ -85,7 +84,7 @@ pub fn take_g(
     whole: i64,
     part: i64,
 ) -> Result<(), u8> {
-    let mut left = part;
+    let mut unused_part = part;
     let group = match whole {
         4 | 10 | 28 | 30 | 53 | 92 => {
             let has_axes = matches!(whole, 10 | 28 | 30 | 92) && part == 0;
@@ -100,7 +99,7 @@ pub fn take_g(
                 if part == 10 {
                     words.non_modal = whole as u16 * 10 + 1;
                 }
-                left = 0;
+                unused_part = 0;
             }
             0
         }
@@ -115,7 +114,7 @@ pub fn take_g(
                     return Err(20);
                 }
                 block.motion = 380 + part as u16 / 10;
-                left = 0;
+                unused_part = 0;
             }
             1
         }
@@ -128,7 +127,7 @@ pub fn take_g(
             3
         }
         91 if part == 10 => {
-            left = 0;
+            unused_part = 0;
             4
         }
         93 | 94 => {
@@ -146,7 +145,7 @@ pub fn take_g(
                 return Err(20);
             }
             words.tool_length = Some(whole == 43);
-            left = 0;
+            unused_part = 0;
             8
         }
         54..=59 => {
@@ -156,7 +155,7 @@ pub fn take_g(
         61 if part == 0 => 13,
         _ => return Err(20),
     };
-    if left > 0 {
+    if unused_part > 0 {
         return Err(23);
     }
     words.group(group)
@@ -177,7 +176,7 @@ pub fn take_m(
             match whole {
                 0 => *flow = ProgramFlow::Pauses,
                 2 | 30 => *flow = ProgramFlow::Ends,
-                // A stop that may be chosen is never chosen here.
+                // The optional stop is off.
                 _ => {}
             }
             16

@@ -1,7 +1,8 @@
-//! A Mark-10 gauge of Series 5 as it answers (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
+//! A Mark-10 gauge of Series 5 (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
 
 use crate::DeviceFault;
 use crate::cell::{CellLoad, EmulatedCell};
+use crate::wire::Outbox;
 use palpate_drivers::mark10::gauge::{FILTER_MAX, RATES};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::sim::{Cause, Random};
@@ -20,21 +21,17 @@ const SAMPLES_PER_MS: f64 = 7.0;
 const STEPS_MAX: usize = 147;
 /// Longest command; more is an illegal one.
 const COMMAND_MAX: usize = 32;
-/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
-const OUTPUT_MAX: usize = 4096;
 /// From its supply to the first answer: a guess.
 const START: Nanos = Nanos::from_millis(500);
 
-/// What an emulated gauge is like.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmulatedGaugeSettings {
-    /// Serial number that it tells.
+    /// Serial number that it reports.
     pub serial_number: String,
     /// Whether `AOUT1` gives 50 readings a second, as on the 7i.
     pub is_7i: bool,
     /// Unit it is switched on with.
     pub unit: ForceUnit,
-    /// Seed of its noise.
     pub seed: u64,
 }
 
@@ -57,7 +54,7 @@ enum Mode {
     PeakCompression,
 }
 
-/// What commands set; lost with its supply, as nothing is saved.
+/// What commands set. A loss of supply resets it, as nothing is saved.
 #[derive(Clone, Debug)]
 struct GaugeState {
     unit: ForceUnit,
@@ -87,13 +84,12 @@ impl GaugeState {
     }
 }
 
-/// The gauge.
 pub struct EmulatedGauge {
     settings: EmulatedGaugeSettings,
     state: GaugeState,
     noise: Random,
     command: Vec<u8>,
-    /// Force in N at the newest ms each, with its noise, newest last.
+    /// Force with noise in N, one value a ms, newest last.
     forces: VecDeque<f64>,
     zero: f64,
     peaks: (f64, f64),
@@ -102,12 +98,11 @@ pub struct EmulatedGauge {
     is_stuck: bool,
     is_saturated: bool,
     is_other: bool,
-    output: Vec<u8>,
+    output: Outbox,
 }
 
 impl EmulatedGauge {
     /// A gauge that has been on for a while, not zeroed.
-    #[must_use]
     pub fn new(settings: EmulatedGaugeSettings) -> Self {
         Self {
             state: GaugeState::new(settings.unit),
@@ -122,11 +117,11 @@ impl EmulatedGauge {
             is_stuck: false,
             is_saturated: false,
             is_other: false,
-            output: Vec::new(),
+            output: Outbox::default(),
         }
     }
 
-    /// Its reading of the moment as `?` gives it, for a stand that it sits on.
+    /// The present reading as `?` gives it; a stand passes it on.
     pub fn displayed(&self) -> String {
         let force = match self.state.mode {
             Mode::Current => self.filtered(self.state.filter_displayed),
@@ -183,19 +178,10 @@ impl EmulatedGauge {
     }
 
     fn send_line(&mut self, text: &str) {
-        if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
-            self.output.extend_from_slice(text.as_bytes());
-            self.output.extend_from_slice(b"\r\n");
-        }
+        self.output.push(format!("{text}\r\n").as_bytes());
     }
 
-    fn run(&mut self, now: Nanos, command: &str) {
-        if let Some(answer) = self.answer(now, command) {
-            self.send_line(&answer);
-        }
-    }
-
-    /// What it answers; nothing when something was set.
+    /// The answer to a command; none where it sets something.
     fn answer(&mut self, now: Nanos, command: &str) -> Option<String> {
         let state = &mut self.state;
         match command {
@@ -289,7 +275,9 @@ impl EmulatedCell for EmulatedGauge {
             match byte {
                 b'\r' => {
                     let command = std::mem::take(&mut self.command);
-                    self.run(now, &String::from_utf8_lossy(&command));
+                    if let Some(answer) = self.answer(now, &String::from_utf8_lossy(&command)) {
+                        self.send_line(&answer);
+                    }
                 }
                 // "where the Line Feed, 0x0A, is ignored" (Series 5 user's guide, page 17).
                 b'\n' => {}
@@ -320,7 +308,7 @@ impl EmulatedCell for EmulatedGauge {
     }
 
     fn transmit(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.output)
+        self.output.take()
     }
 
     fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {

@@ -62,7 +62,7 @@ impl Wire {
             self.board.advance(now, switches);
             let shift = self.board.take_counter_shift();
             if shift != 0.0 {
-                self.plant.shift(shift);
+                self.plant.shift_counter(shift);
             }
             self.plant.advance(self.board.counter_mm(), Seconds(0.001));
             let at = now + DELAY;

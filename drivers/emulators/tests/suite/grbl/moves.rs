@@ -202,7 +202,7 @@ fn home_is_seen_and_the_far_limit_stops() {
     host.tell(to(back, 1.0));
     host.until("off the limit", |host| !host.has(AxisStatus::FORWARD_LIMIT));
     assert_eq!(host.faults, []);
-    host.wire.lock().plant.shift(1.0);
+    host.wire.lock().plant.shift_counter(1.0);
     host.until("a fault", |host| !host.faults.is_empty());
     host.pass(0.5);
     assert!(host.has(AxisStatus::FORWARD_LIMIT) && !host.has(AxisStatus::HOME));

@@ -53,7 +53,7 @@ fn a_closed_limit_pin_that_both_ends_share_is_refused() {
         let wire = wired(grbl::EmulatedGrblSettings::default());
         {
             let mut wire = wire.lock();
-            wire.plant.shift(by);
+            wire.plant.shift_counter(by);
             wire.pass(Nanos::from_millis(10));
         }
         let err = try_connect(&wire, &slide()).expect_err("refused");
@@ -101,7 +101,7 @@ fn a_board_that_a_limit_has_locked_is_reset_and_opened() {
     let err = try_connect(&wire, &settings).expect_err("the switch is closed still");
     assert_eq!(err, GrblOpenError::OnALimit { axis: 'X' });
     // By hand.
-    wire.lock().plant.shift(-20.0);
+    wire.lock().plant.shift_counter(-20.0);
     try_connect(&wire, &settings).expect("it connects");
 }
 

@@ -1,4 +1,4 @@
-//! What the words of a block mean together, checked in the order in which Grbl does (gnea/grbl, gcode.c, step 3).
+//! Checks the words of a block against each other, in the order of Grbl (gnea/grbl, gcode.c, step 3).
 
 use super::gcode::{
     BlockContext, CoordinateOffsets, GcodeMotion, ModalState, ParsedBlock, ProgramFlow,
@@ -11,8 +11,7 @@ const MM_PER_INCH: f64 = 25.4;
 /// Values of X, Y and Z in mm, where they are given.
 type Axes = [Option<f64>; AXES];
 
-/// Checks the words against each other.
-pub fn finish(
+pub fn check_block(
     line: BlockContext,
     mut offsets: CoordinateOffsets,
     mut words: BlockWords,
@@ -32,7 +31,7 @@ pub fn finish(
     if let Some(speed) = words.value('S') {
         block.spindle_speed = speed;
     }
-    // A block without it forgets it.
+    // A block without it resets it.
     block.tool = words.value('T').map_or(0, |tool| tool as u8);
     let dwell = match words.non_modal {
         4 => Some(words.take('P').ok_or(28_u8)?),
@@ -53,21 +52,13 @@ pub fn finish(
     };
     refuse_leftovers(&mut words, is_jog)?;
     if is_jog {
-        // Only distance, units and G53 beside the way.
+        // Only distance mode, units and G53 are allowed.
         let is_plain = words.groups & !(1 << 0 | 1 << 3 | 1 << 6) == 0;
         if !is_plain || !matches!(words.non_modal, 0 | 53) {
             return Err(16);
         }
-        // A jog leaves everything as it was (doc/markdown/jogging.md).
-        return Ok(ParsedBlock {
-            modes: before,
-            offsets,
-            dwell: None,
-            via: None,
-            motion,
-            flow,
-            waits_for_rest: false,
-        });
+        // A jog changes no mode (doc/markdown/jogging.md).
+        block = before;
     }
     let has_spindle = block.spindle != before.spindle
         || block.spindle != 5 && block.spindle_speed != before.spindle_speed;
@@ -87,7 +78,7 @@ pub fn finish(
     })
 }
 
-/// Where the axis words lead, in machine coordinates.
+/// Target of the axis words, in machine coordinates.
 fn target(
     block: &ModalState,
     words: &BlockWords,
@@ -105,7 +96,8 @@ fn target(
     })
 }
 
-/// Words that hold for one block: what they store, and the ways of `G28` and `G30`, over a place and to the stored one.
+/// Words that hold for one block: stores offsets, and returns the motions of `G28` and `G30`, via a position and to the
+/// stored one.
 fn non_modal(
     offsets: &mut CoordinateOffsets,
     words: &mut BlockWords,
@@ -116,7 +108,7 @@ fn non_modal(
 ) -> Result<(Option<GcodeMotion>, Option<GcodeMotion>), u8> {
     let has_axes = axes.iter().any(Option::is_some);
     let rapid = |to| Some(GcodeMotion { kind: 0, to, feed: block.feed, is_jog: false });
-    let mut ways = (None, None);
+    let mut motions = (None, None);
     match words.non_modal {
         10 => store(offsets, words, axes, block, here)?,
         92 if !has_axes => return Err(26),
@@ -134,7 +126,7 @@ fn non_modal(
                 None if has_axes => target[axis],
                 _ => place[axis],
             });
-            ways = (rapid(target).filter(|_| has_axes), rapid(to));
+            motions = (rapid(target).filter(|_| has_axes), rapid(to));
         }
         281 | 301 => offsets.stored[usize::from(words.non_modal == 301)] = here,
         921 => offsets.shift = [0.0; AXES],
@@ -144,10 +136,10 @@ fn non_modal(
     if block.motion == 80 && has_axes {
         return Err(31);
     }
-    Ok(ways)
+    Ok(motions)
 }
 
-/// The motion that axis words ask for, if there are any.
+/// The motion of the axis words, if there are any.
 fn motion(
     block: &ModalState,
     words: &BlockWords,
@@ -170,8 +162,8 @@ fn motion(
             return Err(33);
         }
     }
-    let way = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
-    let length = way.sum::<f64>().sqrt();
+    let squares = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
+    let length = squares.sum::<f64>().sqrt();
     let share = if block.is_inverse && !is_jog { length } else { 1.0 };
     Ok(has_axes.then_some(GcodeMotion {
         kind: block.motion,
@@ -181,7 +173,7 @@ fn motion(
     }))
 }
 
-/// A word that nothing has used.
+/// Refuses a word that no other uses.
 fn refuse_leftovers(words: &mut BlockWords, is_jog: bool) -> Result<(), u8> {
     let of_axes = words.axes_for.is_some();
     let used = [("NF", true), ("ST", !is_jog), ("XYZ", of_axes)];
@@ -218,7 +210,7 @@ fn feed(
     })
 }
 
-/// Why an arc is refused.
+/// Error number of an arc.
 fn arc(block: &ModalState, words: &BlockWords, axes: Axes) -> u8 {
     let plane = match block.plane {
         17 => [0, 1],
