@@ -81,7 +81,7 @@ impl EmulatedPlant {
     }
 
     /// Force on the cell: that on the probe plus weights.
-    pub fn on_cell(&self) -> Newtons {
+    pub fn cell_force(&self) -> Newtons {
         self.cell_force
     }
 

@@ -61,23 +61,23 @@ impl LineDirection {
 
     /// Sends bytes, which arrive later than usual by `lateness`.
     pub fn push(&mut self, now: Nanos, bytes: &[u8], lateness: Nanos) {
-        if self.under_line.len() + bytes.len() > BYTES_MAX {
+        if self.under_way.len() + bytes.len() > BYTES_MAX {
             return;
         }
         for byte in bytes {
             self.free_at = self.free_at.max(now) + Nanos(self.nanos_per_byte);
             let arrival = self.free_at + lateness;
             // Late bytes delay those behind them.
-            let newest = self.under_line.back().map_or(Nanos::ZERO, |(at, _)| *at);
-            self.under_line.push_back((arrival.max(newest), *byte));
+            let newest = self.under_way.back().map_or(Nanos::ZERO, |(at, _)| *at);
+            self.under_way.push_back((arrival.max(newest), *byte));
         }
     }
 
     /// Bytes that have arrived at the other end.
     pub fn take(&mut self, now: Nanos) -> Vec<u8> {
         let mut out = Vec::new();
-        while let Some((at, byte)) = self.under_line.front().copied().filter(|(at, _)| *at <= now) {
-            self.under_line.pop_front();
+        while let Some((at, byte)) = self.under_way.front().copied().filter(|(at, _)| *at <= now) {
+            self.under_way.pop_front();
             self.release(at, &mut out);
             if self.held.is_empty() {
                 self.held_since = at;
@@ -98,10 +98,10 @@ impl LineDirection {
         }
     }
 
-    /// Time of the next arrival, if anything is under line.
+    /// Time of the next arrival, if anything is under way.
     pub fn next_at(&self) -> Option<Nanos> {
         let held = (!self.held.is_empty()).then(|| self.held_since + self.latency);
-        let coming = self.under_line.front().map(|(at, _)| *at);
+        let coming = self.under_way.front().map(|(at, _)| *at);
         match (held, coming) {
             (Some(held), Some(coming)) => Some(held.min(coming)),
             (held, coming) => held.or(coming),
@@ -109,7 +109,7 @@ impl LineDirection {
     }
 
     pub fn clear(&mut self) {
-        self.under_line.clear();
+        self.under_way.clear();
         self.held.clear();
     }
 }

@@ -122,7 +122,7 @@ impl EmulatedGauge {
     }
 
     /// The present reading as `?` gives it; a stand passes it on.
-    pub fn displayed(&self) -> String {
+    pub fn displayed_reading(&self) -> String {
         let force = match self.state.mode {
             Mode::Current => self.filtered(self.state.filter_displayed),
             Mode::PeakTension => self.peaks.0,

@@ -117,7 +117,7 @@ fn run(seed: u64) -> Result<(), String> {
     let mut random = SplitMix::seeded(seed);
     let mut story = Story { seed, lines: Vec::new() };
     let (orders, received) = sync_channel(16);
-    let (sender, told) = sync_channel(64);
+    let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);
     let served = std::thread::Builder::new()
@@ -136,12 +136,12 @@ fn run(seed: u64) -> Result<(), String> {
                 faults: Vec::new(),
                 seed,
             };
-            let mut tell = |told| drop(sender.try_send(told));
+            let mut tell = |printed| drop(sender.try_send(printed));
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
             device
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         return Err("the emulator did not start".into());
     };
     let place = Place::Serial { port: address, baud: 115_200, has_handshake: false };

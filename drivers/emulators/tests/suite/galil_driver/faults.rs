@@ -32,8 +32,8 @@ fn silence_of_the_host_stops_the_axis_within_the_worst_case() {
     assert!(!wire.emulator.is_running(0));
     wire.emulator.transmit(0);
     wire.emulator.receive(now, 0, b"MG _TDA\r");
-    let told = String::from_utf8(wire.emulator.transmit(0)).unwrap();
-    let rest: f64 = told.split("\r\n").next().unwrap().trim().parse().unwrap();
+    let printed = String::from_utf8(wire.emulator.transmit(0)).unwrap();
+    let rest: f64 = printed.split("\r\n").next().unwrap().trim().parse().unwrap();
     let way = (rest - from as f64) * 0.015;
     assert!(way > 5.0 && way < worst, "{way} mm of {worst} mm");
 }

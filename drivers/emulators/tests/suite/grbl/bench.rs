@@ -20,7 +20,7 @@ use std::time::Duration;
 
 /// One way over the wire: 3 ms is usual for the USB converter of an Uno.
 const DELAY: Nanos = Nanos(3_000_000);
-/// Simulated time goes on in such steps while somebody waits.
+/// Step of simulated time while a test waits.
 const STEP: Nanos = Nanos(1_000_000);
 
 pub struct Wire {
@@ -41,7 +41,7 @@ pub struct Wire {
 
 impl Wire {
     /// What is on the way to the host, as text; it does not arrive any more.
-    pub fn take_said(&mut self) -> String {
+    pub fn take_output(&mut self) -> String {
         let bytes: Vec<u8> = self.arriving.drain(..).map(|(_, byte)| byte).collect();
         String::from_utf8_lossy(&bytes).into_owned()
     }
@@ -79,7 +79,7 @@ pub struct Shared(pub Arc<Mutex<Wire>>);
 
 impl Shared {
     pub fn lock(&self) -> MutexGuard<'_, Wire> {
-        self.0.lock().expect("nobody panics with the wire")
+        self.0.lock().expect("no panic holds the wire")
     }
 }
 
@@ -264,11 +264,11 @@ impl Host {
     }
 
     pub fn pulses(&self) -> f64 {
-        self.track.lock().expect("nobody panics with it").at(self.now()).pulses
+        self.track.lock().expect("no panic holds it").at(self.now()).pulses
     }
 
     pub fn has(&self, status: AxisStatus) -> bool {
-        self.track.lock().expect("nobody panics with it").at(self.now()).status.has(status)
+        self.track.lock().expect("no panic holds it").at(self.now()).status.has(status)
     }
 
     pub fn settle(&mut self) {

@@ -54,7 +54,7 @@ fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
         // What the board has of the stop and of the jogs is done.
         wire.lock().pass(Nanos::from_millis(5_000));
         let now = wire.lock().now;
-        let placed = track.lock().expect("nobody panics with it").at(now);
+        let placed = track.lock().expect("no panic holds it").at(now);
         assert!(!placed.status.has(AxisStatus::MOVING), "{speed}");
         let truth = wire.lock().board.counter_mm() / 0.0025;
         assert!(
@@ -80,7 +80,7 @@ fn a_reset_that_is_lost_is_written_again() {
         host.ask(RigCommand::Halt);
         host.pass(0.05);
         assert!(!host.acks.contains(&RigCommand::Halt));
-        assert!(host.has(AxisStatus::MOVING), "it moves and is said to rest");
+        assert!(host.has(AxisStatus::MOVING), "it moves and is message to rest");
         host.tell(RigCommand::Halt);
         let there = host.truth();
         host.pass(1.0);
@@ -176,7 +176,7 @@ fn what_waits_is_not_begun_when_nobody_attends_or_the_cell_has_failed() {
     for is_cell in [false, true] {
         let mut host = Host::new(&slide());
         if is_cell {
-            host.track.lock().expect("nobody panics with it").is_stop_wanted = true;
+            host.track.lock().expect("no panic holds it").is_stop_wanted = true;
         } else {
             host.is_attended = false;
             host.pass(0.6);
@@ -223,7 +223,7 @@ fn a_jog_in_doubt_is_cancelled_until_a_second_report_of_rest() {
         b'k' => Vec::new(),
         other => vec![other],
     });
-    host.until("told", |host| !host.faults.is_empty());
+    host.until("printed", |host| !host.faults.is_empty());
     host.pass(1.0);
     let sent = host.wire.lock().sent.clone();
     let resumed: Vec<usize> = (0..sent.len()).filter(|at| sent[*at] == b'~').collect();
@@ -251,8 +251,8 @@ fn a_limit_switch_that_locks_the_board_is_told() {
     let mut host = Host::on(wire, &GrblSettings { home: HomeSwitch::Probe, ..slide() });
     host.tell(to(90_000, 20.0));
     host.until("a fault", |host| !host.faults.is_empty());
-    let said = host.faults[0].to_string();
-    assert!(said.contains("ALARM:1") && said.contains("limit switch"), "{said}");
+    let message = host.faults[0].to_string();
+    assert!(message.contains("ALARM:1") && message.contains("limit switch"), "{message}");
     assert!(host.refused(to(0, 5.0)).contains("ALARM:1"));
     host.tell(RigCommand::Stop);
 }
@@ -264,7 +264,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
     host.pass(0.5);
     {
         let mut wire = host.wire.lock();
-        // Short, as Ctrl-X of somebody else.
+        // Short, like a Ctrl-X of another program.
         let now = wire.now;
         wire.board.receive(now, &[0x18]);
     }

@@ -206,8 +206,8 @@ fn home_is_seen_and_the_far_limit_stops() {
     host.until("a fault", |host| !host.faults.is_empty());
     host.pass(0.5);
     assert!(host.has(AxisStatus::FORWARD_LIMIT) && !host.has(AxisStatus::HOME));
-    let said = host.faults[0].to_string();
-    assert!(said.contains("limit switch"), "{said}");
+    let message = host.faults[0].to_string();
+    assert!(message.contains("limit switch"), "{message}");
     assert!(host.truth() > back as f64 + 400.0);
 }
 
@@ -226,8 +226,8 @@ fn what_cannot_be_done_is_refused_in_words() {
         (to(1 << 40, 5.0), "ten metres"),
         (RigCommand::Oscillate(sine), "no sines"),
     ] {
-        let said = host.refused(command);
-        assert!(said.contains(words), "{said}");
+        let message = host.refused(command);
+        assert!(message.contains(words), "{message}");
     }
     // A way that is none is done.
     host.tell(to(0, 5.0));

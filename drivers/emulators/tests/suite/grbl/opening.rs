@@ -33,8 +33,8 @@ fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
         (21, 1.0, "$21=0"),
         (10, 0.0, "$10=1"),
     ] {
-        let said = refused(&[(number, value)], &slide());
-        assert!(said.contains(words) && said.contains(&format!("${number}={value}")), "{said}");
+        let message = refused(&[(number, value)], &slide());
+        assert!(message.contains(words) && message.contains(&format!("${number}={value}")), "{message}");
     }
     let probe = GrblSettings { home: HomeSwitch::Probe, ..slide() };
     assert!(refused(&[], &probe).contains("$21=1"));
@@ -43,8 +43,8 @@ fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
 #[test]
 fn steps_that_are_finer_than_what_grbl_tells_are_refused() {
     let fine = GrblSettings { mm_per_pulse: 1.0 / 1_600.0, ..slide() };
-    let said = refused(&[(100, 1_600.0)], &fine);
-    assert!(said.contains("$100=1600") && said.contains("thousandths"), "{said}");
+    let message = refused(&[(100, 1_600.0)], &fine);
+    assert!(message.contains("$100=1600") && message.contains("thousandths"), "{message}");
 }
 
 #[test]
@@ -67,8 +67,8 @@ fn a_closed_limit_pin_that_both_ends_share_is_refused() {
 #[test]
 fn a_locked_board_is_unlocked_only_when_the_rig_file_says_so() {
     let locked = [(22, 1.0)];
-    let said = refused(&locked, &slide());
-    assert!(said.contains("unlock = true"), "{said}");
+    let message = refused(&locked, &slide());
+    assert!(message.contains("unlock = true"), "{message}");
     let wire = wired(board(&locked));
     let settings = GrblSettings { is_unlocking: true, ..slide() };
     try_connect(&wire, &settings).expect("it connects");
@@ -86,11 +86,11 @@ fn on_a_limit() -> (Shared, GrblSettings) {
         let now = wire.now;
         wire.board.receive(now, b"$J=G91X400F1200\n");
         wire.pass(Nanos::from_millis(12_000));
-        let said = wire.take_said();
-        assert!(said.contains("ALARM:1"), "{said}");
+        let message = wire.take_output();
+        assert!(message.contains("ALARM:1"), "{message}");
         wire.board.receive(Nanos::ZERO, b"?$I\n");
         wire.pass(Nanos::from_millis(1_000));
-        assert_eq!(wire.take_said(), "");
+        assert_eq!(wire.take_output(), "");
     }
     (wire, settings)
 }

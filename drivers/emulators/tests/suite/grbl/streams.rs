@@ -114,7 +114,7 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
         }
         board.advance(now, switches());
         assert!(board.counter_mm().is_finite(), "{seed}");
-        // What nobody reads is bounded too.
+        // Unread output is bounded too.
         if seed % 50 == 0 {
             assert!(board.transmit().len() < 1 << 16, "{seed}");
         }
@@ -127,8 +127,8 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
     board.advance(now + Nanos::from_millis(500), switches());
     board.receive(now + Nanos::from_millis(500), b"?");
     board.advance(now + Nanos::from_millis(600), switches());
-    let said = String::from_utf8_lossy(&board.transmit()).into_owned();
-    assert!(said.contains("MPos:"), "{said}");
+    let message = String::from_utf8_lossy(&board.transmit()).into_owned();
+    assert!(message.contains("MPos:"), "{message}");
 }
 
 /// A session in the middle of a motion hears nonsense. Whatever it makes of it, it gives no more way than it states.

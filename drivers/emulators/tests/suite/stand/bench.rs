@@ -18,7 +18,7 @@ use std::io::{self, ErrorKind};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-/// Simulated time goes on in such steps while somebody waits.
+/// Step of simulated time while a test waits.
 const STEP: Nanos = Nanos(200_000);
 
 pub struct Wire {
@@ -65,7 +65,7 @@ impl Shared {
     }
 
     pub fn lock(&self) -> MutexGuard<'_, Wire> {
-        self.0.lock().expect("nobody panics with the wire")
+        self.0.lock().expect("no panic holds the wire")
     }
 
     pub fn clock(&self) -> HostClock {

@@ -103,8 +103,8 @@ fn the_emulated_stand_takes_anything() {
     stand.receive(now, 0, b"\\999999\\si/AOUT0\rFULL\rN\r\\");
     stand.transmit(0);
     stand.receive(now, 0, b"x");
-    let said = String::from_utf8(stand.transmit(0)).expect("text");
-    assert!(travel(said.trim()).is_some(), "{said}");
+    let message = String::from_utf8(stand.transmit(0)).expect("text");
+    assert!(travel(message.trim()).is_some(), "{message}");
     println!("{count} streams of random bytes");
 }
 

@@ -1,4 +1,4 @@
-//! Questions of a run on real wires, asked on the terminal: a person does what is asked and presses Enter.
+//! Prompts of a run on a wired rig, on the terminal: the operator does what is asked and presses Enter.
 
 use super::Failure;
 use super::output::Output;
@@ -14,41 +14,37 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 /// Lines that may wait; a person types them.
 const LINES_MAX: usize = 16;
 
-/// The terminal's side of the questions.
-pub(super) struct Asking {
+pub(super) struct OperatorPrompts {
     requests: SyncSender<Request>,
     lines: Receiver<String>,
-    asked: Option<(String, Seconds)>,
+    shown_prompt: Option<(String, Seconds)>,
     is_closed: bool,
-    /// How far the question after a stop is.
-    stopped: Stopped,
-    /// Whether that question waits for an answer, for whoever presses Ctrl-C.
-    is_asking: Arc<AtomicBool>,
+    retract_question: RetractQuestion,
+    /// Whether that question is open, for the handler of Ctrl-C.
+    is_question_open: Arc<AtomicBool>,
 }
 
 /// The question whether to retract.
 #[derive(Clone, Copy, Debug)]
-enum Stopped {
-    /// Not put.
-    No,
-    /// Put at this session time.
+enum RetractQuestion {
+    NotAsked,
+    /// At this session time.
     Asked(Nanos),
-    /// Answered at this session time; the runner has yet to take it.
+    /// At this session time; the runner has yet to take it.
     Answered(Nanos),
 }
 
-/// Longest wait for an answer after a stop: who watches a run is there within minutes, and a run that nobody watches
-/// must end.
+/// Longest wait for an answer after a stop: an operator is there within minutes, and an unattended run must end.
 const STOPPED_MAX: Seconds = Seconds(300.0);
 
-/// Until when an answer has surely been taken: thirty looks at the run.
+/// Time after which an answer has been taken: thirty updates of the run.
 const ANSWERED_MAX: Seconds = Seconds(1.0);
 
-impl Asking {
+impl OperatorPrompts {
     /// Listens to standard input and answers to a runner.
     pub fn start(
         requests: SyncSender<Request>,
-        is_asking: Arc<AtomicBool>,
+        is_question_open: Arc<AtomicBool>,
     ) -> Result<Self, Failure> {
         let (sender, lines) = sync_channel(LINES_MAX);
         std::thread::Builder::new()
@@ -62,90 +58,97 @@ impl Asking {
                 }
             })
             .map_err(Failure::failed)?;
-        Ok(Self { requests, lines, asked: None, is_closed: false, stopped: Stopped::No, is_asking })
+        Ok(Self {
+            requests,
+            lines,
+            shown_prompt: None,
+            is_closed: false,
+            retract_question: RetractQuestion::NotAsked,
+            is_question_open,
+        })
     }
 
-    /// Tells a new question and passes on an answer to it. What was typed before the question is no answer.
-    pub fn look(&mut self, view: &RunView, output: &Output) {
-        let typed = self.typed();
+    /// Prints a new question and passes on the answer. A line typed before the question is no answer.
+    pub fn update(&mut self, view: &RunView, output: &Output) {
+        let typed = self.newest_line();
         match (&view.holding, &view.outcome) {
-            (Some(stop), None) => self.look_stopped(view, stop, typed, output),
+            (Some(stop), None) => self.ask_to_retract(view, stop, typed, output),
             _ => {
-                self.stopped = Stopped::No;
-                self.is_asking.store(false, Ordering::Relaxed);
-                self.look_prompt(view.prompt.as_ref(), typed, output);
+                self.retract_question = RetractQuestion::NotAsked;
+                self.is_question_open.store(false, Ordering::Relaxed);
+                self.show_prompt(view.prompt.as_ref(), typed, output);
             }
         }
     }
 
-    fn look_prompt(&mut self, prompt: Option<&PromptView>, typed: Option<String>, output: &Output) {
+    fn show_prompt(&mut self, prompt: Option<&PromptView>, typed: Option<String>, output: &Output) {
         let Some(prompt) = prompt else {
-            self.asked = None;
+            self.shown_prompt = None;
             return;
         };
-        let is_same = self.asked.as_ref().is_some_and(|(message, left)| {
+        let is_same = self.shown_prompt.as_ref().is_some_and(|(message, left)| {
             *message == prompt.message && prompt.time_left.0 <= left.0
         });
-        self.asked = Some((prompt.message.clone(), prompt.time_left));
+        self.shown_prompt = Some((prompt.message.clone(), prompt.time_left));
         if !is_same {
-            let how = if self.is_closed {
-                "nobody can answer, because standard input is closed"
+            let instruction = if self.is_closed {
+                "no answer is possible: standard input is closed"
             } else {
                 "press Enter when it is done, or type no"
             };
             let left = prompt.time_left.0.round();
-            output.note(&format!("{} ({how}; {left} s left)", prompt.message));
+            output.note(&format!("{} ({instruction}; {left} s left)", prompt.message));
             return;
         }
-        let again = "press Enter when it is done, or type no; Ctrl-C stops the run";
-        let choice = match answer(typed, again, output) {
+        let hint = "press Enter when it is done, or type no; Ctrl-C stops the run";
+        let choice = match parse_answer(typed, hint, output) {
             Some(true) => Operator::Confirm,
             Some(false) => Operator::Decline,
             None => return,
         };
-        // A runner that is swamped or gone ends the run by itself.
+        // A runner that cannot take it ends the run by itself.
         let _ = self.requests.try_send(Request::Operator(choice));
     }
 
-    /// After a stop the probe stands where it is, maybe deep in the tissue: it leaves where somebody wants that.
-    fn look_stopped(
+    /// After a stop the probe stays where it is, maybe deep in the tissue, until the operator asks for a retract.
+    fn ask_to_retract(
         &mut self,
         view: &RunView,
         stop: &Outcome,
         typed: Option<String>,
         output: &Output,
     ) {
-        if let Stopped::Answered(at) = self.stopped {
+        if let RetractQuestion::Answered(at) = self.retract_question {
             if view.now.since(at).seconds() < ANSWERED_MAX {
                 return;
             }
             // A retract that was stopped at once is another stop.
-            self.stopped = Stopped::No;
+            self.retract_question = RetractQuestion::NotAsked;
         }
-        let choice = match (self.stopped, &view.can_retract) {
+        let choice = match (self.retract_question, &view.can_retract) {
             (_, Err(reason)) => {
-                output.note(&format!("the probe stays where it stands: {reason}"));
+                output.note(&format!("the probe stays where it is: {reason}"));
                 Operator::Close
             }
-            (Stopped::No, Ok(())) if self.is_closed => Operator::Close,
-            (Stopped::No, Ok(())) => {
-                self.stopped = Stopped::Asked(view.now);
-                self.is_asking.store(true, Ordering::Relaxed);
+            (RetractQuestion::NotAsked, Ok(())) if self.is_closed => Operator::Close,
+            (RetractQuestion::NotAsked, Ok(())) => {
+                self.retract_question = RetractQuestion::Asked(view.now);
+                self.is_question_open.store(true, Ordering::Relaxed);
                 let (ending, reason, left) = (&stop.ending, &stop.reason, STOPPED_MAX.0);
                 output.note(&format!(
                     "{ending}: {reason}. Retract the probe? (press Enter to retract, or type no to leave it there; {left} s left)"
                 ));
                 return;
             }
-            (Stopped::Asked(since), Ok(()))
+            (RetractQuestion::Asked(since), Ok(()))
                 if view.now.since(since).seconds().0 > STOPPED_MAX.0 =>
             {
-                output.note("nobody answered; the probe stays where it stands");
+                output.note("no answer came; the probe stays where it is");
                 Operator::Close
             }
-            (Stopped::Asked(_) | Stopped::Answered(_), Ok(())) => {
-                let again = "press Enter to retract, or type no to leave the probe where it stands";
-                match answer(typed, again, output) {
+            (RetractQuestion::Asked(_) | RetractQuestion::Answered(_), Ok(())) => {
+                let hint = "press Enter to retract, or type no to leave the probe where it is";
+                match parse_answer(typed, hint, output) {
                     Some(true) => Operator::Retract,
                     Some(false) => Operator::Close,
                     // A last line may come before the end of the input.
@@ -154,14 +157,14 @@ impl Asking {
                 }
             }
         };
-        // A runner that is swamped is asked again.
+        // A full queue: the next update tries again.
         if self.requests.try_send(Request::Operator(choice)).is_ok() {
-            self.stopped = Stopped::Answered(view.now);
+            self.retract_question = RetractQuestion::Answered(view.now);
         }
     }
 
     /// The newest line, if any.
-    fn typed(&mut self) -> Option<String> {
+    fn newest_line(&mut self) -> Option<String> {
         let mut newest = None;
         loop {
             match self.lines.try_recv() {
@@ -176,13 +179,13 @@ impl Asking {
     }
 }
 
-/// What was typed, as yes or no; `again` says what may be typed.
-fn answer(typed: Option<String>, again: &str, output: &Output) -> Option<bool> {
+/// A typed line as yes or no; `hint` is printed where it is neither.
+fn parse_answer(typed: Option<String>, hint: &str, output: &Output) -> Option<bool> {
     match typed?.trim() {
         "" | "y" | "yes" | "done" => Some(true),
         "n" | "no" => Some(false),
         _ => {
-            output.note(again);
+            output.note(hint);
             None
         }
     }
