@@ -101,7 +101,7 @@ fn use_catalog<T>(
     mut work: impl FnMut(&mut Catalog) -> Result<T, CatalogError>,
 ) -> Result<T, Failure> {
     let mut remarks = Vec::new();
-    let done = Catalog::use_catalog(library, |catalog| {
+    let done = Catalog::with(library, |catalog| {
         remarks.append(&mut catalog.remarks);
         work(catalog)
     });

@@ -81,7 +81,7 @@ impl DoctorReport {
 }
 
 /// One session after the other, with progress.
-pub(super) fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec<T> {
+pub(super) fn for_each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec<T> {
     let bar = output.count_bar(paths.len() as u64);
     let done = paths
         .iter()

@@ -4,6 +4,7 @@ use super::Failure;
 use super::arguments::{Choice, choice, parse_number};
 use super::output::Output;
 use super::rig::BenchArgs;
+use super::terminal::{ctrl_c_flag, read_lines};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use palpate_emulators::bench::EmulatedBench;
@@ -14,18 +15,11 @@ use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedSt
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
-use std::io::BufRead;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
 
 /// An Arduino Uno's ceramic resonator is rated at 0.5 %: this one is fast by 0.3 %.
 const UNO_CLOCK: f64 = 1.003;
-
-/// Orders that may wait; a person types them.
-const ORDERS_MAX: usize = 16;
 
 /// Emulate a device on a wire, with the simulated bench behind it
 #[derive(Debug, Subcommand)]
@@ -267,11 +261,8 @@ fn emulate(
         faults: wire.fault.clone(),
         seed,
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let stop_requested = Arc::clone(&stop);
-    ctrlc::set_handler(move || stop_requested.store(true, Ordering::Relaxed))
-        .map_err(Failure::failed)?;
-    let orders = orders()?;
+    let stop = ctrl_c_flag()?;
+    let orders = read_lines("orders")?;
     let mut notify = |event: Told| match event {
         Told::Ready(at) => announcement.print(&at, wire.tcp.is_none(), output),
         Told::Fault(turn) => {
@@ -286,22 +277,4 @@ fn emulate(
         Told::Refused(sentence) => output.note(&sentence),
     };
     serve(device, &options, &orders, &stop, &mut notify).map_err(Failure::failed)
-}
-
-/// Lines of standard input; the emulator goes on after its end.
-fn orders() -> Result<Receiver<String>, Failure> {
-    let (sender, receiver) = sync_channel(ORDERS_MAX);
-    std::thread::Builder::new()
-        .name("orders".into())
-        .spawn(move || {
-            for line in std::io::stdin().lock().lines() {
-                let Ok(line) = line else { return };
-                let line = line.trim();
-                if !line.is_empty() && sender.send(line.to_owned()).is_err() {
-                    return;
-                }
-            }
-        })
-        .map_err(Failure::failed)?;
-    Ok(receiver)
 }

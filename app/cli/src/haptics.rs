@@ -216,7 +216,11 @@ fn run_follow(args: &HapticsFollowArgs, output: &Output) -> Result<(), Failure> 
         ..CheckSettings::source(body)
     };
     let followed = output
-        .with_share_bar(|bar| follow(&settings, &mut |share| drop(bar.share(share, ""))))
+        .with_share_bar(|bar| {
+            follow(&settings, &mut |share| {
+                bar.share(share, "");
+            })
+        })
         .map_err(Failure::usage)?;
     output.answer("haptics-follow", &followed, || follow_text(&followed));
     let source = args.source.display().to_string();

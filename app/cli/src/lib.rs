@@ -49,6 +49,7 @@ mod select;
 mod slave;
 mod support_bundle;
 mod tag;
+mod terminal;
 mod trade;
 mod verdict;
 mod window;

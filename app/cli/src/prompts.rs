@@ -2,17 +2,14 @@
 
 use super::Failure;
 use super::output::Output;
+use super::terminal::read_lines;
 use palpate_model::time::Nanos;
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{Operator, Outcome};
 use palpate_runner::{PromptView, Request, RunView};
-use std::io::BufRead;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
-
-/// Lines that may wait; a person types them.
-const LINES_MAX: usize = 16;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError};
 
 pub(super) struct OperatorPrompts {
     requests: SyncSender<Request>,
@@ -46,18 +43,7 @@ impl OperatorPrompts {
         requests: SyncSender<Request>,
         is_question_open: Arc<AtomicBool>,
     ) -> Result<Self, Failure> {
-        let (sender, lines) = sync_channel(LINES_MAX);
-        std::thread::Builder::new()
-            .name("answers".into())
-            .spawn(move || {
-                for line in std::io::stdin().lock().lines() {
-                    let Ok(line) = line else { return };
-                    if sender.send(line).is_err() {
-                        return;
-                    }
-                }
-            })
-            .map_err(Failure::failed)?;
+        let lines = read_lines("answers")?;
         Ok(Self {
             requests,
             lines,

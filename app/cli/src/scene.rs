@@ -154,7 +154,9 @@ fn run_scene(
     }
     let played = output
         .with_share_bar(|bar| {
-            play(&file, (args.path, laps), record, &mut |share| drop(bar.share(share, "")))
+            play(&file, (args.path, laps), record, &mut |share| {
+                bar.share(share, "");
+            })
         })
         .map_err(Failure::failed)?;
     let plan = after.as_ref().map(|(_, plan)| plan);

@@ -4,6 +4,7 @@ use super::Failure;
 use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::open_rig_file;
+use super::terminal::ctrl_c_flag;
 use clap::{Args, Subcommand};
 use palpate_drivers::detect::{Found, ask};
 use palpate_drivers::serial::list_ports;
@@ -14,8 +15,7 @@ use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_runner::driver_clock;
 use serde::Serialize;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// Interval of the printed lines.
 const PRINT_EVERY: Nanos = Nanos::from_millis(500);
@@ -259,10 +259,7 @@ impl SampleWindow {
 
 fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
     let (mut rig, _lock) = open_rig_file(&args.file)?;
-    let is_ending = Arc::new(AtomicBool::new(false));
-    let end_requested = Arc::clone(&is_ending);
-    ctrlc::set_handler(move || end_requested.store(true, Ordering::Relaxed))
-        .map_err(Failure::failed)?;
+    let is_ending = ctrl_c_flag()?;
     let clock = driver_clock();
     let length = args.seconds.map(|seconds| Nanos((seconds * 1e9) as u64));
     let (mut whole, mut recent) = (SampleWindow::default(), SampleWindow::default());

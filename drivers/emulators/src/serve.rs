@@ -119,9 +119,9 @@ pub fn serve(
     let mut server = Server::open(device, options)?;
     notify(Told::Ready(server.address.clone()));
     while !stop.load(Ordering::Relaxed) {
-        for order in orders.try_iter() {
+        for order in orders.try_iter().filter(|line| !line.trim().is_empty()) {
             let now = server.now();
-            match EmulatorOrder::parse(&order, now) {
+            match EmulatorOrder::parse(order.trim(), now) {
                 Ok(EmulatorOrder::Fault(fault)) => server.faults.add(fault),
                 Ok(order @ EmulatorOrder::Hand(action)) => {
                     server.device.apply_hand_action(now, action);

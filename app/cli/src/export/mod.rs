@@ -223,11 +223,11 @@ fn extra_columns(
     };
     let corrections = compliance::corrections(Some(name))?;
     let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
-    let kept = corrections.of_rig(rig);
-    let kept = kept.map_err(|err| source_failure(err.into()))?;
-    let Some((kept, _)) = kept else {
+    let saved = corrections.of_rig(rig);
+    let saved = saved.map_err(|err| source_failure(err.into()))?;
+    let Some((saved, _)) = saved else {
         return Ok((None, Beside::default()));
     };
-    let columns = columns(session, kept).map_err(source_failure)?;
-    Ok((Some(kept.id.clone()), columns))
+    let columns = columns(session, saved).map_err(source_failure)?;
+    Ok((Some(saved.id.clone()), columns))
 }

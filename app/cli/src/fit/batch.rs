@@ -1,6 +1,6 @@
 //! Fits many sources on several threads; results come in the order of the sources.
 
-use super::super::{Failure, output::Output, source_failure};
+use super::super::{Failure, output::Output, source_failure, terminal::on_ctrl_c};
 use palpate_analysis::compliance::Correction;
 use palpate_analysis::fit::{Fitted, NotFitted, Recipe, each};
 use palpate_analysis::pool::News;
@@ -114,12 +114,11 @@ pub(super) fn run(
 /// The first signal ends after the fits under way, the second at once.
 pub(super) fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
     let is_ending = Arc::clone(is_ending);
-    ctrlc::set_handler(move || {
+    on_ctrl_c(move || {
         if is_ending.swap(true, Ordering::Relaxed) {
             std::process::exit(1);
         }
     })
-    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
 }
 
 /// Notes, the correction of depths, and the fit or its failure.

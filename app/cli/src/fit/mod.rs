@@ -195,11 +195,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let intervals = fitted.intervals(&recipe.options, wanted, |done| intervals::show(&bar, done));
     drop(bar);
     let intervals = intervals.map_err(Failure::failed)?;
-    let beside = fitted.beside(&overlay, &intervals);
-    let object = FitObject::of(recipe.options.family(), report, beside, fitted.seconds);
+    let extras = fitted.beside(&overlay, &intervals);
+    let object = FitObject::of(recipe.options.family(), report, extras, fitted.seconds);
     saved::save(args, source, &object)?;
     output.result(&object, || {
-        let mut lines = vec![text::whole(report, beside)];
+        let mut lines = vec![text::whole(report, extras)];
         lines.extend(fitted.compliance.as_ref().map(compliance::correction_sentence));
         let saved = args.save.iter();
         lines.extend(saved.map(|name| format!("saved as analysis '{name}'")));

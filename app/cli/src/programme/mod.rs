@@ -20,7 +20,7 @@ use preflight::{
     problem_failure, require_labels, with_settings,
 };
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::sync_channel;
 
 /// Name of the page in the programme's folder.

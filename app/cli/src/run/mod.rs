@@ -9,6 +9,7 @@ use super::programme;
 use super::prompts::OperatorPrompts;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
+use super::terminal::on_ctrl_c;
 use clap::Args;
 use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_drivers::Rig;
@@ -239,7 +240,7 @@ pub(super) fn execute(
     request: RunRequest,
     output: &Output,
 ) -> Result<Arc<Snapshot>, Failure> {
-    let is_asked = request.answers == Answers::Operator;
+    let has_operator = request.answers == Answers::Operator;
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
@@ -255,7 +256,7 @@ pub(super) fn execute(
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
         Err(_) => return Err(Failure::failed("the runner ended before the run began")),
     }
-    let prompts = is_asked.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
+    let prompts = has_operator.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
     watch(&runner, &woken, prompts.transpose()?, output)
 }
 
@@ -276,16 +277,15 @@ pub(super) fn stop_on_signals(runner: &Runner) -> Result<Arc<AtomicBool>, Failur
     let requests = runner.requests();
     let count = AtomicU32::new(0);
     let is_question_open = Arc::new(AtomicBool::new(false));
-    let is_asked = Arc::clone(&is_question_open);
-    ctrlc::set_handler(move || {
+    let question = Arc::clone(&is_question_open);
+    on_ctrl_c(move || {
         let choice = match count.fetch_add(1, Ordering::Relaxed) {
-            _ if is_asked.load(Ordering::Relaxed) => Operator::Close,
+            _ if question.load(Ordering::Relaxed) => Operator::Close,
             0 => Operator::Stop,
             _ => Operator::Halt,
         };
         let _ = requests.try_send(Request::Operator(choice));
-    })
-    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))?;
+    })?;
     Ok(is_question_open)
 }
 

@@ -1,6 +1,7 @@
 //! One axis: motion at the sample clock, the smoothing filter of the pulses, switches and stop codes.
 
 use super::profile::AxisProfile;
+use super::scope::bits;
 use super::settings::{AxisSetting, AxisSettings, NO_LIMIT, round_speed};
 use palpate_drivers::galil::ErrorCode;
 
@@ -342,15 +343,9 @@ impl GalilAxis {
 
     /// The byte of `TS` (DMC-1400 user manual, page 211).
     pub fn switches(&self) -> u8 {
-        let bits = [
-            (self.is_running(), 7),
-            (!self.is_on, 5),
-            (self.inputs.forward, 3),
-            (self.inputs.reverse, 2),
-            (self.inputs.home, 1),
-            // No latch is armed or has occurred.
-            (true, 0),
-        ];
-        bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |byte, (_, bit)| byte | 1 << bit)
+        let AxisInputs { forward, reverse, home } = self.inputs;
+        // Bit 0: no latch is armed or has occurred. Bits 4 and 6 are not used.
+        let all = [true, home, reverse, forward, false, !self.is_on, false, self.is_running()];
+        bits(all.into_iter())
     }
 }

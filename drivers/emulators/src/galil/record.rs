@@ -48,26 +48,24 @@ impl ArrayRecorder {
         self.interval = 0;
     }
 
+    fn check_change(&self, count: usize) -> Result<(), ErrorCode> {
+        match count {
+            _ if self.is_running() => Err(ErrorCode::RECORDING),
+            ..=ARRAYS_MAX => Ok(()),
+            _ => Err(ErrorCode::TOO_MANY_ELEMENTS),
+        }
+    }
+
     /// `RA`.
     pub fn set_arrays(&mut self, names: Vec<String>) -> Result<(), ErrorCode> {
-        if self.is_running() {
-            return Err(ErrorCode::RECORDING);
-        }
-        if names.len() > ARRAYS_MAX {
-            return Err(ErrorCode::TOO_MANY_ELEMENTS);
-        }
+        self.check_change(names.len())?;
         self.arrays = names;
         Ok(())
     }
 
     /// `RD`.
     pub fn set_sources(&mut self, sources: Vec<RecordSource>) -> Result<(), ErrorCode> {
-        if self.is_running() {
-            return Err(ErrorCode::RECORDING);
-        }
-        if sources.len() > ARRAYS_MAX {
-            return Err(ErrorCode::TOO_MANY_ELEMENTS);
-        }
+        self.check_change(sources.len())?;
         self.sources = sources;
         Ok(())
     }

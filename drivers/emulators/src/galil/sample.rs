@@ -4,6 +4,7 @@ use super::axis::{AxisEvent, AxisMotion};
 use super::contour::ContourStep;
 use super::data_record::{GeneralBlock, build_record};
 use super::record::RecordSource;
+use super::scope::bits;
 use super::settings::AxisSetting;
 use super::{GalilEmulator, StatementAnswer};
 use palpate_drivers::sim::MM_PER_PULSE;
@@ -142,24 +143,15 @@ impl GalilEmulator {
 
     /// `QR`.
     pub(super) fn data_record(&self) -> Vec<u8> {
-        let threads = self.running_threads();
-        let mut contouring = 0;
-        for axis in &self.contour.axes {
-            contouring |= 1 << axis;
-        }
-        let mut handles = 0;
-        for (at, client) in self.clients.iter().enumerate() {
-            handles |= u8::from(client.is_open) << at;
-        }
         let general = GeneralBlock {
             sample: self.clock.count(),
             outputs: self.outputs,
             error: self.error.0,
-            threads,
+            threads: self.running_threads(),
             has_echo: self.clients[0].has_echo,
             contour: (self.contour.done, self.contour.free() as u16),
-            contouring,
-            handles,
+            contouring: bits((0..8).map(|axis| self.contour.axes.contains(&axis))),
+            handles: bits(self.clients.iter().map(|client| client.is_open)),
         };
         let analog: Vec<u16> = self.analog.as_ref().map_or_else(Vec::new, |analog| {
             (0..self.axes.len())

@@ -19,6 +19,11 @@ pub fn axis_of(letter: char) -> Option<usize> {
     }
 }
 
+/// One bit for each flag, the first the lowest.
+pub fn bits(flags: impl Iterator<Item = bool>) -> u8 {
+    flags.enumerate().fold(0, |bits, (at, is_set)| bits | u8::from(is_set) << at)
+}
+
 pub fn truth(is_so: bool) -> f64 {
     if is_so { 1.0 } else { 0.0 }
 }
@@ -120,11 +125,7 @@ impl GalilEmulator {
 
     /// Threads that run, one bit each.
     pub(super) fn running_threads(&self) -> u8 {
-        let mut bits = 0;
-        for (at, thread) in self.threads.iter().enumerate() {
-            bits |= u8::from(thread.is_running) << at;
-        }
-        bits
+        bits(self.threads.iter().map(|thread| thread.is_running))
     }
 
     /// The byte of `TB`.

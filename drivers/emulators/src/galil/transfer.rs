@@ -28,9 +28,20 @@ impl GalilEmulator {
         let result = match word {
             "DM" => self.dimension(arguments),
             "DA" => self.deallocate(arguments),
-            "LV" => Ok(self.list_variables()),
-            "LA" => Ok(self.list_arrays()),
-            "LL" => Ok(self.list_labels()),
+            "LV" => {
+                let format = self.variable_format;
+                let line =
+                    |(name, value): (&String, f64)| format!("{name}={}", format.write(value));
+                Ok(join_lines(self.memory.variables().map(line)))
+            }
+            "LA" => {
+                let line = |(name, length)| format!("{name}[{length}]");
+                Ok(join_lines(self.memory.arrays().map(line)))
+            }
+            "LL" => {
+                let line = |(name, line)| format!("#{name}={line}");
+                Ok(join_lines(self.program.labels().map(line)))
+            }
             "RA" => self.record_arrays(arguments),
             "RD" => self.record_sources(arguments),
             "RC" => self.record(arguments),
@@ -64,27 +75,6 @@ impl GalilEmulator {
             self.memory.deallocate(field)?;
         }
         Ok(StatementAnswer::Done)
-    }
-
-    fn list_variables(&self) -> StatementAnswer {
-        let lines: Vec<String> = self
-            .memory
-            .variables()
-            .map(|(name, value)| format!("{name}={}", self.variable_format.write(value)))
-            .collect();
-        join_lines(&lines)
-    }
-
-    fn list_arrays(&self) -> StatementAnswer {
-        let lines: Vec<String> =
-            self.memory.arrays().map(|(name, length)| format!("{name}[{length}]")).collect();
-        join_lines(&lines)
-    }
-
-    fn list_labels(&self) -> StatementAnswer {
-        let lines: Vec<String> =
-            self.program.labels().map(|(name, line)| format!("#{name}={line}")).collect();
-        join_lines(&lines)
     }
 
     /// `RA force[],pos[]`.
@@ -349,6 +339,7 @@ impl GalilEmulator {
     }
 }
 
-fn join_lines(lines: &[String]) -> StatementAnswer {
+fn join_lines(lines: impl Iterator<Item = String>) -> StatementAnswer {
+    let lines: Vec<String> = lines.collect();
     if lines.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(lines.join("\r\n")) }
 }

@@ -34,7 +34,10 @@ fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
         (10, 0.0, "$10=1"),
     ] {
         let message = refused(&[(number, value)], &slide());
-        assert!(message.contains(words) && message.contains(&format!("${number}={value}")), "{message}");
+        assert!(
+            message.contains(words) && message.contains(&format!("${number}={value}")),
+            "{message}"
+        );
     }
     let probe = GrblSettings { home: HomeSwitch::Probe, ..slide() };
     assert!(refused(&[], &probe).contains("$21=1"));
