@@ -138,19 +138,15 @@ fn session_text(session: &Patient) -> String {
 /// Every session of a library, oldest first.
 fn all_sessions(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     let folder = library.join("sessions");
-    let failed = |err: std::io::Error| {
-        Failure::failed(format!("cannot read {} ({err}); check its permissions", folder.display()))
-    };
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
-    let mut paths = Vec::new();
-    for item in std::fs::read_dir(&folder).map_err(failed)? {
-        let path = item.map_err(failed)?.path();
-        if path.is_dir() {
-            paths.push(path);
-        }
-    }
+    let items = std::fs::read_dir(&folder)
+        .and_then(|items| items.map(|item| Ok(item?.path())).collect::<Result<Vec<_>, _>>());
+    let mut paths = items.map_err(|err| {
+        Failure::failed(format!("cannot read {} ({err}); check its permissions", folder.display()))
+    })?;
+    paths.retain(|path| path.is_dir());
     paths.sort_unstable();
     Ok(paths)
 }

@@ -4,34 +4,30 @@ use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
 use super::scope::axis_of;
 use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
-use super::{GalilEmulator, StatementAnswer, StatementOrigin};
+use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 /// Words whose arguments are numbers of axes, in addition to the [`AxisSetting`]s.
 const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AxisArgument {
+pub enum Argument {
     /// `?`.
     Query,
     Number(f64),
 }
 
 impl GalilEmulator {
-    pub(super) fn execute(
-        &mut self,
-        origin: StatementOrigin,
-        text: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    pub(super) fn execute(&mut self, origin: Origin, text: &str) -> Result<Answer, ErrorCode> {
         if !text.is_ascii() {
             return Err(ErrorCode::UNRECOGNIZED);
         }
         match text.as_bytes() {
             // ^R^V, ^R^S.
-            [0x12, 0x16, ..] => return Ok(StatementAnswer::Text(self.revision().to_owned())),
+            [0x12, 0x16, ..] => return Ok(Answer::Text(self.revision().to_owned())),
             [0x12, 0x13, ..] => {
                 self.reset();
-                return Ok(StatementAnswer::Silent);
+                return Ok(Answer::Silent);
             }
             _ => {}
         }
@@ -55,7 +51,7 @@ impl GalilEmulator {
     }
 
     /// `name=expression`, `name[index]=expression`, `name=` to read it; `None` when it is a command.
-    fn assignment(&mut self, text: &str) -> Option<Result<StatementAnswer, ErrorCode>> {
+    fn assignment(&mut self, text: &str) -> Option<Result<Answer, ErrorCode>> {
         let mut cursor = Cursor::new(text);
         let name = cursor.take_while(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
         if !name.starts_with(|first: char| first.is_ascii_alphabetic()) {
@@ -83,19 +79,14 @@ impl GalilEmulator {
         Some(self.assign(name, index, cursor.rest()))
     }
 
-    fn assign(
-        &mut self,
-        name: &str,
-        index: Option<f64>,
-        rest: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn assign(&mut self, name: &str, index: Option<f64>, rest: &str) -> Result<Answer, ErrorCode> {
         let model = self.settings.model;
         if rest.is_empty() || rest == "?" {
             let value = match index {
                 Some(index) => self.memory.element(name, index)?,
                 None => self.memory.variable(name).ok_or(ErrorCode::VARIABLE)?,
             };
-            return Ok(StatementAnswer::Text(self.variable_format.write(value)));
+            return Ok(Answer::Text(self.variable_format.write(value)));
         }
         let value = evaluate(rest, self)?;
         match index {
@@ -103,14 +94,14 @@ impl GalilEmulator {
             None if is_name(name) && name != "TIME" => self.memory.set(name, value, model)?,
             None => return Err(ErrorCode::VARIABLE),
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// Arguments for axes: `A=1`, `*=1`, or one field per axis.
     pub(super) fn axis_arguments(
         &self,
         arguments: &str,
-    ) -> Result<Vec<(usize, AxisArgument)>, ErrorCode> {
+    ) -> Result<Vec<(usize, Argument)>, ErrorCode> {
         let axes = self.axes.len();
         if let Some((letter, value)) = arguments.split_once('=') {
             let mut letters = letter.trim().chars();
@@ -148,14 +139,14 @@ impl GalilEmulator {
         Ok(all)
     }
 
-    fn argument(&self, field: &str) -> Result<AxisArgument, ErrorCode> {
+    fn argument(&self, field: &str) -> Result<Argument, ErrorCode> {
         if field == "?" {
-            return Ok(AxisArgument::Query);
+            return Ok(Argument::Query);
         }
         if field.contains('?') {
             return Err(ErrorCode::QUESTION_MARK);
         }
-        evaluate(field, self).map(AxisArgument::Number)
+        evaluate(field, self).map(Argument::Number)
     }
 
     /// Numbers in fields; an empty field is `None`.
@@ -192,18 +183,18 @@ impl GalilEmulator {
             .collect()
     }
 
-    fn set(&mut self, setting: AxisSetting, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn set(&mut self, setting: AxisSetting, arguments: &str) -> Result<Answer, ErrorCode> {
         let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
             match argument {
-                AxisArgument::Query => {
+                Argument::Query => {
                     let format = super::NumberFormat {
                         decimals: setting.decimals(),
                         ..self.position_format
                     };
                     values.push(format.write(self.axes[axis].settings.get(setting)));
                 }
-                AxisArgument::Number(value) => {
+                Argument::Number(value) => {
                     let value = setting.round(value, self.settings.model, self.clock.tm())?;
                     if setting == AxisSetting::Speed
                         && self.axes[axis].is_stepper()
@@ -223,8 +214,8 @@ impl GalilEmulator {
 }
 
 /// Values of several axes in one line, separated by commas; each begins with the place of its sign.
-pub fn join_values(values: Vec<String>) -> StatementAnswer {
-    if values.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(values.join(",")) }
+pub fn join_values(values: Vec<String>) -> Answer {
+    if values.is_empty() { Answer::Done } else { Answer::Text(values.join(",")) }
 }
 
 /// Fields between commas outside brackets and parentheses.

@@ -2,7 +2,7 @@
 
 use super::client::ClientMode;
 use super::input::Statement;
-use super::{GalilEmulator, StatementAnswer, StatementOrigin};
+use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
@@ -48,18 +48,18 @@ impl GalilEmulator {
     fn answer(&mut self, channel: usize, statement: &Statement) {
         let answer = match statement {
             Statement::TooLong => Err(ErrorCode::BUFFER_FULL),
-            Statement::Whole(text) if text.is_empty() => Ok(StatementAnswer::Done),
-            Statement::Whole(text) => self.execute(StatementOrigin::Client(channel), text),
+            Statement::Whole(text) if text.is_empty() => Ok(Answer::Done),
+            Statement::Whole(text) => self.execute(Origin::Client(channel), text),
         };
         let bytes = match answer {
-            Ok(StatementAnswer::Done) => b":".to_vec(),
-            Ok(StatementAnswer::Text(text)) => format!("{text}\r\n:").into_bytes(),
-            Ok(StatementAnswer::Open(text)) => format!("{text}:").into_bytes(),
-            Ok(StatementAnswer::Bytes(mut bytes)) => {
+            Ok(Answer::Done) => b":".to_vec(),
+            Ok(Answer::Text(text)) => format!("{text}\r\n:").into_bytes(),
+            Ok(Answer::Open(text)) => format!("{text}:").into_bytes(),
+            Ok(Answer::Bytes(mut bytes)) => {
                 bytes.push(b':');
                 bytes
             }
-            Ok(StatementAnswer::Silent) => Vec::new(),
+            Ok(Answer::Silent) => Vec::new(),
             Err(code) => {
                 self.error = code;
                 b"?".to_vec()

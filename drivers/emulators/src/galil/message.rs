@@ -2,7 +2,7 @@
 
 use super::expression::{Cursor, unpack_text};
 use super::format::NumberFormat;
-use super::{GalilEmulator, StatementAnswer};
+use super::{Answer, GalilEmulator};
 use palpate_drivers::galil::ErrorCode;
 
 /// What braces ask for.
@@ -38,7 +38,7 @@ impl Form {
 impl GalilEmulator {
     /// The text of `MG`. A form in front holds for all numbers, one behind a number for that one. Items follow each
     /// other without anything between: the sign's place parts numbers.
-    pub(super) fn message(&self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    pub(super) fn message(&self, arguments: &str) -> Result<Answer, ErrorCode> {
         let mut cursor = Cursor::new(arguments);
         let mut text = String::new();
         let mut form = Form::Number(self.variable_format);
@@ -90,7 +90,7 @@ impl GalilEmulator {
             }
         }
         self.write_newest(&mut newest, form, &mut text);
-        Ok(if is_open { StatementAnswer::Open(text) } else { StatementAnswer::Text(text) })
+        Ok(if is_open { Answer::Open(text) } else { Answer::Text(text) })
     }
 
     fn write_newest(&self, newest: &mut Option<f64>, form: Form, text: &mut String) {

@@ -85,12 +85,12 @@ impl Default for GalilSettings {
 
 /// A client or a thread of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum StatementOrigin {
+enum Origin {
     Client(usize),
     Thread(usize),
 }
 
-impl StatementOrigin {
+impl Origin {
     fn client(self) -> Option<usize> {
         match self {
             Self::Client(channel) => Some(channel),
@@ -100,7 +100,7 @@ impl StatementOrigin {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum StatementAnswer {
+enum Answer {
     /// `:`.
     Done,
     /// A text, its line end, `:`.

@@ -1,21 +1,21 @@
 //! Commands that move an axis, or set or report its position.
 
 use super::axis::{AxisMotion, COUNTS_MAX, PreparedMotion};
-use super::commands::{AxisArgument, join_values};
+use super::commands::{Argument, join_values};
 use super::format::NumberFormat;
 use super::program::ProgramThread;
 use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
-use super::{GalilEmulator, StatementAnswer, StatementOrigin};
+use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
     /// A command about axes; `None` when it is another one.
     pub(super) fn axis_command(
         &mut self,
-        origin: StatementOrigin,
+        origin: Origin,
         word: &str,
         arguments: &str,
-    ) -> Option<Result<StatementAnswer, ErrorCode>> {
+    ) -> Option<Result<Answer, ErrorCode>> {
         Some(match word {
             "PA" | "PR" | "JG" | "DP" | "DE" => self.position_command(word, arguments),
             "BG" => self.begin(arguments),
@@ -34,14 +34,10 @@ impl GalilEmulator {
         })
     }
 
-    fn position_command(
-        &mut self,
-        word: &str,
-        arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn position_command(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
         let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
-            let AxisArgument::Number(value) = argument else {
+            let Argument::Number(value) = argument else {
                 let value = self.axis_operand(word, axis).unwrap_or(0.0);
                 values.push(self.position_format.write(value));
                 continue;
@@ -70,22 +66,18 @@ impl GalilEmulator {
         Ok(join_values(values))
     }
 
-    fn begin(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn begin(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         for axis in self.axis_list(arguments)? {
             if self.contour.axes.contains(&axis) {
                 return Err(ErrorCode::CONTOURING);
             }
             self.axes[axis].begin(self.polarity)?;
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// Sent by a host without axes it stops programs too (DMC-40x0 command reference, `ST`).
-    fn stop(
-        &mut self,
-        origin: StatementOrigin,
-        arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn stop(&mut self, origin: Origin, arguments: &str) -> Result<Answer, ErrorCode> {
         let axes = self.axis_list(arguments)?;
         for axis in axes {
             self.axes[axis].stop(AxisSetting::Deceleration, 4);
@@ -93,11 +85,11 @@ impl GalilEmulator {
         if arguments.is_empty() && origin.client().is_some() {
             self.halt_threads();
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// `AB` and `AB 0` abort motion and programs, `AB 1` motion alone (DMC-40x0 command reference, `AB`).
-    fn abort(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn abort(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let numbers = self.numbers(arguments)?;
         let is_motion_only = match numbers.as_slice() {
             [] | [Some(0.0)] => false,
@@ -110,38 +102,34 @@ impl GalilEmulator {
         if !is_motion_only {
             self.halt_threads();
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     pub(super) fn halt_threads(&mut self) {
         self.threads.fill(ProgramThread::idle());
     }
 
-    fn enable(&mut self, is_on: bool, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn enable(&mut self, is_on: bool, arguments: &str) -> Result<Answer, ErrorCode> {
         for axis in self.axis_list(arguments)? {
             if !is_on {
                 self.axes[axis].abort(7);
             }
             self.axes[axis].is_on = is_on;
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
-    fn prepare_edge(
-        &mut self,
-        is_homing: bool,
-        arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn prepare_edge(&mut self, is_homing: bool, arguments: &str) -> Result<Answer, ErrorCode> {
         for axis in self.axis_list(arguments)? {
             if self.axes[axis].is_running() {
                 return Err(ErrorCode::RUNNING);
             }
             self.axes[axis].prepared = PreparedMotion::Edge { is_homing };
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
-    fn query_axes(&self, word: &str, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn query_axes(&self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
         let format = match word {
             "TT" => NumberFormat::decimal(10, 4),
             // Stop codes and switch bytes have three digits.
@@ -156,15 +144,11 @@ impl GalilEmulator {
         Ok(join_values(values))
     }
 
-    fn contour_command(
-        &mut self,
-        word: &str,
-        arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn contour_command(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
         match word {
             "CM" if arguments == "?" => {
                 let free = self.contour.free() as f64;
-                return Ok(StatementAnswer::Text(self.position_format.write(free)));
+                return Ok(Answer::Text(self.position_format.write(free)));
             }
             "CM" => {
                 let axes = self.axis_list(arguments)?;
@@ -185,7 +169,7 @@ impl GalilEmulator {
             "DT" => self.contour.set_interval(self.first_number(arguments)?)?,
             _ => self.contour_data(arguments)?,
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// `CD 1,2=n`, `CDA=1`.
@@ -200,7 +184,7 @@ impl GalilEmulator {
         };
         let mut increments = vec![0.0; self.contour.axes.len()];
         for (axis, argument) in self.axis_arguments(list)? {
-            let AxisArgument::Number(value) = argument else {
+            let Argument::Number(value) = argument else {
                 return Err(ErrorCode::QUESTION_MARK);
             };
             match self.contour.axes.iter().position(|one| *one == axis) {

@@ -2,7 +2,7 @@
 
 use super::expression::evaluate;
 use super::program::{ProgramThread, ThreadWait};
-use super::{GalilEmulator, StatementOrigin};
+use super::{GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 /// `WT n` is in ms of which 1024 are a second, as samples at TM 1000 are; `WT n,1` in samples
@@ -131,7 +131,7 @@ impl GalilEmulator {
             }
             "DL" | "QD" | "QR" | "BN" | "BP" | "BV" => return Err(ErrorCode::NOT_IN_PROGRAM),
             _ => {
-                let answer = self.execute(StatementOrigin::Thread(index), text)?;
+                let answer = self.execute(Origin::Thread(index), text)?;
                 self.send_program_output(answer);
             }
         }

@@ -6,7 +6,7 @@ use super::data_record::{GeneralBlock, build_record};
 use super::record::RecordSource;
 use super::scope::bits;
 use super::settings::AxisSetting;
-use super::{GalilEmulator, StatementAnswer};
+use super::{Answer, GalilEmulator};
 use palpate_drivers::sim::MM_PER_PULSE;
 use palpate_model::Nanos;
 
@@ -171,11 +171,11 @@ impl GalilEmulator {
     }
 
     /// The answer to a statement of a program is unsolicited text.
-    pub(super) fn send_program_output(&mut self, answer: StatementAnswer) {
+    pub(super) fn send_program_output(&mut self, answer: Answer) {
         match answer {
-            StatementAnswer::Text(text) => self.send_unsolicited(&format!("{text}\r\n")),
-            StatementAnswer::Open(text) => self.send_unsolicited(&text),
-            StatementAnswer::Done | StatementAnswer::Bytes(_) | StatementAnswer::Silent => {}
+            Answer::Text(text) => self.send_unsolicited(&format!("{text}\r\n")),
+            Answer::Open(text) => self.send_unsolicited(&text),
+            Answer::Done | Answer::Bytes(_) | Answer::Silent => {}
         }
     }
 }

@@ -4,7 +4,7 @@ use super::analog::Analog;
 use super::data_record::lengths;
 use super::expression::evaluate;
 use super::format::NumberFormat;
-use super::{GalilEmulator, StatementAnswer, StatementOrigin};
+use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 use palpate_model::Nanos;
 
@@ -24,34 +24,34 @@ impl GalilEmulator {
     /// All commands that are about no axis and move no data.
     pub(super) fn system_command(
         &mut self,
-        origin: StatementOrigin,
+        origin: Origin,
         word: &str,
         arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    ) -> Result<Answer, ErrorCode> {
         match word {
             "MG" => return self.message(arguments),
             "TC" => return self.query_error(arguments),
             "TB" | "TI" => {
                 let value = self.controller_operand(word).unwrap_or(0.0);
                 let format = NumberFormat { whole: 3, ..self.position_format };
-                return Ok(StatementAnswer::Text(format.write(value)));
+                return Ok(Answer::Text(format.write(value)));
             }
-            "ID" => return Ok(StatementAnswer::Text(self.identity())),
-            "WH" => return Ok(StatementAnswer::Text(self.connection_name(origin))),
-            "TH" => return Ok(StatementAnswer::Text(self.list_handles())),
-            "QZ" => return Ok(StatementAnswer::Text(lengths(self.settings.model))),
+            "ID" => return Ok(Answer::Text(self.identity())),
+            "WH" => return Ok(Answer::Text(self.connection_name(origin))),
+            "TH" => return Ok(Answer::Text(self.list_handles())),
+            "QZ" => return Ok(Answer::Text(lengths(self.settings.model))),
             // Which blocks a client asks for is ignored: all come.
             "QR" if origin.client().is_some() => {
-                return Ok(StatementAnswer::Bytes(self.data_record()));
+                return Ok(Answer::Bytes(self.data_record()));
             }
             "QR" => return Err(ErrorCode::NOT_IN_PROGRAM),
             "RS" => {
                 self.reset();
-                return Ok(StatementAnswer::Silent);
+                return Ok(Answer::Silent);
             }
             "TM" | "PF" | "VF" | "LZ" if arguments == "?" => {
                 let value = self.controller_operand(word).unwrap_or(0.0);
-                return Ok(StatementAnswer::Text(self.variable_format.write(value)));
+                return Ok(Answer::Text(self.variable_format.write(value)));
             }
             "TM" => self.set_tm(arguments)?,
             "PF" | "VF" | "LZ" => self.set_format(word, arguments)?,
@@ -87,7 +87,7 @@ impl GalilEmulator {
             },
             // As in the DMC-30010's answer to `TH`.
             "IA" if arguments == "?" => {
-                return Ok(StatementAnswer::Text("127, 0, 0, 1".to_owned()));
+                return Ok(Answer::Text("127, 0, 0, 1".to_owned()));
             }
             "CO" if !self.settings.model.is_40x0() => return Err(ErrorCode::UNRECOGNIZED),
             // Stored on the controller; nothing here depends on them.
@@ -110,7 +110,7 @@ impl GalilEmulator {
             }
             _ => return Err(ErrorCode::UNRECOGNIZED),
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     fn allowed_number(&self, arguments: &str, allowed: &[f64]) -> Result<f64, ErrorCode> {
@@ -122,7 +122,7 @@ impl GalilEmulator {
     }
 
     /// `TC`, `TC0`: the number; `TC1`: number and text. The answer clears it.
-    fn query_error(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn query_error(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let has_text = match arguments {
             "" | "0" | "?" => false,
             "1" => true,
@@ -130,7 +130,7 @@ impl GalilEmulator {
         };
         let code = std::mem::replace(&mut self.error, ErrorCode(0));
         let text = if has_text { code.text() } else { "" };
-        Ok(StatementAnswer::Text(format!("{} {text}", code.0).trim_end().to_owned()))
+        Ok(Answer::Text(format!("{} {text}", code.0).trim_end().to_owned()))
     }
 
     /// Of this form on 41x3 and 40x0 boards; the words are this emulator's.
@@ -146,9 +146,9 @@ impl GalilEmulator {
         )
     }
 
-    fn connection_name(&self, origin: StatementOrigin) -> String {
+    fn connection_name(&self, origin: Origin) -> String {
         match origin {
-            StatementOrigin::Client(channel) if !self.settings.is_serial => {
+            Origin::Client(channel) if !self.settings.is_serial => {
                 format!("IH{}", handle_letter(channel))
             }
             _ => "RS232".to_owned(),
@@ -201,11 +201,7 @@ impl GalilEmulator {
     }
 
     /// `A` to `H`, `S` for the serial line, `I` for the connection that asks.
-    fn parse_handle(
-        &self,
-        origin: StatementOrigin,
-        name: &str,
-    ) -> Result<Option<usize>, ErrorCode> {
+    fn parse_handle(&self, origin: Origin, name: &str) -> Result<Option<usize>, ErrorCode> {
         match name.as_bytes() {
             b"I" => Ok(origin.client()),
             b"S" => Ok(self.settings.is_serial.then_some(0)),
@@ -256,7 +252,7 @@ impl GalilEmulator {
     }
 
     /// `DR n,h`: refused on a serial line, as gclib does.
-    fn push(&mut self, origin: StatementOrigin, arguments: &str) -> Result<(), ErrorCode> {
+    fn push(&mut self, origin: Origin, arguments: &str) -> Result<(), ErrorCode> {
         let (interval, handle) = arguments.split_once(',').unwrap_or((arguments, "I"));
         let interval = evaluate(interval, self)?;
         if interval == 0.0 {
@@ -275,7 +271,7 @@ impl GalilEmulator {
         Ok(())
     }
 
-    fn burn(&mut self, origin: StatementOrigin) -> Result<(), ErrorCode> {
+    fn burn(&mut self, origin: Origin) -> Result<(), ErrorCode> {
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
@@ -287,7 +283,7 @@ impl GalilEmulator {
 
     /// `IHT=>-3` closes all other handles, `IHS=>-2` the one that sent it, `IHN=>-2` all but that one, `IHC=>-1` one
     /// (DMC-1400 command reference, `IH`; `GalilConnector.cpp` of EPICS).
-    fn close_handles(&mut self, origin: StatementOrigin, arguments: &str) -> Result<(), ErrorCode> {
+    fn close_handles(&mut self, origin: Origin, arguments: &str) -> Result<(), ErrorCode> {
         let Some((selection, how)) = arguments.split_once("=>") else {
             // Opening a connection of its own to another device.
             return Err(ErrorCode::NOT_SUPPORTED);

@@ -6,7 +6,7 @@ use super::expression::evaluate;
 use super::program::{Program, check_line};
 use super::record::RecordSource;
 use super::scope::axis_of;
-use super::{GalilEmulator, StatementAnswer, StatementOrigin};
+use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
@@ -21,10 +21,10 @@ impl GalilEmulator {
     /// A command about arrays or programs; `None` when it is another one.
     pub(super) fn transfer_command(
         &mut self,
-        origin: StatementOrigin,
+        origin: Origin,
         word: &str,
         arguments: &str,
-    ) -> Option<Result<StatementAnswer, ErrorCode>> {
+    ) -> Option<Result<Answer, ErrorCode>> {
         let result = match word {
             "DM" => self.dimension(arguments),
             "DA" => self.deallocate(arguments),
@@ -56,10 +56,10 @@ impl GalilEmulator {
         Some(result)
     }
 
-    fn dimension(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn dimension(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         if arguments == "?" {
             let free = self.memory.free(self.settings.model) as f64;
-            return Ok(StatementAnswer::Text(self.position_format.write(free)));
+            return Ok(Answer::Text(self.position_format.write(free)));
         }
         for field in fields(arguments) {
             let (name, rest) = field.split_once('[').ok_or(ErrorCode::BRACKETS)?;
@@ -67,18 +67,18 @@ impl GalilEmulator {
             let length = evaluate(length, self)?.trunc();
             self.memory.dimension(name.trim(), length, self.settings.model)?;
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
-    fn deallocate(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn deallocate(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         for field in fields(arguments) {
             self.memory.deallocate(field)?;
         }
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// `RA force[],pos[]`.
-    fn record_arrays(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn record_arrays(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let mut names = Vec::new();
         for field in fields(arguments) {
             let name = field.strip_suffix("[]").ok_or(ErrorCode::BRACKETS)?;
@@ -86,15 +86,15 @@ impl GalilEmulator {
             names.push(name.to_owned());
         }
         self.recorder.set_arrays(names)?;
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// `RD _AFX,_TDA`.
-    fn record_sources(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn record_sources(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let sources: Result<Vec<RecordSource>, ErrorCode> =
             fields(arguments).into_iter().map(|field| self.source(field)).collect();
         self.recorder.set_sources(sources?)?;
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     fn source(&self, field: &str) -> Result<RecordSource, ErrorCode> {
@@ -125,15 +125,15 @@ impl GalilEmulator {
     }
 
     /// `RC n,m`, `RC 0`, `RC?`.
-    fn record(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn record(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         if arguments == "?" {
             let is_running = f64::from(u8::from(self.recorder.is_running()));
-            return Ok(StatementAnswer::Text(self.position_format.write(is_running)));
+            return Ok(Answer::Text(self.position_format.write(is_running)));
         }
         let n = self.first_number(arguments)?;
         if n == 0.0 {
             self.recorder.stop();
-            return Ok(StatementAnswer::Done);
+            return Ok(Answer::Done);
         }
         let lengths: Result<Vec<usize>, ErrorCode> = self
             .recorder
@@ -145,7 +145,7 @@ impl GalilEmulator {
         let m = self.numbers(arguments)?.get(1).copied().flatten();
         let now = self.clock.count();
         self.recorder.start(n, m, shortest, now)?;
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
     /// `name[],start,end,delimiter`: the array, first element, element behind the last, and the rest.
@@ -170,7 +170,7 @@ impl GalilEmulator {
 
     /// `QU name[],start,end,delimiter`: 1 is a comma, 0 a carriage return between values. Whether a line end comes
     /// before the end mark is not confirmed.
-    fn upload(&self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn upload(&self, arguments: &str) -> Result<Answer, ErrorCode> {
         let (name, from, to, delimiter) = self.range_of(arguments)?;
         let between = if delimiter == 1.0 { "," } else { "\r\n" };
         let values: Vec<String> = self.memory.array(&name)?[from..to]
@@ -180,38 +180,34 @@ impl GalilEmulator {
         let mut bytes = values.join(between).into_bytes();
         bytes.extend_from_slice(b"\r\n");
         bytes.push(END);
-        Ok(StatementAnswer::Bytes(bytes))
+        Ok(Answer::Bytes(bytes))
     }
 
-    fn upload_program(&self) -> StatementAnswer {
+    fn upload_program(&self) -> Answer {
         let mut bytes = Vec::new();
         for line in &self.program.lines {
             bytes.extend_from_slice(line.as_bytes());
             bytes.extend_from_slice(b"\r\n");
         }
         bytes.push(END);
-        StatementAnswer::Bytes(bytes)
+        Answer::Bytes(bytes)
     }
 
-    fn download_values(
-        &mut self,
-        origin: StatementOrigin,
-        arguments: &str,
-    ) -> Result<StatementAnswer, ErrorCode> {
+    fn download_values(&mut self, origin: Origin, arguments: &str) -> Result<Answer, ErrorCode> {
         let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         let (name, next, end, _) = self.range_of(arguments)?;
         self.clients[channel].mode =
             ClientMode::Values { name, next, end, value: Vec::new(), is_wrong: false };
-        Ok(StatementAnswer::Silent)
+        Ok(Answer::Silent)
     }
 
-    fn download(&mut self, origin: StatementOrigin) -> Result<StatementAnswer, ErrorCode> {
+    fn download(&mut self, origin: Origin) -> Result<Answer, ErrorCode> {
         let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
         self.clients[channel].mode = ClientMode::Program { lines: Vec::new(), line: Vec::new() };
-        Ok(StatementAnswer::Silent)
+        Ok(Answer::Silent)
     }
 
     /// A byte of a program. Silence until the end, then two prompts, one of them that of `DL`; a line that is
@@ -301,7 +297,7 @@ impl GalilEmulator {
     }
 
     /// `XQ #LABEL,thread`, `XQ line,thread`, `XQ`.
-    fn run_program(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn run_program(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let (place, thread) = arguments.split_once(',').unwrap_or((arguments, "0"));
         let line = match place.trim().strip_prefix('#') {
             Some(label) => self.program.find(label).ok_or(ErrorCode::NO_LABEL)?,
@@ -321,13 +317,13 @@ impl GalilEmulator {
             return Err(ErrorCode::STRAND_BUSY);
         }
         thread.start(line, now);
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 
-    fn halt(&mut self, arguments: &str) -> Result<StatementAnswer, ErrorCode> {
+    fn halt(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         if arguments.is_empty() {
             self.halt_threads();
-            return Ok(StatementAnswer::Done);
+            return Ok(Answer::Done);
         }
         let number = evaluate(arguments, self)?;
         let is_one = (0.0..self.threads.len() as f64).contains(&number);
@@ -335,11 +331,11 @@ impl GalilEmulator {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
         self.threads[number as usize] = super::ProgramThread::idle();
-        Ok(StatementAnswer::Done)
+        Ok(Answer::Done)
     }
 }
 
-fn join_lines(lines: impl Iterator<Item = String>) -> StatementAnswer {
+fn join_lines(lines: impl Iterator<Item = String>) -> Answer {
     let lines: Vec<String> = lines.collect();
-    if lines.is_empty() { StatementAnswer::Done } else { StatementAnswer::Text(lines.join("\r\n")) }
+    if lines.is_empty() { Answer::Done } else { Answer::Text(lines.join("\r\n")) }
 }

@@ -1,7 +1,7 @@
 //! The homing cycle of the X axis (gnea/grbl, limits.c): seek, pull off, locate, pull off.
 
 use super::planner::STEP;
-use super::{Grbl, MachineState};
+use super::{Grbl, State};
 
 /// Searches go so many times further than the travel, and than the pull-off (doc/markdown/interface.md, ALARM:9).
 const SEARCH: f64 = 1.5;
@@ -79,7 +79,7 @@ impl Grbl {
         self.steps[0] = steps;
         self.planner.clear(self.machine());
         self.speed = 0.0;
-        self.state = MachineState::Idle;
+        self.state = State::Idle;
         self.send("ok\r\n");
     }
 }

@@ -3,7 +3,7 @@
 use super::gcode::{self, GcodeMotion, ParsedBlock, ProgramFlow};
 use super::homing::HomingCycle;
 use super::words;
-use super::{FEED_MIN, Grbl, LINE_MAX, MachineState};
+use super::{FEED_MIN, Grbl, LINE_MAX, State};
 use palpate_model::Nanos;
 
 /// A line whose answer comes later.
@@ -30,10 +30,7 @@ impl Grbl {
                 || self.is_probing
                 || self.is_cancelling
                 || self.is_suspended
-                || matches!(
-                    self.state,
-                    MachineState::Hold | MachineState::Door | MachineState::Sleep
-                );
+                || matches!(self.state, State::Hold | State::Door | State::Sleep);
             if is_blocked {
                 return;
             }
@@ -97,12 +94,12 @@ impl Grbl {
         if let Some(command) = line.strip_prefix('$') {
             return self.system(command);
         }
-        if matches!(self.state, MachineState::Alarm | MachineState::Jog) {
+        if matches!(self.state, State::Alarm | State::Jog) {
             return Err(9);
         }
         let here = self.planner.end();
         let parsed = gcode::parse(line, self.modes, false, here, &self.offsets)?;
-        if parsed.waits_for_rest && !self.planner.is_idle() && self.state != MachineState::Check {
+        if parsed.waits_for_rest && !self.planner.is_idle() && self.state != State::Check {
             self.waiting = Some(PendingLine::Rest(Box::new(parsed)));
             return Ok(false);
         }
@@ -137,15 +134,15 @@ impl Grbl {
         (self.modes, self.offsets) = (modes, parsed.offsets);
         match parsed.flow {
             ProgramFlow::Runs => {}
-            ProgramFlow::Pauses if self.state == MachineState::Check => {}
-            ProgramFlow::Pauses => self.state = MachineState::Hold,
+            ProgramFlow::Pauses if self.state == State::Check => {}
+            ProgramFlow::Pauses => self.state = State::Hold,
             ProgramFlow::Ends => {
                 self.modes = modes.after_end();
                 self.reports.report_offset();
                 self.send("[MSG:Pgm End]\r\n");
             }
         }
-        if self.state == MachineState::Check {
+        if self.state == State::Check {
             return Ok(true);
         }
         let motions: Vec<GcodeMotion> = parsed.via.into_iter().chain(parsed.motion).collect();
@@ -170,7 +167,7 @@ impl Grbl {
         }
         self.is_probing = true;
         self.plan(motion);
-        self.state = MachineState::Run;
+        self.state = State::Run;
         Ok(false)
     }
 
@@ -200,8 +197,8 @@ impl Grbl {
         let limits = self.limits();
         let feed = if motion.kind == 0 { f64::INFINITY } else { motion.feed.max(FEED_MIN) };
         self.planner.push(to, feed / 60.0, &limits);
-        if motion.is_jog && self.state == MachineState::Idle && !self.planner.is_idle() {
-            self.state = MachineState::Jog;
+        if motion.is_jog && self.state == State::Idle && !self.planner.is_idle() {
+            self.state = State::Jog;
         }
     }
 
@@ -214,7 +211,7 @@ impl Grbl {
     }
 
     fn jog(&mut self, line: &str) -> Result<bool, u8> {
-        if !matches!(self.state, MachineState::Idle | MachineState::Jog) {
+        if !matches!(self.state, State::Idle | State::Jog) {
             return Err(8);
         }
         let Some(words) = line.strip_prefix('=') else {
@@ -239,31 +236,31 @@ impl Grbl {
         if let Some(rest) = command.strip_prefix('J') {
             return self.jog(rest);
         }
-        let is_free = matches!(self.state, MachineState::Idle | MachineState::Alarm);
+        let is_free = matches!(self.state, State::Idle | State::Alarm);
         let has_more = command.len() > 1;
         match command {
             _ if has_more && command.starts_with(['$', 'G', 'C', 'X']) => return Err(3),
-            "$" if matches!(self.state, MachineState::Run | MachineState::Hold) => return Err(8),
+            "$" if matches!(self.state, State::Run | State::Hold) => return Err(8),
             "$" => {
                 let listing = self.eeprom.listing();
                 self.send(&listing);
             }
             "G" => self.send_modes(),
-            "C" if self.state == MachineState::Check => {
+            "C" if self.state == State::Check => {
                 self.send("[MSG:Disabled]\r\nok\r\n");
-                self.state = MachineState::Idle;
+                self.state = State::Idle;
                 self.start_over();
                 return Ok(false);
             }
-            "C" if self.state == MachineState::Idle => {
-                self.state = MachineState::Check;
+            "C" if self.state == State::Idle => {
+                self.state = State::Check;
                 self.send("[MSG:Enabled]\r\n");
             }
             "C" => return Err(8),
             "X" => {
-                if self.state == MachineState::Alarm {
+                if self.state == State::Alarm {
                     self.send("[MSG:Caution: Unlocked]\r\n");
-                    self.state = MachineState::Idle;
+                    self.state = State::Idle;
                 }
             }
             _ if !is_free => return Err(8),
@@ -276,12 +273,12 @@ impl Grbl {
             }
             _ if command.starts_with('H') && !self.eeprom.is_set(22) => return Err(5),
             "H" => {
-                self.state = MachineState::Home;
+                self.state = State::Home;
                 self.homing = Some(HomingCycle::default());
                 return Ok(false);
             }
             "SLP" => {
-                self.state = MachineState::Sleep;
+                self.state = State::Sleep;
                 self.send("ok\r\n[MSG:Sleeping]\r\n");
                 return Ok(false);
             }
@@ -317,7 +314,7 @@ impl Grbl {
         let (key, rest) = words::number(line.unwrap_or(command)).ok_or(2)?;
         let value = rest.strip_prefix('=').ok_or(3)?;
         if line.is_some() {
-            if self.state != MachineState::Idle {
+            if self.state != State::Idle {
                 return Err(8);
             }
             // Only what can be done is decimals_kept, and so it is done.

@@ -75,7 +75,7 @@ impl Default for EmulatedGrblSettings {
 
 /// Machine state (doc/markdown/interface.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum MachineState {
+enum State {
     #[default]
     Idle,
     Run,
@@ -93,7 +93,7 @@ enum MachineState {
 pub struct Grbl {
     settings: EmulatedGrblSettings,
     eeprom: Eeprom,
-    state: MachineState,
+    state: State,
     /// After a hard or soft limit only a reset is accepted.
     is_waiting_for_reset: bool,
     is_cancelling: bool,
@@ -190,9 +190,8 @@ impl Grbl {
     }
 
     fn is_moving(&self) -> bool {
-        matches!(self.state, MachineState::Run | MachineState::Jog | MachineState::Home)
-            || (matches!(self.state, MachineState::Hold | MachineState::Door)
-                && !self.planner.is_idle())
+        matches!(self.state, State::Run | State::Jog | State::Home)
+            || (matches!(self.state, State::Hold | State::Door) && !self.planner.is_idle())
     }
 
     fn has_line_under_way(&self) -> bool {
@@ -207,8 +206,8 @@ impl Grbl {
 
     /// Blocks that wait begin (`protocol_auto_cycle_start`).
     fn start(&mut self) {
-        if self.state == MachineState::Idle && !self.planner.is_idle() {
-            self.state = MachineState::Run;
+        if self.state == State::Idle && !self.planner.is_idle() {
+            self.state = State::Run;
         }
     }
 
@@ -229,14 +228,14 @@ impl Grbl {
         if self.homing.is_none() && self.planner.is_idle() {
             self.speed = 0.0;
             match self.state {
-                MachineState::Jog | MachineState::Run if self.is_cancelling || self.is_probing => {
-                    self.state = MachineState::Idle;
+                State::Jog | State::Run if self.is_cancelling || self.is_probing => {
+                    self.state = State::Idle;
                     self.is_suspended = self.is_cancelling && self.settings.is_suspending;
                     self.finish_cancelled_motion();
                 }
                 // A jog does not go on behind a door.
-                MachineState::Door if self.is_cancelling => self.finish_cancelled_motion(),
-                MachineState::Jog | MachineState::Run => self.state = MachineState::Idle,
+                State::Door if self.is_cancelling => self.finish_cancelled_motion(),
+                State::Jog | State::Run => self.state = State::Idle,
                 _ => {}
             }
         }
@@ -246,7 +245,7 @@ impl Grbl {
         if has_changed
             && self.eeprom.is_set(21)
             && self.homing.is_none()
-            && self.state != MachineState::Alarm
+            && self.state != State::Alarm
         {
             self.alarm(1, true);
         }
@@ -331,7 +330,7 @@ impl EmulatedAxis for Grbl {
                 self.tx.clear();
                 self.planner.clear([0.0; AXES]);
                 self.steps = [0; AXES];
-                self.state = MachineState::Idle;
+                self.state = State::Idle;
                 self.boots_at = Some(now + BOOT);
             }
             DeviceFault::WrongDevice => self.is_wrong = is_on,

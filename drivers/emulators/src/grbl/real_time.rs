@@ -1,6 +1,6 @@
 //! Bytes that are never queued (doc/markdown/commands.md, realtime commands).
 
-use super::{Grbl, MachineState};
+use super::{Grbl, State};
 
 impl Grbl {
     /// A byte that is never queued; `false` for all others.
@@ -11,38 +11,28 @@ impl Grbl {
             0x18 => self.reset(),
             _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
             // A hold of a jog ends it (doc/markdown/jogging.md).
-            0x85 | b'!' if self.state == MachineState::Jog => {
+            0x85 | b'!' if self.state == State::Jog => {
                 self.is_cancelling = true;
                 self.planner.hold();
             }
-            b'!' if self.state == MachineState::Run || self.state == MachineState::Idle => {
-                self.state = MachineState::Hold;
+            b'!' if self.state == State::Run || self.state == State::Idle => {
+                self.state = State::Hold;
                 self.planner.hold();
             }
-            0x84 if matches!(
-                self.state,
-                MachineState::Run | MachineState::Idle | MachineState::Hold | MachineState::Jog
-            ) =>
-            {
+            0x84 if matches!(self.state, State::Run | State::Idle | State::Hold | State::Jog) => {
                 self.send("[MSG:Check Door]\r\n");
-                self.is_cancelling = self.state == MachineState::Jog;
-                self.state = MachineState::Door;
+                self.is_cancelling = self.state == State::Jog;
+                self.state = State::Door;
                 self.planner.hold();
             }
-            b'~' if matches!(self.state, MachineState::Hold | MachineState::Door)
-                && self.planner.is_idle() =>
-            {
+            b'~' if matches!(self.state, State::Hold | State::Door) && self.planner.is_idle() => {
                 self.planner.resume();
-                self.state = MachineState::Idle;
+                self.state = State::Idle;
                 self.start();
             }
-            b'~' if self.state == MachineState::Idle => self.is_suspended = false,
+            b'~' if self.state == State::Idle => self.is_suspended = false,
             0x90..=0x9d => self.change_override(byte),
-            0xa0 if matches!(
-                self.state,
-                MachineState::Idle | MachineState::Run | MachineState::Hold
-            ) =>
-            {
+            0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
                 self.modes.has_coolant = !self.modes.has_coolant;
                 self.reports.report_overrides();
             }

@@ -1,7 +1,7 @@
 //! Status reports and answers to queries (doc/markdown/interface.md; forms as in report.c).
 
 use super::planner::Coordinates;
-use super::{Grbl, MachineState, RX_MAX};
+use super::{Grbl, RX_MAX, State};
 use std::fmt::Write;
 
 /// Reports between two that carry the offset or the overrides: 30 and 20 in motion, 10 at rest (config.h).
@@ -39,17 +39,17 @@ fn list(place: &Coordinates) -> String {
 impl Grbl {
     pub(super) fn send_status(&mut self) {
         let name = match self.state {
-            MachineState::Idle => "Idle",
-            MachineState::Run => "Run",
-            MachineState::Jog => "Jog",
-            MachineState::Hold if self.planner.is_idle() => "Hold:0",
-            MachineState::Hold => "Hold:1",
-            MachineState::Door if self.planner.is_idle() => "Door:0",
-            MachineState::Door => "Door:2",
-            MachineState::Alarm => "Alarm",
-            MachineState::Home => "Home",
-            MachineState::Check => "Check",
-            MachineState::Sleep => "Sleep",
+            State::Idle => "Idle",
+            State::Run => "Run",
+            State::Jog => "Jog",
+            State::Hold if self.planner.is_idle() => "Hold:0",
+            State::Hold => "Hold:1",
+            State::Door if self.planner.is_idle() => "Door:0",
+            State::Door => "Door:2",
+            State::Alarm => "Alarm",
+            State::Home => "Home",
+            State::Check => "Check",
+            State::Sleep => "Sleep",
         };
         let inch = if self.eeprom.is_set(13) { 1.0 / 25.4 } else { 1.0 };
         let scaled = |place: Coordinates| place.map(|mm| mm * inch);

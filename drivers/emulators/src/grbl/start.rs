@@ -2,13 +2,13 @@
 
 use super::gcode::ModalState;
 use super::planner::AXES;
-use super::{ALARM_PAUSE, Grbl, MachineState, report};
+use super::{ALARM_PAUSE, Grbl, State, report};
 
 impl Grbl {
     /// After power-up or a reset by the converter, which clears the position (main.c).
     pub(super) fn power_up(&mut self) {
         self.steps = [0; AXES];
-        self.state = if self.eeprom.is_set(22) { MachineState::Alarm } else { MachineState::Idle };
+        self.state = if self.eeprom.is_set(22) { State::Alarm } else { State::Idle };
         self.start_over();
     }
 
@@ -44,14 +44,14 @@ impl Grbl {
         self.send(&format!("\r\nGrbl {version} ['$' for help]\r\n"));
         if self.eeprom.is_set(21) && self.is_limit() {
             self.send("[MSG:Check Limits]\r\n");
-            self.state = MachineState::Alarm;
+            self.state = State::Alarm;
         }
         self.was_limit = self.is_limit();
-        if matches!(self.state, MachineState::Alarm | MachineState::Sleep) {
+        if matches!(self.state, State::Alarm | State::Sleep) {
             self.send("[MSG:'$H'|'$X' to unlock]\r\n");
-            self.state = MachineState::Alarm;
+            self.state = State::Alarm;
         } else {
-            self.state = MachineState::Idle;
+            self.state = State::Idle;
             if is_first {
                 self.send(">:error:7\r\n>:error:7\r\n");
             }
@@ -77,7 +77,7 @@ impl Grbl {
         self.is_probing = false;
         self.is_cancelling = false;
         self.speed = 0.0;
-        self.state = MachineState::Alarm;
+        self.state = State::Alarm;
         if is_critical {
             self.send("[MSG:Reset to continue]\r\n");
             self.is_waiting_for_reset = true;
