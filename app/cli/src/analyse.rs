@@ -1,5 +1,6 @@
-//! `palpate analyse`: what the cycles of a record show.
+//! `palpate analyse`: loops, shift, decay and relaxation of cycles.
 
+use super::arguments::parse_columns;
 use super::output::Output;
 use super::{Failure, known_fit_failure, new_file, source_failure};
 use clap::Args;
@@ -10,19 +11,19 @@ use palpate_model::units::Depth;
 use palpate_rheology::cycles::SteadyRule;
 use std::path::PathBuf;
 
-/// Tell what the cycles of a record show: loops, shift, decay, relaxation
+/// Analyse the cycles of a record: hysteresis loops, shift, peak decay, relaxation
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
     /// Session folders, or delimited tables with columns for time, depth and force
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Depth in mm at which the stiffness is told; without it 80 % of the first cycle's
+    /// Depth in mm at which the stiffness is reported; without it 80 % of the first cycle's
     #[arg(long, value_name = "MM", value_parser = positive)]
     at: Option<f64>,
     /// Cycles are steady when peak and shift change by less than so many percent, twice in a row
     #[arg(long, value_name = "PERCENT", default_value = "1", value_parser = positive)]
     steady: f64,
-    /// Take a table for one sine of this frequency in Hz; sessions know theirs
+    /// Treat a table as one sine of this frequency in Hz; a session has its own
     #[arg(long, value_name = "HZ", value_parser = positive)]
     frequency: Option<f64>,
     /// Compare with the prediction of a fit: a file of 'palpate fit --json', or a session or table to fit
@@ -48,8 +49,7 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
         return Err(Failure::usage("a plot shows one source; give one, or leave out --plot"));
     }
     new_file::check("plot", args.plot.as_deref())?;
-    let columns = args.columns.as_deref().map(str::parse).transpose();
-    let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
+    let columns = parse_columns(args.columns.as_deref())?;
     let fitted = args.validate.as_deref();
     let fitted = fitted.map(|path| KnownFit::of(path, columns.as_ref())?.0.body());
     let question = Question {

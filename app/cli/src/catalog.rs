@@ -1,18 +1,18 @@
-//! `palpate catalog`: the file in which `palpate find` looks, made anew or compared with the sessions.
+//! `palpate catalog`: rebuilds the index of `palpate find`, or compares it with the sessions.
 
 use super::Failure;
-use super::output::{Bar, Output};
+use super::output::{Bar, Output, merged};
 use clap::Subcommand;
 use palpate_runner::Stopwatch;
-use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, Changes, Doubt};
+use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, Doubt};
 use palpate_sessions::library_folder;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Make the catalog of the library anew, or check it
+/// Rebuild the catalog of the library, or check it
 #[derive(Debug, Subcommand)]
 pub enum CatalogCommand {
-    /// Make the catalog anew from the sessions of the library
+    /// Rebuild the catalog from the sessions of the library
     Rebuild,
     /// Read every session and compare it with the catalog
     Check,
@@ -27,15 +27,6 @@ pub(super) fn run(command: &CatalogCommand, output: &Output) -> Result<(), Failu
 }
 
 #[derive(Serialize)]
-struct RebuildReport {
-    file: PathBuf,
-    #[serde(flatten)]
-    changes: Changes,
-    unreadable: Vec<Unreadable>,
-    seconds: f64,
-}
-
-#[derive(Serialize)]
 struct Unreadable {
     folder: String,
     reason: String,
@@ -44,7 +35,7 @@ struct Unreadable {
 fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
     let watch = Stopwatch::start();
     let mut bar = LateBar::new(output, "reading sessions");
-    let (changes, entries) = with(library, output, |catalog| {
+    let (changes, entries) = use_catalog(library, output, |catalog| {
         let changes = catalog.rebuild(&mut |done, of| bar.show(done, of))?;
         Ok((changes, catalog.all()?))
     })?;
@@ -52,74 +43,59 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
     let unreadable = entries
         .into_iter()
         .filter_map(|entry| Some(Unreadable { folder: entry.folder, reason: entry.trouble? }));
-    let report = RebuildReport {
-        file: library.join(CATALOG_FILE),
-        changes,
-        unreadable: unreadable.collect(),
-        seconds: watch.seconds(),
-    };
-    say(&report.changes.remarks, output);
-    output.answer("catalog rebuild", &report, || {
-        let mut lines = vec![format!(
-            "{} sessions read in {:.2} s, {}",
-            report.changes.sessions,
-            report.seconds,
-            report.file.display()
-        )];
-        let bad = report.unreadable.iter();
-        lines.extend(bad.map(|one| format!("{}: {}", one.folder, one.reason)));
-        lines.join("\n")
+    let unreadable: Vec<Unreadable> = unreadable.collect();
+    let (file, seconds) = (library.join(CATALOG_FILE).display().to_string(), watch.seconds());
+    let object = serde_json::json!({ "file": file, "unreadable": unreadable, "seconds": seconds });
+    note_all(&changes.remarks, output);
+    output.answer("catalog rebuild", &merged(object, &changes), || {
+        let head = format!("{} sessions read in {seconds:.2} s, {file}", changes.sessions);
+        let bad = unreadable.iter().map(|one| format!("{}: {}", one.folder, one.reason));
+        [head].into_iter().chain(bad).collect::<Vec<_>>().join("\n")
     });
     Ok(())
 }
 
-#[derive(Serialize)]
-struct CheckReport {
-    file: PathBuf,
-    sessions: usize,
-    doubts: Vec<Doubt>,
-}
-
 fn check(library: &Path, output: &Output) -> Result<(), Failure> {
     let mut bar = LateBar::new(output, "comparing");
-    let (sessions, doubts) = with(library, output, |catalog| {
+    let (sessions, doubts) = use_catalog(library, output, |catalog| {
         let doubts = catalog.check(&mut |done, of| bar.show(done, of))?;
         Ok((catalog.all()?.len(), doubts))
     })?;
     drop(bar);
-    let report = CheckReport { file: library.join(CATALOG_FILE), sessions, doubts };
-    output.answer("catalog check", &report, || match report.doubts.as_slice() {
+    let file = library.join(CATALOG_FILE).display().to_string();
+    let object = serde_json::json!({ "file": file, "sessions": sessions, "doubts": doubts });
+    output.answer("catalog check", &object, || match doubts.as_slice() {
         [] => format!("the catalog agrees with its {sessions} sessions"),
         doubts => {
             let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
             doubts.iter().map(line).collect::<Vec<_>>().join("\n")
         }
     });
-    match report.doubts.len() {
+    match doubts.len() {
         0 => Ok(()),
         count => Err(Failure::failed(format!(
-            "the catalog is behind in {count} sessions; 'palpate find' reads what changed, 'palpate catalog rebuild' everything"
+            "the catalog is out of date for {count} sessions; 'palpate find' reads what changed, 'palpate catalog rebuild' reads all"
         ))),
     }
 }
 
 /// Brings the catalog up to date and does some work with it.
-pub(super) fn with_updated<T>(
+pub(super) fn use_updated_catalog<T>(
     library: &Path,
     output: &Output,
     mut work: impl FnMut(&mut Catalog) -> Result<T, CatalogError>,
 ) -> Result<T, Failure> {
     let mut bar = LateBar::new(output, "reading sessions");
-    let (changes, done) = with(library, output, |catalog| {
+    let (changes, done) = use_catalog(library, output, |catalog| {
         let changes = catalog.update(&mut |done, of| bar.show(done, of))?;
         Ok((changes, work(catalog)?))
     })?;
     drop(bar);
-    say(&changes.remarks, output);
+    note_all(&changes.remarks, output);
     Ok(done)
 }
 
-fn with<T>(
+fn use_catalog<T>(
     library: &Path,
     output: &Output,
     mut work: impl FnMut(&mut Catalog) -> Result<T, CatalogError>,
@@ -129,15 +105,15 @@ fn with<T>(
         remarks.append(&mut catalog.remarks);
         work(catalog)
     });
-    say(&remarks, output);
+    note_all(&remarks, output);
     done.map_err(Failure::failed)
 }
 
-fn say(remarks: &[String], output: &Output) {
+fn note_all(remarks: &[String], output: &Output) {
     remarks.iter().for_each(|remark| output.note(remark));
 }
 
-/// A progress bar that comes once the work has taken a second.
+/// A progress bar that appears once the work has taken a second.
 struct LateBar<'a> {
     output: &'a Output,
     message: &'static str,
@@ -145,7 +121,7 @@ struct LateBar<'a> {
     bar: Option<Bar>,
 }
 
-/// Seconds of work that nobody needs a bar for.
+/// Longest work without a bar, in s.
 const SHORT_S: f64 = 1.0;
 
 impl<'a> LateBar<'a> {

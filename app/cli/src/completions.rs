@@ -1,14 +1,14 @@
-//! `palpate completions`: the whole command as shells know it.
+//! `palpate completions`: the completion script of a shell.
 
 use super::output::Output;
 use super::{Cli, Failure};
 use clap::{Args, CommandFactory};
 use clap_complete::aot::{Shell, generate};
 
-/// Print what completes palpate's commands in a shell
+/// Print the completion script of a shell
 #[derive(Debug, Args)]
 pub struct CompletionsArgs {
-    /// The shell
+    /// Name of the shell
     #[arg(value_enum)]
     shell: Shell,
 }

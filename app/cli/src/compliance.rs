@@ -1,4 +1,4 @@
-//! `palpate compliance`: how far a rig gives way under force, and what to take from its depths.
+//! `palpate compliance`: machine compliance of a rig, and the correction of depths by it.
 
 use super::Failure;
 use super::output::Output;
@@ -10,10 +10,9 @@ use palpate_model::units::Newtons;
 use palpate_sessions::compliances::{Kept, Shelf};
 use palpate_sessions::library_folder;
 use palpate_sessions::shelf::{LibraryError, save, supersede};
-use serde::Serialize;
 use std::path::PathBuf;
 
-/// Find how far a rig gives way, from a session of stiff-surface
+/// Measure the machine compliance of a rig, from a session of stiff-surface
 #[derive(Debug, Args)]
 pub struct ComplianceArgs {
     /// Session folder of a stiff-surface run
@@ -21,19 +20,9 @@ pub struct ComplianceArgs {
     /// Force in N from which the surfaces count as seated [default: 0.3 of the highest]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seating: Option<f64>,
-    /// Keep it in the library, in the place of the one in force for the rig
+    /// Save it in the library and supersede the one in force for the rig
     #[arg(long)]
     save: bool,
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    /// Its id in the library, null where it was not kept.
-    id: Option<&'a str>,
-    file: Option<&'a PathBuf>,
-    um_per_n: f64,
-    std_error_um_per_n: f64,
-    document: &'a RigCompliance,
 }
 
 pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure> {
@@ -48,50 +37,50 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
     edited.session.notes.iter().for_each(|note| output.note(note));
     if let Some(reason) = edited.rejection() {
         return Err(Failure::usage(format!(
-            "the session was rejected ({reason}) and tells no compliance; 'palpate verdict' changes the verdict"
+            "the session was rejected ({reason}), so it gives no compliance; 'palpate verdict' changes the verdict"
         )));
     }
     let found = measured(&edited.session, args.seating.map(Newtons)).map_err(failure)?;
-    let kept = args.save.then(|| keep(&found)).transpose()?;
-    let document = kept.as_ref().map_or(&found, |kept| &kept.document);
-    let report = Report {
-        id: kept.as_ref().map(|kept| kept.id.as_str()),
-        file: kept.as_ref().map(|kept| &kept.path),
-        um_per_n: 1e3 * document.mm_per_n,
-        std_error_um_per_n: 1e3 * document.std_error_mm_per_n,
-        document,
-    };
-    output.answer("compliance", &report, || text(document, kept.as_ref()));
+    let saved = args.save.then(|| save_compliance(&found)).transpose()?;
+    let document = saved.as_ref().map_or(&found, |saved| &saved.document);
+    let object = serde_json::json!({
+        "id": saved.as_ref().map(|saved| &saved.id),
+        "file": saved.as_ref().map(|saved| saved.path.display().to_string()),
+        "um_per_n": 1e3 * document.mm_per_n,
+        "std_error_um_per_n": 1e3 * document.std_error_mm_per_n,
+        "document": document,
+    });
+    output.answer("compliance", &object, || text(document, saved.as_ref()));
     Ok(())
 }
 
-/// Stores what was found, in the place of the one in force for its rig.
-fn keep(found: &RigCompliance) -> Result<Kept, Failure> {
+/// Saves the compliance and supersedes the one in force for its rig.
+fn save_compliance(found: &RigCompliance) -> Result<Kept, Failure> {
     let library = library_folder().map_err(Failure::usage)?;
-    let kept = match Shelf::open(&library).in_force(&found.rig) {
+    let saved = match Shelf::open(&library).in_force(&found.rig) {
         Some(old) if is_same(&old.document, found) => {
             Err(LibraryError::AlreadyThere { kind: "compliance", id: old.id.clone() })
         }
         Some(old) => supersede(&library, &old.id, found),
         None => save(&library, found),
     };
-    kept.map_err(|err| match err {
+    saved.map_err(|err| match err {
         LibraryError::Io { .. } => Failure::failed(err),
         _ => Failure::usage(err),
     })
 }
 
-/// Whether two differ in nothing but whose place they take.
-fn is_same(kept: &RigCompliance, found: &RigCompliance) -> bool {
-    let kept = RigCompliance { supersedes: None, ..kept.clone() };
-    kept == *found
+/// Whether two are equal apart from what they supersede.
+fn is_same(saved: &RigCompliance, found: &RigCompliance) -> bool {
+    let saved = RigCompliance { supersedes: None, ..saved.clone() };
+    saved == *found
 }
 
-fn text(found: &RigCompliance, kept: Option<&Kept>) -> String {
+fn text(found: &RigCompliance, saved: Option<&Kept>) -> String {
     let um = |mm: f64| 1e3 * mm;
     let mut lines = vec![
         format!(
-            "rig {} gives way by {:.6} ± {:.6} mm/N ({:.3} ± {:.3} um/N)",
+            "machine compliance of rig {}: {:.6} ± {:.6} mm/N ({:.3} ± {:.3} um/N)",
             found.rig,
             found.mm_per_n,
             found.std_error_mm_per_n,
@@ -105,7 +94,7 @@ fn text(found: &RigCompliance, kept: Option<&Kept>) -> String {
             1e3 * found.rmse_n
         ),
         format!(
-            "  {} samples of {:.2} to {:.2} N on the way in, {} presses",
+            "  {} samples of {:.2} to {:.2} N while loading, {} presses",
             found.samples,
             found.seating_n,
             found.force_max_n,
@@ -121,14 +110,14 @@ fn text(found: &RigCompliance, kept: Option<&Kept>) -> String {
             press.samples
         )
     }));
-    lines.push(match kept {
-        Some(kept) => format!("kept as {}, {}", kept.id, kept.path.display()),
-        None => "not kept; --save keeps it for 'palpate fit --compliance last'".into(),
+    lines.push(match saved {
+        Some(saved) => format!("saved as {}, {}", saved.id, saved.path.display()),
+        None => "not saved; --save saves it for 'palpate fit --compliance last'".into(),
     });
     lines.join("\n")
 }
 
-/// A session of another kind is wrong use; a run that tells nothing has failed.
+/// A session of another kind is wrong use; a run without a result is a failure.
 fn failure(err: MeasureError) -> Failure {
     match err {
         MeasureError::Source(err) => super::source_failure(err),
@@ -137,8 +126,7 @@ fn failure(err: MeasureError) -> Failure {
     }
 }
 
-/// What `--compliance` of a command asks for; without it depths stay raw. A library that cannot be found
-/// matters only where it is asked for.
+/// The correction of `--compliance`; without it depths stay raw, and a missing library is no error.
 pub(super) fn corrections(name: Option<&str>) -> Result<Corrections, Failure> {
     let library = library_folder();
     let Some(name) = name else {
@@ -148,10 +136,10 @@ pub(super) fn corrections(name: Option<&str>) -> Result<Corrections, Failure> {
     Corrections::named(name, Some(&library)).map_err(|err| super::source_failure(err.into()))
 }
 
-/// What a compliance does to depths, and how to take it from them where it is not.
-pub(super) fn sentence(told: &Correction) -> String {
-    match told.is_applied {
-        true => told.sentence(),
-        false => format!("{} (--compliance {LAST})", told.sentence()),
+/// How a compliance changes depths, and the flag that applies it.
+pub(super) fn correction_sentence(correction: &Correction) -> String {
+    match correction.is_applied {
+        true => correction.sentence(),
+        false => format!("{} (--compliance {LAST})", correction.sentence()),
     }
 }

@@ -1,6 +1,7 @@
-//! `palpate daily-check`: the check that opens a rig for the day.
+//! `palpate daily-check`: the check that enables a rig for the day.
 
 use super::Failure;
+use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::RigArgs;
 use clap::Args;
@@ -13,36 +14,25 @@ use palpate_protocols::plans::Plan;
 use palpate_runner::{AfterStop, Answers, RunRequest, wall_now};
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check};
 use palpate_sessions::{Session, library_folder};
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Check zero, one known weight and the way home; the result counts for the day
+/// Check zero, one known weight and homing; the result holds for the day
 #[derive(Debug, Args)]
 pub struct DailyCheckArgs {
     /// The known weight in g
-    #[arg(long, value_name = "G", default_value = "840", value_parser = super::run::number)]
+    #[arg(long, value_name = "G", default_value = "840", value_parser = parse_number)]
     mass: f64,
     #[command(flatten)]
     rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Who makes the check
+    /// Operator
     #[arg(long, default_value = "")]
     operator: String,
 }
 
-#[derive(Serialize)]
-struct Checked<'a> {
-    rig: &'a str,
-    session: PathBuf,
-    calibration: &'a str,
-    is_passed: bool,
-    parts: &'a [CheckPart],
-}
-
-/// Runs the check, judges it and keeps the result.
 pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let labels = Labels {
@@ -80,7 +70,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     let is_stopped = |ending| matches!(ending, EndingKind::Stop | EndingKind::Halt);
     if let Some(outcome) = ended.filter(|outcome| is_stopped(outcome.ending)) {
         return Err(Failure::failed(format!(
-            "the check was ended ({}), so nothing is recorded for today; make it again",
+            "the check ended early ({}), so no result is saved for today; run it again",
             outcome.reason
         )));
     }
@@ -96,14 +86,12 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         parts,
     };
     add_check(&library, &check).map_err(Failure::failed)?;
-    let checked = Checked {
-        rig: &check.rig,
-        session: view.folder.clone(),
-        calibration: &check.calibration,
-        is_passed: check.is_passed,
-        parts: &check.parts,
-    };
-    output.answer("daily-check", &checked, || text(&checked));
+    let folder = view.folder.display().to_string();
+    let object = serde_json::json!({
+        "rig": check.rig, "session": folder, "calibration": check.calibration,
+        "is_passed": check.is_passed, "parts": check.parts,
+    });
+    output.answer("daily-check", &object, || text(&check, &folder));
     match check.is_passed {
         true => Ok(()),
         false => Err(Failure::failed(format!(
@@ -124,22 +112,17 @@ fn plan(mass_g: f64, labels: &Labels) -> Result<Plan, Failure> {
         let first = problems.first().map(ToString::to_string);
         Failure::usage(first.unwrap_or_default())
     })?;
-    let told = protocol.check_labels(labels);
-    told.map_err(|reason| Failure::usage(format!("{reason}; add --operator")))?;
+    let labels_checked = protocol.check_labels(labels);
+    labels_checked.map_err(|reason| Failure::usage(format!("{reason}; add --operator")))?;
     Ok(plan)
 }
 
-fn text(checked: &Checked<'_>) -> String {
+fn text(check: &DailyCheck, folder: &str) -> String {
     let word = |is_passed| if is_passed { "pass" } else { "FAIL" };
-    let mut lines = vec![format!(
-        "{}: {} in {}",
-        checked.rig,
-        word(checked.is_passed),
-        checked.session.display()
-    )];
+    let mut lines = vec![format!("{}: {} in {folder}", check.rig, word(check.is_passed))];
     let part =
         |part: &CheckPart| format!("{:<7} {}: {}", part.what, word(part.is_passed), part.sentence);
-    lines.extend(checked.parts.iter().map(part));
+    lines.extend(check.parts.iter().map(part));
     lines.join("\n")
 }
 

@@ -1,33 +1,27 @@
-//! `palpate emulate`: a device that is not there, on a pseudo-terminal or a TCP port.
+//! `palpate emulate`: an emulated device on a pseudo-terminal or a TCP port.
 
 use super::Failure;
+use super::arguments::{Choice, choice, parse_number};
 use super::output::Output;
 use super::rig::BenchArgs;
+use super::terminal::{ctrl_c_flag, read_lines};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
-use palpate_emulators::bench::Bench;
+use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
-use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
+use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
-use palpate_emulators::{Device, ScheduledFault};
+use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
-use serde::Serialize;
-use std::io::BufRead;
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
 
 /// An Arduino Uno's ceramic resonator is rated at 0.5 %: this one is fast by 0.3 %.
-const UNO: f64 = 1.003;
+const UNO_CLOCK: f64 = 1.003;
 
-/// Orders that may wait; a person types them.
-const ORDERS_MAX: usize = 16;
-
-/// Answer like a controller on a wire, with the simulated bench behind it
+/// Emulate a device on a wire, with the simulated bench behind it
 #[derive(Debug, Subcommand)]
 pub enum EmulateCommand {
     /// A Galil DMC controller: axis A the slide with the probe, analog input 1 the load cell
@@ -41,19 +35,19 @@ pub enum EmulateCommand {
 /// The wire to an emulated device.
 #[derive(Debug, Args)]
 struct WireArgs {
-    /// Be a serial port: a pseudo-terminal, with a link to it by this name; the usual place
+    /// Serve on a pseudo-terminal, with a link of this name to it; the default
     #[arg(long, value_name = "PATH", num_args = 0..=1, conflicts_with = "tcp")]
     pty: Option<Option<PathBuf>>,
-    /// Be a device on a network at this address, such as 127.0.0.1:5023; port 0 is any free one
+    /// Serve on the network at this address, such as 127.0.0.1:5023; port 0 takes any free port
     #[arg(long, value_name = "ADDRESS:PORT")]
     tcp: Option<SocketAddr>,
-    /// Bits a second of the serial line; without it bytes take no time
+    /// Bits a second of the serial line; without it there is no delay
     #[arg(long, value_name = "BAUD", value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
     baud: Option<u32>,
-    /// Latency timer of a USB converter in ms: it keeps a packet that is not full for so long
+    /// Latency timer of a USB converter in ms: an incomplete packet waits that long
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=255))]
     latency_ms: u32,
-    /// A fault, KIND@SECONDS[:DURATION]: garbage, drop, duplicate, partial, late, deaf, mute, reset, disconnect, stuck, saturated or wrong-device; may be repeated. Lines KIND[:DURATION] on standard input begin at once; so do load GRAMS, mount NUMBER and unmount
+    /// A fault, KIND@SECONDS[:DURATION]: garbage, drop, duplicate, partial, late, deaf, mute, reset, disconnect, stuck, saturated or wrong-device; may be repeated. Lines on standard input take effect at once: KIND[:DURATION], load GRAMS, mount NUMBER or unmount
     #[arg(long, value_name = "FAULT")]
     fault: Vec<ScheduledFault>,
 }
@@ -72,7 +66,7 @@ pub struct GalilArgs {
     /// Echo on the serial line from power-up (EO 1)
     #[arg(long)]
     echo: bool,
-    /// How fast the controller's crystal is, in parts in a million
+    /// Error of the controller's crystal in ppm; positive is fast
     #[arg(long, value_name = "PPM", default_value_t = 0.0, allow_negative_numbers = true, value_parser = ppm)]
     clock_ppm: f64,
     /// Serial number
@@ -87,19 +81,19 @@ pub struct GalilArgs {
 pub struct GrblArgs {
     #[command(flatten)]
     wire: WireArgs,
-    /// Load cell beside it
+    /// Load cell on a line of its own
     #[arg(long, default_value = "hx711", value_parser = PossibleValuesParser::new(emulated_cells()))]
     cell: String,
-    /// Link to the pseudo-terminal of the load cell, which has one also where --tcp is the board's address
+    /// Link to the pseudo-terminal of the load cell, which it has even with --tcp
     #[arg(long, value_name = "PATH")]
     cell_pty: Option<PathBuf>,
     /// Home switch on the limit pin of the axis, or on the probe pin with limit switches on the limit pin: limit or probe
-    #[arg(long, default_value = "limit")]
-    home: HomePin,
+    #[arg(long, value_parser = choice(&HOME_PINS), default_value = "limit")]
+    home: HomeWiring,
     /// A setting that the board has stored, NUMBER=VALUE such as 22=1; may be repeated
     #[arg(long, value_name = "NUMBER=VALUE", value_parser = setting)]
     setting: Vec<(u16, f64)>,
-    /// What $I= has stored, by which a board is told from others
+    /// Text that $I= has stored, which identifies the board
     #[arg(long, value_name = "TEXT", default_value = "")]
     build_info: String,
     #[command(flatten)]
@@ -115,18 +109,16 @@ pub struct Mark10Args {
     bench: BenchArgs,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum HomePin {
-    Limit,
-    Probe,
-}
+const HOME_PINS: [Choice<HomeWiring>; 2] = [
+    ("limit", HomeWiring::Limit, "Home switch on the limit pin of the axis"),
+    ("probe", HomeWiring::Probe, "Home switch on the probe pin, limit switches on the limit pin"),
+];
 
 fn setting(text: &str) -> Result<(u16, f64), String> {
     let wrong = || "give NUMBER=VALUE, such as 22=1".to_owned();
     let (number, value) = text.split_once('=').ok_or_else(wrong)?;
     let number = number.trim_start_matches('$').parse().map_err(|_| wrong())?;
-    let value = value.parse().ok().filter(|value: &f64| value.is_finite());
-    Ok((number, value.ok_or_else(wrong)?))
+    Ok((number, parse_number(value).map_err(|_| wrong())?))
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -143,23 +135,37 @@ fn converter(text: &str) -> Result<Converter, String> {
 
 /// A crystal is off by tens, never by thousands.
 fn ppm(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|ppm: &f64| ppm.abs() <= 1000.0)
-        .ok_or_else(|| "give -1000 to 1000".to_owned())
+    let ppm = parse_number(text).ok().filter(|ppm| ppm.abs() <= 1000.0);
+    ppm.ok_or_else(|| "give -1000 to 1000".to_owned())
 }
 
-#[derive(Serialize)]
-struct Ready<'a> {
+/// How an emulated device is announced.
+struct Announcement {
+    /// Key of the device in the JSON object.
     device: &'static str,
     model: String,
-    at: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    cell_at: Option<&'a str>,
-    is_serial: bool,
+    label: String,
+    /// Name of a load cell on a line of its own.
+    cell: Option<String>,
 }
 
-/// Emulates until it is stopped.
+impl Announcement {
+    /// Prints the addresses: that of the device and, after a comma, that of its cell.
+    fn print(&self, addresses: &str, is_serial: bool, output: &Output) {
+        let (at, cell_at) = addresses.split_once(", ").unwrap_or((addresses, ""));
+        let mut object = serde_json::json!({
+            "device": self.device, "model": self.model, "at": at, "is_serial": is_serial,
+        });
+        if self.cell.is_some() {
+            object["cell_at"] = cell_at.into();
+        }
+        output.answer("emulate", &object, || match &self.cell {
+            Some(cell) => format!("{} at {at}, {cell} at {cell_at}; Ctrl-C ends it", self.label),
+            None => format!("{} at {at}; Ctrl-C ends it", self.label),
+        });
+    }
+}
+
 pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failure> {
     match command {
         EmulateCommand::Galil(args) => galil(args, output),
@@ -180,18 +186,15 @@ fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
         clock_ppm: args.clock_ppm,
         serial_number: args.serial_number,
     });
-    let mut ready = |at: &str| {
-        let object =
-            Ready { device: "galil", model: args.model.to_string(), at, cell_at: None, is_serial };
-        output.answer("emulate", &object, || format!("{} at {at}; Ctrl-C ends it", args.model));
-    };
-    emulate(&mut device, &args.wire, None, args.bench.seed, &mut ready, output)
+    let model = args.model.to_string();
+    let announcement = Announcement { device: "galil", label: model.clone(), model, cell: None };
+    emulate(&mut device, announcement, &args.wire, None, args.bench.seed, output)
 }
 
 fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
     let mut eeprom = Eeprom::slide();
-    if args.home == HomePin::Probe {
-        // As the limit switches on the limit pin need it; every board takes it.
+    if args.home == HomeWiring::Probe {
+        // Limit switches on the limit pin need hard limits; every board accepts the setting.
         let _ = eeprom.set(21, 1.0);
     }
     for (number, value) in &args.setting {
@@ -202,36 +205,26 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
         })?;
     }
     eeprom.build_info.clone_from(&args.build_info);
-    let board = Grbl::new(GrblSettings {
+    let board = Grbl::new(EmulatedGrblSettings {
         eeprom,
-        home: match args.home {
-            HomePin::Limit => HomeWiring::Limit,
-            HomePin::Probe => HomeWiring::Probe,
-        },
-        resonator: UNO,
-        ..GrblSettings::default()
+        home: args.home,
+        resonator: UNO_CLOCK,
+        ..EmulatedGrblSettings::default()
     });
     let seed = args.bench.seed;
     let model = &args.cell;
-    // One of those that are emulated: it was checked when the arguments were read.
+    // The parser of the arguments accepts only emulated cells.
     let cell = emulated_cell(model, seed)
         .ok_or_else(|| Failure::usage(format!("no emulated load cell is called {model}")))?;
-    let mut device = Bench::new(&args.bench.settings(), Box::new(board), cell);
-    let mut ready = |places: &str| {
-        let (at, cell_at) = places.split_once(", ").unwrap_or((places, ""));
-        let object = Ready {
-            device: "grbl",
-            model: format!("1.1h with {model}"),
-            at,
-            cell_at: Some(cell_at),
-            is_serial: args.wire.tcp.is_none(),
-        };
-        output.answer("emulate", &object, || {
-            format!("Grbl 1.1h at {at}, {model} at {cell_at}; Ctrl-C ends it")
-        });
+    let mut device = EmulatedBench::new(&args.bench.settings(), Box::new(board), cell);
+    let announcement = Announcement {
+        device: "grbl",
+        model: format!("1.1h with {model}"),
+        label: "Grbl 1.1h".into(),
+        cell: Some(model.clone()),
     };
     let cell_link = Some(args.cell_pty.clone());
-    emulate(&mut device, &args.wire, cell_link, seed, &mut ready, output)
+    emulate(&mut device, announcement, &args.wire, cell_link, seed, output)
 }
 
 fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
@@ -241,21 +234,17 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
         gauge: EmulatedGaugeSettings { seed, ..EmulatedGaugeSettings::default() },
         ..EmulatedStandSettings::default()
     });
-    let is_serial = args.wire.tcp.is_none();
-    let mut ready = |at: &str| {
-        let object =
-            Ready { device: "mark10", model: "ESM303".into(), at, cell_at: None, is_serial };
-        output.answer("emulate", &object, || format!("ESM303 at {at}; Ctrl-C ends it"));
-    };
-    emulate(&mut device, &args.wire, None, seed, &mut ready, output)
+    let (model, label) = ("ESM303".to_owned(), "ESM303".to_owned());
+    let announcement = Announcement { device: "mark10", model, label, cell: None };
+    emulate(&mut device, announcement, &args.wire, None, seed, output)
 }
 
 fn emulate(
-    device: &mut dyn Device,
+    device: &mut dyn EmulatedDevice,
+    announcement: Announcement,
     wire: &WireArgs,
     cell_link: Option<Option<PathBuf>>,
     seed: u64,
-    ready: &mut dyn FnMut(&str),
     output: &Output,
 ) -> Result<(), Failure> {
     let link = wire.pty.clone().flatten();
@@ -272,40 +261,20 @@ fn emulate(
         faults: wire.fault.clone(),
         seed,
     };
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)).map_err(Failure::failed)?;
-    let orders = orders()?;
-    let mut tell = |told: Told| match told {
-        Told::Ready(at) => ready(&at),
+    let stop = ctrl_c_flag()?;
+    let orders = read_lines("orders")?;
+    let mut notify = |event: Told| match event {
+        Told::Ready(at) => announcement.print(&at, wire.tcp.is_none(), output),
         Told::Fault(turn) => {
             let verb = if turn.is_on { "begins" } else { "ends" };
             output.note(&format!("{} {verb}", turn.kind));
         }
         Told::Done(order) => {
-            if let Some(told) = order.told() {
-                output.note(&told);
+            if let Some(sentence) = order.confirmation() {
+                output.note(&sentence);
             }
         }
         Told::Refused(sentence) => output.note(&sentence),
     };
-    serve(device, &options, &orders, &stop, &mut tell).map_err(Failure::failed)
-}
-
-/// Lines of standard input; its end changes nothing.
-fn orders() -> Result<Receiver<String>, Failure> {
-    let (sender, receiver) = sync_channel(ORDERS_MAX);
-    std::thread::Builder::new()
-        .name("orders".into())
-        .spawn(move || {
-            for line in std::io::stdin().lock().lines() {
-                let Ok(line) = line else { return };
-                let line = line.trim();
-                if !line.is_empty() && sender.send(line.to_owned()).is_err() {
-                    return;
-                }
-            }
-        })
-        .map_err(Failure::failed)?;
-    Ok(receiver)
+    serve(device, &options, &orders, &stop, &mut notify).map_err(Failure::failed)
 }

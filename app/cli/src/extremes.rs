@@ -1,4 +1,4 @@
-//! `palpate extremes`: numerical stability where numbers end.
+//! `palpate extremes`: numerical stability at extreme values.
 
 use super::Failure;
 use super::new_file;
@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 /// Test numerical stability at the extremes, every family, integrator and fit
 #[derive(Debug, Args)]
 pub struct ExtremesArgs {
-    /// Corners and middles of every table only, in seconds
+    /// Only corners and centres of every table; takes seconds
     #[arg(long, conflicts_with = "soak")]
     quick: bool,
-    /// The longest records for every family too, in tens of minutes
+    /// Also the longest records for every family; takes tens of minutes
     #[arg(long)]
     soak: bool,
     /// One family and its fit, such as series-3
@@ -36,7 +36,7 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         new_file::check("page", args.page.as_deref())?;
     }
     let rows = survey(extent, args.family.as_deref(), &output.share_bar());
-    // Nobody ends it early here, so there is always an answer.
+    // Only cancelling gives no rows, and a progress bar never cancels.
     let rows = rows.map_err(Failure::usage)?.unwrap_or_default();
     let count = |verdict| rows.iter().filter(|row| row.verdict == verdict).count();
     let wrong = count(Verdict::Wrong);
@@ -55,7 +55,7 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Whether a file is a page that this command wrote: that one may be written anew.
+/// Whether this command wrote the file, so that it may replace it.
 fn is_own_page(file: &Path) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.starts_with(PAGE_HEAD))
 }

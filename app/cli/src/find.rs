@@ -1,18 +1,15 @@
-//! `palpate find`: sessions of the library by what is known of them.
+//! `palpate find`: searches the sessions of the library.
 
 use super::Failure;
-use super::catalog::with_updated;
+use super::arguments::{Choice, choice};
+use super::catalog::use_updated_catalog;
 use super::output::Output;
 use chrono::{DateTime, Utc};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use palpate_analysis::report::catalog as report;
-use palpate_sessions::catalog::{
-    Condition, Entry, Order, Query, ReviewIs, VerdictIs, beginning, ending,
-};
+use palpate_sessions::catalog::{Condition, Order, Query, ReviewIs, VerdictIs, beginning, ending};
 use palpate_sessions::library_folder;
-use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
 
 /// Find sessions of the library
 #[derive(Debug, Args)]
@@ -41,7 +38,7 @@ pub struct FindArgs {
     /// Started on this day or before, UTC, or before a time
     #[arg(long, value_name = "DAY", value_parser = ending)]
     until: Option<DateTime<Utc>>,
-    /// A condition on a value of the protocol, on what was told or on a saved fit, as in
+    /// A condition on a value of the protocol, on details of the session or on a saved fit, as in
     /// depth>=2mm, specimen.thickness_mm<12 or fit.tau_eps>1.5; may be repeated
     #[arg(long = "where", value_name = "CONDITION")]
     conditions: Vec<Condition>,
@@ -54,10 +51,10 @@ pub struct FindArgs {
     /// accepted, rejected, repeat, outdated or none
     #[arg(long)]
     review: Option<ReviewIs>,
-    /// What the sessions are sorted by
-    #[arg(long, value_enum, default_value = "started")]
-    sort: Sort,
-    /// The other way round
+    /// Sort order
+    #[arg(long, value_parser = choice(&SORTS), default_value = "started")]
+    sort: Order,
+    /// Reverse the order
     #[arg(long)]
     reverse: bool,
     /// Sessions on a page
@@ -68,46 +65,15 @@ pub struct FindArgs {
     page: NonZeroUsize,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Sort {
-    /// Latest first
-    Started,
-    /// By specimen
-    Specimen,
-    /// By operator
-    Operator,
-    /// By protocol
-    Protocol,
-    /// Longest first
-    Duration,
-    /// By verdict, in alphabetical order
-    Verdict,
-    /// By review, in alphabetical order
-    Review,
-}
-
-impl From<Sort> for Order {
-    fn from(sort: Sort) -> Self {
-        match sort {
-            Sort::Started => Self::Started,
-            Sort::Specimen => Self::Specimen,
-            Sort::Operator => Self::Operator,
-            Sort::Protocol => Self::Protocol,
-            Sort::Duration => Self::Duration,
-            Sort::Verdict => Self::Verdict,
-            Sort::Review => Self::Review,
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct FindReport<'a> {
-    library: &'a PathBuf,
-    count: usize,
-    page: usize,
-    pages: usize,
-    sessions: &'a [Entry],
-}
+const SORTS: [Choice<Order>; 7] = [
+    ("started", Order::Started, "Latest first"),
+    ("specimen", Order::Specimen, "By specimen"),
+    ("operator", Order::Operator, "By operator"),
+    ("protocol", Order::Protocol, "By protocol"),
+    ("duration", Order::Duration, "Longest first"),
+    ("verdict", Order::Verdict, "By verdict, in alphabetical order"),
+    ("review", Order::Review, "By review, in alphabetical order"),
+];
 
 pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
@@ -125,25 +91,23 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
         verdict: args.verdict,
         review: args.review,
         tags: args.tags.clone(),
-        order: args.sort.into(),
+        order: args.sort,
         is_reversed: args.reverse,
         skip: limit.saturating_mul(page - 1),
         limit: Some(limit),
     };
-    let (found, doubts) = with_updated(&library, output, |catalog| {
+    let (found, doubts) = use_updated_catalog(&library, output, |catalog| {
         let found = catalog.find(&query)?;
         let is_none = found.count == 0;
         let doubts = if is_none { catalog.doubts(&query.conditions)? } else { Vec::new() };
         Ok((found, doubts))
     })?;
     doubts.iter().for_each(|doubt| output.note(doubt));
-    let object = FindReport {
-        library: &library,
-        count: found.count,
-        page,
-        pages: found.count.div_ceil(limit),
-        sessions: &found.entries,
-    };
-    output.answer("find", &object, || report::list(&found, page, object.pages));
+    let pages = found.count.div_ceil(limit);
+    let object = serde_json::json!({
+        "library": library.display().to_string(), "count": found.count, "page": page, "pages": pages,
+        "sessions": found.entries,
+    });
+    output.answer("find", &object, || report::list(&found, page, pages));
     Ok(())
 }

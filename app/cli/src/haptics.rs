@@ -1,10 +1,10 @@
-//! `palpate haptics`: a fitted body felt through a master-slave device.
+//! `palpate haptics`: a fitted model on a master-slave device.
 
 use super::Failure;
+use super::arguments::{above_zero, parse_number};
 use super::new_file;
 use super::output::Output;
-use super::run::number;
-use super::scene::{ReplayArgs, told};
+use super::scene::{RecordingReplayArgs, report_replay};
 use super::slave::{self, SlaveArgs};
 use clap::{Args, Subcommand, ValueEnum};
 use palpate_analysis::follow_session::keep_followed;
@@ -20,26 +20,26 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use std::path::{Path, PathBuf};
 
-/// Feel a fitted body through a master-slave device: check it, run it, time its loop
+/// Feel a fitted model through a master-slave device: check it, run it, time its loop
 #[derive(Debug, Subcommand)]
 pub enum HapticsCommand {
-    /// Tell before play where a body can return energy, what damping it needs, and what the guard does about it
-    Check(CheckArgs),
-    /// Run the loop in real time on the simulated device and tell how it kept its time
-    Run(RunArgs),
+    /// Report where a model can return energy, which damping it needs and what the guard does
+    Check(HapticsCheckArgs),
+    /// Run the loop in real time on the simulated device and report its timing
+    Run(HapticsRunArgs),
     /// Compute every tick of a recorded run again and compare bit for bit
-    Replay(ReplayArgs),
+    Replay(RecordingReplayArgs),
     /// Push the master's rack with a simulated slider and compare the force commanded with the force measured
-    Follow(FollowArgs),
-    /// Lead the slave of a rig with a simulated master, and compare the force at its handle with what the slave's cell feels
+    Follow(HapticsFollowArgs),
+    /// Lead the slave of a rig with a simulated master, and compare the force at its handle with the force on the slave's load cell
     Slave(SlaveArgs),
-    /// Time the loop on this computer at several rates, idle and beside busy threads
-    Bench(BenchArgs),
+    /// Time the loop on this computer at several rates, idle and with busy threads
+    Bench(HapticsBenchArgs),
 }
 
 /// The motor's drive.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Drive {
+enum DriveArg {
     /// By voltage, as the source thesis did; the motor's back-EMF damps
     Voltage,
     /// By current; the motor damps nothing
@@ -49,39 +49,31 @@ enum Drive {
 /// The device, the loop and the hand.
 #[derive(Debug, Args)]
 struct DeviceArgs {
-    /// Ticks of the loop a second, 250 to 10000
-    #[arg(long, default_value_t = 1000.0, value_parser = number, allow_negative_numbers = true, value_name = "HZ")]
+    /// Loop rate in Hz, 250 to 10000
+    #[arg(long, default_value_t = 1000.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "HZ")]
     rate: f64,
     /// How the motor is driven
     #[arg(long, value_enum, default_value = "voltage")]
-    drive: Drive,
+    drive: DriveArg,
     /// Damping of the device without its motor, in N s/m
-    #[arg(long, default_value_t = 0.0, value_parser = number, allow_negative_numbers = true, value_name = "NS_PER_M")]
+    #[arg(long, default_value_t = 0.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "NS_PER_M")]
     damping: f64,
     /// Coulomb friction of the device in N; without it that of the source's motor
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "N")]
+    #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "N")]
     friction: Option<f64>,
-    /// Ticks from an encoder count to the force made of it
+    /// Delay from an encoder count to its force, in ticks
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=i64::from(Setting::DELAY_MAX)), value_name = "TICKS")]
     delay: u8,
     /// End of the stroke in mm
-    #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
+    #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM")]
     depth: f64,
     /// Speed of the hand in mm/s
-    #[arg(long, default_value_t = 50.0, value_parser = number, allow_negative_numbers = true, value_name = "MM_PER_S")]
+    #[arg(long, default_value_t = 50.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM_PER_S")]
     speed: f64,
 }
 
 impl DeviceArgs {
     fn setting(&self) -> Result<Setting, Failure> {
-        let positive = |name: &str, value: f64, most: f64, unit: &str| {
-            let is_good = value > 0.0 && value <= most;
-            is_good.then_some(value).ok_or_else(|| {
-                Failure::usage(format!(
-                    "--{name} {value} is not possible; give a number above 0 and up to {most} {unit}"
-                ))
-            })
-        };
         let not_negative = |name: &str, value: f64| {
             (value >= 0.0).then_some(value).ok_or_else(|| {
                 Failure::usage(format!("--{name} {value} is not possible; give 0 or more"))
@@ -93,23 +85,23 @@ impl DeviceArgs {
         Ok(Setting {
             period,
             drive: match self.drive {
-                Drive::Voltage => usual.drive,
-                Drive::Current => DriveKind::Current { amps_per_volt: 1.0 },
+                DriveArg::Voltage => usual.drive,
+                DriveArg::Current => DriveKind::Current { amps_per_volt: 1.0 },
             },
             // N s/m as catalogues have it, N s/mm inside.
             damping: 1e-3 * not_negative("damping", self.damping)?,
             friction: friction.transpose()?.map(Newtons),
             delay: usize::from(self.delay),
-            deepest: Depth(positive("depth", self.depth, Setting::DEPTH_MAX, "mm")?),
-            speed: MmPerS(positive("speed", self.speed, Setting::SPEED_MAX, "mm/s")?),
+            deepest: Depth(above_zero("depth", self.depth, Setting::DEPTH_MAX, "mm")?),
+            speed: MmPerS(above_zero("speed", self.speed, Setting::SPEED_MAX, "mm/s")?),
         })
     }
 }
 
 /// Arguments of `palpate haptics check`.
 #[derive(Debug, Args)]
-pub struct CheckArgs {
-    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+pub struct HapticsCheckArgs {
+    /// A session or table to fit, or 'thesis' for the model of the source thesis
     #[arg(value_name = "SESSION|thesis")]
     source: PathBuf,
     #[command(flatten)]
@@ -118,14 +110,14 @@ pub struct CheckArgs {
 
 /// Arguments of `palpate haptics run`.
 #[derive(Debug, Args)]
-pub struct RunArgs {
-    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+pub struct HapticsRunArgs {
+    /// A session or table to fit, or 'thesis' for the model of the source thesis
     #[arg(value_name = "SESSION|thesis")]
     source: PathBuf,
     #[command(flatten)]
     device: DeviceArgs,
-    /// For how long, in s
-    #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    /// Duration in s
+    #[arg(long, default_value_t = 10.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: f64,
     /// Record every tick in this new folder, which 'palpate haptics replay' computes again
     #[arg(long, value_name = "DIR")]
@@ -134,20 +126,20 @@ pub struct RunArgs {
 
 /// Arguments of `palpate haptics follow`.
 #[derive(Debug, Args)]
-pub struct FollowArgs {
-    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+pub struct HapticsFollowArgs {
+    /// A session or table to fit, or 'thesis' for the model of the source thesis
     #[arg(value_name = "SESSION|thesis")]
     source: PathBuf,
     /// Speed of the slider in mm/s
-    #[arg(long, default_value_t = 0.75, value_parser = number, allow_negative_numbers = true, value_name = "MM_PER_S")]
+    #[arg(long, default_value_t = 0.75, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM_PER_S")]
     speed: f64,
-    /// Its way in mm
-    #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
+    /// Travel in mm
+    #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM")]
     depth: f64,
-    /// How long it holds in s
-    #[arg(long, default_value_t = 50.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    /// Hold in s
+    #[arg(long, default_value_t = 50.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     hold: f64,
-    /// Share of the motor's friction that the drive makes up for, in percent
+    /// Share of the motor's friction that the drive compensates, in percent
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=100), value_name = "PERCENT")]
     help_friction: u8,
     /// Draw both forces and the torque as a new SVG file
@@ -163,33 +155,33 @@ pub struct FollowArgs {
 
 /// Arguments of `palpate haptics bench`.
 #[derive(Debug, Args)]
-pub struct BenchArgs {
+pub struct HapticsBenchArgs {
     /// Seconds for each rate and load
-    #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    #[arg(long, default_value_t = 10.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: f64,
     /// Rates in Hz
-    #[arg(long, value_delimiter = ',', default_values_t = [500.0, 1000.0, 2000.0, 5000.0], value_parser = number, allow_negative_numbers = true, value_name = "HZ,...")]
+    #[arg(long, value_delimiter = ',', default_values_t = [500.0, 1000.0, 2000.0, 5000.0], value_parser = parse_number, allow_negative_numbers = true, value_name = "HZ,...")]
     rates: Vec<f64>,
-    /// Busy threads beside the loop in the second half of the table
+    /// Busy threads in the second half of the table
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=64), value_name = "THREADS")]
     busy: u8,
 }
 
-/// Longest run asked for, in s: a day.
+/// A day, in s.
 const SECONDS_MAX: f64 = 86_400.0;
 
 pub(super) fn run(command: &HapticsCommand, output: &Output) -> Result<(), Failure> {
     match command {
         HapticsCommand::Check(args) => run_check(args, output),
         HapticsCommand::Run(args) => run_loop(args, output),
-        HapticsCommand::Replay(args) => run_replay(args, output),
+        HapticsCommand::Replay(args) => report_replay("haptics-replay", args, replay, output),
         HapticsCommand::Follow(args) => run_follow(args, output),
         HapticsCommand::Slave(args) => slave::run(args, output),
         HapticsCommand::Bench(args) => run_bench(args, output),
     }
 }
 
-/// The body of a source, with what is to be known of it as notes.
+/// The model of a source; remarks on it become notes.
 pub(super) fn body(
     source: &Path,
     deepest: Depth,
@@ -201,18 +193,17 @@ pub(super) fn body(
     Ok(found.body)
 }
 
-fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+fn run_check(args: &HapticsCheckArgs, output: &Output) -> Result<(), Failure> {
     let setting = args.device.setting()?;
     let body = body(&args.source, setting.deepest, output)?;
-    let bar = output.share_bar();
-    let checked = check(body, &setting, &mut |share| bar.share(share, ""));
-    drop(bar);
-    let checked = checked.map_err(Failure::usage)?;
+    let checked = output
+        .with_share_bar(|bar| check(body, &setting, &mut |share| bar.share(share, "")))
+        .map_err(Failure::usage)?;
     output.answer("haptics-check", &checked, || check_text(&checked));
     Ok(())
 }
 
-fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
+fn run_follow(args: &HapticsFollowArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.plot.as_deref())?;
     new_file::check("table", args.table.as_deref())?;
     new_file::check("session", args.out.as_deref())?;
@@ -224,12 +215,13 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
         friction_share: f64::from(args.help_friction) / 100.0,
         ..CheckSettings::source(body)
     };
-    let bar = output.share_bar();
-    let followed = follow(&settings, &mut |share| {
-        bar.share(share, "");
-    });
-    drop(bar);
-    let followed = followed.map_err(Failure::usage)?;
+    let followed = output
+        .with_share_bar(|bar| {
+            follow(&settings, &mut |share| {
+                bar.share(share, "");
+            })
+        })
+        .map_err(Failure::usage)?;
     output.answer("haptics-follow", &followed, || follow_text(&followed));
     let source = args.source.display().to_string();
     new_file::write("picture", args.plot.as_deref(), || follow_plot(&source, &followed))?;
@@ -240,31 +232,25 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
     }
 }
 
-fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
+fn run_loop(args: &HapticsRunArgs, output: &Output) -> Result<(), Failure> {
     let setting = args.device.setting()?;
-    let seconds = checked_seconds(args.seconds)?;
+    let seconds = above_zero("seconds", args.seconds, SECONDS_MAX, "s")?;
     new_file::check("recording", args.record.as_deref())?;
     let body = body(&args.source, setting.deepest, output)?;
     let recorder = args.record.as_deref().map(|to| recorder(to, body, &setting));
     let recorder = recorder.transpose().map_err(Failure::failed)?;
-    let bar = output.share_bar();
     let settings = setting.simulation(body, true);
-    let paced = pace(&settings, seconds, 0, recorder, &mut |share| bar.share(share, ""));
-    drop(bar);
-    let paced = paced.map_err(Failure::failed)?;
+    let paced = output
+        .with_share_bar(|bar| {
+            pace(&settings, seconds, 0, recorder, &mut |share| bar.share(share, ""))
+        })
+        .map_err(Failure::failed)?;
     output.answer("haptics-run", &paced, || run_text(&paced));
     Ok(())
 }
 
-fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
-    let bar = output.share_bar();
-    let replayed = replay(&args.folder, &mut |share| bar.share(share, ""));
-    drop(bar);
-    told("haptics-replay", replayed, output)
-}
-
-fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
-    let seconds = checked_seconds(args.seconds)?;
+fn run_bench(args: &HapticsBenchArgs, output: &Output) -> Result<(), Failure> {
+    let seconds = above_zero("seconds", args.seconds, SECONDS_MAX, "s")?;
     let periods = args.rates.iter().map(|rate| Period::of_rate(*rate));
     let periods: Vec<Period> = periods.collect::<Result<_, _>>().map_err(Failure::usage)?;
     let loads = match args.busy {
@@ -289,14 +275,4 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
     let found = serde_json::json!({ "seconds": seconds, "loops": loops });
     output.answer("haptics-bench", &found, || bench_text(&loops));
     Ok(())
-}
-
-fn checked_seconds(seconds: f64) -> Result<f64, Failure> {
-    if seconds > 0.0 && seconds <= SECONDS_MAX {
-        Ok(seconds)
-    } else {
-        Err(Failure::usage(format!(
-            "--seconds {seconds} is not possible; give a number above 0 and up to {SECONDS_MAX}"
-        )))
-    }
 }

@@ -1,18 +1,17 @@
-//! `palpate import`: files of other programs become sessions.
+//! `palpate import`: imports files of other programs as sessions.
 
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::imports::{FileReport, ImportFailure, Request, import, text};
+use palpate_analysis::imports::{ImportFailure, Request, import, text};
 use palpate_model::about::Labels;
 use palpate_tables::import::{
     ColumnChoice, Decimal, Delimiter, Fault, ForeignError, Format, KeepError, TextEncoding, Told,
     UnitChoice, ZeroChoice,
 };
-use serde::Serialize;
 use std::path::PathBuf;
 
-/// Make sessions of other programs' files
+/// Import files of other programs as sessions
 #[derive(Debug, Args)]
 pub struct ImportArgs {
     #[arg(required = true, help = format!("Files: {}", Format::sources()))]
@@ -20,31 +19,31 @@ pub struct ImportArgs {
     /// Folder for the new session folders; without it they go to the library (~/palpate or PALPATE_HOME)
     #[arg(long, value_name = "FOLDER")]
     into: Option<PathBuf>,
-    /// Only tell how the files would be read
+    /// Only report how the files would be read
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]
-    how: ToldArgs,
-    /// Who measured
+    layout: LayoutArgs,
+    /// Operator
     #[arg(long, default_value = "")]
     operator: String,
-    /// What was indented
+    /// Specimen
     #[arg(long, default_value = "")]
     specimen: String,
-    /// With which probe
+    /// Indenter
     #[arg(long, default_value = "")]
     indenter: String,
-    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    /// Details of specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     about: Vec<String>,
 }
 
-/// What is told of the files; all else is detected.
+/// What is given about the layout of the files; all else is detected.
 #[derive(Debug, Args)]
-struct ToldArgs {
+struct LayoutArgs {
     #[arg(long, help = format!("Layout: {}", Format::names()))]
     format: Option<Format>,
-    /// What stands between cells: tab, comma, semicolon, space or one character
+    /// Separator of cells: tab, comma, semicolon, space or one character
     #[arg(long, value_name = "NAME")]
     delimiter: Option<Delimiter>,
     /// Encoding, such as utf-8, utf-16le or windows-1252
@@ -56,7 +55,7 @@ struct ToldArgs {
     /// Names of all columns in order, where the file has none, as in t_s,depth_mm,force_N
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Which column is time, depth, force or signal, by name or number; -NAME turns its sign
+    /// Column of time, depth, force or signal, by name or number; -NAME changes its sign
     #[arg(long = "column", value_name = "QUANTITY=NAME")]
     column: Vec<ColumnChoice>,
     /// Unit of time, depth, force or signal
@@ -65,22 +64,22 @@ struct ToldArgs {
     /// Depth or force that counts as zero: that of the first row, or a number in mm or N
     #[arg(long = "zero", value_name = "QUANTITY=first|NUMBER")]
     zero: Vec<ZeroChoice>,
-    /// Line of the column names
+    /// Number of the line with the column names
     #[arg(long, value_name = "N")]
     header_row: Option<usize>,
-    /// Line of the units; 0 if there is none
+    /// Number of the line with the units; 0 if there is none
     #[arg(long, value_name = "N")]
     units_row: Option<usize>,
-    /// Sheet, block or interval wanted, by name or number; may be repeated [default: all]
+    /// Sheet, block or interval to read, by name or number; may be repeated [default: all]
     #[arg(long = "part", visible_aliases = ["sheet", "block"], value_name = "NAME|N")]
     part: Vec<String>,
-    /// Rows to leave out instead of refusing the file: missing, repeated, backward
+    /// Rows to skip instead of refusing the file: missing, repeated, backward
     #[arg(long, value_name = "FAULT,...", value_delimiter = ',')]
     skip: Vec<Fault>,
 }
 
-impl ToldArgs {
-    fn told(&self) -> Told {
+impl LayoutArgs {
+    fn known_layout(&self) -> Told {
         Told {
             format: self.format,
             delimiter: self.delimiter,
@@ -98,27 +97,19 @@ impl ToldArgs {
     }
 }
 
-#[derive(Serialize)]
-struct Report {
-    is_dry_run: bool,
-    files: Vec<FileReport>,
-}
-
 pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
     let request = Request {
         files: args.files.clone(),
-        told: args.how.told(),
+        told: args.layout.known_layout(),
         labels: labels(args)?,
         into: args.into.clone(),
         library: None,
         is_dry_run: args.dry_run,
     };
     let files = import(&request, &output.count_bar(0));
-    let report = Report { is_dry_run: args.dry_run, files: files.map_err(import_failure)? };
-    output.answer("import", &report, || {
-        let files = report.files.iter().map(text);
-        files.collect::<Vec<_>>().join("\n\n")
-    });
+    let files = files.map_err(import_failure)?;
+    let object = serde_json::json!({ "is_dry_run": args.dry_run, "files": files });
+    output.answer("import", &object, || files.iter().map(text).collect::<Vec<_>>().join("\n\n"));
     Ok(())
 }
 
@@ -129,7 +120,7 @@ fn labels(args: &ImportArgs) -> Result<Labels, Failure> {
         indenter: args.indenter.clone(),
         ..Labels::default()
     };
-    super::tell(&mut labels, &args.about)?;
+    super::add_labels(&mut labels, &args.about)?;
     Ok(labels)
 }
 
@@ -140,7 +131,7 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Keep(_) => Failure::failed(err),
         ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
         ImportFailure::Foreign(_) => {
-            Failure::usage(format!("{err}; 'palpate import --help' tells how to say so"))
+            Failure::usage(format!("{err}; 'palpate import --help' lists the options for it"))
         }
         _ => Failure::usage(err),
     }

@@ -1,11 +1,11 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 //!
 //! Arguments become requests to [`palpate_analysis`] and the runner; results become text or one JSON
-//! object. This crate knows no window: whoever has one hands it to [`main`].
+//! object. This crate has no window: a program with one passes it to [`main`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod analyse;
-mod asking;
+mod arguments;
 mod calibration;
 mod catalog;
 mod completions;
@@ -33,6 +33,7 @@ mod note;
 mod output;
 mod plan;
 mod programme;
+mod prompts;
 mod protocol;
 mod recalibrate;
 mod recover;
@@ -48,6 +49,7 @@ mod select;
 mod slave;
 mod support_bundle;
 mod tag;
+mod terminal;
 mod trade;
 mod verdict;
 mod window;
@@ -71,7 +73,7 @@ use std::sync::Arc;
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version, propagate_version = true)]
 struct Cli {
-    /// Show on standard error what is logged; RUST_LOG says what that is
+    /// Show log lines on standard error; RUST_LOG selects them
     #[arg(long, global = true)]
     verbose: bool,
     #[command(subcommand)]
@@ -131,7 +133,7 @@ commands! { windows;
     Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run;
     Mask(mask::MaskArgs) => mask::run;
     Withdraw(withdraw::WithdrawArgs) => withdraw::run;
-    #[command(subcommand)] Rig(wired::RigCommand) => wired::run;
+    #[command(subcommand)] Rig(wired::RigSubcommand) => wired::run;
     #[cfg(feature = "haptics")] #[command(subcommand)] Haptics(haptics::HapticsCommand) => haptics::run;
     #[cfg(feature = "haptics")] #[command(subcommand)] Scene(scene::SceneCommand) => scene::run;
     #[cfg(feature = "emulators")] #[command(subcommand)] Emulate(emulate::EmulateCommand) => emulate::run;
@@ -139,12 +141,12 @@ commands! { windows;
     Man(man::ManArgs) => man::run;
 }
 
-/// Why a command did not do what was asked.
+/// Why a command failed.
 #[derive(Debug)]
 pub enum Failure {
     /// Wrong use: nothing was done. Exit code 2.
     Usage(String),
-    /// It was tried and failed. Exit code 1.
+    /// It began and failed. Exit code 1.
     Failed(String),
 }
 
@@ -157,8 +159,8 @@ impl Failure {
         Self::Failed(reason.to_string())
     }
 
-    /// The same, of something that is named before it.
-    fn of(self, name: &str) -> Self {
+    /// The same sentence after a name.
+    fn prefixed(self, name: &str) -> Self {
         match self {
             Self::Usage(sentence) => Self::Usage(format!("{name}: {sentence}")),
             Self::Failed(sentence) => Self::Failed(format!("{name}: {sentence}")),
@@ -179,7 +181,7 @@ impl Failure {
     }
 }
 
-/// Whether the arguments ask for JSON, wherever they do: among tags, and where the rest is wrong.
+/// Whether `--json` is given anywhere: among tags, or where the other arguments are wrong.
 fn asks_for_json() -> bool {
     let mut named = std::env::args_os().take_while(|argument| argument != "--");
     named.any(|argument| argument == "--json")
@@ -195,7 +197,7 @@ fn parse() -> Result<Cli, ExitCode> {
         }
         let output = Output::new(asks_for_json());
         let text = err.to_string();
-        // What is missing stands in lines of its own under the first.
+        // Missing arguments follow on lines of their own.
         let lines = text.lines().take_while(|line| !line.trim().is_empty());
         let sentence = lines.map(str::trim).collect::<Vec<_>>().join(" ");
         let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
@@ -205,18 +207,16 @@ fn parse() -> Result<Cli, ExitCode> {
 }
 
 /// A file that reaches the limit of its size (`ulimit -f`) ends a program by a signal, in the middle of a run. Where
-/// the signal is taken the write fails instead, and the log knows how to go on from there.
+/// the signal is handled, the write fails instead, which the log survives.
 fn outlive_file_limits() {
-    // If it cannot be taken the signal ends the program as ever.
+    // Without a handler the signal ends the program, as by default.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// That this program was built without a window.
 const NO_WINDOW: &str =
-    "this palpate was built without its window; see 'palpate --help' for what it does without";
+    "this palpate was built without its window; 'palpate --help' lists the commands that need none";
 
-/// Runs what the arguments ask for; `windows` is what opens a window, if this program has one.
-#[must_use]
+/// Runs the command of the arguments; `windows` opens windows, if this program has any.
 pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
     outlive_file_limits();
     let cli = match parse() {
@@ -246,15 +246,15 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
     code
 }
 
-/// Adds what `--about` tells and checks that all of it can stand together.
-fn tell(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
+/// Adds the pairs of `--about` and checks that the labels are consistent.
+fn add_labels(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
     for pair in about {
         labels.tell_pair(pair).map_err(|err| Failure::usage(format!("--about: {err}")))?;
     }
     labels.check().map_err(Failure::usage)
 }
 
-/// A session that cannot be read: not being one, or being newer, is wrong use; damage is a failure.
+/// A session that cannot be read: another kind of folder or a newer format is wrong use, damage is a failure.
 fn read_failure(err: ReadError) -> Failure {
     match err {
         ReadError::Damaged { .. } => Failure::failed(format!("{err} with 'palpate recover'")),
@@ -263,13 +263,13 @@ fn read_failure(err: ReadError) -> Failure {
     }
 }
 
-/// Recordings that cannot be taken together: paths are the user's, folders and damage are not.
+/// Recordings that cannot be read together: a wrong path is wrong use, an unreadable folder or damage is a failure.
 fn sources_failure(err: SourcesError) -> Failure {
     match err {
         SourcesError::Folder { .. } => Failure::failed(err),
         SourcesError::Source { reason, .. } => source_failure(*reason),
         SourcesError::Rejected(_) => {
-            Failure::usage(format!("{err}; add --include-rejected to take them all the same"))
+            Failure::usage(format!("{err}; add --include-rejected to include them"))
         }
         SourcesError::Table(_) => {
             Failure::usage(format!("{err}; 'palpate import' makes one of a table"))
@@ -278,7 +278,7 @@ fn sources_failure(err: SourcesError) -> Failure {
     }
 }
 
-/// A fit that cannot be used: its file is the user's, what it was remembered as is not.
+/// A fit that cannot be used: a wrong file is wrong use, a changed record is a failure.
 fn known_fit_failure(err: KnownFitError) -> Failure {
     match err {
         KnownFitError::NotAFit { .. } => {
@@ -295,21 +295,21 @@ fn source_failure(err: SourceError) -> Failure {
     let with = |way_out: &str| Failure::Usage(format!("{err}; {way_out}"));
     match err {
         SourceError::Rejected { .. } => with(
-            "--include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict",
+            "--include-rejected of fit and select includes it, and 'palpate verdict' changes the verdict",
         ),
-        SourceError::Imported { .. } => with("'palpate info' tells what it holds"),
-        // The reader of tables says it in words only.
+        SourceError::Imported { .. } => with("'palpate info' shows its content"),
+        // The error of tables has no variant for it.
         SourceError::Table(_) if err.to_string().contains("no header") => {
             with("--columns names them")
         }
         SourceError::NoCycles => {
-            Failure::Failed(format!("{err}; 'palpate report' tells what happened in it"))
+            Failure::Failed(format!("{err}; 'palpate report' shows what happened in it"))
         }
         SourceError::Correction(CorrectionError::NoneInForce { .. }) => {
             with("'palpate compliance SESSION --save' does so")
         }
         SourceError::Session(err) => read_failure(err),
-        SourceError::Analysis(err) => recalibrate::failure(err),
+        SourceError::Analysis(err) => recalibrate::analysis_failure(err),
         SourceError::Table(_)
         | SourceError::TableAnalysis { .. }
         | SourceError::Correction(_)

@@ -1,15 +1,15 @@
-//! `palpate mask`: stretches of a session whose forces do not count, as an analysis beside it.
+//! `palpate mask`: excludes stretches of a session, as a named analysis.
 
 use super::Failure;
 use super::output::Output;
-use super::recalibrate::{Who, deed_failure};
+use super::recalibrate::{AuthorArgs, analysis_edit_failure};
 use clap::Args;
 use palpate_analysis::analyses;
 use palpate_analysis::progress::Unwatched;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Name stretches of a session whose forces do not count, as an analysis beside it
+/// Exclude stretches of a session from evaluation, as a named analysis
 #[derive(Debug, Args)]
 pub struct MaskArgs {
     /// Session folder
@@ -17,11 +17,11 @@ pub struct MaskArgs {
     /// Name of the analysis
     #[arg(long, value_name = "NAME")]
     name: String,
-    /// A stretch whose forces do not count, in s as in the column t_s of an export; may be repeated
+    /// A stretch to exclude, in s as in the column t_s of an export; may be repeated
     #[arg(long, required = true, value_name = "FROM..TO")]
     leave_out: Vec<Span>,
     #[command(flatten)]
-    who: Who,
+    author: AuthorArgs,
 }
 
 /// A stretch of time in s.
@@ -45,18 +45,15 @@ impl FromStr for Span {
 
 pub(super) fn run(args: &MaskArgs, output: &Output) -> Result<(), Failure> {
     let spans = args.leave_out.iter().map(|span| span.0).collect();
-    let (session, who) = (&args.session, args.who.who());
-    let masked = analyses::mask(session, &args.name, spans, &who, &Unwatched);
-    let masked = masked.map_err(deed_failure)?;
+    let (session, author) = (&args.session, args.author.author());
+    let masked = analyses::mask(session, &args.name, spans, &author, &Unwatched);
+    let masked = masked.map_err(analysis_edit_failure)?;
     let (left_out, of, name) = (masked.left_out, masked.of, &masked.analysis.name);
     let object = serde_json::json!({
-        "session": session, "analysis": name, "by": who.by, "left_out": left_out, "of": of,
+        "session": session, "analysis": name, "by": author.by, "left_out": left_out, "of": of,
     });
     output.answer("mask", &object, || {
-        format!(
-            "{}: {left_out} of {of} forces are left out by analysis '{name}'",
-            session.display()
-        )
+        format!("{}: analysis '{name}' excludes {left_out} of {of} forces", session.display())
     });
     Ok(())
 }

@@ -1,10 +1,10 @@
-//! Files that a command makes beside its answer: never over another, and looked into before hours of work.
+//! Files that a command writes: never over another file, and checked before hours of work.
 
 use super::Failure;
 use palpate_sessions::atomic;
 use std::path::Path;
 
-/// Refuses a file that exists, or whose folder does not. `what` it is, for the sentence.
+/// Refuses a file that exists, or whose folder does not. `what` names it in the message.
 pub(super) fn check(what: &str, to: Option<&Path>) -> Result<(), Failure> {
     let Some(to) = to else {
         return Ok(());
@@ -25,7 +25,7 @@ pub(super) fn check(what: &str, to: Option<&Path>) -> Result<(), Failure> {
     }
 }
 
-/// Writes the file if one was asked for.
+/// Writes the file if a path is given.
 pub(super) fn write(
     what: &str,
     to: Option<&Path>,
@@ -34,7 +34,7 @@ pub(super) fn write(
     to.map_or(Ok(()), |to| write_bytes(what, to, content().as_bytes()))
 }
 
-/// Writes a file that is no text.
+/// Writes a binary file.
 pub(super) fn write_bytes(what: &str, to: &Path, bytes: &[u8]) -> Result<(), Failure> {
     atomic::create(to, bytes).map_err(|err| {
         Failure::failed(format!(

@@ -1,32 +1,32 @@
-//! `palpate note`: remarks on sessions.
+//! `palpate note`: adds notes to sessions.
 
 use super::Failure;
 use super::output::Output;
-use super::review::{say_failure, subjects};
+use super::review::{read_subjects, session_edit_failure};
 use clap::Args;
 use palpate_analysis::edits::author;
 use palpate_sessions::edits::Change;
 use std::path::PathBuf;
 
-/// Remark on sessions, beside their logs
+/// Add a note to sessions; their logs stay unchanged
 #[derive(Debug, Args)]
 pub struct NoteArgs {
     /// Session folders
     #[arg(required = true, value_name = "SESSION")]
     sessions: Vec<PathBuf>,
-    /// What there is to say
+    /// Text of the note
     #[arg(long, value_name = "TEXT")]
     text: String,
-    /// Who says so; without it the login name
+    /// Author; without it the login name
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
 }
 
 pub(super) fn run(args: &NoteArgs, output: &Output) -> Result<(), Failure> {
     let by = author(args.by.as_deref());
-    for subject in subjects(&args.sessions)? {
-        let said = subject.say(&by, &args.text, Change::Note);
-        said.map_err(say_failure)?;
+    for subject in read_subjects(&args.sessions)? {
+        let edit = subject.say(&by, &args.text, Change::Note);
+        edit.map_err(session_edit_failure)?;
     }
     let text = args.text.trim();
     let object = serde_json::json!({ "by": by, "note": text, "sessions": args.sessions,

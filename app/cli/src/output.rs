@@ -1,13 +1,13 @@
-//! What a command prints: text for people or one JSON object for machines.
+//! Output of a command: text for people or one JSON object for machines.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use palpate_analysis::progress::Progress;
 use palpate_analysis::report::catalog::one_line;
 use serde::Serialize;
+use serde_json::Value;
 use std::io::Write;
 use std::ops::ControlFlow;
 
-/// Where results go.
 pub(super) struct Output {
     is_json: bool,
 }
@@ -37,7 +37,7 @@ impl Output {
         self.text_only(text);
     }
 
-    /// Prints what only machines read.
+    /// Prints an object, with `--json` only.
     pub fn object(&self, object: &impl Serialize) {
         if self.is_json {
             let line = serde_json::to_string(object)
@@ -46,19 +46,17 @@ impl Output {
         }
     }
 
-    /// Prints what only people read.
+    /// Prints text, without `--json` only.
     pub fn text_only(&self, text: impl FnOnce() -> String) {
         if !self.is_json {
             print(&harmless(&text()));
         }
     }
 
-    /// Prints a remark that is not the result.
     pub fn note(&self, text: &str) {
         let _ = writeln!(std::io::stderr(), "note: {}", one_line(text));
     }
 
-    /// Prints why the command failed.
     pub fn error(&self, sentence: &str, exit: u8) {
         let _ = writeln!(std::io::stderr(), "error: {}", harmless(sentence));
         if self.is_json {
@@ -67,19 +65,24 @@ impl Output {
         }
     }
 
-    /// A progress bar on the terminal; silent in JSON and where nobody watches.
+    /// A progress bar on the terminal; silent in JSON and without a terminal.
     pub fn bar(&self, length: u64) -> Bar {
         self.bar_like(length, "{bar:30} {percent:>3} %  {msg}")
     }
 
-    /// A progress bar that counts pieces of like size and tells the time left.
+    /// A progress bar that counts pieces of like size, with the time left.
     pub fn count_bar(&self, length: u64) -> Bar {
         self.bar_like(length, "{bar:30} {pos} of {len}  {eta} left  {msg}")
     }
 
-    /// A progress bar over one long piece of work that tells the time left.
+    /// A progress bar over one long piece of work, with the time left.
     pub fn share_bar(&self) -> Bar {
         self.bar_like(0, "{bar:30} {percent:>3} %  {eta} left  {msg}")
+    }
+
+    /// Runs work with a bar over its share.
+    pub fn with_share_bar<T>(&self, work: impl FnOnce(&Bar) -> T) -> T {
+        work(&self.share_bar())
     }
 
     fn bar_like(&self, length: u64, template: &str) -> Bar {
@@ -94,7 +97,17 @@ impl Output {
     }
 }
 
-/// A bar on the terminal that goes when it is dropped. Nobody ends the work that it watches.
+/// An object with the fields of another.
+pub(super) fn merged(mut object: Value, more: &impl Serialize) -> Value {
+    if let (Value::Object(fields), Ok(Value::Object(more))) =
+        (&mut object, serde_json::to_value(more))
+    {
+        fields.extend(more);
+    }
+    object
+}
+
+/// A bar on the terminal that disappears when it is dropped. It never cancels the work.
 pub(super) struct Bar(ProgressBar);
 
 impl std::ops::Deref for Bar {
@@ -120,8 +133,8 @@ impl Drop for Bar {
     }
 }
 
-/// A text of lines without anything that moves the cursor or gives the terminal an order: words of a session may hold
-/// whatever somebody typed.
+/// Lines without control characters, which could move the cursor or command the terminal: text of a session may hold
+/// anything.
 fn harmless(text: &str) -> String {
     let is_order = |letter: char| letter.is_control() && letter != '\n';
     text.replace(is_order, " ")

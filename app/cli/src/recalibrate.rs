@@ -1,18 +1,18 @@
-//! `palpate recalibrate`: forces made anew with another calibration, as an analysis beside a session.
+//! `palpate recalibrate`: recomputes forces with another calibration, as a named analysis.
 
 use super::Failure;
-use super::calibration::source::Source;
+use super::calibration::source::CalibrationSource;
 use super::output::Output;
 use clap::Args;
 use palpate_analysis::analysed::ForceChange;
 use palpate_analysis::analyses::{self, DeedFailure};
-use palpate_analysis::edits::author;
+use palpate_analysis::edits;
 use palpate_analysis::report::kept;
 use palpate_sessions::analyses::AnalysisError;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Make the forces of sessions anew from the raw signal with another calibration, as an analysis beside them
+/// Recompute forces of sessions from the raw signal with another calibration, as a named analysis
 #[derive(Debug, Args)]
 pub struct RecalibrateArgs {
     /// Session folders
@@ -25,24 +25,22 @@ pub struct RecalibrateArgs {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
     #[command(flatten)]
-    who: Who,
+    author: AuthorArgs,
 }
 
-/// Who makes an analysis, and why.
 #[derive(Debug, Args)]
-pub(super) struct Who {
-    /// Why, in a few words
+pub(super) struct AuthorArgs {
+    /// Reason, in a few words
     #[arg(long, value_name = "TEXT", default_value = "")]
     pub reason: String,
-    /// Who says so; without it the login name
+    /// Author; without it the login name
     #[arg(long, value_name = "NAME")]
     pub by: Option<String>,
 }
 
-impl Who {
-    /// As an analysis names them.
-    pub fn who(&self) -> analyses::Who {
-        analyses::Who { by: author(self.by.as_deref()), reason: self.reason.clone() }
+impl AuthorArgs {
+    pub fn author(&self) -> analyses::Who {
+        analyses::Who { by: edits::author(self.by.as_deref()), reason: self.reason.clone() }
     }
 }
 
@@ -54,16 +52,16 @@ struct Recalibrated {
 }
 
 pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure> {
-    let source = Source::find(&args.calibration)?;
-    let own = source.id.as_ref().unwrap_or(&source.calibration.name);
-    let name = args.name.clone().unwrap_or_else(|| format!("recalibrated {own}"));
-    let who = args.who.who();
+    let source = CalibrationSource::find(&args.calibration)?;
+    let label = source.id.as_ref().unwrap_or(&source.calibration.name);
+    let name = args.name.clone().unwrap_or_else(|| format!("recalibrated {label}"));
+    let author = args.author.author();
     let bar = output.count_bar(args.sessions.len() as u64);
     let mut done = Vec::new();
     for session in &args.sessions {
         bar.set_message(session.display().to_string());
-        let made = analyses::recalibrate(session, &name, &source.calibration, &who);
-        let made = made.map_err(deed_failure)?;
+        let made = analyses::recalibrate(session, &name, &source.calibration, &author);
+        let made = made.map_err(analysis_edit_failure)?;
         for doubt in source.doubts(&made.rig) {
             bar.suspend(|| output.note(&format!("{}: {doubt}", session.display())));
         }
@@ -73,7 +71,7 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
     drop(bar);
     let object = serde_json::json!({
         "analysis": name, "calibration": source.calibration.name, "calibration_id": source.id,
-        "by": who.by, "sessions": done,
+        "by": author.by, "sessions": done,
     });
     output.answer("recalibrate", &object, || {
         let line = |one: &Recalibrated| {
@@ -81,18 +79,17 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
         };
         let mut lines: Vec<String> = done.iter().map(line).collect();
         lines.push(format!(
-            "kept as analysis '{name}'; read with --analysis '{name}' of fit and export"
+            "saved as analysis '{name}'; fit and export read it with --analysis '{name}'"
         ));
         lines.join("\n")
     });
     Ok(())
 }
 
-/// What could not be written beside a session.
-pub(super) fn deed_failure(err: DeedFailure) -> Failure {
+pub(super) fn analysis_edit_failure(err: DeedFailure) -> Failure {
     match err {
         DeedFailure::Source(err) => super::source_failure(err),
-        DeedFailure::Say(err) => super::review::say_failure(err),
+        DeedFailure::Say(err) => super::review::session_edit_failure(err),
         DeedFailure::Calibration(err) => super::calibration::source::failure(err),
         DeedFailure::NothingLeftOut => {
             Failure::usage(format!("{err}; see t_s of 'palpate export'"))
@@ -105,8 +102,8 @@ pub(super) fn deed_failure(err: DeedFailure) -> Failure {
     }
 }
 
-/// An analysis that cannot be had: names are the user's, files are not.
-pub(super) fn failure(err: AnalysisError) -> Failure {
+/// A wrong name of an analysis is wrong use, an unreadable file is a failure.
+pub(super) fn analysis_failure(err: AnalysisError) -> Failure {
     match err {
         AnalysisError::None { .. } => {
             Failure::usage(format!("{err}; 'palpate info' shows those there are"))

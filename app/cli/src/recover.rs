@@ -1,18 +1,19 @@
-//! `palpate recover`: what can be kept of sessions that were interrupted or damaged.
+//! `palpate recover`: recovers the intact part of interrupted or damaged sessions.
 
 use super::Failure;
-use super::doctor::each;
+use super::doctor::for_each;
 use super::output::Output;
 use clap::Args;
 use palpate_runner::wall_now;
 use palpate_sessions::library_folder;
 use palpate_sessions::recover::{Missing, RecoverError, examine_library, recover, recover_library};
 use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Keep what is whole of interrupted or damaged sessions, beside the originals
+/// Recover the intact part of interrupted or damaged sessions; the originals stay
 #[derive(Debug, Args)]
 pub struct RecoverArgs {
     /// Session folders; without any, every unfinished session of the library
@@ -31,54 +32,41 @@ struct Recovered {
     sentences: Vec<String>,
 }
 
-/// A session that was not recovered.
-#[derive(Serialize)]
-struct NotRecovered {
-    session: PathBuf,
-    error: String,
-    exit: u8,
-}
-
-#[derive(Serialize)]
-struct Recoveries {
-    sessions: Vec<Recovered>,
-    not_recovered: Vec<NotRecovered>,
-}
-
 pub(super) fn run(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
     let paths = if args.sessions.is_empty() {
         unfinished(&library_folder().map_err(Failure::usage)?)?
     } else {
         args.sessions.clone()
     };
-    let mut recoveries = Recoveries { sessions: Vec::new(), not_recovered: Vec::new() };
-    let mut lines = Vec::new();
-    for (path, outcome) in paths.iter().zip(each(&paths, output, one)) {
+    let (mut recovered, mut failed, mut lines) = (Vec::new(), Vec::new(), Vec::new());
+    for (path, outcome) in paths.iter().zip(for_each(&paths, output, recover_one)) {
         match outcome {
             Ok(one) => {
                 lines.extend(one.sentences.iter().cloned());
-                recoveries.sessions.push(one);
+                recovered.push(one);
             }
-            // With one session there is nothing to go on with, and the error is the answer.
+            // The error of a single session is the answer.
             Err(failure) if paths.len() == 1 => return Err(failure),
             Err(failure) => {
                 lines.push(format!("not recovered: {}", failure.sentence()));
-                recoveries.not_recovered.push(NotRecovered {
-                    session: path.clone(),
-                    error: failure.sentence().into(),
-                    exit: failure.code(),
-                });
+                failed.push((path, failure));
             }
         }
     }
-    output.answer("recover", &recoveries, || match lines.is_empty() {
+    let not_recovered = failed.iter().map(|(path, failure)| {
+        json!({
+            "session": path.display().to_string(), "error": failure.sentence(), "exit": failure.code(),
+        })
+    });
+    let object =
+        json!({ "sessions": recovered, "not_recovered": not_recovered.collect::<Vec<_>>() });
+    output.answer("recover", &object, || match lines.is_empty() {
         true => "nothing to recover".into(),
         false => lines.join("\n"),
     });
-    let failed = &recoveries.not_recovered;
     let sentence = || format!("{} of {} were not recovered", failed.len(), paths.len());
     // A failure weighs more than wrong use.
-    match failed.iter().map(|one| one.exit).min() {
+    match failed.iter().map(|(_, failure)| failure.code()).min() {
         None => Ok(()),
         Some(1) => Err(Failure::failed(sentence())),
         Some(_) => Err(Failure::usage(sentence())),
@@ -91,7 +79,7 @@ fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     })
 }
 
-fn one(path: &Path) -> Result<Recovered, Failure> {
+fn recover_one(path: &Path) -> Result<Recovered, Failure> {
     let recovery = recover(path, VERSION, wall_now().into()).map_err(|err| match err {
         RecoverError::Read(err) => super::read_failure(err),
         RecoverError::Whole { .. }
@@ -111,8 +99,8 @@ fn one(path: &Path) -> Result<Recovered, Failure> {
     })
 }
 
-/// Recovers what a crash left unfinished in a library, and says so; what fails is only told.
+/// Recovers the unfinished sessions of a library and notes each; a failure is only noted.
 pub(super) fn recover_unfinished(library: &Path, output: &Output) {
-    let told = recover_library(library, VERSION, wall_now().into());
-    told.iter().for_each(|line| output.note(line));
+    let sentences = recover_library(library, VERSION, wall_now().into());
+    sentences.iter().for_each(|line| output.note(line));
 }

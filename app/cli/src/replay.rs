@@ -1,4 +1,4 @@
-//! `palpate replay`: recorded sessions through the same engine again.
+//! `palpate replay`: replays recorded sessions through the engine.
 
 use super::Failure;
 use super::output::Output;
@@ -12,13 +12,13 @@ use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Feed recorded sessions to the engine again and compare
+/// Replay recorded sessions through the engine and compare
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
     /// Session folders
     #[arg(required = true)]
     sessions: Vec<PathBuf>,
-    /// Fail also where a session is not whole, so that what tests rely on cannot rot unseen
+    /// Fail also where a session is incomplete
     #[arg(long)]
     check: bool,
     /// Show one session in a window, as it was at any moment
@@ -34,12 +34,6 @@ struct Replayed {
     session: PathBuf,
     #[serde(flatten)]
     report: ReplayReport,
-}
-
-#[derive(Serialize)]
-struct Replays {
-    sessions: Vec<Replayed>,
-    differing: usize,
 }
 
 pub(super) fn run(
@@ -60,14 +54,12 @@ pub(super) fn run(
     }
     drop(bar);
     let differing = sessions.iter().filter(|one| one.report.first_difference.is_some()).count();
-    let replays = Replays { sessions, differing };
-    output.answer("replay", &replays, || {
-        replays.sessions.iter().map(text).collect::<Vec<_>>().join("\n")
-    });
+    let object = serde_json::json!({ "sessions": sessions, "differing": differing });
+    output.answer("replay", &object, || sessions.iter().map(text).collect::<Vec<_>>().join("\n"));
     if differing > 0 {
         return Err(Failure::failed(format!(
             "{differing} of {} sessions differ from what the engine decides now",
-            replays.sessions.len()
+            sessions.len()
         )));
     }
     Ok(())
@@ -120,7 +112,7 @@ fn text(replayed: &Replayed) -> String {
     let name = replayed.session.display();
     if let Some(difference) = &report.first_difference {
         let (mut recorded, mut now) = (difference.recorded_words(), difference.now_words());
-        // Words round; what differs in a digit they leave out is shown as it stands.
+        // Words round numbers; a difference in a later digit is shown unrounded.
         if recorded == now {
             (recorded, now) = (difference.recorded.to_string(), difference.now.to_string());
         }

@@ -1,14 +1,14 @@
-//! `palpate review`: that somebody looked at a session, and what was decided.
+//! `palpate review`: records a reviewer's decision about a session.
 
 use super::Failure;
 use super::output::Output;
-use super::verdict::Why;
+use super::verdict::ReasonArgs;
 use clap::Args;
 use palpate_analysis::edits::{SayFailure, Subject};
 use palpate_sessions::edits::{Change, Decision, EditError};
 use std::path::PathBuf;
 
-/// Say that you looked at a session and what you decided, with hashes of what was seen
+/// Record your decision about a session, with hashes of the files you saw
 #[derive(Debug, Args)]
 pub struct ReviewArgs {
     /// Session folder
@@ -16,19 +16,19 @@ pub struct ReviewArgs {
     #[command(flatten)]
     decision: DecisionArgs,
     #[command(flatten)]
-    why: Why,
+    reason: ReasonArgs,
 }
 
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct DecisionArgs {
-    /// It stands, with its analyses
+    /// Accept the session with its analyses
     #[arg(long)]
     accept: bool,
-    /// It does not stand
+    /// Reject the session
     #[arg(long)]
     reject: bool,
-    /// It is to be done again
+    /// Ask for a repeat
     #[arg(long)]
     repeat: bool,
 }
@@ -43,7 +43,7 @@ impl DecisionArgs {
     }
 }
 
-/// What is wrong with an edit: the user's words are, the disk's state is not.
+/// Wrong words in an edit are wrong use, an unreadable journal is a failure.
 pub(super) fn edit_failure(err: EditError) -> Failure {
     match err {
         EditError::Chain(_) => Failure::failed(err),
@@ -51,7 +51,7 @@ pub(super) fn edit_failure(err: EditError) -> Failure {
     }
 }
 
-pub(super) fn say_failure(err: SayFailure) -> Failure {
+pub(super) fn session_edit_failure(err: SayFailure) -> Failure {
     match err {
         SayFailure::Read(err) => super::read_failure(err),
         SayFailure::Analyses(err) => super::source_failure(err.into()),
@@ -59,18 +59,18 @@ pub(super) fn say_failure(err: SayFailure) -> Failure {
     }
 }
 
-/// All are looked at before any is changed.
-pub(super) fn subjects(sessions: &[PathBuf]) -> Result<Vec<Subject>, Failure> {
-    let read = |path: &PathBuf| Subject::read(path).map_err(say_failure);
+/// Reads all before any is changed.
+pub(super) fn read_subjects(sessions: &[PathBuf]) -> Result<Vec<Subject>, Failure> {
+    let read = |path: &PathBuf| Subject::read(path).map_err(session_edit_failure);
     sessions.iter().map(read).collect()
 }
 
 pub(super) fn run(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
-    let subject = Subject::read(&args.session).map_err(say_failure)?;
+    let subject = Subject::read(&args.session).map_err(session_edit_failure)?;
     let decision = args.decision.decision();
-    let change = subject.review(decision).map_err(say_failure)?;
-    let who = args.why.who();
-    let edit = subject.say(&who.by, &who.reason, change).map_err(say_failure)?;
+    let change = subject.review(decision).map_err(session_edit_failure)?;
+    let author = args.reason.author();
+    let edit = subject.say(&author.by, &author.reason, change).map_err(session_edit_failure)?;
     let Change::Review { seen, .. } = &edit.change else {
         return Ok(());
     };

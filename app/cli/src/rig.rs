@@ -1,8 +1,8 @@
-//! Which rig, at which pace: shared by every command that needs one.
+//! The rig and its pace, shared by all commands that need one.
 
 use super::Failure;
-use super::calibration::source::Source;
-use clap::Args;
+use super::calibration::source::CalibrationSource;
+use clap::{Args, Parser};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
     SimBath, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile, SimRate,
@@ -20,50 +20,33 @@ pub struct BenchArgs {
     /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
     #[arg(long, default_value = "lab")]
     pub profile: SimProfile,
-    /// Simulated rig: its randomness; the same seed gives the same run
+    /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
+    /// Simulated rig: largest loss of elastic force after deeper loading, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
     /// Simulated rig: white noise of the ideal load cell, rms, in mN
     #[arg(long, default_value = "20", value_name = "MN")]
     pub noise: SimNoise,
-    /// Simulated rig: stiffness of the tissue, in percent of the usual
+    /// Simulated rig: stiffness of the tissue, in percent of the default
     #[arg(long, default_value = "100", value_name = "PERCENT")]
     pub stiffness: SimStiffness,
-    /// Simulated rig: from the surface of its specimen to a stiff base behind it, in mm
+    /// Simulated rig: thickness of the specimen on its stiff base, in mm
     #[arg(long, default_value = "100", value_name = "MM")]
     pub thickness: SimThickness,
-    /// Simulated rig: how far the rig itself gives way, in um/N
+    /// Simulated rig: machine compliance, in um/N
     #[arg(long, default_value = "0", value_name = "UM_PER_N")]
     pub compliance: SimCompliance,
-    /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
+    /// Simulated rig: shift of the tissue's surface by repeated loading, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
-    /// Simulated rig: what its bath is heated to from 21 °C, in °C; 0 for none
+    /// Simulated rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
     #[arg(long, default_value = "0", value_name = "CELSIUS")]
     pub bath: SimBath,
     /// Simulated rig: when its digital input 1 goes high, in s; 0 for none
     #[arg(long, default_value = "0", value_name = "SECONDS")]
     pub input: SimInput,
-}
-
-impl Default for BenchArgs {
-    fn default() -> Self {
-        Self {
-            profile: SimProfile::Lab,
-            seed: 1,
-            softening: SimSoftening::default(),
-            noise: SimNoise::default(),
-            stiffness: SimStiffness::default(),
-            thickness: SimThickness::default(),
-            compliance: SimCompliance::default(),
-            preconditioning: SimPreconditioning::default(),
-            bath: SimBath::default(),
-            input: SimInput::default(),
-        }
-    }
 }
 
 impl BenchArgs {
@@ -85,7 +68,6 @@ impl BenchArgs {
     }
 }
 
-/// The rig to use.
 #[derive(Clone, Debug, Args)]
 pub struct RigArgs {
     /// Rig: sim, sim:NAME for a simulated rig that only one program may hold, or a rig file, NAME.toml
@@ -99,7 +81,7 @@ pub struct RigArgs {
     /// Simulated rig: samples a second, 1000 to 20000
     #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
     pub rate: SimRate,
-    /// Furthest position from home, in mm: a little before the base, so that no search meets it
+    /// Furthest position from home, in mm; set it a little before the base, so that no search meets it
     #[arg(long, value_name = "MM")]
     pub travel_max: Option<f64>,
     /// Read forces with this calibration: a name or id of the library, or a file
@@ -111,16 +93,14 @@ pub struct RigArgs {
 }
 
 impl Default for RigArgs {
+    /// The values of a command line without arguments.
     fn default() -> Self {
-        Self {
-            rig: "sim".into(),
-            bench: BenchArgs::default(),
-            clock: SimClock::Nominal,
-            rate: SimRate::default(),
-            travel_max: None,
-            calibration: None,
-            time_scale: TimeScale::Factor(1.0),
+        #[derive(Parser)]
+        struct Defaults {
+            #[command(flatten)]
+            rig: RigArgs,
         }
+        Defaults::parse_from(["palpate"]).rig
     }
 }
 
@@ -131,21 +111,20 @@ impl RigArgs {
     }
 }
 
-/// A rig that is ours, with what is known about its cell.
+/// An open rig with the calibration of its load cell.
 pub struct OpenRig {
-    /// The rig.
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
-    /// What speaks against that calibration, one sentence each.
+    /// Reasons to doubt that calibration, one sentence each.
     pub doubts: Vec<String>,
     /// Interlock thresholds.
     pub limits: Limits,
-    /// Keep other programs off a rig that has a name of its own.
+    /// Lock a named rig against other programs.
     pub _locks: Vec<HolderLock>,
 }
 
-/// Opens the rig, or says who holds it.
+/// Opens the rig; another program that holds it is named in the error.
 pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     let settings = args.settings();
     if palpate_drivers::is_rig_file(&args.rig) {
@@ -162,7 +141,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     let (calibration, doubts) = match &args.calibration {
         None => (palpate_drivers::sim::calibration(settings.profile), Vec::new()),
         Some(name) => {
-            let source = Source::find(name)?;
+            let source = CalibrationSource::find(name)?;
             let doubts = source.doubts(&rig.description().name);
             (source.calibration, doubts)
         }
@@ -175,8 +154,8 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     if args.time_scale != TimeScale::Factor(1.0) {
         return Err(Failure::usage("--time-scale is for simulated rigs; leave it out"));
     }
-    // A wrong name is told before anything is opened.
-    let source = args.calibration.as_deref().map(Source::find).transpose()?;
+    // A wrong name is refused before anything is opened.
+    let source = args.calibration.as_deref().map(CalibrationSource::find).transpose()?;
     let (rig, locks) = open_rig_file(&args.rig)?;
     let description = rig.description();
     let mut limits = Limits::for_travel(travel(args, description.travel)?);
@@ -200,7 +179,7 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         }
         (None, ..) => {
             return Err(Failure::usage(format!(
-                "which calibration has the load cell of {}? Give --calibration NAME or FILE",
+                "the load cell of {} has no calibration; give --calibration NAME or FILE",
                 args.rig
             )));
         }
@@ -208,7 +187,7 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     Ok(OpenRig { rig, calibration, doubts, limits, _locks: locks })
 }
 
-/// Opens the rig of a file and keeps other programs off it.
+/// Opens the rig of a file and locks it against other programs.
 pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, Vec<HolderLock>), Failure> {
     let file = palpate_drivers::read_rig_file(file_name).map_err(Failure::usage)?;
     // Two programs may be connected to one controller on a network; only one may drive it.

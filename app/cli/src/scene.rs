@@ -1,9 +1,9 @@
-//! `palpate scene`: a piece of tissue that is seen and felt, without a window.
+//! `palpate scene`: a visual and haptic piece of tissue, without a window.
 
 use super::Failure;
+use super::arguments::{above_zero, parse_number};
 use super::new_file;
 use super::output::Output;
-use super::run::number;
 use super::trade::with_bar;
 use clap::{Args, Subcommand};
 use palpate_analysis::progress::Progress;
@@ -21,29 +21,29 @@ use std::path::{Path, PathBuf};
 /// See and feel a piece of tissue: run a scene, record it, compute a recording again
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
-    /// Run a scene in real time with a hand on a path, and tell how its loop kept its time
-    Run(RunArgs),
+    /// Run a scene in real time with a hand on a path, and report the timing of its loop
+    Run(SceneRunArgs),
     /// Run a scene and record every tick in a new folder
-    Record(RecordArgs),
+    Record(SceneRecordArgs),
     /// Measure what exactness costs on this computer, and plan a scene from its tolerances
-    Bench(BenchArgs),
+    Bench(SceneBenchArgs),
     /// Compute every tick of a recording again and compare bit for bit
-    Replay(ReplayArgs),
-    /// Print a scene file whole, with everything that it leaves to its usual value; without a file, the built-in scene
-    Show(ShowArgs),
+    Replay(RecordingReplayArgs),
+    /// Print a scene file with all defaults filled in; without a file, the built-in scene
+    Show(SceneShowArgs),
 }
 
 /// Arguments of `palpate scene run`.
 #[derive(Debug, Args)]
-pub struct RunArgs {
-    /// A scene file; without one the built-in scene of the source thesis's body
+pub struct SceneRunArgs {
+    /// A scene file; without one the built-in scene with the model of the source thesis
     #[arg(value_name = "SCENE.toml")]
     file: Option<PathBuf>,
     /// What the hand does: poke, press, drag or taps
     #[arg(long, default_value = "poke", value_parser = path, value_name = "PATH")]
     path: ScenePath,
-    /// For how long, in s, the path gone again and again; without it once
-    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    /// Duration in s, with the path repeated; without it once
+    #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: Option<f64>,
 }
 
@@ -53,9 +53,9 @@ fn path(name: &str) -> Result<ScenePath, String> {
 
 /// Arguments of `palpate scene record`.
 #[derive(Debug, Args)]
-pub struct RecordArgs {
+pub struct SceneRecordArgs {
     #[command(flatten)]
-    run: RunArgs,
+    run: SceneRunArgs,
     /// The folder to make
     #[arg(long, value_name = "DIR")]
     to: PathBuf,
@@ -63,7 +63,7 @@ pub struct RecordArgs {
 
 /// Arguments of `palpate scene bench`.
 #[derive(Debug, Args)]
-pub struct BenchArgs {
+pub struct SceneBenchArgs {
     /// A scene file, whose tolerances are planned for; without one those of the built-in scene
     #[arg(value_name = "SCENE.toml")]
     file: Option<PathBuf>,
@@ -74,7 +74,7 @@ pub struct BenchArgs {
 
 /// Arguments of `palpate scene replay` and `palpate haptics replay`.
 #[derive(Debug, Args)]
-pub struct ReplayArgs {
+pub struct RecordingReplayArgs {
     /// The folder of a recording
     #[arg(value_name = "DIR")]
     pub(super) folder: PathBuf,
@@ -85,7 +85,7 @@ pub struct ReplayArgs {
 
 /// Arguments of `palpate scene show`.
 #[derive(Debug, Args)]
-pub struct ShowArgs {
+pub struct SceneShowArgs {
     /// A scene file
     #[arg(value_name = "SCENE.toml")]
     file: Option<PathBuf>,
@@ -99,10 +99,10 @@ struct PlayedOutput<'a> {
     planned_again: Option<&'a ScenePlan>,
 }
 
-/// Nodes along a side with which a scene is tried whose mesh is to be planned: all else is the same on any mesh.
+/// Nodes along a side for the check of a scene whose mesh is still to be planned; the check is the same on any mesh.
 const COARSEST: usize = 3;
 
-/// Longest run asked for, in s: a day.
+/// A day, in s.
 const SECONDS_MAX: f64 = 86_400.0;
 
 pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure> {
@@ -113,7 +113,7 @@ pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure
             run_scene("scene-record", &args.run, Some(&args.to), output)
         }
         SceneCommand::Bench(args) => run_bench(args, output),
-        SceneCommand::Replay(args) => run_replay(args, output),
+        SceneCommand::Replay(args) => report_replay("scene-replay", args, replay, output),
         SceneCommand::Show(args) => {
             let file = read(args.file.as_deref(), output)?.text();
             let found = serde_json::json!({ "file": file });
@@ -131,23 +131,19 @@ fn read(file: Option<&Path>, output: &Output) -> Result<SceneFile, Failure> {
 
 fn run_scene(
     command: &'static str,
-    args: &RunArgs,
+    args: &SceneRunArgs,
     record: Option<&Path>,
     output: &Output,
 ) -> Result<(), Failure> {
     let laps = match args.seconds {
         None => 1,
-        Some(seconds) if seconds > 0.0 && seconds <= SECONDS_MAX => {
-            (seconds / args.path.seconds()).ceil() as u32
-        }
         Some(seconds) => {
-            return Err(Failure::usage(format!(
-                "--seconds {seconds} is not possible; give a number above 0 and up to {SECONDS_MAX}"
-            )));
+            let seconds = above_zero("seconds", seconds, SECONDS_MAX, "s")?;
+            (seconds / args.path.seconds()).ceil() as u32
         }
     };
     let mut file = read(args.file.as_deref(), output)?;
-    // What cannot be is told before anything is measured, or made on disk.
+    // An impossible scene is refused before anything is measured or written.
     file.scene(COARSEST).map_err(Failure::usage)?;
     let mut after = None;
     if file.nodes.is_none() {
@@ -156,12 +152,13 @@ fn run_scene(
         file = made_after(&file, &plan);
         after = Some((curves, plan));
     }
-    let bar = output.share_bar();
-    let played = play(&file, (args.path, laps), record, &mut |share| {
-        bar.share(share, "");
-    });
-    drop(bar);
-    let played = played.map_err(Failure::failed)?;
+    let played = output
+        .with_share_bar(|bar| {
+            play(&file, (args.path, laps), record, &mut |share| {
+                bar.share(share, "");
+            })
+        })
+        .map_err(Failure::failed)?;
     let plan = after.as_ref().map(|(_, plan)| plan);
     let again = after.as_ref().filter(|_| !played.is_within_budget);
     let again = again.map(|(curves, plan)| {
@@ -187,7 +184,7 @@ fn run_scene(
     Ok(())
 }
 
-fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
+fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {
     let file = read(args.file.as_deref(), output)?;
     let extent = match args.full {
         true => Extent::Full,
@@ -198,20 +195,16 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
-    let bar = output.share_bar();
-    let replayed = replay(&args.folder, &mut |share| bar.share(share, ""));
-    drop(bar);
-    told("scene-replay", replayed, output)
-}
-
-/// Tells what a recording gave; one that is not as recorded is a failure.
-pub(super) fn told(
+/// Replays a recording and prints the result; a difference is a failure.
+pub(super) fn report_replay(
     command: &str,
-    replayed: Result<Replayed, String>,
+    args: &RecordingReplayArgs,
+    replay: impl FnOnce(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let replayed = replayed.map_err(Failure::usage)?;
+    let replayed = output
+        .with_share_bar(|bar| replay(&args.folder, &mut |share| bar.share(share, "")))
+        .map_err(Failure::usage)?;
     output.answer(command, &replayed, || replayed.words());
-    replayed.failure().map_or(Ok(()), |why| Err(Failure::failed(why)))
+    replayed.failure().map_or(Ok(()), |reason| Err(Failure::failed(reason)))
 }

@@ -1,5 +1,6 @@
 //! `palpate select`: model families compared on sessions and tables.
 
+use super::arguments::parse_columns;
 use super::new_file;
 use super::output::Output;
 use super::{Failure, sources_failure};
@@ -12,14 +13,14 @@ use palpate_rheology::families::by_key;
 use palpate_rheology::select::{SelectError, SelectOptions};
 use std::path::PathBuf;
 
-/// Compare model families and recommend the cheapest that will do
+/// Compare model families and recommend the cheapest adequate one
 #[derive(Debug, Args)]
 pub struct SelectArgs {
     /// Session folders, delimited tables with columns for time, depth and force, or folders of them;
-    /// all are taken for presses of one body
+    /// all are taken as presses on one material
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Error of force that does not matter: newtons (0.05N), percent of the peak force (1%) or
+    /// Negligible error of force: newtons (0.05N), percent of the peak force (1%) or
     /// percent of what a hand notices (10%jnd)
     #[arg(long, value_name = "ERROR")]
     tolerance: Option<String>,
@@ -27,7 +28,7 @@ pub struct SelectArgs {
     /// speed, depth, specimen or none
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     hold_out: String,
-    /// The specimen of each source in turn, as in S1,S1,S2; without it what sessions say of themselves
+    /// The specimen of each source in turn, as in S1,S1,S2; without it as the sessions state
     #[arg(long, value_name = "NAMES")]
     specimens: Option<String>,
     /// Families to compare, as in kelvin,series-3,prony-2; all without it
@@ -36,10 +37,10 @@ pub struct SelectArgs {
     /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
-    /// Compare the way back too, where it was recorded
+    /// Compare unloading too, where it was recorded
     #[arg(long)]
     unload: bool,
-    /// Take sessions though they were rejected
+    /// Include rejected sessions
     #[arg(long)]
     include_rejected: bool,
     /// Draw error over cost as a new SVG file
@@ -48,11 +49,10 @@ pub struct SelectArgs {
 }
 
 pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
-    let columns = args.columns.as_deref().map(str::parse).transpose();
     let names = args.specimens.as_ref();
     let request = SelectRequest {
         paths: args.sources.clone(),
-        columns: columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?,
+        columns: parse_columns(args.columns.as_deref())?,
         wanted: Wanted {
             stretch: Stretch::with_unload(args.unload),
             is_rejected_included: args.include_rejected,

@@ -1,8 +1,9 @@
 //! `palpate haptics slave`: a simulated master leads the slave of a rig, through the runner like any run.
 
+use super::arguments::{above_zero, parse_number};
 use super::haptics::body;
 use super::output::Output;
-use super::run::{HowArgs, Led, carry_out, labels, number};
+use super::run::{RunLeader, SessionArgs, labels, run_plan};
 use super::{Failure, recover, rig};
 use clap::Args;
 use palpate_analysis::haptics::Setting;
@@ -22,24 +23,24 @@ const SECONDS_MAX: f64 = 3600.0;
 /// Arguments of `palpate haptics slave`.
 #[derive(Debug, Args)]
 pub struct SlaveArgs {
-    /// A session or a table, whose fit is felt, or 'thesis' for the body of the source thesis
+    /// A session or table to fit, or 'thesis' for the model of the source thesis
     #[arg(value_name = "SESSION|thesis")]
     source: PathBuf,
-    /// How long the slave follows, in s
-    #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    /// Duration in s
+    #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: f64,
-    /// How deep the hand wants to go and the slave may, in mm
-    #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
+    /// Target depth of the hand and limit of the slave, in mm
+    #[arg(long, default_value_t = 10.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM")]
     depth: f64,
     /// Fastest speed of the hand, which presses in and out, in mm/s; moves of the slave go at up to three times that
-    #[arg(long, default_value_t = 2.0, value_parser = number, allow_negative_numbers = true, value_name = "MM_PER_S")]
+    #[arg(long, default_value_t = 2.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM_PER_S")]
     speed: f64,
     #[command(flatten)]
-    how: HowArgs,
+    session: SessionArgs,
 }
 
 impl SlaveArgs {
-    /// The hand's way: from the surface to the depth and back, again and again, at this speed half way.
+    /// Path of the hand: from the surface to the depth and back, repeated; `speed` is reached half way.
     fn hand(&self) -> Hand {
         let half = 0.5 * self.depth;
         Hand::firm(HandPath::Sine {
@@ -49,19 +50,11 @@ impl SlaveArgs {
         })
     }
 
-    /// Refuses what no hand and no rig can do.
     fn check(&self, speed_max: MmPerS) -> Result<(), Failure> {
-        let wanted = [
-            ("seconds", self.seconds, SECONDS_MAX, "s"),
-            ("depth", self.depth, Setting::DEPTH_MAX, "mm"),
-            ("speed", self.speed, speed_max.0, "mm/s"),
-        ];
-        let bad = wanted.into_iter().find(|(_, value, most, _)| !(*value > 0.0 && value <= most));
-        bad.map_or(Ok(()), |(name, value, most, unit)| {
-            Err(Failure::usage(format!(
-                "--{name} {value} is not possible; give a number above 0 and up to {most} {unit}"
-            )))
-        })
+        above_zero("seconds", self.seconds, SECONDS_MAX, "s")?;
+        above_zero("depth", self.depth, Setting::DEPTH_MAX, "mm")?;
+        above_zero("speed", self.speed, speed_max.0, "mm/s")?;
+        Ok(())
     }
 }
 
@@ -69,7 +62,7 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     if let Ok(library) = library_folder() {
         recover::recover_unfinished(&library, output);
     }
-    let bench = rig::open(&args.how.rig)?;
+    let bench = rig::open(&args.session.rig)?;
     let description = bench.rig.description().clone();
     args.check(description.speed_max)?;
     let depth_max = Depth(args.depth);
@@ -86,19 +79,19 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
         rig: description,
     });
     let slave = Arc::new(Mutex::new(leader.map_err(Failure::usage)?));
-    let labels = labels(&args.how)?;
+    let labels = labels(&args.session)?;
     let leading = Arc::clone(&slave);
-    let led = Led {
+    let run_leader = RunLeader {
         command: "haptics-slave",
         leader: slave,
         report: Box::new(move |output| {
             let leader = leading.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(reason) = leader.failure() {
-                output.note(&format!("nothing led the slave: {reason}"));
+                output.note(&format!("the master did not lead the slave: {reason}"));
             }
             let slaved = leader.slaved()?;
             Some((serde_json::to_value(&slaved).ok()?, slave_text(&slaved)))
         }),
     };
-    carry_out(follow.plan(), bench, &args.how, labels, Some(led), output)
+    run_plan(follow.plan(), bench, &args.session, labels, Some(run_leader), output)
 }

@@ -1,39 +1,32 @@
-//! `palpate support-bundle`: one file for whoever helps from afar.
+//! `palpate support-bundle`: one file for support.
 
 use super::Failure;
 use super::output::Output;
 use chrono::{DateTime, Utc};
 use clap::Args;
 use palpate_analysis::opening::Windows;
-use palpate_analysis::support_bundle::{BundleError, BundleRequest, Bundled, make_bundle};
+use palpate_analysis::support_bundle::{BundleError, BundleRequest, make_bundle};
 use palpate_runner::wall_now;
 use palpate_sessions::library_folder;
-use serde::Serialize;
 use std::path::PathBuf;
 
-/// Make one file for whoever helps: log, versions, settings, state of the sessions; nothing measured unless asked
+/// Make one file for support: log, versions, settings, state of the sessions; measured data only on request
 #[derive(Debug, Args)]
 pub struct SupportBundleArgs {
     /// The file to make; palpate-support-TIME.zip in this folder if none is given
     out: Option<PathBuf>,
-    /// A rig file to put in, without passwords and tokens
+    /// A rig file to include, without passwords and tokens
     #[arg(long, value_name = "FILE")]
     rig: Vec<PathBuf>,
-    /// Put in what the library's sessions say about themselves: operator, specimen, rig, plan
+    /// Include manifests of the library's sessions: operator, specimen, rig, plan
     #[arg(long)]
     with_manifests: bool,
-    /// Put in a session with all that was measured
+    /// Include a session with all measured data
     #[arg(long, value_name = "SESSION")]
     with_session: Vec<PathBuf>,
 }
 
-#[derive(Serialize)]
-struct BundleReport {
-    file: PathBuf,
-    files: Vec<Bundled>,
-}
-
-/// The parts that this program was built with.
+/// The features of this build.
 fn features(has_window: bool) -> Vec<&'static str> {
     let parts = [
         ("window", has_window),
@@ -69,11 +62,12 @@ pub(super) fn run(
         BundleError::Write { .. } => Failure::failed(err),
         BundleError::Read { .. } | BundleError::Session(_) => Failure::usage(err),
     })?;
-    let made = BundleReport { file: request.to, files };
-    output.answer("support-bundle", &made, || {
+    let file = request.to.display().to_string();
+    let object = serde_json::json!({ "file": file, "files": files });
+    output.answer("support-bundle", &object, || {
         let lines =
-            made.files.iter().map(|one| format!("{}: {}, {} bytes", one.name, one.what, one.bytes));
-        let end = format!("{} holds these {} files", made.file.display(), made.files.len());
+            files.iter().map(|one| format!("{}: {}, {} bytes", one.name, one.what, one.bytes));
+        let end = format!("{file} holds these {} files", files.len());
         lines.chain([end]).collect::<Vec<_>>().join("\n")
     });
     Ok(())

@@ -1,26 +1,26 @@
-//! `palpate tag`: words by which sessions are found.
+//! `palpate tag`: adds and removes tags of sessions.
 
 use super::Failure;
 use super::output::Output;
-use super::review::{edit_failure, say_failure, subjects};
+use super::review::{edit_failure, read_subjects, session_edit_failure};
 use clap::Args;
 use palpate_analysis::edits::author;
 use palpate_sessions::edits::{Change, Edits};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Give sessions tags to find them by, or take them away
+/// Add or remove tags of sessions
 #[derive(Debug, Args)]
 pub struct TagArgs {
-    /// Session folders, then tags: +TAG to give one, -TAG to take one away; options come before
+    /// Session folders, then tags: +TAG adds one, -TAG removes one; options come before
     #[arg(required = true, value_name = "SESSION|+TAG|-TAG", allow_hyphen_values = true)]
     words: Vec<String>,
-    /// Who says so; without it the login name
+    /// Author; without it the login name
     #[arg(long, value_name = "NAME")]
     by: Option<String>,
 }
 
-/// What is taken for an option though it stands among the tags.
+/// An option even among the tags.
 const JSON: &str = "--json";
 
 #[derive(Serialize)]
@@ -50,7 +50,7 @@ pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
     }
     let by = author(args.by.as_deref());
     let mut tagged = Vec::new();
-    for subject in subjects(&sessions)? {
+    for subject in read_subjects(&sessions)? {
         let tags = subject.edits.tags();
         let (remove, absent): (Vec<_>, Vec<_>) = remove
             .iter()
@@ -59,12 +59,12 @@ pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
         let session = subject.folder.clone();
         for tag in absent {
             let name = session.display();
-            output.note(&format!("{name} has no tag '{tag}' to take away"));
+            output.note(&format!("{name} has no tag '{tag}' to remove"));
         }
         if !add.is_empty() || !remove.is_empty() {
             let add = add.clone();
-            let said = subject.say(&by, "", Change::Tags { add, remove });
-            said.map_err(say_failure)?;
+            let edit = subject.say(&by, "", Change::Tags { add, remove });
+            edit.map_err(session_edit_failure)?;
         }
         let edits = Edits::read(&session, &subject.id).map_err(edit_failure)?;
         let tags = edits.tags().into_iter().map(str::to_owned).collect();

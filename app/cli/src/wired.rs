@@ -1,8 +1,10 @@
-//! `palpate rig`: what is at the ports, whether a rig is as its file says, and what it reports. Nothing moves.
+//! `palpate rig`: detects devices, checks a rig against its file, monitors it. Nothing moves.
 
 use super::Failure;
+use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::open_rig_file;
+use super::terminal::ctrl_c_flag;
 use clap::{Args, Subcommand};
 use palpate_drivers::detect::{Found, ask};
 use palpate_drivers::serial::list_ports;
@@ -13,32 +15,31 @@ use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_runner::driver_clock;
 use serde::Serialize;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
-/// How often a line is printed.
-const TELL_EVERY: Nanos = Nanos::from_millis(500);
+/// Interval of the printed lines.
+const PRINT_EVERY: Nanos = Nanos::from_millis(500);
 /// Longest wait for the rig, so that Ctrl-C is heeded.
-const LOOK_EVERY: Nanos = Nanos::from_millis(20);
+const WAIT_MAX: Nanos = Nanos::from_millis(20);
 
-/// Look at rigs on wires: which are there, whether one is as its file says, what it reports
+/// Inspect wired rigs: detect devices, check a rig against its file, monitor it
 #[derive(Debug, Subcommand)]
-pub enum RigCommand {
-    /// List serial ports; with --ask, ask each which device is behind it
-    Detect(DetectArgs),
-    /// Open the rig of a file, compare its devices with it, and tell who they are and how fast the links; nothing moves
-    Check(CheckArgs),
+pub enum RigSubcommand {
+    /// List serial ports; with --ask, identify the device on each
+    Detect(RigDetectArgs),
+    /// Open the rig of a file, compare its devices with the file, and report their identity and link timing; nothing moves
+    Check(RigCheckArgs),
     /// Show what the rig of a file reports, until Ctrl-C; nothing moves
-    Monitor(MonitorArgs),
+    Monitor(RigMonitorArgs),
 }
 
 /// Arguments of `palpate rig detect`.
 #[derive(Debug, Args)]
-pub struct DetectArgs {
-    /// Open each port and ask: palpate writes `?`, which moves nothing. An Arduino starts anew when its port is opened
+pub struct RigDetectArgs {
+    /// Open each port and query it: palpate writes `?`, which moves nothing. An Arduino restarts when its port is opened
     #[arg(long)]
     ask: bool,
-    /// Ask here instead of at the ports of this computer: a port, or HOST:PORT of a device on a network; may be repeated
+    /// Query here instead of at the ports of this computer: a port, or HOST:PORT of a device on a network; may be repeated
     #[arg(long, value_name = "PORT|HOST:PORT")]
     at: Vec<String>,
     /// Bits a second of serial ports
@@ -48,7 +49,7 @@ pub struct DetectArgs {
 
 /// Arguments of `palpate rig check`.
 #[derive(Debug, Args)]
-pub struct CheckArgs {
+pub struct RigCheckArgs {
     /// The rig file
     #[arg(value_name = "FILE.toml")]
     file: String,
@@ -56,28 +57,25 @@ pub struct CheckArgs {
 
 /// Arguments of `palpate rig monitor`.
 #[derive(Debug, Args)]
-pub struct MonitorArgs {
+pub struct RigMonitorArgs {
     /// The rig file
     #[arg(value_name = "FILE.toml")]
     file: String,
-    /// End after so long
+    /// End after this time
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|seconds: &f64| (0.1..=1e6).contains(seconds))
-        .ok_or_else(|| "give 0.1 to 1000000".to_owned())
+    let seconds = parse_number(text).ok().filter(|seconds| (0.1..=1e6).contains(seconds));
+    seconds.ok_or_else(|| "give 0.1 to 1000000".to_owned())
 }
 
-/// Does it.
-pub(super) fn run(command: &RigCommand, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(command: &RigSubcommand, output: &Output) -> Result<(), Failure> {
     match command {
-        RigCommand::Detect(args) => detect(args, output),
-        RigCommand::Check(args) => check(args, output),
-        RigCommand::Monitor(args) => monitor(args, output),
+        RigSubcommand::Detect(args) => detect(args, output),
+        RigSubcommand::Check(args) => check(args, output),
+        RigSubcommand::Monitor(args) => monitor(args, output),
     }
 }
 
@@ -90,9 +88,9 @@ struct Port {
     error: Option<String>,
 }
 
-fn detect(args: &DetectArgs, output: &Output) -> Result<(), Failure> {
+fn detect(args: &RigDetectArgs, output: &Output) -> Result<(), Failure> {
     let mut ports: Vec<Port> = Vec::new();
-    let place = |at: &str, description: String| Port {
+    let port_at = |at: &str, description: String| Port {
         at: at.to_owned(),
         description,
         device: None,
@@ -101,16 +99,16 @@ fn detect(args: &DetectArgs, output: &Output) -> Result<(), Failure> {
     };
     if args.at.is_empty() {
         for port in list_ports().map_err(|err| Failure::Failed(err.to_string()))? {
-            ports.push(place(&port.name, port.description));
+            ports.push(port_at(&port.name, port.description));
         }
     } else {
-        ports.extend(args.at.iter().map(|at| place(at, String::new())));
+        ports.extend(args.at.iter().map(|at| port_at(at, String::new())));
     }
     let bar = output.count_bar(ports.len() as u64);
     if args.ask || !args.at.is_empty() {
         for port in &mut ports {
             bar.set_message(port.at.clone());
-            match who_is_at(&port.at, args.baud) {
+            match identify_device(&port.at, args.baud) {
                 Ok(found) => {
                     port.device = found.device();
                     port.says = Some(found.to_string());
@@ -122,11 +120,11 @@ fn detect(args: &DetectArgs, output: &Output) -> Result<(), Failure> {
     }
     drop(bar);
     let object = serde_json::json!({ "ports": ports });
-    output.answer("rig detect", &object, || detected(&ports));
+    output.answer("rig detect", &object, || port_lines(&ports));
     Ok(())
 }
 
-fn who_is_at(at: &str, baud: u32) -> Result<Found, String> {
+fn identify_device(at: &str, baud: u32) -> Result<Found, String> {
     // A name with a number behind the last colon is an address; ports of Windows end in their colon.
     let is_address = at
         .rsplit_once(':')
@@ -140,9 +138,9 @@ fn who_is_at(at: &str, baud: u32) -> Result<Found, String> {
     ask(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
 }
 
-fn detected(ports: &[Port]) -> String {
+fn port_lines(ports: &[Port]) -> String {
     if ports.is_empty() {
-        return "no serial port; plug in the device, or give --at HOST:PORT for one on a network"
+        return "no serial port found; plug in the device, or give --at HOST:PORT for one on a network"
             .into();
     }
     let lines = ports.iter().map(|port| {
@@ -157,57 +155,40 @@ fn detected(ports: &[Port]) -> String {
     lines.collect::<Vec<String>>().join("\n")
 }
 
-#[derive(Serialize)]
-struct LinkObject {
-    device: String,
-    round_trip_min_s: f64,
-    round_trip_mean_s: f64,
-    round_trip_max_s: f64,
-    jitter_s: f64,
-    answers: u64,
-    in_flight: usize,
-    resynchronised: u64,
-    is_real_time: bool,
-}
-
-fn links(rig: &dyn Rig) -> Vec<LinkObject> {
-    let object = |(device, stats): (String, LinkStats)| LinkObject {
-        device,
-        round_trip_min_s: stats.round_trip_min.seconds().0,
-        round_trip_mean_s: stats.round_trip_mean.seconds().0,
-        round_trip_max_s: stats.round_trip_max.seconds().0,
-        jitter_s: stats.jitter().seconds().0,
-        answers: stats.answers,
-        in_flight: stats.in_flight,
-        resynchronised: stats.resynchronised,
-        is_real_time: stats.is_real_time,
+fn link_objects(links: &[(String, LinkStats)]) -> Vec<serde_json::Value> {
+    let object = |(device, stats): &(String, LinkStats)| {
+        serde_json::json!({
+            "device": device, "round_trip_min_s": stats.round_trip_min.seconds().0,
+            "round_trip_mean_s": stats.round_trip_mean.seconds().0,
+            "round_trip_max_s": stats.round_trip_max.seconds().0,
+            "jitter_s": stats.jitter().seconds().0, "answers": stats.answers,
+            "in_flight": stats.in_flight, "resynchronised": stats.resynchronised,
+            "is_real_time": stats.is_real_time,
+        })
     };
-    rig.links().into_iter().map(object).collect()
+    links.iter().map(object).collect()
 }
 
-fn link_lines(links: &[LinkObject]) -> impl Iterator<Item = String> {
-    links.iter().map(|link| {
+fn link_lines(links: &[(String, LinkStats)]) -> impl Iterator<Item = String> {
+    let ms = |time: Nanos| time.seconds().0 * 1e3;
+    links.iter().map(move |(device, stats)| {
         format!(
-            "link       {}: {:.2} ms there and back ({:.2} to {:.2}), jitter {:.2} ms, {} lost and found again, its thread at {} priority",
-            link.device,
-            link.round_trip_mean_s * 1e3,
-            link.round_trip_min_s * 1e3,
-            link.round_trip_max_s * 1e3,
-            link.jitter_s * 1e3,
-            link.resynchronised,
-            match link.is_real_time {
-                true => "real-time",
-                false => "ordinary",
-            }
+            "link       {device}: round trip {:.2} ms ({:.2} to {:.2}), jitter {:.2} ms, resynchronised {} times, thread at {} priority",
+            ms(stats.round_trip_mean),
+            ms(stats.round_trip_min),
+            ms(stats.round_trip_max),
+            ms(stats.jitter()),
+            stats.resynchronised,
+            if stats.is_real_time { "real-time" } else { "ordinary" }
         )
     })
 }
 
-fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+fn check(args: &RigCheckArgs, output: &Output) -> Result<(), Failure> {
     let (rig, _lock) = open_rig_file(&args.file)?;
     let about = rig.description();
-    let links = links(rig.as_ref());
-    let object = serde_json::json!({ "rig": about, "links": links });
+    let links = rig.links();
+    let object = serde_json::json!({ "rig": about, "links": link_objects(&links) });
     output.answer("rig check", &object, || {
         let mut lines = vec![
             format!("rig        {}", about.name),
@@ -223,15 +204,15 @@ fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
             ),
         ];
         lines.extend(link_lines(&links));
-        lines.push("It is as its file says. Nothing has moved.".into());
+        lines.push("The rig matches its file. Nothing has moved.".into());
         lines.join("\n")
     });
     Ok(())
 }
 
-/// What came in a stretch of time.
+/// Readings of a stretch of time.
 #[derive(Clone, Copy, Default)]
-struct Stretch {
+struct SampleWindow {
     samples: u64,
     sum_v: f64,
     min_v: f64,
@@ -241,30 +222,29 @@ struct Stretch {
     longest_gap: u64,
 }
 
-impl Stretch {
-    fn take(&mut self, reading: &Reading, ticks: u64) {
+impl SampleWindow {
+    /// One reading, `ticks` after the one before it.
+    fn of(reading: &Reading, ticks: u64) -> Self {
         let volts = reading.volts.0;
-        if self.samples == 0 {
-            (self.min_v, self.max_v) = (volts, volts);
+        Self {
+            samples: 1,
+            sum_v: volts,
+            min_v: volts,
+            max_v: volts,
+            age_max: reading.age.map_or(Nanos::ZERO, |age| age.by),
+            within_max: reading.age.map_or(Nanos::ZERO, |age| age.within),
+            longest_gap: ticks,
         }
-        self.samples += 1;
-        self.sum_v += volts;
-        self.min_v = self.min_v.min(volts);
-        self.max_v = self.max_v.max(volts);
-        if let Some(age) = reading.age {
-            self.age_max = self.age_max.max(age.by);
-            self.within_max = self.within_max.max(age.within);
-        }
-        self.longest_gap = self.longest_gap.max(ticks);
     }
 
     fn add(&mut self, other: &Self) {
-        if other.samples == 0 {
-            return;
+        match (self.samples, other.samples) {
+            (_, 0) => return,
+            (0, _) => return *self = *other,
+            _ => {}
         }
-        let is_first = self.samples == 0;
-        self.min_v = if is_first { other.min_v } else { self.min_v.min(other.min_v) };
-        self.max_v = if is_first { other.max_v } else { self.max_v.max(other.max_v) };
+        self.min_v = self.min_v.min(other.min_v);
+        self.max_v = self.max_v.max(other.max_v);
         self.samples += other.samples;
         self.sum_v += other.sum_v;
         self.age_max = self.age_max.max(other.age_max);
@@ -277,50 +257,48 @@ impl Stretch {
     }
 }
 
-fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
+fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
     let (mut rig, _lock) = open_rig_file(&args.file)?;
-    let is_asked_to_end = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&is_asked_to_end);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)).map_err(Failure::failed)?;
+    let is_ending = ctrl_c_flag()?;
     let clock = driver_clock();
     let length = args.seconds.map(|seconds| Nanos((seconds * 1e9) as u64));
-    let (mut whole, mut recent) = (Stretch::default(), Stretch::default());
-    let (mut newest, mut told_at): (Option<Reading>, Nanos) = (None, Nanos::ZERO);
+    let (mut whole, mut recent) = (SampleWindow::default(), SampleWindow::default());
+    let (mut newest, mut printed_at): (Option<Reading>, Nanos) = (None, Nanos::ZERO);
     let mut faults = Vec::new();
     let end = loop {
         let now = clock();
-        if is_asked_to_end.load(Ordering::Relaxed) || length.is_some_and(|length| now >= length) {
+        if is_ending.load(Ordering::Relaxed) || length.is_some_and(|length| now >= length) {
             break now;
         }
-        while let Some(event) = rig.next_event(clock() + LOOK_EVERY) {
+        while let Some(event) = rig.next_event(clock() + WAIT_MAX) {
             match event.body {
                 RigEventBody::Reading(reading) => {
                     let before = newest.map_or(reading.tick, |newest| newest.tick);
-                    recent.take(&reading, reading.tick.saturating_sub(before));
+                    recent.add(&SampleWindow::of(&reading, reading.tick.saturating_sub(before)));
                     newest = Some(reading);
                 }
                 RigEventBody::Ack(_) => {}
                 RigEventBody::Fault(fault) => faults.push(fault.to_string()),
             }
-            if clock().since(told_at) >= TELL_EVERY {
+            if clock().since(printed_at) >= PRINT_EVERY {
                 break;
             }
         }
-        // What is exchanged is nobody's.
+        // The raw bytes are not recorded here.
         drop(rig.take_raw());
         if let Some(fault) = faults.first() {
             return Err(Failure::Failed(format!("{}: {fault}", args.file)));
         }
         let now = clock();
-        let since = now.since(told_at);
-        if since >= TELL_EVERY {
-            output.text_only(|| told(rig.as_ref(), newest.as_ref(), &recent, since));
+        let since = now.since(printed_at);
+        if since >= PRINT_EVERY {
+            output.text_only(|| monitor_line(rig.as_ref(), newest.as_ref(), &recent, since));
             whole.add(&recent);
-            (recent, told_at) = (Stretch::default(), now);
+            (recent, printed_at) = (SampleWindow::default(), now);
         }
     };
     whole.add(&recent);
-    let links = links(rig.as_ref());
+    let links = rig.links();
     let tick = rig.description().tick().0;
     let object = serde_json::json!({ "rig": rig.description().name,
         "seconds": end.seconds().0,
@@ -333,8 +311,8 @@ fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
         "age_within_s": whole.within_max.seconds().0,
         "longest_gap_s": whole.longest_gap as f64 * tick,
         "pulses": newest.map(|reading| reading.pulses),
-        "position_mm": newest.map(|reading| place_mm(rig.as_ref(), &reading)),
-        "links": links,
+        "position_mm": newest.map(|reading| position_mm(rig.as_ref(), &reading)),
+        "links": link_objects(&links),
     });
     output.answer("rig monitor", &object, || {
         let mut lines = vec![format!(
@@ -350,12 +328,17 @@ fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn place_mm(rig: &dyn Rig, reading: &Reading) -> f64 {
+fn position_mm(rig: &dyn Rig, reading: &Reading) -> f64 {
     position_from_pulses(reading.pulses, rig.description().mm_per_pulse).0
 }
 
-/// A line of what came lately. The counter's zero is wherever the device was switched on, until it is zeroed in a run.
-fn told(rig: &dyn Rig, newest: Option<&Reading>, recent: &Stretch, since: Nanos) -> String {
+/// A line on the newest readings. The counter's zero is where the device was switched on, until a run zeroes it.
+fn monitor_line(
+    rig: &dyn Rig,
+    newest: Option<&Reading>,
+    recent: &SampleWindow,
+    since: Nanos,
+) -> String {
     let (Some(reading), Some(mean)) = (newest, recent.mean_v()) else {
         return "no sample".into();
     };
@@ -373,7 +356,7 @@ fn told(rig: &dyn Rig, newest: Option<&Reading>, recent: &Stretch, since: Nanos)
         "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old within {:.2}  {states}",
         recent.min_v,
         recent.max_v,
-        place_mm(rig, reading),
+        position_mm(rig, reading),
         recent.samples as f64 / since.seconds().0,
         recent.age_max.seconds().0 * 1e3,
         recent.within_max.seconds().0 * 1e3

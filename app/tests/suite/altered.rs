@@ -20,7 +20,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     let log = at.join("emptied/000.mcap");
     let has_grown = || (fs::metadata(&log).ok()?.len() > 100_000).then_some(());
     until(has_grown, || "a log that grows".into());
-    // Whoever wants it in a lake is told to wait.
+    // An export of it into a lake is refused until it ends.
     let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
     assert_refused(&export, 1, "is being recorded");
     assert!(lake::sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
@@ -32,9 +32,9 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     assert_ne!(report["ending"], "finish", "{report}");
     assert_ne!(report["verdict"], "valid", "{report}");
     assert!(report["samples_lost"].as_u64().unwrap() > 0, "{report}");
-    let said = stderr(&done);
+    let message = stderr(&done);
     for words in ["000.mcap", "another program", "are missing", "palpate recover"] {
-        assert!(said.contains(words), "{words}: {said}");
+        assert!(message.contains(words), "{words}: {message}");
     }
     // What came after is kept, and can be recovered.
     assert_eq!(palpate(at, &["doctor", "emptied"]).status.code(), Some(1));
@@ -65,8 +65,8 @@ fn a_review_that_was_cut_off_is_told_by_every_command() {
     ] {
         let output = palpate(at, &words);
         assert_eq!(output.status.code(), Some(code), "{words:?}: {}", stderr(&output));
-        let said = stdout(&output) + &stderr(&output);
-        assert!(said.contains("edits.jsonl") && said.contains("1 of 2"), "{words:?}: {said}");
+        let message = stdout(&output) + &stderr(&output);
+        assert!(message.contains("edits.jsonl") && message.contains("1 of 2"), "{words:?}: {message}");
     }
     let history = json(&palpate(at, &["history", "specimen", "gel", "--json"]));
     assert_eq!(history["events"].as_array().unwrap().len(), 1);

@@ -122,7 +122,7 @@ fn wrong_use_gets_a_sentence() {
     let at = folder.path();
     table(at, "one.csv", 1, 3.0);
     std::fs::write(at.join("few.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,0,0\n").unwrap();
-    for (args, code, said) in [
+    for (args, code, message) in [
         (&["analyse", "one.csv", "--steady", "0"][..], 2, "not a positive number"),
         (&["analyse", "nowhere.csv"], 2, "nowhere.csv"),
         (&["analyse", "one.csv", "one.csv", "--plot", "x.svg"], 2, "one source"),
@@ -131,6 +131,6 @@ fn wrong_use_gets_a_sentence() {
     ] {
         let output = palpate(at, args);
         assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
-        assert!(stderr(&output).contains(said), "{args:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(message), "{args:?}: {}", stderr(&output));
     }
 }

@@ -1,4 +1,4 @@
-//! The library searched, its sessions analysed, reviewed and told of over time, as a user does it.
+//! The library searched, its sessions analysed and reviewed, and their history, as a user does it.
 
 use crate::support::{
     assert_prints, assert_refused, assert_says, background, json, palpate, short_run, stderr,
@@ -39,8 +39,8 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     let nothing = palpate(at, &["find"]);
     succeeded(&nothing);
     assert!(stdout(&nothing).contains("no session"));
-    let told = ["--operator", "Ada", "--specimen", "liver \"3\" *"];
-    let one = run(at, "one", &told);
+    let printed = ["--operator", "Ada", "--specimen", "liver \"3\" *"];
+    let one = run(at, "one", &printed);
     let two = run(at, "two", &["--operator", "Grace", "--seed", "3"]);
     assert_eq!(found(at, &[]), ["sessions/one", "sessions/two"]);
     assert_eq!(found(at, &["--operator", "Ada"]), ["sessions/one"]);
@@ -50,7 +50,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(found(at, &["--where", "ramp.depth_mm<6"]).len(), 0);
     assert_eq!(found(at, &["--verdict", "valid"]).len(), 2);
     assert_eq!(found(at, &["--until", "2001-01-01"]).len(), 0);
-    // What can never be found is told apart from what is not there.
+    // A condition that can never hold differs from one that matches no session.
     for (condition, word) in
         [("ramp.dept>=1mm", "ramp.dept"), ("depth>=1kg", "it is in mm"), ("ramp.depth>=100mm", "")]
     {
@@ -63,7 +63,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_refused(&order, 2, "depth>=2mm");
 
     succeeded(&palpate(at, &["tag", &one, &two, "+pilot", "-none"]));
-    // What is not there is told, and leaves no edit.
+    // A missing tag gives a note and leaves no edit.
     let nothing = palpate(at, &["tag", &two, "-nothere"]);
     succeeded(&nothing);
     assert_says(&nothing, "no tag 'nothere'");
@@ -106,10 +106,10 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     let kinds: Vec<&str> = events.iter().map(|one| one["what"].as_str().unwrap()).collect();
     let all = ["session", "verdict", "tags", "note", "review", "verdict"];
     assert_eq!(kinds, all);
-    let nobody = palpate(at, &["history", "rig", "nobody's"]);
-    assert_eq!(nobody.status.code(), Some(2));
+    let unknown = palpate(at, &["history", "rig", "unknown"]);
+    assert_eq!(unknown.status.code(), Some(2));
 
-    // Two at a time, while one makes it anew.
+    // Two at a time, while one rebuilds it.
     fs::remove_file(at.join("library/catalog.sqlite")).unwrap();
     let several = ["find", "catalog rebuild", "find ada"];
     for mut one in several.map(|line| background(at, line)) {
@@ -118,7 +118,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     succeeded(&palpate(at, &["find"]));
     succeeded(&palpate(at, &["catalog", "check"]));
 
-    // A journal that cannot be read hides no verdict: nobody can say that there is none.
+    // A journal that cannot be read hides no verdict: there may be one.
     let journal = at.join(&two).join("edits.jsonl");
     fs::write(&journal, fs::read_to_string(&journal).unwrap().replace("good", "food")).unwrap();
     assert!(found(at, &["--verdict", "none"]).is_empty());

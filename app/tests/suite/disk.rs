@@ -17,7 +17,7 @@ fn in_own_namespace(at: &Path, script: &str) -> Output {
 }
 
 /// Runs with `variables` on a 24 MB file system of its own, in a mount namespace, that fills up in mid-run: what the
-/// run said, on stdout as JSON and on stderr. The session is copied to `saved`.
+/// run printed, on stdout as JSON and on stderr. The session is copied to `saved`.
 fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> (Value, String) {
     std::fs::create_dir(at.join("disk")).expect("a folder");
     let script = r#"
@@ -32,13 +32,13 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> (Value, String) {
     let script = format!("{variables}\n{script}");
     succeeded(&in_own_namespace(at, &script));
     let read = |name: &str| std::fs::read_to_string(at.join(name)).expect("what the run left");
-    let said = read("error.txt");
-    assert_eq!(read("exit.txt").trim(), "1", "{said}");
-    assert!(said.contains("No space left"), "{said}");
+    let message = read("error.txt");
+    assert_eq!(read("exit.txt").trim(), "1", "{message}");
+    assert!(message.contains("No space left"), "{message}");
     // The report is the first line, the error the second.
     let out = read("out.json");
     let report = serde_json::from_str(out.lines().next().unwrap_or_default());
-    (report.expect("a report"), said)
+    (report.expect("a report"), message)
 }
 
 #[test]
@@ -48,16 +48,16 @@ fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
     }
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let (report, said) = run_on_a_disk_that_fills_up(at, "");
+    let (report, message) = run_on_a_disk_that_fills_up(at, "");
     let info = json(&palpate(at, &["info", "saved", "--json"]));
     assert_eq!(info["is_complete"], false);
     assert!(info["samples"].as_u64().unwrap() > 1000, "{info}");
     succeeded(&palpate(at, &["replay", "saved"]));
     // The run says what is in the file, and what is not.
-    assert_eq!(report["samples"], info["samples"], "{said}");
+    assert_eq!(report["samples"], info["samples"], "{message}");
     let lost = report["samples_lost"].as_u64().unwrap();
     assert!(lost > 0, "{report}");
-    assert!(said.contains(&format!("the last {lost} of ")), "{lost}: {said}");
+    assert!(message.contains(&format!("the last {lost} of ")), "{lost}: {message}");
 }
 
 #[test]
@@ -68,13 +68,13 @@ fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let spare = "export PALPATE_SPARE=$PWD/spare";
-    let (report, said) = run_on_a_disk_that_fills_up(at, spare);
-    assert_eq!(report["samples_lost"], 0, "{said}");
-    assert!(said.contains("lacks nothing"), "{said}");
-    for wrong in ["log cannot be written", "not kept as it was"] {
-        assert!(!said.contains(wrong), "{said}");
+    let (report, message) = run_on_a_disk_that_fills_up(at, spare);
+    assert_eq!(report["samples_lost"], 0, "{message}");
+    assert!(message.contains("lacks nothing"), "{message}");
+    for wrong in ["log cannot be written", "not as it was recorded"] {
+        assert!(!message.contains(wrong), "{message}");
     }
-    assert!(said.contains("verdict") && said.contains("palpate verdict"), "{said}");
+    assert!(message.contains("verdict") && message.contains("palpate verdict"), "{message}");
     // Segments elsewhere make it no less whole.
     succeeded(&palpate(at, &["doctor", "saved"]));
     let replayed = json(&palpate(at, &["replay", "--check", "saved", "--json"]));

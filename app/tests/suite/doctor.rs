@@ -20,7 +20,7 @@ fn every_kind_of_file_gets_the_right_word() {
     let mut hurt = bytes.clone();
     hurt[bytes.len() / 2] ^= 0x10;
     with("damaged", &hurt);
-    with("foreign", b"a text that somebody called a log");
+    with("foreign", b"a text with the name of a log");
     let mut manifest = Session::open(&at.join("whole")).unwrap().manifest;
     manifest.record_version = palpate_sessions::RECORD_VERSION + 1;
     let newer = palpate_sessions::SessionFolder::create(&at.join("newer")).unwrap();
@@ -104,8 +104,8 @@ fn several_sessions_are_recovered_one_after_the_other() {
     let again = palpate(at, &["recover", "first", "lost", "--json"]);
     assert_eq!(again.status.code(), Some(1), "{}", stderr(&again));
     let first = stdout(&again).lines().next().unwrap().to_owned();
-    let told: serde_json::Value = serde_json::from_str(&first).unwrap();
-    let exits = told["not_recovered"].as_array().unwrap().iter();
+    let printed: serde_json::Value = serde_json::from_str(&first).unwrap();
+    let exits = printed["not_recovered"].as_array().unwrap().iter();
     let exits: Vec<_> = exits.map(|one| one["exit"].as_u64()).collect();
     assert_eq!(exits, [Some(2), Some(1)]);
     let visit = palpate(at, &["doctor", "nowhere", "first", "whole"]);
@@ -153,8 +153,8 @@ fn a_session_and_its_recovered_copy_count_once() {
     // In the lake before it was recovered.
     succeeded(&palpate(at, &["export", "L", "--lake", "lake"]));
     succeeded(&palpate(at, &["recover", "L/cut"]));
-    let told = "because the copy that was recovered from it is there too: ";
-    for (args, is_told) in [
+    let printed = "because the copy that was recovered from it is there too: ";
+    for (args, is_reported) in [
         (["export", "L", "--lake", "other", "--json"], true),
         (["export", "L/cut.recovered", "--lake", "lake", "--json"], false),
         (["fit", "lake", "--jobs", "1", "--json"], true),
@@ -162,7 +162,7 @@ fn a_session_and_its_recovered_copy_count_once() {
     ] {
         let output = palpate(at, &args);
         succeeded(&output);
-        assert_eq!(stderr(&output).contains(told), is_told, "{args:?}: {}", stderr(&output));
+        assert_eq!(stderr(&output).contains(printed), is_reported, "{args:?}: {}", stderr(&output));
         if args[0] == "export" {
             assert_eq!(json(&output)["added"], 1, "{args:?}");
         }

@@ -111,7 +111,7 @@ fn wrong_use_is_one_sentence() {
     ] {
         let output = palpate(folder.path(), &[&["emulate", "galil"], args].concat());
         assert_eq!(output.status.code(), Some(code), "{args:?}");
-        let told = stderr(&output);
-        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+        let printed = stderr(&output);
+        assert!(printed.contains(part) && printed.lines().count() == 1, "{printed}");
     }
 }

@@ -127,9 +127,9 @@ fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
     let refused = palpate(at, &["fit", "ramp.csv", "--picture", "ramp.svg"]);
     assert_eq!(refused.status.code(), Some(1));
     let picture = std::fs::read_to_string(at.join("ramp.svg")).unwrap();
-    let said = stderr(&refused);
-    let words: Vec<&str> = said.split_whitespace().skip(1).take(6).collect();
-    assert!(picture.contains(&words.join(" ")), "{said}");
+    let message = stderr(&refused);
+    let words: Vec<&str> = message.split_whitespace().skip(1).take(6).collect();
+    assert!(picture.contains(&words.join(" ")), "{message}");
 
     let many = palpate(at, &["fit", "t.csv", "ramp.csv", "--picture", "x.svg"]);
     assert_eq!(many.status.code(), Some(2));
@@ -205,7 +205,7 @@ fn recordings_are_fitted_together_and_say_what_they_share() {
         object["records"][record]["report"]["parameters"][parameter]["value"].as_f64().unwrap()
     };
     assert_eq!(value(0, 0), value(1, 0));
-    // The second specimen is a fifth stiffer in its cubic term, and told so.
+    // The second specimen is a fifth stiffer in its cubic term, and labelled so.
     assert!((value(1, 3) / value(0, 3) - 1.2).abs() < 0.01);
     let text = stdout(&palpate(at, &["fit", "a.csv", "b.csv", "--share", "body"]));
     assert!(text.contains("2 records together"), "{text}");

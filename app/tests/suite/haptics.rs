@@ -21,8 +21,8 @@ fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
     let weak =
         split_words("haptics check thesis --drive current --damping 0.5 --friction 0 --delay 2");
     let words = palpate(at.path(), &weak);
-    let told = stdout(&words);
-    assert!(told.contains("damping"), "{told}");
+    let printed = stdout(&words);
+    assert!(printed.contains("damping"), "{printed}");
     let both = json(&palpate(at.path(), &[&weak[..], &["--json"]].concat()));
     let [without, with] = [0, 1].map(|i| &both["tried"][i]);
     assert!(without["buzz_share"].as_f64().unwrap() > 0.5, "{both}");
@@ -41,7 +41,7 @@ fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
     assert!(run["work"]["count"].as_u64().unwrap() > 100, "{run}");
     assert!(run["work"]["p50_s"].as_f64().unwrap() > 0.0, "{run}");
     assert!(!run["priority"].as_str().unwrap().is_empty());
-    // A stroke beyond what was measured is extrapolated, and told.
+    // A stroke beyond what was measured is extrapolated, with a note.
     let session = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/ramp-hold-lab");
     let far = palpate(at.path(), &["haptics", "check", session]);
     assert_says(&far, "extrapolated");
@@ -86,9 +86,9 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
     let words = split_words(
         "haptics run thesis --seconds 1 --drive current --friction 0.1 --record run --json",
     );
-    let told = json(&palpate(at.path(), &words));
-    assert_eq!(told["recorded"]["lost"], 0, "{told}");
-    assert!(told["recorded"]["ticks"].as_u64().unwrap() > 100, "{told}");
+    let printed = json(&palpate(at.path(), &words));
+    assert_eq!(printed["recorded"]["lost"], 0, "{printed}");
+    assert!(printed["recorded"]["ticks"].as_u64().unwrap() > 100, "{printed}");
     let again = json(&palpate(at.path(), &["haptics", "replay", "run", "--json"]));
     assert_eq!(again["is_identical"], true, "{again}");
     assert_eq!(again["is_whole"], true, "{again}");
@@ -99,7 +99,7 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
     std::fs::write(&settings, text.replace("friction_n = 0.1", "friction_n = 0.3")).unwrap();
     let other = palpate(at.path(), &["haptics", "replay", "run"]);
     assert_refused(&other, 1, "error: tick ");
-    // Without its end nobody knows what came after, however alike the rest is.
+    // Without its end the rest is unknown, however alike the ticks before are.
     std::fs::write(&settings, text).unwrap();
     let ticks = at.path().join("run/ticks.csv");
     let lines = std::fs::read_to_string(&ticks).unwrap();
@@ -148,7 +148,7 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
     }
     let exported = palpate(at.path(), &["export", "followed", "--format", "csv"]);
     assert!(exported.status.success(), "{}", stderr(&exported));
-    // No engine decided anything, so nothing is there to replay; that is said and nothing else.
+    // No engine decided anything, so there is nothing to replay; that is the only message.
     let replayed = palpate(at.path(), &["replay", "followed"]);
     assert!(stderr(&replayed).contains("no decisions"));
     // It can be followed in its turn, and words explain the difference.
@@ -179,18 +179,18 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
             "--json",
         ]
     };
-    let told = json(&palpate(at.path(), &words("one")));
-    assert_eq!(told["command"], "haptics-slave", "{told}");
-    assert_eq!(told["ending"], "finish", "{told}");
-    assert_eq!(told["verdict"], "valid", "{told}");
-    let slave = &told["slave"];
+    let printed = json(&palpate(at.path(), &words("one")));
+    assert_eq!(printed["command"], "haptics-slave", "{printed}");
+    assert_eq!(printed["ending"], "finish", "{printed}");
+    assert_eq!(printed["verdict"], "valid", "{printed}");
+    let slave = &printed["slave"];
     let number = |name: &str| slave[name].as_f64().unwrap_or(f64::NAN);
-    assert!(number("depth_max_mm") > 2.0 && number("depth_max_mm") < 6.0 + 1e-9, "{told}");
-    assert!(number("cell_max_n") > 0.05, "{told}");
-    assert!(slave["lag_ms"]["median"].as_f64().unwrap() > 20.0, "{told}");
+    assert!(number("depth_max_mm") > 2.0 && number("depth_max_mm") < 6.0 + 1e-9, "{printed}");
+    assert!(number("cell_max_n") > 0.05, "{printed}");
+    assert!(slave["lag_ms"]["median"].as_f64().unwrap() > 20.0, "{printed}");
     // The same again is the same, but for the folder.
     let again = json(&palpate(at.path(), &words("two")));
-    assert_eq!(again["slave"], told["slave"]);
+    assert_eq!(again["slave"], printed["slave"]);
     let replayed = palpate(at.path(), &["replay", "one"]);
     assert_eq!(replayed.status.code(), Some(0), "{}", stderr(&replayed));
     let fitted = json(&palpate(at.path(), &["fit", "one", "--json"]));

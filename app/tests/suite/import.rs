@@ -76,10 +76,10 @@ fn fits_agree_and_replay_has_nothing_to_do() {
         // The same numbers but for the last digit of a time.
         assert!((session - table).abs() <= 1e-9 * table.abs().max(1e-3), "{session} {table}");
     }
-    for (command, told) in [("replay", "no decisions"), ("report", "nothing to report")] {
+    for (command, printed) in [("replay", "no decisions"), ("report", "nothing to report")] {
         let output = palpate(at, &[command, "in/zug"]);
         assert_eq!(output.status.code(), Some(2), "{command}");
-        assert!(stderr(&output).contains(told), "{command}: {}", stderr(&output));
+        assert!(stderr(&output).contains(printed), "{command}: {}", stderr(&output));
     }
     succeeded(&palpate(at, &["analyse", "in/zug"]));
 }
@@ -90,10 +90,10 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     let at = folder.path();
     fs::write(at.join("good.csv"), "t_s,x_mm,F_N\n0,0,0\n1,1,1\n").unwrap();
     fs::write(at.join("bad.csv"), "t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n").unwrap();
-    let check = |args: &[&str], told: &str| {
+    let check = |args: &[&str], printed: &str| {
         let output = palpate(at, args);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stdout(&output));
-        assert!(stderr(&output).contains(told), "{args:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(printed), "{args:?}: {}", stderr(&output));
         assert!(!at.join("in").exists(), "{args:?}");
     };
     check(&["import", "good.csv", "bad.csv", "--into", "in"], "decimal sign");

@@ -24,8 +24,8 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
     let part = split_words(
         "export demo --format csv --phase ramp,hold --from 60 --columns t_s,force_N --decimate 10 --delimiter ; --json",
     );
-    let told = answer(&palpate(at, &part));
-    assert_eq!((&told["every"], &told["is_part"]), (&10.into(), &true.into()));
+    let printed = answer(&palpate(at, &part));
+    assert_eq!((&printed["every"], &printed["is_part"]), (&10.into(), &true.into()));
     let thinned = fs::read_to_string(at.join("demo.every10.csv")).unwrap();
     let expected: Vec<String> = whole
         .lines()
@@ -38,12 +38,12 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
         .map(|(number, cells)| format!("{number};{};{}", cells[t], cells[force]))
         .collect();
     assert!(expected.len() > 10);
-    assert_eq!(told["rows"], expected.len());
+    assert_eq!(printed["rows"], expected.len());
     let found: Vec<&str> = thinned.lines().collect();
     assert_eq!(found[0], "sample_every_10;t_s;force_N");
     assert_eq!(found[1..], expected);
     let dictionary =
-        fs::read_to_string(told["dictionary"].as_str().map(|name| at.join(name)).unwrap());
+        fs::read_to_string(printed["dictionary"].as_str().map(|name| at.join(name)).unwrap());
     assert!(dictionary.unwrap().contains("every 10th"));
 
     succeeded(&palpate(at, &["export", "demo", "--format", "arrow"]));
@@ -100,9 +100,9 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
         fs::create_dir_all(at.join("runs")).unwrap();
         succeeded(&short_run(at, &out, &["--seed", &seed.to_string()]));
     }
-    let told = palpate(at, &["export", "runs", "--lake", "lake", "--json"]);
-    succeeded(&told);
-    assert_eq!((&json(&told)["added"], &json(&told)["were_there"]), (&5.into(), &0.into()));
+    let printed = palpate(at, &["export", "runs", "--lake", "lake", "--json"]);
+    succeeded(&printed);
+    assert_eq!((&json(&printed)["added"], &json(&printed)["were_there"]), (&5.into(), &0.into()));
     let before = contents(&at.join("lake"));
     // Of each: samples, events, the session itself, and the checksums of the three.
     assert_eq!(before.len(), 20);
@@ -199,9 +199,9 @@ fn what_cannot_be_fitted_is_listed_and_the_rest_is_fitted() {
     let fit = palpate(at, &["fit", "lake", "--json"]);
     assert_eq!(fit.status.code(), Some(1));
     let text = stdout(&fit);
-    let told: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
-    assert_eq!(told["made"], 1);
-    assert_eq!(told["failed"][0]["session_id"], id);
+    let printed: Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+    assert_eq!(printed["made"], 1);
+    assert_eq!(printed["failed"][0]["session_id"], id);
 }
 
 #[test]

@@ -29,8 +29,8 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     fs::write(at.join("deep.toml"), TWO.replace("DEPTH", "200 mm")).unwrap();
     let refused = typed(at, "run deep.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
-    let told = stderr(&refused);
-    assert!(told.contains("line 10: task 'press'") && told.contains("200"), "{told}");
+    let printed = stderr(&refused);
+    assert!(printed.contains("line 10: task 'press'") && printed.contains("200"), "{printed}");
     assert!(!at.join("day").exists(), "something ran");
 
     fs::write(at.join("two.toml"), TWO.replace("DEPTH", "10 mm")).unwrap();
@@ -116,12 +116,12 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
     for (more, is_nameless) in [(&[][..], true), (&["--operator", "Ada"][..], false)] {
         let refused = run(more);
         assert_eq!(refused.status.code(), Some(2));
-        let told = stderr(&refused);
+        let printed = stderr(&refused);
         for fact in ["line 5: task 'press'", "line 10: task 'press-again'", "specimen.storage"] {
-            assert!(told.contains(fact), "{fact}: {told}");
+            assert!(printed.contains(fact), "{fact}: {printed}");
         }
-        assert_eq!(told.contains("operator ("), is_nameless, "{told}");
-        assert!(told.contains("[about]") && told.trim_end().lines().count() == 1, "{told}");
+        assert_eq!(printed.contains("operator ("), is_nameless, "{printed}");
+        assert!(printed.contains("[about]") && printed.trim_end().lines().count() == 1, "{printed}");
         assert!(!at.join("day").exists(), "something ran");
     }
     let check = palpate(at, &["protocol", "check", "asking.toml"]);
@@ -162,24 +162,24 @@ fn check_looks_at_a_programme_whole() {
         palpate(at, &["protocol", "check", "asking.toml"])
     };
     let about = "[about]\noperator = \"Ada\"\nspecimen.storage = \"saline\"\n\n[[task]]";
-    let told = ASKING.replacen("[[task]]", about, 1);
-    let sound = check(told.replace("DEPTH", "5 mm"));
+    let printed = ASKING.replacen("[[task]]", about, 1);
+    let sound = check(printed.replace("DEPTH", "5 mm"));
     succeeded(&sound);
     assert_prints(&sound, "asking.toml: sound, about");
     let shown = palpate(at, &["protocol", "preview", "asking.toml"]);
     assert_refused(&shown, 2, "'palpate run asking.toml --preview'");
     // What a run would refuse, line by line.
     for (text, words) in [
-        (told.replace("DEPTH", "12 mm"), "line 17: parameter 'depth'"),
+        (printed.replace("DEPTH", "12 mm"), "line 17: parameter 'depth'"),
         (
-            told.replace("DEPTH", "5 mm").replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
+            printed.replace("DEPTH", "5 mm").replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
             "line 16: 'theirs.toml'",
         ),
         (
-            told.replace("mine.toml", "ramp-hold").replace("DEPTH", "200 mm"),
+            printed.replace("mine.toml", "ramp-hold").replace("DEPTH", "200 mm"),
             "task 'press-again': step 5",
         ),
-        (told.replace("DEPTH", "5 mm").replace("palpate-programme = 1\n", ""), "palpate-programme"),
+        (printed.replace("DEPTH", "5 mm").replace("palpate-programme = 1\n", ""), "palpate-programme"),
     ] {
         let refused = check(text);
         assert_eq!(refused.status.code(), Some(2));
@@ -188,7 +188,7 @@ fn check_looks_at_a_programme_whole() {
         assert_eq!(run.status.code(), Some(2));
         assert!(stderr(&run).contains(words), "{words}: {}", stderr(&run));
     }
-    let deep = told.replace("mine.toml", "ramp-hold").replace("DEPTH", "45 mm");
+    let deep = printed.replace("mine.toml", "ramp-hold").replace("DEPTH", "45 mm");
     let warned = check(deep);
     succeeded(&warned);
     assert!(
@@ -210,8 +210,8 @@ fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     fs::write(at.join("two.toml"), TWO.replace("DEPTH", "10 mm")).unwrap();
     let refused = typed(at, "run two.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
-    let told = stderr(&refused);
-    assert!(told.contains("line 6: task 'look'") && told.contains("daily check"), "{told}");
+    let printed = stderr(&refused);
+    assert!(printed.contains("line 6: task 'look'") && printed.contains("daily check"), "{printed}");
     assert!(!at.join("day").exists(), "something ran");
 }
 
@@ -270,7 +270,7 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     let words = "first/01: rejected";
     assert!(page().contains(words), "{}", page());
 
-    // One is gone, and one is noise; what was said of it was said of something else.
+    // One is gone, and one is noise; the edits of it belonged to another recording.
     fs::remove_dir_all(at.join("day/first/02")).unwrap();
     let log = at.join("day/second/01").join(palpate_sessions::LOG_FILE);
     let length = fs::metadata(&log).unwrap().len() as usize;
@@ -278,10 +278,10 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     let sound = fs::read(&log).unwrap();
     for damaged in [noise.clone(), [&sound[..length / 2], &noise[length / 2..]].concat()] {
         fs::write(&log, damaged).unwrap();
-        let told = palpate(at, &run);
-        assert_eq!(told.status.code(), Some(1), "{}", stdout(&told));
+        let printed = palpate(at, &run);
+        assert_eq!(printed.status.code(), Some(1), "{}", stdout(&printed));
         let row = |start: &str| {
-            let text = stdout(&told);
+            let text = stdout(&printed);
             let mut rows = text.lines().map(str::to_owned);
             rows.find(|row| row.starts_with(start) && !row.contains("first/01"))
         };
@@ -289,15 +289,15 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
         let second = row("second").unwrap();
         assert!(second.contains("now damaged") && !second.contains("valid"), "{second}");
         assert!(
-            stderr(&told).contains("first/02") && stderr(&told).contains("second/01"),
+            stderr(&printed).contains("first/02") && stderr(&printed).contains("second/01"),
             "{}",
-            stderr(&told)
+            stderr(&printed)
         );
         for words in ["first/02 is missing", "first/02: missing", "second/01: damaged"] {
             assert!(page().contains(words), "{words}: {}", page());
         }
-        let told = palpate(at, &[&run[..], &["--json"]].concat());
-        let line = stdout(&told).lines().next().unwrap().to_owned();
+        let printed = palpate(at, &[&run[..], &["--json"]].concat());
+        let line = stdout(&printed).lines().next().unwrap().to_owned();
         let report: serde_json::Value = serde_json::from_str(&line).unwrap();
         let run = &report["runs"][1];
         assert_eq!((&run["lost"], run["duration_s"].is_null()), (&"missing".into(), true));
@@ -338,13 +338,13 @@ protocol = "jog.toml"
     ] {
         let refused = run(&more);
         assert_eq!(refused.status.code(), Some(2), "{words}");
-        let told = stderr(&refused);
-        assert!(told.contains(words) && told.trim_end().lines().count() == 1, "{told}");
+        let printed = stderr(&refused);
+        assert!(printed.contains(words) && printed.trim_end().lines().count() == 1, "{printed}");
     }
     let longer = stdout(&shown).replace("default = \"5 mm\"", "default = \"6 mm\"");
     fs::write(at.join("jog.toml"), longer).unwrap();
     let refused = run(&["max"]);
     assert_eq!(refused.status.code(), Some(2));
-    let told = stderr(&refused);
-    assert!(told.contains("task 'jog'"), "{told}");
+    let printed = stderr(&refused);
+    assert!(printed.contains("task 'jog'"), "{printed}");
 }

@@ -50,8 +50,8 @@ fn run_mine(at: &Path, more: &[&str]) -> std::process::Output {
 fn a_file_runs_and_its_session_says_which_it_was() {
     let folder = with_mine();
     let at = folder.path();
-    let told = split_words("--set depth=6mm --operator Ada --about specimen.storage=saline");
-    let run = run_mine(at, &told);
+    let printed = split_words("--set depth=6mm --operator Ada --about specimen.storage=saline");
+    let run = run_mine(at, &printed);
     succeeded(&run);
     let run = json(&run);
     assert_eq!((run["plan"].as_str(), run["ending"].as_str()), (Some("mine"), Some("finish")));
@@ -195,7 +195,7 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
 fn a_limit_that_changes_nothing_is_told_where_it_stands() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    for (limit, is_told) in [
+    for (limit, is_reported) in [
         ("force_max = 6 N", false),
         ("force_max = 9 N", true),
         ("force_max = 12 N", true),
@@ -208,14 +208,14 @@ fn a_limit_that_changes_nothing_is_told_where_it_stands() {
         std::fs::write(at.join("mine.toml"), limited).unwrap();
         let check = palpate(at, &["protocol", "check", "mine.toml"]);
         succeeded(&check);
-        let told = stdout(&check);
+        let printed = stdout(&check);
         let words = format!("line 12: warning: {limit}");
-        assert_eq!(told.contains(&words), is_told, "{told}");
-        assert_eq!(told.contains("stops at "), is_told, "{told}");
+        assert_eq!(printed.contains(&words), is_reported, "{printed}");
+        assert_eq!(printed.contains("stops at "), is_reported, "{printed}");
         let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
         succeeded(&preview);
-        let said = stdout(&preview) + &stderr(&preview);
-        assert_eq!(said.matches("changes nothing").count(), usize::from(is_told), "{said}");
+        let message = stdout(&preview) + &stderr(&preview);
+        assert_eq!(message.matches("changes nothing").count(), usize::from(is_reported), "{message}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is told of a session, what is said of it afterwards, and what happened in it.
+//! Labels of a session, later edits of it, and the report on it.
 
 use crate::support::{
     answer, assert_prints, assert_refused, assert_says, json, palpate, short_run, stderr, stdout,
@@ -11,7 +11,7 @@ use std::fs;
 fn what_is_told_stands_in_the_session_and_the_table() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let told = [
+    let printed = [
         "--specimen",
         "pig 7",
         "--about",
@@ -21,13 +21,13 @@ fn what_is_told_stands_in_the_session_and_the_table() {
         "--about",
         "series.repeat=2",
     ];
-    succeeded(&short_run(at, "told", &told));
-    let info = palpate(at, &["info", "told", "--json"]);
+    succeeded(&short_run(at, "printed", &printed));
+    let info = palpate(at, &["info", "printed", "--json"]);
     let info = json(&info);
     assert_eq!(info["about"]["specimen.thickness_mm"], 11.5);
     assert_eq!(info["about"]["series.repeat"], 2);
     assert_eq!(info["signal"]["sample_rate_hz"], 1000.0);
-    let text = stdout(&palpate(at, &["info", "told"]));
+    let text = stdout(&palpate(at, &["info", "printed"]));
     assert!(text.contains("specimen.source pig stomach"), "{text}");
     assert!(text.contains("filter none"), "{text}");
     // Who looks for the key finds it in the refusal.
@@ -135,10 +135,10 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
         (&0.into(), &0.0.into())
     );
     // Where it cannot have been.
-    for (position, told) in [("-1", "travel"), ("x", "not a finite number")] {
+    for (position, printed) in [("-1", "travel"), ("x", "not a finite number")] {
         let refused = correct(position, "why");
         assert_eq!(refused.status.code(), Some(2));
-        assert!(stderr(&refused).contains(told), "{}", stderr(&refused));
+        assert!(stderr(&refused).contains(printed), "{}", stderr(&refused));
     }
     let mute = correct("41", " ");
     assert_refused(&mute, 2, "needs a reason");
@@ -189,7 +189,7 @@ fn a_rejected_session_is_left_out_and_counted() {
     let fit = palpate(at, &["fit", "all/b"]);
     succeeded(&fit);
     assert!(stderr(&fit).contains("the hair was outside"));
-    // Words put into somebody's mouth are noticed by every reader.
+    // Every reader notices a forged edit.
     let edits = at.join("all/b/edits.jsonl");
     let changed = fs::read_to_string(&edits).unwrap().replace("hair under", "air under");
     fs::write(&edits, changed).unwrap();
@@ -238,8 +238,8 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     assert!(!at.join("refused").exists());
     succeeded(&short_run(at, "acknowledged", &["--acknowledge"]));
     let info = json(&palpate(at, &["info", "acknowledged", "--json"]));
-    let told = info["acknowledgements"].to_string();
-    assert!(told.contains("failed its daily check"), "{told}");
+    let printed = info["acknowledgements"].to_string();
+    assert!(printed.contains("failed its daily check"), "{printed}");
     // A check that passes opens the rig again; all three are kept.
     succeeded(&check(&[]));
     succeeded(&short_run(at, "again", &[]));
@@ -260,8 +260,8 @@ fn a_jog_is_motion_and_has_no_cycles() {
     assert!((motion - 5.0 / 3.0).abs() < 0.1, "{motion}");
     let nothing = palpate(at, &["analyse", "jog"]);
     assert_eq!(nothing.status.code(), Some(1));
-    let told = stderr(&nothing);
-    assert!(told.contains("no cycles") && !told.contains("fit"), "{told}");
+    let printed = stderr(&nothing);
+    assert!(printed.contains("no cycles") && !printed.contains("fit"), "{printed}");
 }
 
 #[test]
@@ -300,9 +300,9 @@ fn a_thickness_is_told_by_the_run_and_by_its_session() {
     assert!((between - thickness).abs() < 1e-9, "{run}");
     let line = format!("thickness  {thickness:.3} ± {error:.3} mm");
     for command in ["info", "report"] {
-        let told = json(&palpate(at, &[command, "thick", "--json"]));
+        let printed = json(&palpate(at, &[command, "thick", "--json"]));
         for name in ["base_mm", "base_std_error_mm", "thickness_mm", "thickness_std_error_mm"] {
-            assert_eq!(told[name], run[name], "{command} {name}");
+            assert_eq!(printed[name], run[name], "{command} {name}");
         }
         let text = stdout(&palpate(at, &[command, "thick"]));
         assert!(text.contains(&line), "{text}");
@@ -344,11 +344,11 @@ fn words_of_a_session_give_the_terminal_no_orders() {
     let at = folder.path();
     succeeded(&short_run(at, "one", &["--specimen", "gel\u{1b}[2J 3"]));
     let reason = "hair\nsession    \u{1b}[31mother";
-    let said = palpate(at, &["verdict", "one", "suspect", "--reason", reason]);
-    succeeded(&said);
+    let message = palpate(at, &["verdict", "one", "suspect", "--reason", reason]);
+    succeeded(&message);
     let info = palpate(at, &["info", "one"]);
     succeeded(&info);
-    for output in [&said, &info, &palpate(at, &["doctor", "one"])] {
+    for output in [&message, &info, &palpate(at, &["doctor", "one"])] {
         let text = stdout(output) + &stderr(output);
         assert!(!text.contains('\u{1b}'), "{text:?}");
         assert!(
@@ -357,7 +357,7 @@ fn words_of_a_session_give_the_terminal_no_orders() {
         );
     }
     assert_prints(&info, "gel [2J 3");
-    // Machines get what was said.
+    // The object has the text unchanged.
     let object = json(&palpate(at, &["info", "one", "--json"]));
     assert_eq!(object["verdict_reason"], reason);
 }

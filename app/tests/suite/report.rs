@@ -86,7 +86,7 @@ fn check_text(text: &str, place: &str) {
     assert!(!text.contains(is_bad), "{text:?}");
 }
 
-/// A session with everything that can be said of one, all of it hostile; returns its folder's name.
+/// A session with every kind of edit, all with hostile text; returns the name of its folder.
 fn talked_of(at: &Path) -> &'static str {
     let more = ["--specimen", HOSTILE, "--operator", HOSTILE, "--indenter", HOSTILE, "--seed", "3"];
     succeeded(&short_run(at, "press", &more));
@@ -96,7 +96,7 @@ fn talked_of(at: &Path) -> &'static str {
         &["mask", "press", "--name", "knock <b>", "--leave-out", "70..71"],
         &["mask", "press", "--name", "other", "--leave-out", "60..61"],
         &["withdraw", "press", "other"],
-        &["recalibrate", "press", "--calibration", "thesis", "--name", "anew"],
+        &["recalibrate", "press", "--calibration", "thesis", "--name", "recalibrated"],
         &["fit", "press", "--save", "all & \"more\"", "--include-rejected"],
         &["review", "press", "--accept"],
     ] {
@@ -191,7 +191,7 @@ fn a_page_proves_what_it_describes() {
     succeeded(&whole);
     assert_prints(&whole, "as described");
     succeeded(&check(&["page.html", "press"]));
-    // Elsewhere it has to be told where the session is.
+    // Elsewhere the session has to be named.
     fs::create_dir(at.join("mail")).unwrap();
     fs::copy(at.join("page.html"), at.join("mail/page.html")).unwrap();
     let lost = check(&["mail/page.html"]);
@@ -202,7 +202,7 @@ fn a_page_proves_what_it_describes() {
     fs::write(at.join("changed.html"), page.replacen("Force", "Farce", 1)).unwrap();
     let changed = check(&["changed.html"]);
     assert_refused(&changed, 1, "was changed");
-    // Something said since.
+    // A later edit.
     let why = ["--reason", "hair under the probe", "--by", "Ada"];
     succeeded(&palpate(
         at,
@@ -248,7 +248,7 @@ fn figures_are_drawn_and_wrong_use_is_told() {
     assert!(pixels.starts_with(b"\x89PNG\r\n\x1a\n") && pixels.len() > 10_000);
     let part = ["report", "press", "--figure", "part.svg", "--from", "70", "--until", "71"];
     succeeded(&palpate(at, &part));
-    for (words, told) in [
+    for (words, printed) in [
         (&["report"][..], "name a session"),
         (&["report", "press", "press"], "one session"),
         (&["report", "--html", "p.html"], "name the sessions"),
@@ -264,7 +264,7 @@ fn figures_are_drawn_and_wrong_use_is_told() {
     ] {
         let refused = palpate(at, words);
         assert_eq!(refused.status.code(), Some(2), "{words:?}: {}", stderr(&refused));
-        assert!(stderr(&refused).contains(told), "{words:?}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(printed), "{words:?}: {}", stderr(&refused));
         assert!(!at.join("p.html").exists() && !at.join("a.svg").exists());
     }
 }

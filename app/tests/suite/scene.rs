@@ -6,15 +6,15 @@ use crate::support::{assert_refused, json, palpate, stderr, stdout, typed};
 fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
     let at = tempfile::tempdir().unwrap();
     let record = ["scene", "record", "--to", "poke", "--json"];
-    let told = json(&palpate(at.path(), &record));
-    assert_eq!(told["command"], "scene-record");
-    assert_eq!(told["recorded"]["lost"], 0, "{told}");
-    assert!(told["depth_max_mm"].as_f64().unwrap() > 5.0, "{told}");
-    assert!(told["work"]["count"].as_u64().unwrap() > 1000, "{told}");
+    let printed = json(&palpate(at.path(), &record));
+    assert_eq!(printed["command"], "scene-record");
+    assert_eq!(printed["recorded"]["lost"], 0, "{printed}");
+    assert!(printed["depth_max_mm"].as_f64().unwrap() > 5.0, "{printed}");
+    assert!(printed["work"]["count"].as_u64().unwrap() > 1000, "{printed}");
     let again = json(&palpate(at.path(), &["scene", "replay", "poke", "--json"]));
     assert_eq!(again["is_identical"], true, "{again}");
     assert_eq!(again["is_whole"], true, "{again}");
-    assert_eq!(again["end_hash"], told["surface_hash"]);
+    assert_eq!(again["end_hash"], printed["surface_hash"]);
     // Not over another.
     assert_eq!(palpate(at.path(), &record).status.code(), Some(2));
     // Another tissue gives other forces: exit code 1, and the first tick named.
@@ -24,8 +24,8 @@ fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
     let other = palpate(at.path(), &["scene", "replay", "poke"]);
     assert_eq!(other.status.code(), Some(1));
     assert!(stdout(&other).contains("not as recorded"));
-    let said = stderr(&other);
-    assert!(said.contains("error: tick ") && said.contains("force_z_n"), "{said}");
+    let message = stderr(&other);
+    assert!(message.contains("error: tick ") && message.contains("force_z_n"), "{message}");
     std::fs::write(&settings, text).unwrap();
     // A changed line is damage; a missing end is a recording that was cut off.
     let ticks = at.path().join("poke/ticks.csv");
@@ -36,8 +36,8 @@ fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
     std::fs::write(&ticks, &lines[..lines.len() / 2]).unwrap();
     let cut = palpate(at.path(), &["scene", "replay", "poke"]);
     assert_eq!(cut.status.code(), Some(1), "{}", stderr(&cut));
-    for said in [stdout(&cut), stderr(&cut)] {
-        assert!(said.contains("cut off"), "{said}");
+    for message in [stdout(&cut), stderr(&cut)] {
+        assert!(message.contains("cut off"), "{message}");
     }
 }
 

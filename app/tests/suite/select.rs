@@ -131,8 +131,8 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let rms = |one: &&Value| one["rms_n"].as_f64().unwrap();
     let closest = candidates.iter().min_by(|a, b| rms(a).total_cmp(&rms(b))).unwrap();
     let even = format!("the residuals of {}", closest["family"].as_str().unwrap());
-    let said = found["verdict"]["sentences"][0].as_str().unwrap();
-    assert!(said.contains(&even), "{said}");
+    let message = found["verdict"]["sentences"][0].as_str().unwrap();
+    assert!(message.contains(&even), "{message}");
 
     let specimen = ["--hold-out", "specimen"];
     let nameless = palpate(at, &[&args[..], &specimen].concat());
@@ -198,9 +198,9 @@ fn wrong_use_is_told_in_one_sentence() {
     for (args, code, fact) in cases {
         let output = palpate(at, &[&["select"], args].concat());
         assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
-        let said = stderr(&output);
-        assert!(said.starts_with("error: ") && said.contains(fact), "{args:?}: {said}");
-        assert_eq!(said.lines().count(), 1, "{said}");
+        let message = stderr(&output);
+        assert!(message.starts_with("error: ") && message.contains(fact), "{args:?}: {message}");
+        assert_eq!(message.lines().count(), 1, "{message}");
         assert_eq!(stdout(&output), "");
     }
     let twice = palpate(at, &["select", "slow.csv", "./slow.csv"]);

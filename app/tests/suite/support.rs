@@ -61,18 +61,18 @@ pub fn answer(output: &Output) -> Value {
     json(output)
 }
 
-/// What was said on stderr has this in it.
+/// Standard error contains this.
 #[track_caller]
 pub fn assert_says(output: &Output, fact: &str) {
-    let said = stderr(output);
-    assert!(said.contains(fact), "no {fact:?} in: {said}");
+    let message = stderr(output);
+    assert!(message.contains(fact), "no {fact:?} in: {message}");
 }
 
 /// What was printed has this in it.
 #[track_caller]
 pub fn assert_prints(output: &Output, fact: &str) {
-    let said = stdout(output);
-    assert!(said.contains(fact), "no {fact:?} in: {said}");
+    let message = stdout(output);
+    assert!(message.contains(fact), "no {fact:?} in: {message}");
 }
 
 /// It ended with this exit code, and a sentence that has this in it.

@@ -37,10 +37,10 @@ fn the_log_tells_transitions_of_a_run_and_no_samples() {
     let samples = json(&run)["samples"].as_u64().unwrap();
     let text = log(at);
     assert!(text.starts_with("palpate "), "{text}");
-    for told in
+    for printed in
         ["session opened", "folder=one", "phase: ramp", ":step{number=", "session closed, finish"]
     {
-        assert!(text.contains(told), "{told}: {text}");
+        assert!(text.contains(printed), "{printed}: {text}");
     }
     let lines = text.lines().count() as u64;
     assert!(samples > 10_000 && lines < 100, "{lines} lines, {samples} samples");
@@ -74,15 +74,15 @@ fn what_is_logged_is_shown_when_asked_and_chosen_by_rust_log() {
     assert!(!stderr(&silent).contains("session opened"), "{}", stderr(&silent));
     assert_eq!(log(at), before);
 
-    // A file where the library's folder for logs should be: the run goes on, and who asks for more is told once.
+    // A file where the library's folder for logs should be: the run goes on, and --verbose reports it once.
     let taken = at.join("taken");
     fs::create_dir_all(&taken).unwrap();
     fs::write(taken.join("log"), "").unwrap();
     let without = run(&taken, "without", "");
     succeeded(&without);
-    let told = stderr(&without);
-    assert_eq!(told.matches("no log is kept").count(), 1, "{told}");
-    assert!(told.contains("session closed"), "{told}");
+    let printed = stderr(&without);
+    assert_eq!(printed.matches("no log is written").count(), 1, "{printed}");
+    assert!(printed.contains("session closed"), "{printed}");
 }
 
 #[test]
@@ -101,9 +101,9 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     let made = json(&made);
     assert_eq!(made["command"], "support-bundle");
     let files = unpacked(&at.join("help.zip"));
-    let told: Vec<&str> =
+    let printed: Vec<&str> =
         made["files"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
-    assert!(files.keys().all(|name| told.contains(&name.as_str())), "{made}");
+    assert!(files.keys().all(|name| printed.contains(&name.as_str())), "{made}");
     let names: Vec<&str> = files.keys().map(String::as_str).collect();
     let expected =
         ["findings.txt", "log/palpate.log", "rigs/bench.toml", "versions.txt", "window.json"];
@@ -114,7 +114,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
         "{}",
         text("versions.txt")
     );
-    assert!(text("findings.txt").contains("1 looked at, all can be used"));
+    assert!(text("findings.txt").contains("1 examined, all usable"));
     assert!(text("log/palpate.log").contains("session closed"));
     assert_eq!(text("window.json"), "{\"is_dark\": true}\n");
     let rig = text("rigs/bench.toml");

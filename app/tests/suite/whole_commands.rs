@@ -15,9 +15,9 @@ fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
     let run = short_run(at, "short", &[]);
     succeeded(&run);
     let words = "'palpate fit short'";
-    let told = stdout(&run);
-    let live = told.split_once(words).map(|(_, live)| live);
-    assert!(live.is_some_and(|live| live.contains("tau_eps")), "{told}");
+    let printed = stdout(&run);
+    let live = printed.split_once(words).map(|(_, live)| live);
+    assert!(live.is_some_and(|live| live.contains("tau_eps")), "{printed}");
     let fit = palpate(at, &["fit", "short"]);
     succeeded(&fit);
     assert_prints(&fit, " systematic");
@@ -74,7 +74,7 @@ fn one_seed_gives_one_session_at_any_pace() {
     let open = |name: &str| palpate_sessions::log::Session::open(&at.join(name)).unwrap();
     let (max, paced, other) = (open("max"), open("paced"), open("other"));
     assert_eq!(max.manifest.rig.as_ref().unwrap().settings["seed"], "7");
-    // Not assert_eq: a hundred thousand rows help nobody who reads the failure.
+    // Not assert_eq: a hundred thousand rows do not help a reader of the failure.
     assert!(max.rows == paced.rows, "{:?}", first_difference(&max.rows, &paced.rows));
     assert!(max.entries == paced.entries, "{:?}", first_difference(&max.entries, &paced.entries));
     assert!(max.rows != other.rows);
@@ -151,12 +151,12 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
     let mut failures = Vec::new();
     for (args, expected) in cases {
         let output = palpate(at, args);
-        let said = stderr(&output);
+        let message = stderr(&output);
         let is_right = output.status.code() == Some(2)
-            && said.contains(expected)
-            && !said.contains("panicked");
+            && message.contains(expected)
+            && !message.contains("panicked");
         if !is_right {
-            failures.push(format!("{args:?} exit {:?}: {said}", output.status.code()));
+            failures.push(format!("{args:?} exit {:?}: {message}", output.status.code()));
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));

@@ -53,20 +53,20 @@ fn what_is_not_as_the_file_says_is_told() {
     let file = rig_file(folder.path(), &at, "serial_number = 78\n");
     let other = palpate(folder.path(), &["rig", "check", &file]);
     assert_eq!(other.status.code(), Some(1));
-    let told = stderr(&other);
-    assert!(told.contains("77") && told.contains("78"), "{told}");
+    let printed = stderr(&other);
+    assert!(printed.contains("77") && printed.contains("78"), "{printed}");
     let wrong = rig_file(folder.path(), &at, "travel = 3\n");
     let wrong = palpate(folder.path(), &["rig", "check", &wrong]);
     assert_refused(&wrong, 2, "bench.toml, line 8: ");
-    let nobody = typed(folder.path(), "rig detect --at /dev/there-is-no-such-port");
-    assert_prints(&nobody, "serial port");
+    let missing = typed(folder.path(), "rig detect --at /dev/there-is-no-such-port");
+    assert_prints(&missing, "serial port");
 }
 
-/// What is said where a busy computer has ended a run, or the retract after it.
+/// Messages where a busy computer has ended a run, or the retract after it.
 const LATE: [&str; 4] = ["sample age", "stood still", "samples arrived", "controller answers"];
 
-fn is_late(said: &str) -> bool {
-    LATE.iter().any(|words| said.contains(words))
+fn is_late(message: &str) -> bool {
+    LATE.iter().any(|words| message.contains(words))
 }
 
 /// The samples of a session so far; none before there is one.
@@ -96,9 +96,9 @@ fn fail_under_way(emulator: &mut Emulator, run: &mut Child, session: &Path) {
 }
 
 /// Runs a check of the home switch whose load cell fails under way, and answers the question that follows; how many
-/// mm from home the probe was, at most and at the end, and what was said.
+/// mm from home the probe was, at most and at the end, and the messages.
 ///
-/// A computer busy with other tests may make a sample late, which stops the run before: what was said then is the error.
+/// A computer busy with other tests may make a sample late, which stops the run before: its message is then the error.
 fn stopped_run(answer: Option<&str>) -> Result<([f64; 2], String), String> {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut emulator, at) = emulate_galil(&[]);
@@ -118,10 +118,10 @@ fn stopped_run(answer: Option<&str>) -> Result<([f64; 2], String), String> {
         .spawn()
         .expect("palpate starts");
     let session = folder.path().join("session");
-    let told = run.stderr.take().expect("it is piped");
-    let mut said = String::new();
+    let printed = run.stderr.take().expect("it is piped");
+    let mut message = String::new();
     fail_under_way(&mut emulator, &mut run, &session);
-    for line in BufReader::new(told).lines() {
+    for line in BufReader::new(printed).lines() {
         let line = line.expect("it is text");
         if let (Some(answer), true) = (answer, line.contains("press Enter to retract")) {
             // When the cell recovers, the force jumps again.
@@ -131,17 +131,17 @@ fn stopped_run(answer: Option<&str>) -> Result<([f64; 2], String), String> {
             let mut hand = run.stdin.take().expect("it is piped");
             writeln!(hand, "{answer}").expect("palpate listens");
         }
-        said.push_str(&line);
-        said.push('\n');
+        message.push_str(&line);
+        message.push('\n');
     }
     let code = run.wait().expect("it ends").code();
-    if is_late(&said) {
-        return Err(said);
+    if is_late(&message) {
+        return Err(message);
     }
-    assert!(code == Some(1) && said.contains("the force is 55"), "{said}");
+    assert!(code == Some(1) && message.contains("the force is 55"), "{message}");
     let positions = positions(&session);
-    let last = positions.last().copied().expect("the axis told where it was");
-    Ok(([furthest(&positions), last], said))
+    let last = positions.last().copied().expect("positions of the axis");
+    Ok(([furthest(&positions), last], message))
 }
 
 #[test]
@@ -150,13 +150,13 @@ fn a_stopped_probe_leaves_where_somebody_says_so_and_stays_otherwise() {
         let runs = [Some(""), Some("no"), None]
             .map(|answer| scope.spawn(move || retry(|| stopped_run(answer))));
         let [retracted, left, alone] = runs.map(|run| run.join().unwrap());
-        let ([furthest, last], said) = retracted;
-        assert!(furthest > 5.0 && last < furthest - 2.0, "{furthest} {last} {said}");
-        let ([furthest, last], said) = left;
-        assert!(last > furthest - 0.1, "{furthest} {last} {said}");
+        let ([furthest, last], message) = retracted;
+        assert!(furthest > 5.0 && last < furthest - 2.0, "{furthest} {last} {message}");
+        let ([furthest, last], message) = left;
+        assert!(last > furthest - 0.1, "{furthest} {last} {message}");
         // Without anybody at the terminal nothing is asked.
-        let ([furthest, last], said) = alone;
-        assert!(last > furthest - 0.1, "{furthest} {last} {said}");
-        assert!(!said.contains("nobody answered"), "{said}");
+        let ([furthest, last], message) = alone;
+        assert!(last > furthest - 0.1, "{furthest} {last} {message}");
+        assert!(!message.contains("no answer came"), "{message}");
     });
 }

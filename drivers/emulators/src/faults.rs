@@ -9,11 +9,11 @@ use thiserror::Error;
 /// A fault of the device itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceFault {
-    /// It starts anew, as after a drop of its supply.
+    /// It restarts, as after a drop of its supply.
     Reset,
-    /// The load cell's signal stays where it is.
+    /// The load cell's signal is frozen.
     Stuck,
-    /// The load cell's amplifier is at its end.
+    /// The load cell's amplifier is saturated.
     Saturated,
     /// Another device of its kind answers in its place.
     WrongDevice,
@@ -22,28 +22,25 @@ pub enum DeviceFault {
 /// A fault of the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineFault {
-    /// Bytes are changed, or come out of nowhere.
+    /// Bytes are changed or inserted.
     Garbage,
-    /// Bytes are lost.
+    /// Bytes are dropped.
     Drop,
-    /// Bytes come twice.
+    /// Bytes arrive twice.
     Duplicate,
     /// Answers end early.
     Partial,
-    /// Answers come late.
+    /// Answers arrive late.
     Late,
-    /// Nothing reaches the device.
+    /// No byte reaches the device.
     Deaf,
-    /// Nothing comes from the device.
+    /// No byte leaves the device.
     Mute,
 }
 
-/// What goes wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The line.
     Line(LineFault),
-    /// The device.
     Device(DeviceFault),
     /// The plug is pulled, and put back at the end.
     Disconnect,
@@ -64,32 +61,27 @@ const KINDS: [(&str, FaultKind); 12] = [
     ("wrong-device", FaultKind::Device(DeviceFault::WrongDevice)),
 ];
 
-/// Share of the bytes that a fault of the line spoils: of a 20-byte command one or two.
-const SPOILED: f64 = 0.08;
-/// How much later answers come: longer than the half second that impatient clients wait.
+/// Share of the bytes that a line fault corrupts: one or two of a 20-byte command.
+const CORRUPTED_SHARE: f64 = 0.08;
+/// Delay of late answers: longer than the half second that impatient clients wait.
 const LATENESS: Nanos = Nanos(700_000_000);
-/// How long a fault lasts that nobody gave a duration.
+/// Duration of a fault that names none.
 const DURATION: Nanos = Nanos(500_000_000);
-/// Latest beginning and longest duration: a day.
+/// Latest start and longest duration: a day.
 const SECONDS_MAX: f64 = 86_400.0;
 
-/// A fault cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the fault '{0}' cannot be read; give KIND@SECONDS or KIND@SECONDS:DURATION with one of {kinds}", kinds = kinds())]
+#[error("'{0}' is not a fault; give KIND@SECONDS or KIND@SECONDS:DURATION with one of {kinds}", kinds = kinds())]
 pub struct FaultError(String);
 
 fn kinds() -> String {
     KINDS.map(|(name, _)| name).join(", ")
 }
 
-/// A fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScheduledFault {
-    /// What.
     pub kind: FaultKind,
-    /// From when.
     pub from: Nanos,
-    /// Until when.
     pub until: Nanos,
 }
 
@@ -134,50 +126,45 @@ impl fmt::Display for FaultKind {
     }
 }
 
-/// Faults to come and under way, and the randomness they share.
+/// Pending and active faults, with the random numbers they share.
 #[derive(Clone, Debug)]
 pub struct FaultPlan {
-    coming: Vec<ScheduledFault>,
+    pending: Vec<ScheduledFault>,
     active: Vec<ScheduledFault>,
     random: Random,
 }
 
 /// A fault has begun or ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Turn {
-    /// Which.
+pub struct FaultEvent {
     pub kind: FaultKind,
-    /// Whether it has begun.
     pub is_on: bool,
 }
 
 impl FaultPlan {
-    /// These faults; which bytes they spoil follows from the seed.
-    #[must_use]
+    /// The seed decides which bytes are corrupted.
     pub fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
-        Self { coming: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
+        Self { pending: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
     }
 
-    /// One more.
     pub fn add(&mut self, fault: ScheduledFault) {
-        self.coming.push(fault);
+        self.pending.push(fault);
     }
 
-    /// What begins or ends up to a time, the ends first.
-    pub fn advance(&mut self, now: Nanos) -> Vec<Turn> {
-        let turn = |fault: ScheduledFault, is_on| Turn { kind: fault.kind, is_on };
-        let mut turns = Vec::new();
+    /// Faults that begin or end up to `now`, ends first.
+    pub fn advance(&mut self, now: Nanos) -> Vec<FaultEvent> {
+        let event = |fault: ScheduledFault, is_on| FaultEvent { kind: fault.kind, is_on };
+        let mut events = Vec::new();
         let over = self.active.extract_if(.., |fault| fault.until <= now);
-        turns.extend(over.map(|fault| turn(fault, false)));
-        let begun: Vec<_> = self.coming.extract_if(.., |fault| fault.from <= now).collect();
+        events.extend(over.map(|fault| event(fault, false)));
+        let begun: Vec<_> = self.pending.extract_if(.., |fault| fault.from <= now).collect();
         for fault in begun {
-            turns.push(turn(fault, true));
+            events.push(event(fault, true));
             self.active.push(fault);
         }
-        turns
+        events
     }
 
-    /// Whether a fault is under way.
     pub fn is_on(&self, kind: FaultKind) -> bool {
         self.active.iter().any(|fault| fault.kind == kind)
     }
@@ -186,39 +173,39 @@ impl FaultPlan {
         self.is_on(FaultKind::Line(fault))
     }
 
-    /// How much later what is sent now arrives.
+    /// Delay of what is sent now.
     pub fn lateness(&self) -> Nanos {
         if self.has(LineFault::Late) { LATENESS } else { Nanos::ZERO }
     }
 
-    /// What becomes of bytes on their way, to the device or from it.
-    pub fn spoil(&mut self, bytes: Vec<u8>, is_to_device: bool) -> Vec<u8> {
+    /// Passes bytes through the line faults, to the device or from it.
+    pub fn corrupt(&mut self, bytes: Vec<u8>, is_to_device: bool) -> Vec<u8> {
         if self.active.is_empty() {
             return bytes;
         }
-        let is_lost =
+        let is_dropped =
             if is_to_device { self.has(LineFault::Deaf) } else { self.has(LineFault::Mute) };
-        if is_lost {
+        if is_dropped {
             return Vec::new();
         }
         let mut bytes = bytes;
         if self.has(LineFault::Partial) && !is_to_device && !bytes.is_empty() {
-            let kept = self.random.between(0.0, bytes.len() as f64) as usize;
-            bytes.truncate(kept);
+            let length = self.random.between(0.0, bytes.len() as f64) as usize;
+            bytes.truncate(length);
         }
         let mut out = Vec::with_capacity(bytes.len());
         for byte in bytes {
-            if self.has(LineFault::Drop) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Drop) && self.random.unit() < CORRUPTED_SHARE {
                 continue;
             }
-            if self.has(LineFault::Garbage) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Garbage) && self.random.unit() < CORRUPTED_SHARE {
                 out.push(self.random.between(0.0, 256.0) as u8);
                 if self.random.unit() < 0.5 {
                     continue;
                 }
             }
             out.push(byte);
-            if self.has(LineFault::Duplicate) && self.random.unit() < SPOILED {
+            if self.has(LineFault::Duplicate) && self.random.unit() < CORRUPTED_SHARE {
                 out.push(byte);
             }
         }
@@ -231,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn faults_are_read_or_refused_by_name() {
+    fn faults_are_parsed_or_refused_by_name() {
         let fault: ScheduledFault = "stuck@2.5:10".parse().unwrap();
         assert_eq!(fault.kind, FaultKind::Device(DeviceFault::Stuck));
         assert_eq!((fault.from.0, fault.until.0), (2_500_000_000, 12_500_000_000));
@@ -250,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn they_begin_and_end_and_spoil_what_passes() {
+    fn faults_begin_and_end_and_corrupt_bytes() {
         let all: Vec<u8> = (0..200).collect();
         for (kind, is_to_device) in [
             ("garbage", true),
@@ -263,34 +250,34 @@ mod tests {
             let fault = format!("{kind}@1:1").parse().unwrap();
             let mut plan = FaultPlan::new(vec![fault], 3);
             assert!(plan.advance(Nanos(999_999_999)).is_empty());
-            assert_eq!(plan.spoil(all.clone(), is_to_device), all);
+            assert_eq!(plan.corrupt(all.clone(), is_to_device), all);
             assert_eq!(plan.advance(Nanos(1_000_000_000)).len(), 1);
-            let spoiled = plan.spoil(all.clone(), is_to_device);
-            assert_ne!(spoiled, all, "{kind}");
+            let corrupted = plan.corrupt(all.clone(), is_to_device);
+            assert_ne!(corrupted, all, "{kind}");
             match kind {
-                "drop" | "partial" => assert!(spoiled.len() < all.len() && !spoiled.is_empty()),
-                "duplicate" => assert!(spoiled.len() > all.len()),
+                "drop" | "partial" => assert!(corrupted.len() < all.len() && !corrupted.is_empty()),
+                "duplicate" => assert!(corrupted.len() > all.len()),
                 "deaf" | "mute" => {
-                    assert!(spoiled.is_empty());
-                    assert_eq!(plan.spoil(all.clone(), !is_to_device), all);
+                    assert!(corrupted.is_empty());
+                    assert_eq!(plan.corrupt(all.clone(), !is_to_device), all);
                 }
                 _ => {}
             }
-            let turns = plan.advance(Nanos(2_000_000_000));
-            assert!(matches!(turns[..], [Turn { is_on: false, .. }]));
-            assert_eq!(plan.spoil(all.clone(), is_to_device), all);
+            let events = plan.advance(Nanos(2_000_000_000));
+            assert!(matches!(events[..], [FaultEvent { is_on: false, .. }]));
+            assert_eq!(plan.corrupt(all.clone(), is_to_device), all);
         }
     }
 
     #[test]
-    fn equal_seeds_spoil_equally() {
+    fn equal_seeds_corrupt_equally() {
         let fault = "garbage@0:1".parse().unwrap();
-        let spoiled = |seed| {
+        let corrupted = |seed| {
             let mut plan = FaultPlan::new(vec![fault], seed);
             plan.advance(Nanos(0));
-            plan.spoil(vec![b'x'; 300], false)
+            plan.corrupt(vec![b'x'; 300], false)
         };
-        assert_eq!(spoiled(4), spoiled(4));
-        assert_ne!(spoiled(4), spoiled(5));
+        assert_eq!(corrupted(4), corrupted(4));
+        assert_ne!(corrupted(4), corrupted(5));
     }
 }

@@ -4,14 +4,15 @@
 //! of 5 V; HX711 data sheet, Avia Semiconductor, page 3), so that what is calibrated in those volts stays right.
 
 use super::DeviceFault;
-use super::cell::{EmulatedCell, Felt};
+use super::cell::{CellLoad, EmulatedCell};
+use super::wire::Outbox;
 use palpate_drivers::hx711::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, line};
 use palpate_model::Nanos;
 
 /// Amplified signal at the end of the range, gain 128.
 const FULL_SCALE_V: f64 = 5.0;
-/// The chip's oscillator is an RC one, its data sheet says "typically": here it runs fast by 3 %, within what is seen of
-/// such chips.
+/// The chip's oscillator is an RC one, its data sheet says "typically": here it is fast by 3 %, within what
+/// such chips show.
 const OSCILLATOR: f64 = 1.03;
 /// An Arduino Uno's ceramic resonator, rated at 0.5 %: here fast by 0.2 %.
 const RESONATOR: f64 = 1.002;
@@ -19,18 +20,15 @@ const RESONATOR: f64 = 1.002;
 const MICROS_STEP: u64 = 4;
 /// The Uno's boot loader waits about so long before the sketch.
 const BOOT: Nanos = Nanos::from_millis(1_600);
-/// So many conversions pass after a start before the output is settled (data sheet, page 3: 400 ms at 10, 50 ms at 80
+/// Conversions after a start until the output is settled (data sheet, page 3: 400 ms at 10, 50 ms at 80
 /// samples a second): a value is a mean over them. How they are weighted is not published.
 const SETTLING: u32 = 4;
 /// How long the sketch waits for the chip.
 const MISSING_AFTER: Nanos = Nanos::from_millis(500);
-/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
-const OUTPUT_MAX: usize = 4096;
 
-/// What an emulated board is like.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmulatedHx711Settings {
-    /// Name in its sketch.
+    /// Name that the sketch reports.
     pub board: String,
     /// Conversions a second as wired: 80, or 10.
     pub is_fast: bool,
@@ -46,17 +44,16 @@ impl Default for EmulatedHx711Settings {
     }
 }
 
-/// The board.
 #[derive(Default)]
 pub struct EmulatedHx711 {
     settings: EmulatedHx711Settings,
-    /// When the sketch began, and what its clock said then.
+    /// When the sketch began, and its clock at that time.
     started: Option<(Nanos, u32)>,
     /// When the boot loader ends.
     boot_end: Nanos,
     /// Conversions since the start, or since the chip came back.
     conversions: u32,
-    /// Whether the sketch has said that it started.
+    /// Whether the sketch has sent its `Started` message.
     has_begun: bool,
     next: Nanos,
     sum: f64,
@@ -65,16 +62,15 @@ pub struct EmulatedHx711 {
     newest: [f64; SETTLING as usize],
     count: i32,
     missing_since: Option<Nanos>,
-    is_chip_lost: bool,
+    is_chip_missing: bool,
     is_stuck: bool,
     is_saturated: bool,
-    is_other: bool,
-    output: Vec<u8>,
+    is_wrong: bool,
+    output: Outbox,
 }
 
 impl EmulatedHx711 {
     /// A board that has been on for a while.
-    #[must_use]
     pub fn new(settings: EmulatedHx711Settings) -> Self {
         let mut board = Self {
             started: Some((Nanos::ZERO, settings.micros)),
@@ -87,9 +83,9 @@ impl EmulatedHx711 {
         board
     }
 
-    /// The chip loses its wires, or gets them back.
-    pub fn lose_chip(&mut self, is_lost: bool) {
-        self.is_chip_lost = is_lost;
+    /// Takes the chip off its wires, or puts it back.
+    pub fn set_chip_missing(&mut self, is_missing: bool) {
+        self.is_chip_missing = is_missing;
     }
 
     fn period(&self) -> Nanos {
@@ -112,15 +108,12 @@ impl EmulatedHx711 {
                 (false, false) => 10,
             },
             gain: if self.settings.is_half_gain { 64 } else { 128 },
-            board: if self.is_other { "another".into() } else { self.settings.board.clone() },
+            board: if self.is_wrong { "another".into() } else { self.settings.board.clone() },
         }
     }
 
-    fn say(&mut self, message: &Message) {
-        let text = line(message);
-        if self.output.len() + text.len() <= OUTPUT_MAX {
-            self.output.extend_from_slice(text.as_bytes());
-        }
+    fn send(&mut self, message: &Message) {
+        self.output.push(line(message).as_bytes());
     }
 
     fn restart(&mut self, now: Nanos) {
@@ -154,20 +147,20 @@ impl EmulatedHx711 {
         if self.conversions == SETTLING && !self.has_begun {
             self.has_begun = true;
             let header = self.header();
-            self.say(&Message::Started { micros, header });
+            self.send(&Message::Started { micros, header });
         } else if self.conversions > SETTLING {
-            self.say(&Message::Value { micros, count });
+            self.send(&Message::Value { micros, count });
         }
     }
 
-    /// The sketch says again and again that the chip does not answer.
+    /// The sketch reports every [`MISSING_AFTER`] that the chip does not answer.
     fn wait_for_chip(&mut self, now: Nanos) {
         let since = *self.missing_since.get_or_insert(now);
         if now.since(since) >= MISSING_AFTER {
             self.missing_since = Some(now);
             self.conversions = 0;
             let micros = self.micros(now);
-            self.say(&Message::Missing { micros });
+            self.send(&Message::Missing { micros });
         }
     }
 }
@@ -176,11 +169,11 @@ impl EmulatedCell for EmulatedHx711 {
     fn receive(&mut self, now: Nanos, bytes: &[u8]) {
         if self.started.is_some() && bytes.contains(&b'?') {
             let message = Message::Header { micros: self.micros(now), header: self.header() };
-            self.say(&message);
+            self.send(&message);
         }
     }
 
-    fn advance(&mut self, now: Nanos, felt: Felt) {
+    fn advance(&mut self, now: Nanos, load: CellLoad) {
         if self.started.is_none() {
             if now < self.boot_end {
                 return;
@@ -189,9 +182,9 @@ impl EmulatedCell for EmulatedHx711 {
             self.next = self.boot_end + self.period();
             (self.sum, self.steps) = (0.0, 0);
         }
-        self.sum += felt.volts.0;
+        self.sum += load.volts.0;
         self.steps += 1;
-        if self.is_chip_lost {
+        if self.is_chip_missing {
             self.wait_for_chip(now);
             self.next = now + self.period();
             return;
@@ -205,17 +198,17 @@ impl EmulatedCell for EmulatedHx711 {
     }
 
     fn transmit(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.output)
+        self.output.take()
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => self.restart(now),
             DeviceFault::Reset => {}
             DeviceFault::Stuck => self.is_stuck = is_on,
             DeviceFault::Saturated => self.is_saturated = is_on,
             DeviceFault::WrongDevice => {
-                self.is_other = is_on;
+                self.is_wrong = is_on;
                 self.restart(now);
             }
         }

@@ -1,36 +1,26 @@
-//! What is asked of an emulator while it runs: a fault, or something that a person would do at the bench.
+//! Orders to a running emulator: a fault, or an action of a person at the bench.
 
 use super::faults::{FaultError, ScheduledFault};
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 use thiserror::Error;
 
-/// One thing asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Order {
-    /// A fault that begins now.
+pub enum EmulatorOrder {
     Fault(ScheduledFault),
-    /// Weights, specimens.
     Hand(HandAction),
 }
 
-/// An order cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum OrderError {
-    /// It is no fault, nor anything done by hand.
+    /// Neither a fault nor an action.
     #[error("{0}; or load GRAMS, mount NUMBER, unmount")]
     Unknown(FaultError),
-    /// A number is missing or wrong.
-    #[error("'{order}' cannot be done; give {right}")]
-    Number {
-        /// What was asked.
-        order: String,
-        /// What would be understood.
-        right: &'static str,
-    },
+    #[error("'{order}' is not a valid order; give {right}")]
+    Number { order: String, right: &'static str },
 }
 
-impl Order {
+impl EmulatorOrder {
     /// Reads `load GRAMS`, `mount NUMBER`, `unmount`, or `KIND[:DURATION]` of a fault.
     pub fn parse(text: &str, now: Nanos) -> Result<Self, OrderError> {
         let wrong = |right| OrderError::Number { order: text.to_owned(), right };
@@ -57,8 +47,8 @@ impl Order {
         }
     }
 
-    /// What is told when it is done; nothing of a fault, which tells itself when it begins.
-    pub fn told(&self) -> Option<String> {
+    /// The sentence after it is carried out; none for a fault, which is reported when it begins.
+    pub fn confirmation(&self) -> Option<String> {
         match self {
             Self::Fault(_) => None,
             Self::Hand(HandAction::LoadCell { mass_g }) => {
@@ -67,7 +57,7 @@ impl Order {
             Self::Hand(HandAction::Mount { specimen }) => {
                 Some(format!("specimen {specimen} is mounted"))
             }
-            Self::Hand(HandAction::Unmount) => Some("the specimen is taken out".to_owned()),
+            Self::Hand(HandAction::Unmount) => Some("the specimen is unmounted".to_owned()),
         }
     }
 }
@@ -77,14 +67,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn orders_are_read_or_refused_with_what_would_do() {
-        let parse = |text| Order::parse(text, Nanos(5));
+    fn orders_are_parsed_or_refused_with_the_right_form() {
+        let parse = |text| EmulatorOrder::parse(text, Nanos(5));
         let load = HandAction::LoadCell { mass_g: 140.5 };
-        assert_eq!(parse("load 140.5"), Ok(Order::Hand(load)));
+        assert_eq!(parse("load 140.5"), Ok(EmulatorOrder::Hand(load)));
         let mount = HandAction::Mount { specimen: 3 };
-        assert_eq!(parse("mount 3"), Ok(Order::Hand(mount)));
-        assert_eq!(parse("unmount"), Ok(Order::Hand(HandAction::Unmount)));
-        assert!(matches!(parse("mute:2"), Ok(Order::Fault(_))));
+        assert_eq!(parse("mount 3"), Ok(EmulatorOrder::Hand(mount)));
+        assert_eq!(parse("unmount"), Ok(EmulatorOrder::Hand(HandAction::Unmount)));
+        assert!(matches!(parse("mute:2"), Ok(EmulatorOrder::Fault(_))));
         for (text, part) in [
             ("load", "a mass in g"),
             ("load -1", "a mass in g"),

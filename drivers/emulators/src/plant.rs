@@ -1,14 +1,12 @@
-//! What every emulated device moves and feels: the slide of the simulated rig, its bench and its load cell.
+//! The slide, bench and load cell of the simulated rig behind every emulated device.
 
 use palpate_drivers::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
 use palpate_model::rig::HandAction;
 use palpate_model::{Newtons, Position, Seconds, Volts};
 
-/// The slide with the probe, what stands before it, and the signal of the cell.
-///
-/// Positions given are those of the device's counter, in mm; where its zero is no device can know.
+/// Positions passed in are those of the device's counter, in mm; no device knows where its zero is.
 #[derive(Clone, Debug)]
-pub struct Plant {
+pub struct EmulatedPlant {
     bench: Bench,
     cell: LoadCell,
     /// True position at which the counter reads zero.
@@ -16,26 +14,22 @@ pub struct Plant {
     /// True position of the axis.
     axis: Position,
     force: Newtons,
-    on_cell: Newtons,
+    cell_force: Newtons,
     volts: Volts,
     fault: Option<CellFault>,
 }
 
-/// What is wrong with the cell's signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellFault {
-    /// It stays where it is.
     Stuck,
-    /// The amplifier is at its end.
     Saturated,
 }
 
 /// Beyond the end of every input range, so that each reads its own end.
 const SATURATED: Volts = Volts(12.0);
 
-impl Plant {
-    /// The slide as it is switched on, 5 to 15 mm from home, its counter at zero; the cell is read once per `tick`.
-    #[must_use]
+impl EmulatedPlant {
+    /// Starts 5 to 15 mm from home with the counter at zero; the cell is read once per `tick`.
     pub fn new(settings: &SimSettings, tick: Seconds) -> Self {
         let mut machine = Random::new(settings.seed, Cause::Machine);
         let counter_zero = Position(machine.between(5.0, 15.0));
@@ -45,7 +39,7 @@ impl Plant {
             counter_zero,
             axis: counter_zero,
             force: Newtons(0.0),
-            on_cell: Newtons(0.0),
+            cell_force: Newtons(0.0),
             volts: Volts(0.0),
             fault: None,
         };
@@ -53,13 +47,13 @@ impl Plant {
         plant
     }
 
-    /// The axis has moved straight to a counted position, in mm, in a time step.
+    /// Moves the axis to a counted position, in mm, within a time step.
     pub fn advance(&mut self, counted_mm: f64, dt: Seconds) {
         self.axis = self.counter_zero.moved_by(counted_mm);
-        let felt = self.bench.advance(self.axis, dt);
-        self.force = felt.on_probe;
-        self.on_cell = felt.on_cell;
-        let volts = self.cell.signal(felt.on_cell);
+        let load = self.bench.advance(self.axis, dt);
+        self.force = load.on_probe;
+        self.cell_force = load.on_cell;
+        let volts = self.cell.signal(load.on_cell);
         self.volts = match self.fault {
             None => volts,
             Some(CellFault::Stuck) => self.volts,
@@ -67,29 +61,28 @@ impl Plant {
         };
     }
 
-    /// From now on the counter reads less by so much, in mm, wherever the axis stands.
-    pub fn shift(&mut self, by_mm: f64) {
+    /// Lowers the counter by `by_mm` without motion of the axis.
+    pub fn shift_counter(&mut self, by_mm: f64) {
         self.counter_zero = self.counter_zero.moved_by(by_mm);
     }
 
-    /// A person puts weights on the cell, mounts a specimen or takes it out.
-    pub fn by_hand(&mut self, action: HandAction) {
+    pub fn apply_hand_action(&mut self, action: HandAction) {
         self.bench.by_hand(action);
     }
 
-    /// The cell's amplified signal at the newest step.
+    /// Amplified signal of the cell.
     pub fn volts(&self) -> Volts {
         self.volts
     }
 
-    /// Force on the probe at the newest step.
+    /// Force on the probe.
     pub fn force(&self) -> Newtons {
         self.force
     }
 
-    /// Force on the cell at the newest step: that on the probe, and weights that a person has put on.
-    pub fn on_cell(&self) -> Newtons {
-        self.on_cell
+    /// Force on the cell: that on the probe plus weights.
+    pub fn cell_force(&self) -> Newtons {
+        self.cell_force
     }
 
     /// True position of the axis, in mm from the edge of the home switch.
@@ -97,23 +90,20 @@ impl Plant {
         self.axis
     }
 
-    /// Whether the home switch is closed.
     pub fn is_home(&self) -> bool {
         self.axis.0 <= 0.0
     }
 
-    /// Whether the limit switch at the far end is closed.
     pub fn is_forward_limit(&self) -> bool {
         self.axis.0 >= TRAVEL.0 + SWITCH_MARGIN_MM
     }
 
-    /// Whether the limit switch behind home is closed.
     pub fn is_reverse_limit(&self) -> bool {
         self.axis.0 <= -SWITCH_MARGIN_MM
     }
 
-    /// The cell's signal goes wrong, or right again with `None`.
-    pub fn spoil(&mut self, fault: Option<CellFault>) {
+    /// Sets or clears a fault of the cell's signal.
+    pub fn set_cell_fault(&mut self, fault: Option<CellFault>) {
         self.fault = fault;
     }
 }
@@ -123,11 +113,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_probe_feels_the_tissue_and_the_switches_close_at_the_ends() {
+    fn probe_feels_tissue_and_switches_close_at_ends() {
         let dt = Seconds(0.001);
-        let mut plant = Plant::new(&SimSettings::default(), dt);
+        let mut plant = EmulatedPlant::new(&SimSettings::default(), dt);
         let free = plant.volts();
-        plant.shift(-100.0);
+        plant.shift_counter(-100.0);
         plant.advance(100.0, dt);
         let home = 100.0 - plant.axis().0;
         let mut at = 100.0;
@@ -138,18 +128,18 @@ mod tests {
         assert!(plant.force().0 > 0.5, "{:?}", plant.force());
         assert!(plant.volts().0 > free.0 + 0.05);
 
-        plant.by_hand(HandAction::Unmount);
+        plant.apply_hand_action(HandAction::Unmount);
         plant.advance(at, dt);
         assert_eq!(plant.force().0, 0.0);
-        plant.by_hand(HandAction::LoadCell { mass_g: 400.0 });
+        plant.apply_hand_action(HandAction::LoadCell { mass_g: 400.0 });
         plant.advance(at, dt);
         assert!(plant.volts().0 > free.0 + 0.05 && plant.force().0 == 0.0);
-        assert!((plant.on_cell().0 - 0.4 * 9.80665).abs() < 0.01);
-        plant.spoil(Some(CellFault::Stuck));
+        assert!((plant.cell_force().0 - 0.4 * 9.80665).abs() < 0.01);
+        plant.set_cell_fault(Some(CellFault::Stuck));
         let stuck = plant.volts();
         plant.advance(at - 5.0, dt);
         assert_eq!(plant.volts(), stuck);
-        plant.spoil(Some(CellFault::Saturated));
+        plant.set_cell_fault(Some(CellFault::Saturated));
         plant.advance(home - 0.001, dt);
         assert_eq!(plant.volts(), SATURATED);
         assert!(plant.is_home() && !plant.is_reverse_limit());

@@ -20,13 +20,13 @@ pub struct Pty {
     /// The client's end, such as `/dev/pts/3`.
     pub path: PathBuf,
     link: Option<PathBuf>,
-    /// Whether a client had it open when it was last looked at.
+    /// Whether a client had it open at the newest read.
     pub has_client: bool,
 }
 
 impl Pty {
-    /// A new one, raw, with a link to it where a path is given. A link of an earlier run is replaced; anything else
-    /// that stands there is an error.
+    /// Opens a raw pseudo-terminal, with a link to it where a path is given. It replaces a link of an earlier run;
+    /// anything else at that path is an error.
     pub fn open(link: Option<&Path>) -> io::Result<Self> {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&master)?;
@@ -40,7 +40,7 @@ impl Pty {
         attributes.make_raw();
         tcsetattr(&client, OptionalActions::Now, &attributes)?;
         if let Some(link) = link {
-            if fs::symlink_metadata(link).is_ok_and(|what| what.file_type().is_symlink()) {
+            if fs::symlink_metadata(link).is_ok_and(|entry| entry.file_type().is_symlink()) {
                 fs::remove_file(link)?;
             }
             symlink(&path, link)?;
@@ -48,7 +48,7 @@ impl Pty {
         Ok(Self { master, path, link: link.map(Path::to_owned), has_client: false })
     }
 
-    /// What has arrived; nothing without a client.
+    /// Bytes that have arrived; none without a client.
     pub fn read(&mut self) -> Vec<u8> {
         let mut all = Vec::new();
         let mut part = [0_u8; 4096];
@@ -66,7 +66,7 @@ impl Pty {
                     }
                 }
                 Err(Errno::INTR) => {}
-                // Nothing to read: somebody has it open.
+                // Nothing to read, and a client has it open.
                 Err(_) => {
                     self.has_client = true;
                     return all;
@@ -75,7 +75,7 @@ impl Pty {
         }
     }
 
-    /// Sends what fits; returns how much. Without a client it is lost, as on a line without a plug.
+    /// Sends as much as fits and returns how much that is. Without a client bytes vanish, as on a line without a plug.
     pub fn write(&mut self, bytes: &[u8]) -> usize {
         if !self.has_client {
             return bytes.len();

@@ -1,13 +1,12 @@
-//! Puts an emulated device on a pseudo-terminal or a TCP port, in real time.
+//! Serves an emulated device on a pseudo-terminal or a TCP port, in real time, on one thread.
 //!
-//! One thread does everything. It alone of this crate reads a clock: it is a program of its own, the other end of
-//! the wire, and nothing of palpate decides by it.
+//! Only this module reads a clock: it is the other end of the wire, and nothing in palpate decides by it.
 
-use super::Device;
-use super::faults::{FaultKind, FaultPlan, ScheduledFault, Turn};
-use super::orders::Order;
+use super::EmulatedDevice;
+use super::faults::{FaultEvent, FaultKind, FaultPlan, ScheduledFault};
+use super::orders::EmulatorOrder;
 use super::pty::Pty;
-use super::wire::Way;
+use super::wire::LineDirection;
 use palpate_model::Nanos;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -21,11 +20,10 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Longest sleep: the device's time passes at least this often, about once a sample.
+/// Longest sleep: the device advances at least this often, about once a sample.
 const SLEEP_MAX: Nanos = Nanos(1_000_000);
-/// So long a client gets to read the last bytes before a pseudo-terminal is closed, with which the system throws away
-/// what was not read.
-const FAREWELL: Nanos = Nanos(500_000_000);
+/// Time for a client to read the last bytes before a pseudo-terminal is closed: closing discards what was not read.
+const FLUSH_MAX: Nanos = Nanos(500_000_000);
 
 /// Where clients find the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,55 +38,40 @@ pub enum Place {
     TcpAndPtys(SocketAddr, Vec<Option<PathBuf>>),
 }
 
-/// How a device is put on a wire.
 #[derive(Clone, Debug)]
 pub struct ServeOptions {
-    /// Where.
     pub place: Place,
-    /// Bits a second of the line, 10 a byte; as fast as bytes come without.
+    /// Bits a second of the line, 10 a byte; no delay if `None`.
     pub baud: Option<u32>,
     /// Latency timer of the USB converter on the host's side.
     pub latency: Nanos,
-    /// What goes wrong when.
     pub faults: Vec<ScheduledFault>,
-    /// Of the bytes that faults spoil.
+    /// Decides which bytes faults corrupt.
     pub seed: u64,
 }
 
-/// What happens to an emulated device.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
     /// Clients can connect here: a path or an address, or one for each channel with commas between.
     Ready(String),
-    /// A fault has begun or ended.
-    Fault(Turn),
-    /// An order was carried out.
-    Done(Order),
-    /// An order was not understood; the sentence says what would be.
+    Fault(FaultEvent),
+    Done(EmulatorOrder),
+    /// Why an order was not understood.
     Refused(String),
 }
 
-/// A device cannot be put on a wire.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// The place cannot be had.
-    #[error("the emulator cannot be reached at {place} ({detail}); choose another --pty or --tcp")]
-    Open {
-        /// Path or address.
-        place: String,
-        /// What the operating system said.
-        detail: String,
-    },
-    /// The wires cannot be watched.
+    #[error("the emulator cannot open {place} ({detail}); choose another path or port")]
+    Open { place: String, detail: String },
     #[error("the emulator cannot watch its connections ({0}); start it again")]
     Watch(String),
 }
 
-/// One connection.
 struct Line {
     stream: Option<TcpStream>,
-    to_device: Way,
-    from_device: Way,
+    to_device: LineDirection,
+    from_device: LineDirection,
     unsent: Vec<u8>,
 }
 
@@ -96,9 +79,9 @@ impl Line {
     fn new(options: &ServeOptions) -> Self {
         Self {
             stream: None,
-            // The converter's timer is on the way to the host alone.
-            to_device: Way::new(options.baud, Nanos::ZERO),
-            from_device: Way::new(options.baud, options.latency),
+            // The converter's timer delays only bytes to the host.
+            to_device: LineDirection::new(options.baud, Nanos::ZERO),
+            from_device: LineDirection::new(options.baud, options.latency),
             unsent: Vec::new(),
         }
     }
@@ -111,11 +94,11 @@ impl Line {
     }
 }
 
-/// What is plugged in; nothing once a fault has pulled it.
+/// What is plugged in; empty while a fault holds the plug out.
 #[derive(Default)]
 struct Plug {
     listener: Option<TcpListener>,
-    /// Of a channel. Whoever has none here gets clients of the listener.
+    /// By channel. A channel without one gets clients of the listener.
     ptys: Vec<Option<Pty>>,
 }
 
@@ -125,47 +108,46 @@ impl Plug {
     }
 }
 
-/// Lets clients talk to a device until `stop` is set. `orders` are lines that [`Order::parse`] reads, each
-/// carried out at once.
+/// Serves a device until `stop` is set. `orders` are lines for [`EmulatorOrder::parse`].
 pub fn serve(
-    device: &mut dyn Device,
+    device: &mut dyn EmulatedDevice,
     options: &ServeOptions,
     orders: &Receiver<String>,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(Told),
+    notify: &mut dyn FnMut(Told),
 ) -> Result<(), ServeError> {
     let mut server = Server::open(device, options)?;
-    tell(Told::Ready(server.address.clone()));
+    notify(Told::Ready(server.address.clone()));
     while !stop.load(Ordering::Relaxed) {
-        for order in orders.try_iter() {
+        for order in orders.try_iter().filter(|line| !line.trim().is_empty()) {
             let now = server.now();
-            match Order::parse(&order, now) {
-                Ok(Order::Fault(fault)) => server.faults.add(fault),
-                Ok(order @ Order::Hand(action)) => {
-                    server.device.by_hand(now, action);
-                    tell(Told::Done(order));
+            match EmulatorOrder::parse(order.trim(), now) {
+                Ok(EmulatorOrder::Fault(fault)) => server.faults.add(fault),
+                Ok(order @ EmulatorOrder::Hand(action)) => {
+                    server.device.apply_hand_action(now, action);
+                    notify(Told::Done(order));
                 }
-                Err(err) => tell(Told::Refused(err.to_string())),
+                Err(err) => notify(Told::Refused(err.to_string())),
             }
         }
-        for turn in server.faults.advance(server.now()) {
-            tell(Told::Fault(turn));
-            server.turn(turn)?;
+        for event in server.faults.advance(server.now()) {
+            notify(Told::Fault(event));
+            server.apply_fault_event(event)?;
         }
         server.wait()?;
         server.accept();
         server.exchange();
     }
-    server.farewell();
+    server.flush_output();
     Ok(())
 }
 
 struct Server<'a> {
-    device: &'a mut dyn Device,
+    device: &'a mut dyn EmulatedDevice,
     options: &'a ServeOptions,
     start: Instant,
     plug: Plug,
-    /// Where it is reached; a port that was chosen freely stays the same.
+    /// Where clients reach it; a port that the system chose stays the same.
     address: String,
     bound: Option<SocketAddr>,
     lines: Vec<Line>,
@@ -177,7 +159,10 @@ impl<'a> Server<'a> {
         clippy::disallowed_methods,
         reason = "an emulator is the other end of the wire and has a clock of its own"
     )]
-    fn open(device: &'a mut dyn Device, options: &'a ServeOptions) -> Result<Self, ServeError> {
+    fn open(
+        device: &'a mut dyn EmulatedDevice,
+        options: &'a ServeOptions,
+    ) -> Result<Self, ServeError> {
         let lines = (0..device.channels()).map(|_| Line::new(options)).collect();
         let mut server = Self {
             faults: FaultPlan::new(options.faults.clone(), options.seed),
@@ -204,9 +189,9 @@ impl<'a> Server<'a> {
             Place::Tcp(address) => self.plug_in_tcp(*address)?,
             Place::TcpAndPtys(address, links) => {
                 self.plug_in_ptys(1, links)?;
-                let of_ptys = std::mem::take(&mut self.address);
+                let pty_addresses = std::mem::take(&mut self.address);
                 self.plug_in_tcp(*address)?;
-                self.address = format!("{}, {of_ptys}", self.address);
+                self.address = format!("{}, {pty_addresses}", self.address);
             }
         }
         Ok(())
@@ -230,7 +215,6 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    /// One for each channel from `first` on.
     fn plug_in_ptys(&mut self, first: usize, links: &[Option<PathBuf>]) -> Result<(), ServeError> {
         let mut ptys: Vec<Option<Pty>> = (0..first).map(|_| None).collect();
         let mut addresses = Vec::new();
@@ -251,12 +235,12 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    fn turn(&mut self, turn: Turn) -> Result<(), ServeError> {
+    fn apply_fault_event(&mut self, event: FaultEvent) -> Result<(), ServeError> {
         let now = self.now();
-        match turn.kind {
-            FaultKind::Device(fault) => self.device.suffer(now, fault, turn.is_on),
+        match event.kind {
+            FaultKind::Device(fault) => self.device.apply_fault(now, fault, event.is_on),
             FaultKind::Line(_) => {}
-            FaultKind::Disconnect if turn.is_on => {
+            FaultKind::Disconnect if event.is_on => {
                 self.plug = Plug::default();
                 for channel in 0..self.lines.len() {
                     if self.lines[channel].stream.is_some() {
@@ -270,7 +254,7 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    /// Sleeps until something arrives, something is due, or the device wants to go on.
+    /// Sleeps until bytes arrive or are due, or the device has to advance.
     fn wait(&mut self) -> Result<(), ServeError> {
         let now = self.now();
         let due = self.lines.iter().flat_map(|line| {
@@ -283,7 +267,7 @@ impl<'a> Server<'a> {
             watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN));
         }
         for (pty, line) in self.plug.ptys.iter().zip(&self.lines) {
-            // Without a client a pseudo-terminal reports a hang-up again and again.
+            // Without a client a pseudo-terminal reports a hang-up on every poll.
             if let Some(pty) = pty.as_ref().filter(|pty| pty.has_client) {
                 watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags(line)));
             }
@@ -322,16 +306,16 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Bytes in, time on, bytes out.
+    /// Passes bytes in, advances the device, passes bytes out.
     fn exchange(&mut self) {
         for channel in 0..self.lines.len() {
             let (bytes, is_gone) = self.read(channel);
             let now = self.now();
-            let bytes = self.faults.spoil(bytes, true);
+            let bytes = self.faults.corrupt(bytes, true);
             let line = &mut self.lines[channel];
             line.to_device.push(now, &bytes, Nanos::ZERO);
             let arrived = if is_gone {
-                // Whoever hangs up has sent all of it before.
+                // A client that has hung up had sent all of it before.
                 line.to_device.take(Nanos(u64::MAX))
             } else {
                 line.to_device.take(now)
@@ -349,7 +333,7 @@ impl<'a> Server<'a> {
         for channel in 0..self.lines.len() {
             let bytes = self.device.transmit(channel);
             if !bytes.is_empty() {
-                let bytes = self.faults.spoil(bytes, false);
+                let bytes = self.faults.corrupt(bytes, false);
                 let lateness = self.faults.lateness();
                 self.lines[channel].from_device.push(now, &bytes, lateness);
             }
@@ -360,7 +344,7 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// What a client has sent, and whether it has gone.
+    /// Bytes from a client, and whether it has hung up.
     fn read(&mut self, channel: usize) -> (Vec<u8>, bool) {
         if let Some(pty) = self.plug.pty(channel) {
             return (pty.read(), false);
@@ -385,7 +369,7 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Sends what is due; what the client has no room for waits.
+    /// Sends what is due; bytes that the client has no room for wait.
     fn write(&mut self, channel: usize) {
         let now = self.now();
         let line = &mut self.lines[channel];
@@ -398,15 +382,15 @@ impl<'a> Server<'a> {
         let sent = match (self.plug.pty(channel), &mut line.stream) {
             (Some(pty), _) => pty.write(&line.unsent),
             (None, Some(stream)) => stream.write(&line.unsent).unwrap_or(0),
-            // Nobody is there.
+            // No client.
             (None, None) => line.unsent.len(),
         };
         line.unsent.drain(..sent);
     }
 
-    /// Sends what is left and lets the client read it.
-    fn farewell(&mut self) {
-        let until = self.now() + FAREWELL;
+    /// Sends the remaining bytes and gives the client time to read them.
+    fn flush_output(&mut self) {
+        let until = self.now() + FLUSH_MAX;
         while self.now() < until {
             for channel in 0..self.lines.len() {
                 self.write(channel);

@@ -1,9 +1,9 @@
-//! `palpate calibration import` and `supersede`: a new document from a table or a file.
+//! `palpate calibration import` and `supersede`: stores a calibration from a session, a table or a document.
 
 use super::super::Failure;
 use super::super::new_file;
 use super::super::output::Output;
-use super::source::{Source, failure};
+use super::source::{CalibrationSource, failure};
 use chrono::{DateTime, SecondsFormat, Utc};
 use clap::Args;
 use palpate_model::calibration::{Calibration, CurveKind};
@@ -18,15 +18,15 @@ use std::path::PathBuf;
 
 /// Arguments of `palpate calibration import`.
 #[derive(Debug, Args)]
-pub struct ImportArgs {
+pub struct CalibrationImportArgs {
     /// A session of the protocol load-cell-calibration, a table with columns
     /// mass_g,volts[,direction,repeat,noise_v,samples,waited_s], or a document (.json)
     #[arg(value_name = "SESSION|FILE")]
     file: PathBuf,
-    /// What people call it; a table has no name of its own
+    /// Name; a table has none of its own
     #[arg(long)]
     name: Option<String>,
-    /// Rig whose cell it is
+    /// Rig of the cell
     #[arg(long)]
     rig: Option<String>,
     /// Serial number of the cell
@@ -35,7 +35,7 @@ pub struct ImportArgs {
     /// Excitation of the bridge in V
     #[arg(long, value_name = "V")]
     excitation: Option<f64>,
-    /// Who took it
+    /// Operator
     #[arg(long)]
     operator: Option<String>,
     /// When it was taken, such as 2026-03-05T14:15:00Z; now, for a table without it
@@ -44,7 +44,7 @@ pub struct ImportArgs {
     /// Tolerance in g of each weight; each mass more than the one before counts as one weight laid on it
     #[arg(long, value_name = "G")]
     tolerance: Option<f64>,
-    /// Last digit of the readings in V, where it matters
+    /// Resolution of the readings in V
     #[arg(long, value_name = "V")]
     resolution: Option<f64>,
     /// Signal of the empty cell before the first weight in V
@@ -56,10 +56,10 @@ pub struct ImportArgs {
     /// Days for which it is valid [default: 365; under heavy use take 182]
     #[arg(long, value_name = "DAYS")]
     valid_days: Option<u32>,
-    /// Curve: best (foretells weights left out), monotone, segments=N or polynomial=N; best for a table
+    /// Curve: best (predicts weights left out best), monotone, segments=N or polynomial=N; best for a table
     #[arg(long, value_name = "KIND")]
     curve: Option<CurveChoice>,
-    /// Who measured it on what, in words
+    /// Source in words: who measured it on what
     #[arg(long, value_name = "WORDS")]
     source: Option<String>,
     /// Draw curve, residuals, sensitivity and uncertainty as a new SVG file
@@ -70,14 +70,13 @@ pub struct ImportArgs {
 /// Arguments of `palpate calibration supersede`.
 #[derive(Debug, Args)]
 pub struct SupersedeArgs {
-    /// Name or id of the one whose place is taken
+    /// Name or id of the calibration to supersede
     #[arg(value_name = "OLD")]
     old: String,
     #[command(flatten)]
-    pub new: ImportArgs,
+    pub new: CalibrationImportArgs,
 }
 
-/// Which curve an import asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CurveChoice {
     Best,
@@ -108,29 +107,28 @@ impl std::str::FromStr for CurveChoice {
     }
 }
 
-pub(super) fn import(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn import(args: &CalibrationImportArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
-    let kept = shelf::save(&library, &document(args)?).map_err(failure)?;
-    let source = Source::kept(&kept);
-    super::tell("calibration import", &source, args.picture.as_deref(), output)
+    let saved = shelf::save(&library, &document(args)?).map_err(failure)?;
+    let source = CalibrationSource::from_library(&saved);
+    super::report_calibration("calibration import", &source, args.picture.as_deref(), output)
 }
 
 pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.new.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
     let new = document(&args.new)?;
-    let kept = shelf::supersede(&library, &args.old, &new).map_err(failure)?;
-    let (source, picture) = (Source::kept(&kept), args.new.picture.as_deref());
-    super::tell("calibration supersede", &source, picture, output)
+    let saved = shelf::supersede(&library, &args.old, &new).map_err(failure)?;
+    let (source, picture) = (CalibrationSource::from_library(&saved), args.new.picture.as_deref());
+    super::report_calibration("calibration supersede", &source, picture, output)
 }
 
 fn now() -> String {
     DateTime::<Utc>::from(wall_now()).to_rfc3339_opts(SecondsFormat::Secs, true)
 }
 
-/// The document that the arguments ask for.
-fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
+fn document(args: &CalibrationImportArgs) -> Result<Calibration, Failure> {
     let is_document = args.file.extension().is_some_and(|ending| ending == "json");
     let mut new = if args.file.is_dir() {
         let session = Session::open(&args.file).map_err(Failure::usage)?;
@@ -167,12 +165,12 @@ fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
     }
     let default = (!is_document).then_some(CurveChoice::Best);
     if let Some(choice) = args.curve.or(default) {
-        new.curve = chosen(&new, choice)?;
+        new.curve = choose_curve(&new, choice)?;
     }
     Ok(new)
 }
 
-fn chosen(calibration: &Calibration, choice: CurveChoice) -> Result<CurveKind, Failure> {
+fn choose_curve(calibration: &Calibration, choice: CurveChoice) -> Result<CurveKind, Failure> {
     let points = calibration.points().map_err(Failure::usage)?;
     match choice {
         CurveChoice::Monotone => Ok(CurveKind::Monotone),

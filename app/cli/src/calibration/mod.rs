@@ -1,4 +1,4 @@
-//! `palpate calibration`: the documents that turn volts into newtons.
+//! `palpate calibration`: documents that convert volts to newtons.
 
 mod import;
 pub(super) mod source;
@@ -13,27 +13,27 @@ use palpate_model::units::Volts;
 use palpate_sessions::calibrations::Shelf;
 use palpate_sessions::library_folder;
 use serde::Serialize;
-use source::Source;
+use source::CalibrationSource;
 use std::path::PathBuf;
 
-/// Keep, show and check load-cell calibrations
+/// Store, show and check load-cell calibrations
 #[derive(Debug, Subcommand)]
 pub enum CalibrationCommand {
     /// List the calibrations of the library
     List,
-    /// Tell what a calibration is like: curve, uncertainty, flat stretches
-    Show(ShowArgs),
+    /// Show a calibration: curve, uncertainty, flat stretches
+    Show(CalibrationShowArgs),
     /// Check a calibration with one known weight
-    Check(CheckArgs),
+    Check(CalibrationCheckArgs),
     /// Store a new calibration from a table of weights or a document
-    Import(import::ImportArgs),
-    /// Store a new calibration in the place of an old one, which is kept
+    Import(import::CalibrationImportArgs),
+    /// Supersede a calibration by a new one; the old one is kept
     Supersede(import::SupersedeArgs),
 }
 
 /// Arguments of `palpate calibration show`.
 #[derive(Debug, Args)]
-pub struct ShowArgs {
+pub struct CalibrationShowArgs {
     /// A name or id of the library, a file, or thesis for the table of the source thesis
     #[arg(value_name = "NAME|FILE")]
     calibration: String,
@@ -44,7 +44,7 @@ pub struct ShowArgs {
 
 /// Arguments of `palpate calibration check`.
 #[derive(Debug, Args)]
-pub struct CheckArgs {
+pub struct CalibrationCheckArgs {
     /// A name or id of the library, a file, or thesis
     #[arg(value_name = "NAME|FILE")]
     calibration: String,
@@ -87,7 +87,7 @@ fn list(output: &Output) -> Result<(), Failure> {
     let shelf = Shelf::open(&library);
     let unreadable: Vec<String> = shelf.unreadable.iter().map(ToString::to_string).collect();
     unreadable.iter().for_each(|reason| output.note(reason));
-    let entry = |kept| report::Entry::of(&shelf, kept, source::age_days(kept));
+    let entry = |saved| report::Entry::of(&shelf, saved, source::age_days(saved));
     let found = ListReport {
         folder: library.join("calibrations"),
         calibrations: shelf.kept.iter().map(entry).collect(),
@@ -103,53 +103,52 @@ fn list(output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A calibration with all that is told of it.
 #[derive(Serialize)]
 struct ShowReport<'a> {
     /// Its id in the library, null where it is not from there.
     id: Option<&'a str>,
     file: Option<&'a PathBuf>,
     #[serde(flatten)]
-    told: &'a report::Told,
+    content: &'a report::Told,
     doubts: &'a [String],
     document: &'a Calibration,
 }
 
-fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
+fn show(args: &CalibrationShowArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.picture.as_deref())?;
-    let source = Source::find(&args.calibration)?;
-    tell("calibration show", &source, args.picture.as_deref(), output)
+    let source = CalibrationSource::find(&args.calibration)?;
+    report_calibration("calibration show", &source, args.picture.as_deref(), output)
 }
 
 /// Prints and draws a calibration.
-fn tell(
+fn report_calibration(
     command: &str,
-    source: &Source,
+    source: &CalibrationSource,
     picture: Option<&std::path::Path>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let told = report::Told::of(&source.calibration).map_err(Failure::failed)?;
+    let content = report::Told::of(&source.calibration).map_err(Failure::failed)?;
     let doubts = source.calibration.doubts(&Bench {
         rig: &source.calibration.rig,
         age_days: source.age_days,
         ..Bench::default()
     });
-    new_file::write("picture", picture, || report::picture(&source.calibration, &told))?;
+    new_file::write("picture", picture, || report::picture(&source.calibration, &content))?;
     let object = ShowReport {
         id: source.id.as_deref(),
         file: source.file.as_ref(),
-        told: &told,
+        content: &content,
         doubts: &doubts,
         document: &source.calibration,
     };
     output.answer(command, &object, || {
-        report::whole(&source.calibration, source.id.as_deref(), &told, &doubts)
+        report::whole(&source.calibration, source.id.as_deref(), &content, &doubts)
     });
     Ok(())
 }
 
-fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
-    let source = Source::find(&args.calibration)?;
+fn check(args: &CalibrationCheckArgs, output: &Output) -> Result<(), Failure> {
+    let source = CalibrationSource::find(&args.calibration)?;
     let weight = KnownWeight {
         mass_g: args.mass,
         tolerance_g: args.tolerance,

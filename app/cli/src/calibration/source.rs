@@ -11,15 +11,14 @@ use std::path::{Path, PathBuf};
 /// What names the table of the source thesis.
 const THESIS: &str = "thesis";
 
-/// A calibration and where it is from.
-pub(crate) struct Source {
+pub(crate) struct CalibrationSource {
     pub id: Option<String>,
     pub file: Option<PathBuf>,
     pub calibration: Calibration,
     pub age_days: Option<i64>,
 }
 
-impl Source {
+impl CalibrationSource {
     /// By a file's path, a name or id of the library, or `thesis`.
     pub fn find(name: &str) -> Result<Self, Failure> {
         let path = Path::new(name);
@@ -30,34 +29,33 @@ impl Source {
         let library = library_folder().map_err(Failure::usage)?;
         let shelf = Shelf::open(&library);
         match shelf.find(name) {
-            Ok(kept) => Ok(Self::kept(kept)),
+            Ok(saved) => Ok(Self::from_library(saved)),
             Err(_) if name == THESIS => Ok(Self::new(None, None, Calibration::thesis())),
             Err(err) => Err(failure(err)),
         }
     }
 
-    /// One of the library.
-    pub fn kept(kept: &Kept) -> Self {
-        let (id, path) = (kept.id.clone(), kept.path.clone());
-        Self::new(Some(id), Some(path), kept.document.clone())
+    pub fn from_library(saved: &Kept) -> Self {
+        let (id, path) = (saved.id.clone(), saved.path.clone());
+        Self::new(Some(id), Some(path), saved.document.clone())
     }
 
     fn new(id: Option<String>, file: Option<PathBuf>, calibration: Calibration) -> Self {
         Self { age_days: shelf::age_days(&calibration, wall_now().into()), id, file, calibration }
     }
 
-    /// What speaks against using it on a rig.
+    /// Reasons against using it on a rig.
     pub fn doubts(&self, rig: &str) -> Vec<String> {
         self.calibration.doubts(&Bench { rig, age_days: self.age_days, ..Bench::default() })
     }
 }
 
 /// Days since one of the library was taken.
-pub(super) fn age_days(kept: &Kept) -> Option<i64> {
-    shelf::age_days(&kept.document, wall_now().into())
+pub(super) fn age_days(saved: &Kept) -> Option<i64> {
+    shelf::age_days(&saved.document, wall_now().into())
 }
 
-/// Names and documents are the user's; the disk is not.
+/// A wrong name or document is wrong use, an unreadable disk is a failure.
 pub(crate) fn failure(err: LibraryError) -> Failure {
     match err {
         LibraryError::Io { .. } | LibraryError::Changed { .. } => Failure::failed(err),

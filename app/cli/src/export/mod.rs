@@ -2,6 +2,7 @@
 
 mod lake;
 
+use super::arguments::parse_number;
 use super::output::Output;
 use super::{Failure, compliance, read_failure, source_failure};
 use clap::{Args, ValueEnum};
@@ -51,14 +52,14 @@ pub struct ExportArgs {
     /// host_ns, status, age_ns and age_within_ns
     #[arg(long, alias = "channel", value_name = "NAMES", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Only every so many of the samples that are left, none averaged; the file's name says so
+    /// Only every N-th of the selected samples, without averaging; the file name states N
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
     decimate: Option<u64>,
-    /// Write the session as this analysis of it reads it: with another calibration, or with stretches
-    /// left out, whose forces are empty
+    /// Write the session as this analysis reads it: with another calibration, or with stretches
+    /// excluded, whose forces are empty
     #[arg(long, value_name = "NAME")]
     analysis: Option<String>,
-    /// Add depths less what the rig gave way, beside the raw ones: last for the compliance in force
+    /// Add depths corrected for machine compliance to the raw ones: last for the compliance in force
     /// for the session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
@@ -91,8 +92,7 @@ fn phase(text: &str) -> Result<Phase, String> {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| "give a number of seconds".into())
+    parse_number(text).map_err(|_| "give a number of seconds".into())
 }
 
 impl ExportArgs {
@@ -137,7 +137,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     }
     let [session] = args.sessions.as_slice() else {
         return Err(Failure::usage(
-            "a table is of one session; name one, or add several to a lake with --lake FOLDER",
+            "a table holds one session; name one, or add several to a lake with --lake FOLDER",
         ));
     };
     let selection = args.selection()?;
@@ -149,12 +149,12 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let mut opened = opened.map_err(source_failure)?;
         opened.blank();
         let read = opened.edited.session;
-        let beside;
-        (compliance, beside) = self::beside(args, &read)?;
+        let extra;
+        (compliance, extra) = extra_columns(args, &read)?;
         let table = Table {
             manifest: &read.manifest,
             notes: &read.notes,
-            beside: &beside,
+            beside: &extra,
             selection: &selection,
         };
         let mut feed = |visit: &mut dyn FnMut(&[_])| {
@@ -164,7 +164,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let written = target.write(session, &table, &mut feed);
         written.map_err(failure)?
     } else {
-        // What needs no more than a look at each sample does not keep them.
+        // An export that needs one sample at a time keeps none.
         let bar = output.share_bar();
         let written = exports::export(session, &selection, &target, &mut |done, of| {
             bar.set_length(of);
@@ -183,9 +183,9 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         "every": selection.every.unwrap_or(1), "compliance": compliance,
     });
     output.answer("export", &object, || {
-        let corrected = compliance.as_ref().map_or(String::new(), |id| {
-            format!(", depths corrected with {id} beside the raw ones")
-        });
+        let corrected = compliance
+            .as_ref()
+            .map_or(String::new(), |id| format!(", with depths corrected by {id} and raw ones"));
         let every = selection
             .every
             .map_or(String::new(), |every| format!(", every {every}th of those selected"));
@@ -213,18 +213,21 @@ pub(super) fn failure(err: ExportError) -> Failure {
     }
 }
 
-/// The columns asked for beside the session's own, and the compliance they are made with.
-fn beside(args: &ExportArgs, session: &Session) -> Result<(Option<String>, Beside), Failure> {
+/// Columns added to those of the session, and the id of the compliance they are made with.
+fn extra_columns(
+    args: &ExportArgs,
+    session: &Session,
+) -> Result<(Option<String>, Beside), Failure> {
     let Some(name) = &args.compliance else {
         return Ok((None, Beside::default()));
     };
     let corrections = compliance::corrections(Some(name))?;
     let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
-    let kept = corrections.of_rig(rig);
-    let kept = kept.map_err(|err| source_failure(err.into()))?;
-    let Some((kept, _)) = kept else {
+    let saved = corrections.of_rig(rig);
+    let saved = saved.map_err(|err| source_failure(err.into()))?;
+    let Some((saved, _)) = saved else {
         return Ok((None, Beside::default()));
     };
-    let columns = columns(session, kept).map_err(source_failure)?;
-    Ok((Some(kept.id.clone()), columns))
+    let columns = columns(session, saved).map_err(source_failure)?;
+    Ok((Some(saved.id.clone()), columns))
 }

@@ -1,6 +1,6 @@
-//! Many sources, each read and fitted on one of several threads; the answers in the sources' order.
+//! Fits many sources on several threads; results come in the order of the sources.
 
-use super::super::{Failure, output::Output, source_failure};
+use super::super::{Failure, output::Output, source_failure, terminal::on_ctrl_c};
 use palpate_analysis::compliance::Correction;
 use palpate_analysis::fit::{Fitted, NotFitted, Recipe, each};
 use palpate_analysis::pool::News;
@@ -8,21 +8,20 @@ use palpate_analysis::report::text;
 use palpate_analysis::source::SourceError;
 use palpate_rheology::fit::{FitReport, Parameter};
 use serde::Serialize;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What is told of one source.
-type Row = Result<FitReport, Untold>;
+type SourceResult = Result<FitReport, SourceFailure>;
 
-/// Why a source has no fit.
-enum Untold {
-    /// Its session was rejected, and that is not a failure of the batch.
+enum SourceFailure {
+    /// The session was rejected, which is not a failure of the batch.
     Rejected(String),
     Failed(Failure),
 }
 
-impl From<NotFitted> for Untold {
+impl From<NotFitted> for SourceFailure {
     fn from(none: NotFitted) -> Self {
         match none {
             NotFitted::Source(SourceError::Rejected { reason }) => Self::Rejected(reason),
@@ -42,19 +41,6 @@ struct Line<'a> {
     compliance: Option<&'a Correction>,
 }
 
-#[derive(Serialize)]
-struct FailedLine<'a> {
-    source: &'a Path,
-    error: &'a str,
-    exit: u8,
-}
-
-#[derive(Serialize)]
-struct RejectedLine<'a> {
-    source: &'a Path,
-    rejected: &'a str,
-}
-
 pub(super) fn run(
     sources: &[PathBuf],
     jobs: usize,
@@ -66,25 +52,26 @@ pub(super) fn run(
     let bar = output.count_bar(sources.len() as u64);
     let mut rows = Vec::with_capacity(sources.len());
     let (mut failed, mut rejected) = (0, 0);
-    each(sources, jobs, recipe, &is_ending, |news| match news {
+    each(sources, jobs, recipe, &is_ending, |event| match event {
         News::Done(count) => {
             bar.set_position(count as u64);
             if is_ending.load(Ordering::Relaxed) {
-                bar.set_message("ending after those under way");
+                bar.set_message("ending after unfitted under way");
             }
         }
         News::Next(answer) => {
             let source = sources[rows.len()].as_path();
+            let path = source.display().to_string();
             let answer = answer.map_err(NotFitted::from);
-            let (notes, compliance, result) = told(answer.and_then(|read| Ok(read?)));
+            let (notes, compliance, result) = split_answer(answer.and_then(|read| Ok(read?)));
             match &result {
-                Err(Untold::Failed(_)) => failed += 1,
-                Err(Untold::Rejected(_)) => rejected += 1,
+                Err(SourceFailure::Failed(_)) => failed += 1,
+                Err(SourceFailure::Rejected(_)) => rejected += 1,
                 Ok(_) => {}
             }
             bar.suspend(|| {
                 for note in &notes {
-                    output.note(&format!("{}: {note}", source.display()));
+                    output.note(&format!("{path}: {note}"));
                 }
                 match &result {
                     Ok(report) => output.object(&Line {
@@ -93,14 +80,12 @@ pub(super) fn run(
                         notes: &notes,
                         compliance: compliance.as_ref(),
                     }),
-                    Err(Untold::Rejected(reason)) => {
-                        output.object(&RejectedLine { source, rejected: reason })
+                    Err(SourceFailure::Rejected(reason)) => {
+                        output.object(&json!({ "source": path, "rejected": reason }))
                     }
-                    Err(Untold::Failed(failure)) => output.object(&FailedLine {
-                        source,
-                        error: failure.sentence(),
-                        exit: failure.code(),
-                    }),
+                    Err(SourceFailure::Failed(failure)) => output.object(&json!({
+                        "source": path, "error": failure.sentence(), "exit": failure.code(),
+                    })),
                 }
             });
             rows.push(result);
@@ -111,34 +96,35 @@ pub(super) fn run(
     output.text_only(|| table(sources, &rows));
     if rejected > 0 {
         output.note(&format!(
-            "{} sources, {rejected} of them rejected; --include-rejected fits them all the same",
+            "{} sources, {rejected} of them rejected; --include-rejected fits them too",
             sources.len()
         ));
     }
     if failed == 0 {
         return Ok(());
     }
-    let those = format!("{failed} of {} sources", sources.len());
+    let unfitted = format!("{failed} of {} sources", sources.len());
     Err(Failure::failed(if is_ending.load(Ordering::Relaxed) {
-        format!("{those} not fitted; the batch was asked to end")
+        format!("{unfitted} were not fitted, because the batch was ended")
     } else {
-        format!("{those} could not be fitted; each says why")
+        format!("{unfitted} were not fitted; each states its reason")
     }))
 }
 
-/// The first signal ends after what is under way, the second at once.
+/// The first signal ends after the fits under way, the second at once.
 pub(super) fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
     let is_ending = Arc::clone(is_ending);
-    ctrlc::set_handler(move || {
+    on_ctrl_c(move || {
         if is_ending.swap(true, Ordering::Relaxed) {
             std::process::exit(1);
         }
     })
-    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
 }
 
-/// Remarks, the correction of depths, and the fit or why there is none.
-fn told(answer: Result<Fitted, NotFitted>) -> (Vec<String>, Option<Correction>, Row) {
+/// Notes, the correction of depths, and the fit or its failure.
+fn split_answer(
+    answer: Result<Fitted, NotFitted>,
+) -> (Vec<String>, Option<Correction>, SourceResult) {
     match answer {
         Ok(fitted) => (
             with_correction(fitted.notes, fitted.compliance.as_ref()),
@@ -149,16 +135,16 @@ fn told(answer: Result<Fitted, NotFitted>) -> (Vec<String>, Option<Correction>, 
     }
 }
 
-/// A correction that was made is told of each source; one that could be made is not.
-fn with_correction(mut notes: Vec<String>, told: Option<&Correction>) -> Vec<String> {
-    let made = told.filter(|told| told.is_applied);
-    notes.extend(made.map(Correction::sentence));
+/// Adds a note on a correction that was applied.
+fn with_correction(mut notes: Vec<String>, correction: Option<&Correction>) -> Vec<String> {
+    let applied = correction.filter(|correction| correction.is_applied);
+    notes.extend(applied.map(Correction::sentence));
     notes
 }
 
-/// One row per source: parameters with their intervals, how good, how many sentences; or why not.
-/// Parameters that were held everywhere have no column.
-fn table(sources: &[PathBuf], rows: &[Row]) -> String {
+/// One row per source: parameters with intervals, quality, number of sentences; or the reason of a failure.
+/// Parameters that were fixed everywhere have no column.
+fn table(sources: &[PathBuf], rows: &[SourceResult]) -> String {
     let reports = || rows.iter().flatten();
     let known = reports().next().map_or(&[][..], |first| &first.parameters);
     let is_shown = |one: &&Parameter| {
@@ -184,8 +170,8 @@ fn table(sources: &[PathBuf], rows: &[Row]) -> String {
                 line.push(format!("{:.3}", report.rmse_n * 1e3));
                 line.push(report.sentences().count().to_string());
             }
-            Err(Untold::Rejected(reason)) => line.push(format!("rejected: {reason}")),
-            Err(Untold::Failed(failure)) => {
+            Err(SourceFailure::Rejected(reason)) => line.push(format!("rejected: {reason}")),
+            Err(SourceFailure::Failed(failure)) => {
                 line.push(format!("failed: {}", failure.sentence()));
             }
         }

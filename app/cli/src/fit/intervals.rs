@@ -1,4 +1,4 @@
-//! Intervals that take more than one pass: profile likelihood and block bootstrap.
+//! Intervals that need more than one pass: profile likelihood and block bootstrap.
 
 use super::super::Failure;
 use super::super::output::{Bar, Output};
@@ -6,10 +6,9 @@ use super::FitArgs;
 use palpate_analysis::fit::IntervalsWanted;
 use palpate_rheology::fit::Bootstrap;
 
-/// Repeats below this say nothing of the ends of a 95 % interval.
+/// Fewer repeats do not determine the ends of a 95 % interval.
 const REPEATS_MIN: usize = 40;
 
-/// Refuses what cannot be asked.
 pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     match args.bootstrap {
         Some(repeats) if repeats < REPEATS_MIN => Err(Failure::usage(format!(
@@ -22,7 +21,6 @@ pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     }
 }
 
-/// Those that are asked for.
 pub(super) fn wanted(args: &FitArgs) -> IntervalsWanted {
     let seed = args.seed.unwrap_or(1);
     IntervalsWanted {
@@ -31,14 +29,13 @@ pub(super) fn wanted(args: &FitArgs) -> IntervalsWanted {
     }
 }
 
-/// A bar over the fits of a bootstrap, if one is asked for.
+/// A bar over the fits of a bootstrap, if there is one.
 pub(super) fn bar(args: &FitArgs, output: &Output) -> Option<Bar> {
     let bar = output.count_bar(args.bootstrap? as u64);
     bar.set_message("bootstrap");
     Some(bar)
 }
 
-/// Shows how many of them are done.
 pub(super) fn show(bar: &Option<Bar>, done: usize) {
     bar.iter().for_each(|bar| bar.set_position(done as u64));
 }

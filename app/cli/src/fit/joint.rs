@@ -1,4 +1,4 @@
-//! Several sources fitted together, with some parameters the same in all.
+//! Fits several sources together, with some parameters shared.
 
 use super::super::{Failure, output::Output, sources_failure};
 use super::{FitArgs, intervals};
@@ -7,7 +7,7 @@ use palpate_analysis::report::text;
 use palpate_analysis::sources::{self, Naming, Reading};
 use palpate_rheology::fit::FitError;
 
-/// Fits all sources together; `shared` is a list of names with commas, the whole body without it.
+/// `shared` is a list of names with commas, the whole model without it.
 pub(super) fn run(
     args: &FitArgs,
     shared: Option<&str>,
@@ -21,13 +21,13 @@ pub(super) fn run(
             "--share needs at least two recordings; name them all, or a folder of them",
         ));
     }
-    let how = Reading {
+    let reading = Reading {
         columns: recipe.columns.as_ref(),
         wanted: recipe.wanted,
         corrections: &recipe.corrections,
         naming: Naming::Path,
     };
-    let records = sources::read(&found.paths, how).map_err(sources_failure)?;
+    let records = sources::read(&found.paths, reading).map_err(sources_failure)?;
     records.notes.iter().for_each(|note| output.note(note));
     let request = TogetherRequest {
         options: &recipe.options,
@@ -43,8 +43,8 @@ pub(super) fn run(
         _ => Failure::failed(err),
     })?;
     fitted.notes.iter().for_each(|note| output.note(note));
-    let beside = fitted.beside(&records);
-    let object = fitted.object(&recipe.options, &beside);
-    output.result(&object, || text::together(&fitted, &beside));
+    let extras = fitted.beside(&records);
+    let object = fitted.object(&recipe.options, &extras);
+    output.result(&object, || text::together(&fitted, &extras));
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The sessions of a lake, or one part of them, each fitted and kept in the lake.
+//! Fits the sessions of a lake, or of one shard, and stores the fits in the lake.
 
 use super::super::{Failure, export, output::Output, source_failure};
 use super::{FitArgs, batch, jobs};
@@ -26,14 +26,14 @@ pub(super) fn run(
         recipe,
         fixed: &args.fixed,
         free: &args.free,
-        compliance_sha256: args.compliance.as_deref().map(hash).transpose()?,
+        compliance_sha256: args.compliance.as_deref().map(hash_file).transpose()?,
         jobs: jobs(args),
     };
     let is_ending = Arc::new(AtomicBool::new(false));
     batch::end_on_signals(&is_ending)?;
     let bar = output.count_bar(0);
     let mut failed = Vec::new();
-    let tally = fit_lake(&request, &is_ending, |news| match news {
+    let tally = fit_lake(&request, &is_ending, |event| match event {
         LakeFit::Note(note) => output.note(&note),
         LakeFit::Done(count, of) => {
             // The sessions under way are waited for in any case.
@@ -63,16 +63,18 @@ pub(super) fn run(
     if failed.is_empty() {
         return Ok(());
     }
-    let those = format!("{} of {} sessions", failed.len(), tally.sessions);
+    let unfitted = format!("{} of {} sessions", failed.len(), tally.sessions);
     Err(Failure::failed(match is_ending.load(Ordering::Relaxed) {
         true => {
-            format!("{those} not fitted; the fits were asked to end, and go on when asked again")
+            format!(
+                "{unfitted} were not fitted, because the command was ended; run it again to continue"
+            )
         }
-        false => format!("{those} could not be fitted; each says why"),
+        false => format!("{unfitted} were not fitted; the notes state the reasons"),
     }))
 }
 
-/// What a lake is not asked.
+/// Refuses options that a lake does not have.
 fn check(args: &FitArgs) -> Result<(), Failure> {
     let others = [
         ("--picture", args.picture.is_some()),
@@ -91,8 +93,8 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
     }
 }
 
-/// What the library of one machine has in force would not be the same on the next, so a lake's compliance is a file.
-fn hash(file: &str) -> Result<String, Failure> {
+/// The compliance in force differs between machines, so that of a lake is a file.
+fn hash_file(file: &str) -> Result<String, Failure> {
     sha256_of_file(Path::new(file)).map_err(|err| {
         Failure::usage(format!(
             "--compliance {file} cannot be read as a file ({err}); a lake is fitted the same everywhere, so name the compliance's file"

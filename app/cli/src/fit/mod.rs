@@ -1,4 +1,4 @@
-//! `palpate fit`: the force model fitted to a session or a table, or to folders full of them.
+//! `palpate fit`: fits a force model to sessions and tables.
 
 mod batch;
 mod intervals;
@@ -7,8 +7,9 @@ mod lake;
 mod saved;
 
 use super::Failure;
+use super::arguments::parse_columns;
 use super::output::Output;
-use super::recalibrate::Who;
+use super::recalibrate::AuthorArgs;
 use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
 use palpate_analysis::compliance::Corrections;
@@ -30,24 +31,24 @@ pub struct FitArgs {
     /// which every session and table (.csv, .tsv, .mcap) is fitted; or one lake, which keeps its fits
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Hold a parameter, as NAME=VALUE; may be repeated
+    /// Fix a parameter, as NAME=VALUE; may be repeated
     #[arg(long = "fixed", value_name = "NAME=VALUE")]
     fixed: Vec<String>,
-    /// Free a parameter that is held by default, such as x_contact; may be repeated
+    /// Free a parameter that is fixed by default, such as x_contact; may be repeated
     #[arg(long = "free", value_name = "NAME")]
     free: Vec<String>,
     /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
-    /// Draw the fit, or why there is none, as a new SVG file
+    /// Draw the fit, or the reason of its failure, as a new SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Fit all sources together with these parameters the same in all, as in tau_eps,mu1;
     /// body stands for the five of the tissue
     #[arg(long, value_name = "NAMES", conflicts_with = "picture")]
     share: Option<String>,
-    /// Fit another model family, such as maxwell, prony-2 or unloading-3: one body for all sources, if neither --share
-    /// nor --each says otherwise
+    /// Fit another model family, such as maxwell, prony-2 or unloading-3: one model for all sources unless --share
+    /// or --each is given
     #[arg(long, value_name = "KEY")]
     family: Option<String>,
     /// With --family: fit every source by itself
@@ -65,21 +66,21 @@ pub struct FitArgs {
     /// Seed of the bootstrap, 1 without it
     #[arg(long, value_name = "SEED")]
     seed: Option<u64>,
-    /// Leave out what the calibration's own errors add to the intervals of a session
+    /// Leave out the systematic component of the calibration from the intervals of a session
     #[arg(long)]
     no_systematic: bool,
-    /// Take sessions though they were rejected
+    /// Include rejected sessions
     #[arg(long)]
     include_rejected: bool,
-    /// Read a session as this analysis of it does: with another calibration, or with stretches left out
+    /// Read a session as this analysis does: with another calibration, or with stretches excluded
     #[arg(long, value_name = "NAME", conflicts_with = "share")]
     analysis: Option<String>,
-    /// Keep the fit as an analysis of this name beside its session
+    /// Save the fit as an analysis of this name with its session
     #[arg(long, value_name = "NAME", conflicts_with = "share")]
     save: Option<String>,
     #[command(flatten)]
-    who: Who,
-    /// Fit over depths less what the rig gave way: last for the compliance in force for each
+    author: AuthorArgs,
+    /// Correct depths for machine compliance: last for the compliance in force for each
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
@@ -92,7 +93,6 @@ pub struct FitArgs {
 }
 
 impl FitArgs {
-    /// What is asked of the sources.
     fn wanted(&self) -> Wanted {
         Wanted {
             stretch: Stretch::with_unload(self.unload),
@@ -100,7 +100,6 @@ impl FitArgs {
         }
     }
 
-    /// Which compliance is taken from which depths.
     fn corrections(&self) -> Result<Corrections, Failure> {
         compliance::corrections(self.compliance.as_deref())
     }
@@ -113,17 +112,15 @@ fn jobs(args: &FitArgs) -> usize {
 }
 
 pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
-    let columns = args.columns.as_deref().map(str::parse).transpose();
-    let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
     intervals::check(args)?;
     if args.unload && args.family.is_none() {
         return Err(Failure::usage(
-            "--unload is for --family: this force model knows no unloading; add --family unloading-3",
+            "--unload needs --family: the default model has no unloading; add --family unloading-3",
         ));
     }
     let recipe = Recipe {
         options: options(args)?,
-        columns,
+        columns: parse_columns(args.columns.as_deref())?,
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
         analysis: args.analysis.clone(),
@@ -170,7 +167,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let fitted = recipe.fit(source).map_err(source_failure)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
-    // Its own name only: a picture travels, and folders are nobody else's business.
+    // Only the file name: a picture is passed on, and its folders are private.
     let short = source.file_name().map_or(name.clone(), |name| name.to_string_lossy().into());
     let report = match &fitted.result {
         Ok(report) => report,
@@ -189,7 +186,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     })?;
     if let Err((file, err)) = remember(report, source) {
         output.note(&format!(
-            "this fit will not be remembered for 'palpate plan': {err}, {}",
+            "this fit cannot be stored for 'palpate plan': {err}, {}",
             file.display()
         ));
     }
@@ -198,20 +195,20 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let intervals = fitted.intervals(&recipe.options, wanted, |done| intervals::show(&bar, done));
     drop(bar);
     let intervals = intervals.map_err(Failure::failed)?;
-    let beside = fitted.beside(&overlay, &intervals);
-    let object = FitObject::of(recipe.options.family(), report, beside, fitted.seconds);
-    saved::keep(args, source, &object)?;
+    let extras = fitted.beside(&overlay, &intervals);
+    let object = FitObject::of(recipe.options.family(), report, extras, fitted.seconds);
+    saved::save(args, source, &object)?;
     output.result(&object, || {
-        let mut lines = vec![text::whole(report, beside)];
-        lines.extend(fitted.compliance.as_ref().map(compliance::sentence));
-        let kept = args.save.iter();
-        lines.extend(kept.map(|name| format!("kept as analysis '{name}'")));
+        let mut lines = vec![text::whole(report, extras)];
+        lines.extend(fitted.compliance.as_ref().map(compliance::correction_sentence));
+        let saved = args.save.iter();
+        lines.extend(saved.map(|name| format!("saved as analysis '{name}'")));
         lines.join("\n")
     });
     Ok(())
 }
 
-/// The family asked for, and which of its parameters are found.
+/// The family, and which of its parameters are free.
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     let mut options = match &args.family {
         Some(key) => FitOptions::by_key(key).map_err(Failure::usage)?,
@@ -222,10 +219,7 @@ fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     let mut names: Vec<&str> = names.chain(held).collect();
     names.sort_unstable();
     if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Failure::usage(format!(
-            "{} is given twice; say once what it shall be",
-            pair[0]
-        )));
+        return Err(Failure::usage(format!("{} is given twice; give it once", pair[0])));
     }
     for name in &args.free {
         options.free(name).map_err(Failure::usage)?;

@@ -1,4 +1,4 @@
-//! `palpate fit --save NAME`: the fit as a named record beside its session.
+//! `palpate fit --save NAME`: saves the fit as a named analysis of its session.
 
 use super::super::{Failure, recalibrate};
 use super::FitArgs;
@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::to_value;
 use std::path::Path;
 
-/// Refuses before anything is fitted what could not be kept.
+/// Refuses before the fit what could not be saved after it.
 pub(super) fn check(args: &FitArgs, source: &Path) -> Result<(), Failure> {
     match (&args.save, source.is_dir()) {
         (Some(name), false) => Err(Failure::usage(format!(
@@ -18,8 +18,7 @@ pub(super) fn check(args: &FitArgs, source: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Keeps a fit, if that was asked for.
-pub(super) fn keep(args: &FitArgs, source: &Path, results: &impl Serialize) -> Result<(), Failure> {
+pub(super) fn save(args: &FitArgs, source: &Path, results: &impl Serialize) -> Result<(), Failure> {
     let Some(name) = &args.save else {
         return Ok(());
     };
@@ -41,6 +40,7 @@ pub(super) fn keep(args: &FitArgs, source: &Path, results: &impl Serialize) -> R
         settings: to_value(settings).map_err(Failure::failed)?,
         results: to_value(results).map_err(Failure::failed)?,
     };
-    keep_fit(source, name, fit, &args.who.who()).map_err(recalibrate::deed_failure)?;
+    keep_fit(source, name, fit, &args.author.author())
+        .map_err(recalibrate::analysis_edit_failure)?;
     Ok(())
 }

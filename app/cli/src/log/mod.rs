@@ -1,6 +1,6 @@
 //! The program's own log, for support: transitions of runs, links and workers in `log/` beside the library's sessions.
 //!
-//! Whoever logs hands over a line and goes on; a thread writes it. What is logged never decides anything.
+//! A caller hands over a line and goes on; a thread writes it. No decision depends on the log.
 
 mod panic;
 mod queue;
@@ -13,13 +13,12 @@ use tracing::level_filters::LevelFilter;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::SubscriberExt;
 
-/// What is logged unless `RUST_LOG` says otherwise: what palpate does, and what libraries warn of.
+/// The filter without `RUST_LOG`: information of palpate, warnings of libraries.
 fn usual() -> Targets {
     Targets::new().with_default(LevelFilter::WARN).with_target("palpate", LevelFilter::INFO)
 }
 
-/// Begins to log; `is_verbose` shows every line on standard error as well. Nothing can go wrong here that would keep
-/// the program from its work.
+/// Starts the log; `is_verbose` shows every line on standard error as well. Errors here never stop the program.
 pub(super) fn begin(is_verbose: bool) -> Option<Queue> {
     let folder = library_folder().map(|library| log_folder(&library)).ok();
     let queue = Queue::start(folder, head(), is_verbose)?;
@@ -28,7 +27,7 @@ pub(super) fn begin(is_verbose: bool) -> Option<Queue> {
         Ok(filter) if !wanted.trim().is_empty() => filter,
         Ok(_) => usual(),
         Err(err) => {
-            queue.line(format!("RUST_LOG is not understood ({err}) and left out\n"));
+            queue.line(format!("RUST_LOG is not understood ({err}) and ignored\n"));
             usual()
         }
     };

@@ -1,4 +1,4 @@
-//! A panic stops every open rig before anything is said about it.
+//! A panic stops every open rig before it is logged or printed.
 
 use super::Queue;
 use palpate_drivers::wire::after_farewell;
@@ -8,7 +8,7 @@ use std::backtrace::Backtrace;
 use std::panic::{set_hook, take_hook};
 
 /// From now on a panic of any thread, unless it is contained, first stops the rigs, then is logged with where it
-/// happened, then is told as before.
+/// happened, then is printed as before.
 pub fn stop_rigs_on_panic(log: Option<Queue>) {
     let before = take_hook();
     set_hook(Box::new(move |panic| {

@@ -13,7 +13,7 @@ use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
 use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{self, StandSettings};
 use palpate_drivers::wire::{HostClock, Link, MemoryLink, pair};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, RigCommand, RigDescription};
@@ -44,8 +44,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn note(&self, bytes: &[u8], is_told: bool) {
-        self.writes.lock().unwrap().push((bytes.to_vec(), is_told));
+    fn note(&self, bytes: &[u8], is_reported: bool) {
+        self.writes.lock().unwrap().push((bytes.to_vec(), is_reported));
     }
 
     fn panics(&self) -> ! {
@@ -150,12 +150,12 @@ fn child(case: &str) {
     };
     until(|| is_written(b"d").then_some(()), || "the stand does not move".into());
     let is_runner = case == "runner";
-    let (wakes, told) = (Mutex::new(0), Arc::clone(&seen));
+    let (wakes, printed) = (Mutex::new(0), Arc::clone(&seen));
     let wake = move || {
         let mut wakes = wakes.lock().unwrap();
         *wakes += 1;
         if is_runner && *wakes == 2 {
-            told.panics();
+            printed.panics();
         }
     };
     let runner = Runner::start(Box::new(rig), TimeScale::Factor(1.0), None, wake).unwrap();
@@ -164,20 +164,20 @@ fn child(case: &str) {
         "link" => seen.fails.store(true, Ordering::SeqCst),
         _ => {
             let thread = std::thread::Builder::new().name("elsewhere".into());
-            let told = Arc::clone(&seen);
-            let thread = thread.spawn(move || told.panics()).unwrap();
+            let printed = Arc::clone(&seen);
+            let thread = thread.spawn(move || printed.panics()).unwrap();
             assert!(thread.join().is_err());
         }
     }
     let log = log.unwrap();
     let folder = palpate_sessions::rotating::log_folder(&folder);
-    let is_told = || {
+    let is_reported = || {
         log.flush();
         speaks_of_panic(&folder).then_some(())
     };
-    until(is_told, || "the panic is not logged".into());
-    for (bytes, is_told) in seen.writes.lock().unwrap().iter() {
-        println!("WROTE {} {is_told}", String::from_utf8_lossy(bytes).escape_default());
+    until(is_reported, || "the panic is not logged".into());
+    for (bytes, is_reported) in seen.writes.lock().unwrap().iter() {
+        println!("WROTE {} {is_reported}", String::from_utf8_lossy(bytes).escape_default());
     }
     drop(runner);
 }
@@ -193,15 +193,15 @@ fn panics(case: &str) -> (Vec<(String, bool)>, String) {
         .stdin(Stdio::null())
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    let writes = said.lines().filter_map(|line| line.split_once("WROTE "));
+    let message = String::from_utf8_lossy(&output.stdout).into_owned();
+    let writes = message.lines().filter_map(|line| line.split_once("WROTE "));
     let writes = writes.filter_map(|(_, write)| write.rsplit_once(' '));
     let writes: Vec<_> =
-        writes.map(|(bytes, is_told)| (bytes.to_owned(), is_told == "true")).collect();
+        writes.map(|(bytes, is_reported)| (bytes.to_owned(), is_reported == "true")).collect();
     let log = log_files(&home.path().join("log"));
     let log = log.first().map(|path| std::fs::read_to_string(path).unwrap());
     let errors = String::from_utf8_lossy(&output.stderr);
-    (writes, log.unwrap_or_else(|| panic!("no log: {said}{errors}")))
+    (writes, log.unwrap_or_else(|| panic!("no log: {message}{errors}")))
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! `palpate plan`: the shortest protocol that will tell what is wanted.
+//! `palpate plan`: the shortest protocol for a target uncertainty.
 
 mod text;
 
@@ -12,13 +12,13 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_rheology::expected::{ExpectedError, Memory, Target, Unknowns};
 use std::path::PathBuf;
 
-/// Propose the shortest protocol that will tell what is wanted
+/// Propose the shortest protocol that determines parameters to a target uncertainty
 #[derive(Debug, Args)]
 pub struct PlanArgs {
     /// Half-width of a 95 % interval, as tau=1% or mu1=2%; may be repeated
     #[arg(long, value_name = "NAME=PERCENT", default_value = "tau=1%")]
     within: Vec<String>,
-    /// Body and noise: a session, a table, or what 'palpate fit --json' printed; without it the last fit
+    /// Model and noise: a session, a table, or the output of 'palpate fit --json'; without it the last fit
     #[arg(long, value_name = "SESSION|TABLE|FIT.json")]
     like: Option<PathBuf>,
     /// Noise that is independent from sample to sample, in mN; without it that of the fit
@@ -27,7 +27,7 @@ pub struct PlanArgs {
     /// Slow noise on top: standard deviation in mN and correlation time in s
     #[arg(long, value_name = "SD_MN,SECONDS")]
     memory: Option<String>,
-    /// What is known and need not be fitted, f0 or f_offset; may be repeated
+    /// A parameter that is known and need not be fitted, f0 or f_offset; may be repeated
     #[arg(long, value_name = "NAME")]
     known: Vec<String>,
     /// Samples per second
@@ -50,8 +50,7 @@ pub struct PlanArgs {
     picture: Option<PathBuf>,
 }
 
-/// What a plan from a body that is hardly known is worth.
-const GUESS: &str = "tau_eps of that fit is hardly known, so a plan from it is a guess; name a better record with --like";
+const GUESS: &str = "tau_eps of that fit is poorly determined, so a plan from it is a guess; name a better record with --like";
 
 pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     let request = PlanRequest {
@@ -89,7 +88,7 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A wish that no protocol grants was tried and failed; all else is wrong use.
+/// An unreachable target is a failure, all else is wrong use.
 fn failure(err: PlanFailure) -> Failure {
     match err {
         PlanFailure::Expected(ExpectedError::Unreachable { .. }) => Failure::failed(err),
@@ -115,7 +114,7 @@ fn targets(within: &[String]) -> Result<Vec<Target>, Failure> {
         let target = Target::new(name, percent).map_err(Failure::usage)?;
         if targets.iter().any(|one| one.parameter == target.parameter) {
             return Err(Failure::usage(format!(
-                "{} is given twice; say once how well it shall be known",
+                "{} is given twice; give it once",
                 target.parameter
             )));
         }

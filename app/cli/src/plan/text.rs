@@ -1,4 +1,4 @@
-//! The plan as people read it.
+//! The plan as text.
 
 use palpate_analysis::plan::{Offer, PlanReport};
 use palpate_figures::uncertain::{shortest as plain, significant as digits};
@@ -39,7 +39,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
         .map(|target| format!("{} within {} %", target.parameter, plain(target.percent)))
         .collect();
     vec![
-        format!("body    {}", report.body_source),
+        format!("model   {}", report.body_source),
         format!("        {}", body.join(", ")),
         format!(
             "noise   {} mN in every sample{slow}; {} samples per second",
@@ -52,7 +52,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
             digits(report.rig.force_max.0, 3),
             plain(report.rig.speed_max.0)
         ),
-        format!("wanted  {} (95 % interval)", wanted.join(", ")),
+        format!("target  {} (95 % interval)", wanted.join(", ")),
     ]
 }
 
@@ -79,7 +79,7 @@ fn proposals(report: &PlanReport) -> Vec<String> {
     for (index, offer) in report.proposals.iter().enumerate() {
         lines.push(String::new());
         lines.push(format!("{}  {}", index + 1, offer.proposal.reason));
-        lines.extend(how(offer));
+        lines.extend(run_instructions(offer));
     }
     lines
 }
@@ -94,15 +94,14 @@ pub(super) fn command(press: &RampHold) -> String {
     )
 }
 
-/// How to run it, if that is possible.
-fn how(offer: &Offer) -> Vec<String> {
+fn run_instructions(offer: &Offer) -> Vec<String> {
     let Some(secs) = offer.run_s else {
         return vec!["   there is no command for this yet".into()];
     };
     let mut lines: Vec<String> =
         offer.commands.iter().map(|command| format!("   {command}")).collect();
-    let asks = offer.acknowledgements.iter();
-    lines.extend(asks.map(|ask| format!("   with --acknowledge, because {ask}")));
+    let acknowledgements = offer.acknowledgements.iter();
+    lines.extend(acknowledgements.map(|reason| format!("   with --acknowledge, because {reason}")));
     lines.push(format!("   about {secs:.0} s in all, with homing and finding contact"));
     lines
 }
@@ -178,7 +177,7 @@ fn table(
     lines
 }
 
-/// Three digits; what is above 1000 % is no knowledge at all.
+/// Three digits; above 1000 % nothing is known.
 fn percent(value: Option<f64>) -> String {
     match value {
         Some(value) if value < 1000.0 => digits(value, 3),
@@ -191,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_knowledge_is_a_dash() {
+    fn unknown_values_are_a_dash() {
         assert_eq!(percent(Some(0.324_98)), "0.325");
         assert_eq!((percent(None), percent(Some(2e4))), ("-".into(), "-".into()));
     }

@@ -1,14 +1,13 @@
-//! `palpate run FILE` for a programme: every task on one rig, a journal to continue from, a page of what it told.
+//! `palpate run FILE` for a programme: every task on one rig, a journal to continue from, a summary page.
 
-mod before;
+mod preflight;
 
-pub(super) use before::check;
+pub(super) use preflight::check;
 
 use super::Failure;
-use super::asking::Asking;
-use super::output::Output;
-use super::run::HowArgs;
-use before::{Ahead, ask, contents, look_ahead, parse, refusal, refuse, tell, with_settings};
+use super::output::{Output, merged};
+use super::prompts::OperatorPrompts;
+use super::run::SessionArgs;
 use palpate_analysis::report::programme::Page;
 use palpate_protocols::file::Problem;
 use palpate_protocols::plans::Plan;
@@ -16,9 +15,12 @@ use palpate_runner::programme::{Done, Event, Laboratory, Programme, RunError, ru
 use palpate_runner::{Answers, RunView, Runner, wall_now};
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
-use serde::Serialize;
+use preflight::{
+    apply_labels, parse, parse_failure, preview_object, preview_programme, preview_table,
+    problem_failure, require_labels, with_settings,
+};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::sync_channel;
 
 /// Name of the page in the programme's folder.
@@ -28,24 +30,13 @@ const PAGE_FILE: &str = "summary.html";
 const CALIBRATION_FILE: &str = "calibration.json";
 
 /// Whether a name is the file of a programme.
-pub(super) fn is_one(name: &str) -> bool {
+pub(super) fn is_programme(name: &str) -> bool {
     read(Path::new(name)).is_ok_and(|text| Programme::is_meant(&text))
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    programme: &'a str,
-    folder: PathBuf,
-    was_continued: bool,
-    page: PathBuf,
-    calibration: Option<PathBuf>,
-    #[serde(flatten)]
-    told: &'a Page,
 }
 
 pub(super) fn run(
     file: &Path,
-    how: &HowArgs,
+    options: &SessionArgs,
     values: &BTreeMap<String, String>,
     output: &Output,
 ) -> Result<(), Failure> {
@@ -53,44 +44,45 @@ pub(super) fn run(
         return Err(Failure::usage("a programme sets its values itself; change them in its file"));
     }
     let text = read(file).map_err(Failure::usage)?;
-    let mut programme = parse(file, &text).map_err(|err| refusal(file, &err))?;
-    programme.is_acknowledged |= how.acknowledge;
-    tell(&mut programme, how)?;
-    let rig_args = with_settings(&how.rig, &programme.simulated)?;
+    let mut programme = parse(file, &text).map_err(|err| parse_failure(file, &err))?;
+    programme.is_acknowledged |= options.acknowledge;
+    apply_labels(&mut programme, options)?;
+    let rig_args = with_settings(&options.rig, &programme.simulated)?;
     let bench = super::rig::open(&rig_args)?;
-    let planned = look_ahead(&programme, &bench)?.map_err(|err| refusal(file, &err))?;
+    let planned =
+        preview_programme(&programme, &bench)?.map_err(|err| parse_failure(file, &err))?;
     for note in &planned.notes {
         output.note(&format!("{}, {note}", file.display()));
     }
     if let Some(first) = planned.to_acknowledge.first() {
-        let Failure::Usage(sentence) = refuse(file, first) else {
-            return Err(refuse(file, first));
+        let Failure::Usage(sentence) = problem_failure(file, first) else {
+            return Err(problem_failure(file, first));
         };
         return Err(Failure::Usage(format!("{sentence}, or add --acknowledge")));
     }
-    if how.preview {
-        let report = Ahead::of(&programme, &planned);
-        output.answer("run", &report, || contents(&programme, &report));
+    if options.preview {
+        let object = preview_object(&programme, &planned);
+        output.answer("run", &object, || preview_table(&programme, &planned));
         return Ok(());
     }
-    ask(file, &programme)?;
+    require_labels(file, &programme)?;
     let description = bench.rig.description().clone();
     let is_virtual = bench.rig.is_virtual();
     let gate = |plan: &Plan| {
         let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
         match gate.to_acknowledge() {
-            // What the file accepts are forces, not a rig that failed.
-            reasons if how.acknowledge => Ok(reasons),
+            // The file accepts forces, not a rig that failed its check.
+            reasons if options.acknowledge => Ok(reasons),
             reasons => match reasons.first() {
-                Some(reason) => Err(format!(
-                    "{reason}; or add --acknowledge to run all the same, which is recorded"
-                )),
+                Some(reason) => {
+                    Err(format!("{reason}; or add --acknowledge to run anyway, which is recorded"))
+                }
                 None => Ok(reasons),
             },
         }
     };
     check_gates(file, &programme, &gate)?;
-    let folder = match &how.out {
+    let folder = match &options.out {
         Some(folder) => folder.clone(),
         None => {
             let library = library_folder().map_err(Failure::usage)?;
@@ -101,13 +93,13 @@ pub(super) fn run(
     let answers = if is_virtual { Answers::Confirm } else { Answers::Operator };
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
-        // A full channel already says what this would say.
+        // A full channel holds a wake-up already.
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
-    let is_asking = super::run::stop_on_signals(&runner)?;
-    let asking =
-        (answers == Answers::Operator).then(|| Asking::start(runner.requests(), is_asking));
+    let is_question_open = super::run::stop_on_signals(&runner)?;
+    let prompts = (answers == Answers::Operator)
+        .then(|| OperatorPrompts::start(runner.requests(), is_question_open));
     let laboratory = Laboratory {
         runner: &runner,
         woken: &woken,
@@ -118,13 +110,13 @@ pub(super) fn run(
         answers,
         gate: &gate,
     };
-    let asking = asking.transpose()?;
-    let done = watch(&programme, &checksum(&text), laboratory, asking, output)?;
+    let prompts = prompts.transpose()?;
+    let done = run_and_watch(&programme, &checksum(&text), laboratory, prompts, output)?;
     drop(runner);
-    leave(&programme, &folder, &done, output)
+    write_results(&programme, &folder, &done, output)
 }
 
-/// Refuses before anything moves what today's check of the rig does not let run.
+/// Refuses before anything moves what the daily check of the rig blocks.
 fn check_gates(
     file: &Path,
     programme: &Programme,
@@ -134,33 +126,32 @@ fn check_gates(
         if let Some(plan) = task.plan(1, None) {
             gate(&plan).map_err(|reason| {
                 let message = format!("task '{}': {reason}", task.name);
-                refuse(file, &Problem::error(task.line, message))
+                problem_failure(file, &Problem::error(task.line, message))
             })?;
         }
     }
     Ok(())
 }
 
-/// Carries the programme out with a line of progress.
-fn watch(
+fn run_and_watch(
     programme: &Programme,
     crc32: &str,
     laboratory: Laboratory<'_>,
-    mut asking: Option<Asking>,
+    mut prompts: Option<OperatorPrompts>,
     output: &Output,
 ) -> Result<Done, Failure> {
     let bar = output.bar(1000);
-    let mut so_far = String::new();
+    let mut task_text = String::new();
     let result = carry_out(programme, crc32, laboratory, &mut |event| match event {
         Event::Begun { place, count } => {
             let task = &programme.tasks[place.task].name;
-            so_far = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
+            task_text = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
             bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
         }
         Event::Running(view, left) => {
-            bar.set_message(format!("{so_far}  {}", going(view, left.0)));
-            if let Some(asking) = &mut asking {
-                bar.suspend(|| asking.look(view, output));
+            bar.set_message(format!("{task_text}  {}", progress_text(view, left.0)));
+            if let Some(prompts) = &mut prompts {
+                bar.suspend(|| prompts.update(view, output));
             }
         }
         Event::Finished(..) | Event::Calibrated(_) => {}
@@ -174,7 +165,7 @@ fn watch(
     })
 }
 
-fn going(view: &RunView, left: f64) -> String {
+fn progress_text(view: &RunView, left: f64) -> String {
     let left = left.round() as u64;
     format!(
         "{}  {}:{:02}:{:02} of session time left",
@@ -185,8 +176,8 @@ fn going(view: &RunView, left: f64) -> String {
     )
 }
 
-/// Writes the page and the calibration and tells where they are.
-fn leave(
+/// Writes the page and the calibration and prints their paths.
+fn write_results(
     programme: &Programme,
     folder: &Path,
     done: &Done,
@@ -206,15 +197,12 @@ fn leave(
         let text = serde_json::to_string_pretty(&done.calibration).map_err(Failure::failed)?;
         palpate_sessions::text::write(path, &text).map_err(Failure::failed)?;
     }
-    let report = Report {
-        programme: &programme.name,
-        folder: folder.to_path_buf(),
-        was_continued: done.was_continued,
-        page: path.clone(),
-        calibration: calibration.clone(),
-        told: &page,
-    };
-    output.answer("run", &report, || {
+    let display = |path: &Path| path.display().to_string();
+    let object = serde_json::json!({
+        "programme": programme.name, "folder": display(folder), "was_continued": done.was_continued,
+        "page": display(&path), "calibration": calibration.as_deref().map(display),
+    });
+    output.answer("run", &merged(object, &page), || {
         let mut lines = vec![page.table(), format!("page: {}", path.display())];
         lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
         lines.join("\n")

@@ -1,14 +1,14 @@
-//! `palpate protocol`: what a protocol file says, what is wrong with it, and what it would do.
+//! `palpate protocol`: lists, checks, shows and previews protocols.
 
 mod text;
 
-use super::output::Output;
+use super::output::{Output, merged};
 use super::rig::{OpenRig, RigArgs};
 use super::{Failure, new_file, programme};
 use clap::{Args, Subcommand};
 use palpate_analysis::report::plan_picture;
 use palpate_protocols::file::{
-    BUILT_IN, Checked, Parameter, Problem, Protocol, check, nearest_built_in, reference,
+    BUILT_IN, Checked, Problem, Protocol, check, nearest_built_in, reference,
 };
 use palpate_protocols::plans::PlannedStep;
 use palpate_protocols::preview::{Preview, outline};
@@ -21,21 +21,21 @@ use std::path::{Path, PathBuf};
 /// List, check, show or preview protocols
 #[derive(Debug, Subcommand)]
 pub enum ProtocolCommand {
-    /// Name the built-in protocols
+    /// List the built-in protocols
     List,
     /// Find every mistake in files of protocols and programmes, each with its line
-    Check(CheckArgs),
+    Check(ProtocolCheckArgs),
     /// Print a protocol's file, to read or to copy
-    Show(ShowArgs),
-    /// Tell what a protocol will do, step by step, before anything moves
-    Preview(PreviewArgs),
+    Show(ProtocolShowArgs),
+    /// Preview a protocol step by step before anything moves
+    Preview(ProtocolPreviewArgs),
     /// Print the words of the protocol language
     Words,
 }
 
 /// Arguments of `palpate protocol check`.
 #[derive(Debug, Args)]
-pub struct CheckArgs {
+pub struct ProtocolCheckArgs {
     /// Protocol files, programme files, or names of built-in protocols
     #[arg(required = true, value_name = "NAME|FILE")]
     files: Vec<String>,
@@ -45,7 +45,7 @@ pub struct CheckArgs {
 
 /// Arguments of `palpate protocol show`.
 #[derive(Debug, Args)]
-pub struct ShowArgs {
+pub struct ProtocolShowArgs {
     /// A built-in protocol or a file
     #[arg(value_name = "NAME|FILE")]
     protocol: String,
@@ -58,7 +58,7 @@ pub struct ShowArgs {
 
 /// Arguments of `palpate protocol preview`.
 #[derive(Debug, Args)]
-pub struct PreviewArgs {
+pub struct ProtocolPreviewArgs {
     /// A built-in protocol or a file
     #[arg(value_name = "NAME|FILE")]
     protocol: String,
@@ -90,19 +90,19 @@ pub(super) fn run(command: &ProtocolCommand, output: &Output) -> Result<(), Fail
 #[derive(Clone, Debug, Args)]
 pub struct ValueArgs {
     /// Another value of a parameter, such as depth=20mm or speeds="0.75 mm/s, 1.5 mm/s"; may be repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = pair)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parse_pair)]
     set: Vec<(String, String)>,
 }
 
 impl ValueArgs {
-    /// By name; of two values for one name the later holds.
+    /// By name; the later of two values for one name holds.
     pub fn values(&self) -> BTreeMap<String, String> {
         self.set.iter().cloned().collect()
     }
 }
 
 /// `name=value`, or one sentence.
-pub(super) fn pair(text: &str) -> Result<(String, String), String> {
+pub(super) fn parse_pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() => {
             Ok((name.trim().to_owned(), value.trim().to_owned()))
@@ -112,7 +112,7 @@ pub(super) fn pair(text: &str) -> Result<(String, String), String> {
 }
 
 /// The text of a built-in protocol or of a file.
-pub(super) fn text_of(name: &str) -> Result<String, Failure> {
+pub(super) fn read_text(name: &str) -> Result<String, Failure> {
     if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
         return Ok((*text).to_owned());
     }
@@ -121,7 +121,7 @@ pub(super) fn text_of(name: &str) -> Result<String, Failure> {
         Ok(None) => {
             let hint = match nearest_built_in(name) {
                 Some(near) => format!("did you mean '{near}'?"),
-                None => "'palpate protocol list' names the built-in ones".into(),
+                None => "'palpate protocol list' lists the built-in ones".into(),
             };
             Err(Failure::usage(format!(
                 "there is no built-in protocol and no file '{name}'; {hint}"
@@ -134,23 +134,23 @@ pub(super) fn text_of(name: &str) -> Result<String, Failure> {
 }
 
 /// The same, unless it is a programme.
-fn protocol_text(name: &str) -> Result<String, Failure> {
-    if programme::is_one(name) {
+fn read_protocol_text(name: &str) -> Result<String, Failure> {
+    if programme::is_programme(name) {
         return Err(Failure::usage(format!(
-            "{name} is a programme, not a protocol; 'palpate run {name} --preview' tells what it will do"
+            "{name} is a programme, not a protocol; 'palpate run {name} --preview' shows what it will do"
         )));
     }
-    text_of(name)
+    read_text(name)
 }
 
-/// A protocol written out for a rig, or its first error in a sentence; warnings become notes.
-pub(super) fn sound(
+/// A protocol expanded for a rig, or its first error; warnings become notes.
+pub(super) fn load_checked(
     name: &str,
     values: &BTreeMap<String, String>,
     bench: &OpenRig,
     output: &Output,
 ) -> Result<(Protocol, palpate_protocols::file::Written, Preview), Failure> {
-    let text = protocol_text(name)?;
+    let text = read_protocol_text(name)?;
     let Checked { plan, problems } = check_on(&text, values, bench)?;
     let errors: Vec<&Problem> = problems.iter().filter(|problem| problem.is_error()).collect();
     if let Some(first) = errors.first() {
@@ -162,7 +162,7 @@ pub(super) fn sound(
     }
     let notes = plan.as_ref().map(|(_, _, preview)| &preview.notes);
     for problem in &problems {
-        // The preview tells it too, to those who look at it.
+        // The preview prints it too.
         if notes.is_some_and(|notes| notes.contains(&problem.message)) {
             continue;
         }
@@ -181,36 +181,19 @@ fn check_on(
     Ok(check(text, values, rig, &bench.limits, &curve))
 }
 
-#[derive(Serialize)]
-struct Head<'a> {
-    name: &'a str,
-    version: u32,
-    title: &'a str,
-    about: &'a str,
-    source: &'a str,
-    ask: &'a [String],
-    parameters: &'a [Parameter],
-}
-
-impl<'a> Head<'a> {
-    fn of(protocol: &'a Protocol) -> Self {
-        Self {
-            name: &protocol.name,
-            version: protocol.version,
-            title: &protocol.title,
-            about: &protocol.about,
-            source: &protocol.source,
-            ask: &protocol.ask,
-            parameters: &protocol.parameters,
-        }
-    }
+fn head(protocol: &Protocol) -> serde_json::Value {
+    serde_json::json!({
+        "name": protocol.name, "version": protocol.version, "title": protocol.title,
+        "about": protocol.about, "source": protocol.source, "ask": protocol.ask,
+        "parameters": protocol.parameters,
+    })
 }
 
 fn list(output: &Output) -> Result<(), Failure> {
     let protocols: Result<Vec<Protocol>, Failure> =
         BUILT_IN.iter().map(|(name, text)| read(name, text)).collect();
     let protocols = protocols?;
-    let heads: Vec<Head<'_>> = protocols.iter().map(Head::of).collect();
+    let heads: Vec<_> = protocols.iter().map(head).collect();
     let object = serde_json::json!({ "protocols": heads });
     output.answer("protocol list", &object, || text::list(&protocols));
     Ok(())
@@ -230,7 +213,7 @@ pub(super) struct FileReport {
     pub(super) expected_s: Option<f64>,
 }
 
-fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+fn run_check(args: &ProtocolCheckArgs, output: &Output) -> Result<(), Failure> {
     let bench = super::rig::open(&args.rig)?;
     let curve = bench.calibration.curve().map_err(Failure::usage)?;
     let watch = Stopwatch::start();
@@ -238,13 +221,13 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     let mut files = Vec::new();
     let mut wrong = 0;
     for file in &args.files {
-        if programme::is_one(file) {
+        if programme::is_programme(file) {
             let report = programme::check(file, &bench)?;
             wrong += usize::from(report.problems.iter().any(Problem::is_error));
             files.push(report);
             continue;
         }
-        let text = text_of(file)?;
+        let text = read_text(file)?;
         let checked = check(&text, &nothing, bench.rig.description(), &bench.limits, &curve);
         wrong += usize::from(!checked.is_sound());
         let (name, expected_s) = match checked.plan {
@@ -266,24 +249,24 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     }
 }
 
-fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
-    let file = text_of(&args.protocol)?;
+fn show(args: &ProtocolShowArgs, output: &Output) -> Result<(), Failure> {
+    let file = read_text(&args.protocol)?;
     let values = args.values.values();
     if !args.steps && values.is_empty() {
-        // A file with mistakes is shown too: that is how one finds them.
+        // A file with mistakes is shown too, so that they can be found.
         let protocol = Protocol::read(&file).ok();
-        let object = serde_json::json!({ "protocol": protocol.as_ref().map(Head::of),
+        let object = serde_json::json!({ "protocol": protocol.as_ref().map(head),
             "text": file,
         });
         output.answer("protocol show", &object, || file.trim_end().to_owned());
         return Ok(());
     }
-    let protocol = read(&args.protocol, &protocol_text(&args.protocol)?)?;
+    let protocol = read(&args.protocol, &read_protocol_text(&args.protocol)?)?;
     let written = protocol
         .write_out(&values)
         .map_err(|problems| Failure::usage(text::sentences(&args.protocol, &problems)))?;
     let steps: &[PlannedStep] = &written.plan.steps;
-    let object = serde_json::json!({ "protocol": Head::of(&protocol),
+    let object = serde_json::json!({ "protocol": head(&protocol),
         "steps": steps,
         "lines": written.lines,
     });
@@ -291,44 +274,29 @@ fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-#[derive(Serialize)]
-struct PreviewReport<'a> {
-    protocol: Head<'a>,
-    values: &'a BTreeMap<String, String>,
-    checkpoints: Vec<Checkpoint<'a>>,
-    #[serde(flatten)]
-    preview: &'a Preview,
-}
-
-#[derive(Serialize)]
-struct Checkpoint<'a> {
-    name: &'a str,
-    /// Index of the step before it, from 0.
-    step_index: usize,
-    /// Expected time since the start.
-    after_s: f64,
-}
-
-fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure> {
+fn preview(args: &ProtocolPreviewArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("plot", args.plot.as_deref())?;
     let bench = super::rig::open(&args.rig)?;
     let (protocol, written, preview) =
-        sound(&args.protocol, &args.values.values(), &bench, output)?;
+        load_checked(&args.protocol, &args.values.values(), &bench, output)?;
     let plan = &written.plan;
     let nothing = BTreeMap::new();
-    let after = |index: usize| preview.steps[..=index].iter().map(|step| step.expected.0).sum();
-    let report = PreviewReport {
-        protocol: Head::of(&protocol),
-        values: plan.source.as_ref().map_or(&nothing, |source| &source.values),
-        checkpoints: plan
-            .checkpoints_from(0)
-            .map(|(step_index, name)| Checkpoint { name, step_index, after_s: after(step_index) })
-            .collect(),
-        preview: &preview,
-    };
-    output.answer("protocol preview", &report, || text::preview(&protocol, &written, &preview));
+    let after =
+        |index: usize| -> f64 { preview.steps[..=index].iter().map(|step| step.expected.0).sum() };
+    // The index is that of the step before the checkpoint.
+    let checkpoints = plan.checkpoints_from(0).map(|(step_index, name)| {
+        serde_json::json!({ "name": name, "step_index": step_index, "after_s": after(step_index) })
+    });
+    let object = serde_json::json!({
+        "protocol": head(&protocol),
+        "values": plan.source.as_ref().map_or(&nothing, |source| &source.values),
+        "checkpoints": checkpoints.collect::<Vec<_>>(),
+    });
+    output.answer("protocol preview", &merged(object, &preview), || {
+        text::preview(&protocol, &written, &preview)
+    });
     new_file::write("plot", args.plot.as_deref(), || {
-        // What presses on nothing has no course of depth and force.
+        // A protocol without contact has no curve of depth and force.
         if preview.force_band[1].0 <= 0.0 {
             return plan_picture::of_steps(&protocol.title, &preview.steps);
         }

@@ -1,4 +1,4 @@
-//! `palpate report --check PAGE`: whether the files are still those that a page describes.
+//! `palpate report --check PAGE`: compares files with the hashes in a page.
 
 use super::super::Failure;
 use super::super::output::Output;
@@ -42,7 +42,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
         let place = named.iter().find(|(_, known)| known == id);
         let session = match place {
             Some((path, _)) => path.clone(),
-            None => beside(page, folder, id)?,
+            None => find_near_page(page, folder, id)?,
         };
         // A session compared with itself stands in the page twice.
         own.dedup_by(|a, b| a == b);
@@ -73,7 +73,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
     match (is_whole, count) {
         (true, 0) => Ok(()),
         (false, 0) => Err(Failure::failed(
-            "the page was changed after it was made; make it anew from the sessions",
+            "the page was changed after it was made; make a new page from the sessions",
         )),
         (_, count) => Err(Failure::failed(format!(
             "{} not as the page describes them; make a new page, or restore the files from a backup",
@@ -94,19 +94,19 @@ fn named(sessions: &[PathBuf]) -> Result<Vec<(PathBuf, String)>, Failure> {
     sessions.iter().map(id).collect()
 }
 
-/// The session's folder beside the page, or the one that the page is in.
-fn beside(page: &Path, folder: &str, id: &str) -> Result<PathBuf, Failure> {
+/// The session's folder next to the page, or the folder of the page.
+fn find_near_page(page: &Path, folder: &str, id: &str) -> Result<PathBuf, Failure> {
     let here = page.parent().filter(|here| !here.as_os_str().is_empty());
     let here = here.unwrap_or(Path::new("."));
-    // A page that somebody made must not lead elsewhere.
+    // A manipulated page must not lead elsewhere.
     let is_name = Path::new(folder).file_name() == Some(folder.as_ref());
-    let beside = is_name.then(|| here.join(folder));
-    let places = beside.into_iter().chain([here.to_path_buf()]);
+    let sibling = is_name.then(|| here.join(folder));
+    let places = sibling.into_iter().chain([here.to_path_buf()]);
     let is_it = |place: &PathBuf| {
         place.is_dir()
             && Summary::read(place).is_ok_and(|summary| summary.manifest.session_id == id)
     };
-    // A log that cannot be read any more is compared all the same, if it is where it was.
+    // A log that has become unreadable is still compared, if it is where it was.
     let mut places = places.collect::<Vec<_>>().into_iter();
     let found = places.clone().find(is_it).or_else(|| {
         let first = places.next()?;
@@ -114,7 +114,7 @@ fn beside(page: &Path, folder: &str, id: &str) -> Result<PathBuf, Failure> {
     });
     found.ok_or_else(|| {
         Failure::usage(format!(
-            "session {id} is not beside the page; name its folder after the page"
+            "session {id} is not in the folder of the page; name its folder after the page"
         ))
     })
 }

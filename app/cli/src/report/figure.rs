@@ -2,8 +2,8 @@
 
 use super::super::output::Output;
 use super::super::{Failure, new_file};
-use super::{FigureArg, ReportArgs};
-use palpate_analysis::report::dossier::{self, Wanted};
+use super::ReportArgs;
+use palpate_analysis::report::dossier::{self, Figure, Wanted};
 use palpate_analysis::report::figures::Window;
 use std::path::Path;
 
@@ -17,12 +17,12 @@ pub(super) fn run(
     let ending = dossier::Ending::of(to).map_err(Failure::usage)?;
     let window = window(args)?;
     let wanted = Wanted { session: session.to_path_buf(), analysis: args.analysis.clone() };
-    let drawing = dossier::figure(&wanted, args.of.into(), window);
+    let drawing = dossier::figure(&wanted, args.of, window);
     let drawing = drawing.map_err(super::super::source_failure)?;
     let drawing = drawing.map_err(Failure::failed)?;
     let bytes = ending.bytes(&drawing).map_err(Failure::failed)?;
     new_file::write_bytes("figure", to, &bytes)?;
-    let object = serde_json::json!({ "figure": to, "of": dossier::Figure::from(args.of).name(),
+    let object = serde_json::json!({ "figure": to, "of": args.of.name(),
         "session": session,
     });
     output.answer("report", &object, || format!("{}: drawn", to.display()));
@@ -39,7 +39,7 @@ fn window(args: &ReportArgs) -> Result<Window, Failure> {
             "--from is not before --until, so there is nothing to draw; give two times in s, the earlier with --from",
         ));
     }
-    let is_over_samples = matches!(args.of, FigureArg::ForceTime | FigureArg::ForceDepth);
+    let is_over_samples = matches!(args.of, Figure::ForceTime | Figure::ForceDepth);
     if window != Window::WHOLE && !is_over_samples {
         return Err(Failure::usage(
             "--from and --until are for force-time and force-depth; leave them out",

@@ -1,25 +1,23 @@
-//! `palpate report`: what happened in a run, against what its plan said; a page on one session or several; a figure of one.
+//! `palpate report`: targets and achieved values of a run; a page on sessions; a figure of one.
 
 mod check;
 mod figure;
 
 use super::Failure;
+use super::arguments::{Choice, choice, parse_number};
 use super::new_file;
-use super::output::Output;
-use clap::{Args, ValueEnum};
+use super::output::{Output, merged};
+use clap::Args;
 use palpate_analysis::edited;
 use palpate_analysis::fidelity::of_session;
 use palpate_analysis::report::dossier::{self, Figure, ReportError, Wanted};
 use palpate_analysis::report::figures::Align;
 use palpate_analysis::report::session::fidelity_text;
 use palpate_runner::base::FoundBase;
-use palpate_runner::fidelity::Fidelity;
 use palpate_runner::wall_now;
-use palpate_sessions::Verdict;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Tell what happened in a run: targets and what was done, missing samples, use of time
+/// Report on a run: targets and achieved values, missing samples, use of time
 #[derive(Debug, Args)]
 pub struct ReportArgs {
     /// Session folder; several with --html
@@ -28,81 +26,38 @@ pub struct ReportArgs {
     /// Write a page on the sessions as a new HTML file: one file, without scripts, to be read and printed anywhere
     #[arg(long, value_name = "FILE", conflicts_with_all = ["figure", "check"])]
     html: Option<PathBuf>,
-    /// With --html, where several sessions are laid over each other
-    #[arg(long, value_enum, default_value = "ramp", requires = "html")]
-    align: AlignArg,
+    /// With --html, the event at which several sessions are aligned
+    #[arg(long, value_parser = choice(&ALIGNMENTS), default_value = "ramp", requires = "html")]
+    align: Align,
     /// Draw a figure of the session as a new SVG or PNG file
     #[arg(long, value_name = "FILE", conflicts_with = "check")]
     figure: Option<PathBuf>,
     /// With --figure, which one
-    #[arg(long, value_enum, default_value = "force-time", requires = "figure")]
-    of: FigureArg,
+    #[arg(long, value_parser = choice(&FIGURES), default_value = "force-time", requires = "figure")]
+    of: Figure,
     /// With --figure, draw from here on: s since the first sample
-    #[arg(long, value_name = "S", value_parser = super::run::number, requires = "figure", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = parse_number, requires = "figure", allow_negative_numbers = true)]
     from: Option<f64>,
     /// With --figure, draw to here: s since the first sample
-    #[arg(long, value_name = "S", value_parser = super::run::number, requires = "figure")]
+    #[arg(long, value_name = "S", value_parser = parse_number, requires = "figure")]
     until: Option<f64>,
     /// With --html or --figure, read the sessions as this analysis of theirs does
     #[arg(long, value_name = "NAME", conflicts_with = "check")]
     analysis: Option<String>,
-    /// Compare the files that a page describes with those of the sessions named, or of those beside the page
+    /// Compare the files that a page describes with those of the sessions named, or of those in its folder
     #[arg(long, value_name = "FILE.html")]
     check: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum AlignArg {
-    /// Where the ramp begins
-    Ramp,
-    /// Where contact was found
-    Contact,
-}
+const ALIGNMENTS: [Choice<Align>; 2] =
+    [("ramp", Align::Ramp, "Start of the ramp"), ("contact", Align::Contact, "Contact")];
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FigureArg {
-    /// Force over time
-    ForceTime,
-    /// Force over depth
-    ForceDepth,
-    /// The fit and what it leaves over
-    Residual,
-    /// The calibration with its uncertainty
-    Calibration,
-}
-
-impl From<AlignArg> for Align {
-    fn from(align: AlignArg) -> Self {
-        match align {
-            AlignArg::Ramp => Self::Ramp,
-            AlignArg::Contact => Self::Contact,
-        }
-    }
-}
-
-impl From<FigureArg> for Figure {
-    fn from(figure: FigureArg) -> Self {
-        match figure {
-            FigureArg::ForceTime => Self::ForceTime,
-            FigureArg::ForceDepth => Self::ForceDepth,
-            FigureArg::Residual => Self::Residual,
-            FigureArg::Calibration => Self::Calibration,
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    session_id: &'a str,
-    ending: Option<&'a str>,
-    reason: Option<&'a str>,
-    verdict: Option<Verdict>,
-    verdict_reason: Option<&'a str>,
-    #[serde(flatten)]
-    base: FoundBase,
-    #[serde(flatten)]
-    fidelity: &'a Fidelity,
-}
+const FIGURES: [Choice<Figure>; 4] = [
+    ("force-time", Figure::ForceTime, "Force over time"),
+    ("force-depth", Figure::ForceDepth, "Force over depth"),
+    ("residual", Figure::Residual, "The fit and its residuals"),
+    ("calibration", Figure::Calibration, "The calibration with its uncertainty"),
+];
 
 pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
     if let Some(page) = &args.check {
@@ -114,7 +69,9 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
     let [session] = args.sessions.as_slice() else {
         return Err(Failure::usage(match args.sessions.len() {
             0 => "name a session, or a page with --check",
-            _ => "this is for one session; name one, or compare several on a page with --html FILE",
+            _ => {
+                "a report covers one session; name one, or compare several on a page with --html FILE"
+            }
         }));
     };
     if let Some(to) = &args.figure {
@@ -136,20 +93,18 @@ fn fidelity(session: &Path, output: &Output) -> Result<(), Failure> {
     let verdict = edited.edits.verdict();
     let verdict = verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str()));
     let end = session.end.as_ref();
-    let report = Report {
-        session_id: &session.manifest.session_id,
-        ending: end.map(|end| end.outcome.as_str()),
-        reason: end.map(|end| end.reason.as_str()),
-        verdict: verdict.map(|(verdict, _)| verdict),
-        verdict_reason: verdict.map(|(_, reason)| reason),
-        base: FoundBase::of_session(session),
-        fidelity: &fidelity,
-    };
-    output.answer("report", &report, || {
-        let told = fidelity_text(&fidelity, end, verdict);
-        let facts = report.base.facts();
-        let base = facts.map(|(name, mm, error)| format!("\n{name:<10} {mm:.3} ± {error:.3} mm"));
-        told + &base.collect::<String>()
+    let base = FoundBase::of_session(session);
+    let object = serde_json::json!({
+        "session_id": session.manifest.session_id,
+        "ending": end.map(|end| &end.outcome), "reason": end.map(|end| &end.reason),
+        "verdict": verdict.map(|(verdict, _)| verdict),
+        "verdict_reason": verdict.map(|(_, reason)| reason),
+    });
+    output.answer("report", &merged(merged(object, &base), &fidelity), || {
+        let text = fidelity_text(&fidelity, end, verdict);
+        let facts = base.facts();
+        let facts = facts.map(|(name, mm, error)| format!("\n{name:<10} {mm:.3} ± {error:.3} mm"));
+        text + &facts.collect::<String>()
     });
     Ok(())
 }
@@ -164,11 +119,11 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
         .iter()
         .map(|session| Wanted { session: session.clone(), analysis: args.analysis.clone() })
         .collect();
-    let made = dossier::made(wall_now().into());
-    let page = dossier::write(&wanted, args.align.into(), &made, &output.count_bar(0));
+    let made_at = dossier::made(wall_now().into());
+    let page = dossier::write(&wanted, args.align, &made_at, &output.count_bar(0));
     let page = page.map_err(|err| match err {
         ReportError::Source(path, err) => {
-            super::source_failure(*err).of(&path.display().to_string())
+            super::source_failure(*err).prefixed(&path.display().to_string())
         }
         cancelled @ ReportError::Cancelled => Failure::failed(cancelled),
     })?;

@@ -1,13 +1,15 @@
 //! `palpate run`: a protocol without a window, on the same runner.
 
-mod told;
+mod report;
 
 use super::Failure;
-use super::asking::Asking;
+use super::arguments::parse_number;
 use super::output::Output;
 use super::programme;
+use super::prompts::OperatorPrompts;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
+use super::terminal::on_ctrl_c;
 use clap::Args;
 use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_drivers::Rig;
@@ -21,15 +23,15 @@ use palpate_runner::{
     TimeScale, wall_now,
 };
 use palpate_sessions::library_folder;
+use report::{preview_text, report};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
-use told::{preview_text, report};
 
-/// Probe that is written down where nobody says which.
+/// The indenter where none is given.
 pub(super) const USUAL_INDENTER: &str = "blunt 12 mm probe";
 
 /// Run a protocol without a window
@@ -43,10 +45,9 @@ pub struct RunArgs {
     #[command(flatten)]
     short: ShortArgs,
     #[command(flatten)]
-    how: HowArgs,
+    session: SessionArgs,
 }
 
-/// Heading of what is short for `--set` in the help.
 const SHORT: &str = "Short for --set, of ramp-hold and every protocol with such a parameter";
 
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
@@ -56,24 +57,24 @@ const SHORT: &str = "Short for --set, of ramp-hold and every protocol with such 
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s
-    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = parse_number, allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Depth from contact in mm
-    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = parse_number, allow_negative_numbers = true)]
     depth: Option<f64>,
     /// Time at depth in s
-    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = parse_number, allow_negative_numbers = true)]
     hold: Option<f64>,
-    /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
+    /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the maximum
     #[arg(long, help_heading = SHORT, value_name = "PARAMETER=SHARE")]
     hold_until: Option<String>,
-    /// After the hold come back to the surface at this speed in mm/s, recorded for a fit of unloading
-    #[arg(long, help_heading = SHORT, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
+    /// After the hold unload to the surface at this speed in mm/s, recorded for a fit of unloading
+    #[arg(long, help_heading = SHORT, value_name = "SPEED", value_parser = parse_number, allow_negative_numbers = true)]
     unload: Option<f64>,
 }
 
 impl RunArgs {
-    /// Values of parameters by name, from --set and from what is short for it.
+    /// Values of parameters by name, from --set and its short forms.
     fn values(&self) -> Result<BTreeMap<String, String>, Failure> {
         let with = |value: Option<f64>, unit| value.map(|value| format!("{value} {unit}"));
         let short = &self.short;
@@ -97,93 +98,78 @@ impl RunArgs {
     }
 }
 
-/// On which rig, into which folder, by whom.
 #[derive(Debug, Args)]
-pub(super) struct HowArgs {
+pub(super) struct SessionArgs {
     #[command(flatten)]
     pub(super) rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
     #[arg(long)]
     pub(super) out: Option<PathBuf>,
-    /// Who runs it
+    /// Operator
     #[arg(long, default_value = "")]
     pub(super) operator: String,
-    /// What is indented
+    /// Specimen
     #[arg(long, default_value = "")]
     pub(super) specimen: String,
-    /// With which probe; without it the blunt 12 mm probe
+    /// Indenter; without it the blunt 12 mm probe
     #[arg(long)]
     pub(super) indenter: Option<String>,
-    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    /// Details of specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) about: Vec<String>,
     /// Accept what the preview asks to acknowledge; it is recorded
     #[arg(long)]
     pub(super) acknowledge: bool,
-    /// Only tell what would happen
+    /// Only preview the run
     #[arg(long)]
     pub(super) preview: bool,
 }
 
-/// A finite number, or one sentence.
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("this is not a finite number; write it like 0.75".into()),
-    }
-}
-
-/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
 pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
-        return Err(Failure::usage(
-            "name a protocol; 'palpate protocol list' tells which there are",
-        ));
+        return Err(Failure::usage("name a protocol; 'palpate protocol list' lists them"));
     };
-    let (how, values) = (&args.how, args.values()?);
-    if programme::is_one(name) {
-        return programme::run(Path::new(name), how, &values, output);
+    let (options, values) = (&args.session, args.values()?);
+    if programme::is_programme(name) {
+        return programme::run(Path::new(name), options, &values, output);
     }
     if let Ok(library) = library_folder() {
         super::recover::recover_unfinished(&library, output);
     }
-    let bench = super::rig::open(&how.rig)?;
-    let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
-    let labels = labels(how)?;
+    let bench = super::rig::open(&options.rig)?;
+    let (protocol, written, _) = super::protocol::load_checked(name, &values, &bench, output)?;
+    let labels = labels(options)?;
     if written.plan.name == DAILY_CHECK {
         output.note(&format!(
-            "this run does not count as the check of the day; only '{HOW}' judges and keeps one"
+            "this run does not count as the daily check; only '{HOW}' evaluates and saves one"
         ));
     }
-    if !how.preview {
+    if !options.preview {
         protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
                 "{reason}; add --operator, --specimen or --about KEY=VALUE for each"
             ))
         })?;
     }
-    carry_out(written.plan, bench, how, labels, None, output)
+    run_plan(written.plan, bench, options, labels, None, output)
 }
 
-/// What leads the step of a run that follows.
-pub(super) struct Led {
-    /// The command that leads.
+pub(super) struct RunLeader {
     pub command: &'static str,
-    /// Asked for a lead with every sample.
+    /// Gives a lead for every sample.
     pub leader: Leader,
-    /// What is to be reported of it once the run is over, as an object and in words.
-    pub report: LeadReport,
+    pub report: LeaderReport,
 }
 
-/// Makes an object, and words, of what led a run.
-type LeadReport = Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>;
+/// Reports on the leader after the run, as an object and as text.
+type LeaderReport = Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>;
 
-pub(super) fn carry_out(
+pub(super) fn run_plan(
     plan: Plan,
     bench: OpenRig,
-    how: &HowArgs,
+    options: &SessionArgs,
     labels: Labels,
-    led: Option<Led>,
+    leader: Option<RunLeader>,
     output: &Output,
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
@@ -196,46 +182,46 @@ pub(super) fn carry_out(
         plan,
         calibration: bench.calibration,
         limits: bench.limits,
-        out: how.out.clone(),
+        out: options.out.clone(),
         labels,
-        is_acknowledged: how.acknowledge,
+        is_acknowledged: options.acknowledge,
         to_acknowledge: gate.to_acknowledge(),
         after_stop,
         answers,
-        leader: led.as_ref().map(|led| led.leader.clone()),
+        leader: leader.as_ref().map(|leader| leader.leader.clone()),
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
-    if how.preview {
+    if options.preview {
         output.result(&preview, || preview_text(&preview));
         return match preview.refusals.first() {
             Some(refusal) => Err(Failure::usage(refusal)),
             None => Ok(()),
         };
     }
-    if let Err(reason) = preview.verdict(how.acknowledge) {
+    if let Err(reason) = preview.verdict(options.acknowledge) {
         let hint =
             if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
     match &gate {
-        Gate::Acknowledge(reason) if !how.acknowledge => {
+        Gate::Acknowledge(reason) if !options.acknowledge => {
             return Err(Failure::usage(format!(
-                "{reason}; or add --acknowledge to run all the same, which is recorded"
+                "{reason}; or add --acknowledge to run anyway, which is recorded"
             )));
         }
         Gate::Note(note) => output.note(note),
         _ => {}
     }
     preview.notes.iter().for_each(|note| output.note(note));
-    let snapshot = execute(bench.rig, how.rig.time_scale, request, output)?;
+    let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed("the runner ended without a run"));
     };
-    report(view, led.as_ref(), output)
+    report(view, leader.as_ref(), output)
 }
 
-/// What today's daily check of the rig says to a plan.
+/// Whether the daily check of the rig allows a plan.
 pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
     let name = &bench.rig.description().name;
     gate_of(plan, name, bench.rig.is_virtual()).map_err(Failure::failed)
@@ -247,69 +233,67 @@ pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<Gate, 
     Gate::of(plan, library.as_deref(), rig, is_virtual, wall_now()).map_err(|err| err.to_string())
 }
 
-/// Runs a request and tells its progress; the snapshot is that of the ended run.
+/// Runs a request with progress; the snapshot is that of the ended run.
 pub(super) fn execute(
     rig: Box<dyn Rig>,
     scale: TimeScale,
     request: RunRequest,
     output: &Output,
 ) -> Result<Arc<Snapshot>, Failure> {
-    let is_asked = request.answers == Answers::Operator;
+    let has_operator = request.answers == Answers::Operator;
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
     let runner = Runner::start(rig, scale, Some(first), move || {
-        // A full channel already says what this would say.
+        // A full channel holds a wake-up already.
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
-    let is_asking = stop_on_signals(&runner)?;
+    let is_question_open = stop_on_signals(&runner)?;
     match answer.recv() {
         Ok(Ok(())) => {}
         Ok(Err(StartError::Refused(reason))) => return Err(Failure::Usage(reason)),
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
         Err(_) => return Err(Failure::failed("the runner ended before the run began")),
     }
-    let asking = is_asked.then(|| Asking::start(runner.requests(), is_asking));
-    watch(&runner, &woken, asking.transpose()?, output)
+    let prompts = has_operator.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
+    watch(&runner, &woken, prompts.transpose()?, output)
 }
 
-/// Who and what, as told by the arguments.
-pub(super) fn labels(args: &HowArgs) -> Result<Labels, Failure> {
+pub(super) fn labels(args: &SessionArgs) -> Result<Labels, Failure> {
     let mut labels = Labels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
         indenter: args.indenter.clone().unwrap_or_else(|| USUAL_INDENTER.to_owned()),
         about: About::default(),
     };
-    super::tell(&mut labels, &args.about)?;
+    super::add_labels(&mut labels, &args.about)?;
     Ok(labels)
 }
 
-/// The first signal stops, the second halts; one while a stopped run asks how to go on leaves the probe where it is.
-/// Returns what says that it asks.
+/// The first signal stops, the second halts; one while the question after a stop is open leaves the probe where it is.
+/// Returns the flag of that question.
 pub(super) fn stop_on_signals(runner: &Runner) -> Result<Arc<AtomicBool>, Failure> {
     let requests = runner.requests();
     let count = AtomicU32::new(0);
-    let is_asking = Arc::new(AtomicBool::new(false));
-    let is_asked = Arc::clone(&is_asking);
-    ctrlc::set_handler(move || {
+    let is_question_open = Arc::new(AtomicBool::new(false));
+    let question = Arc::clone(&is_question_open);
+    on_ctrl_c(move || {
         let choice = match count.fetch_add(1, Ordering::Relaxed) {
-            _ if is_asked.load(Ordering::Relaxed) => Operator::Close,
+            _ if question.load(Ordering::Relaxed) => Operator::Close,
             0 => Operator::Stop,
             _ => Operator::Halt,
         };
         let _ = requests.try_send(Request::Operator(choice));
-    })
-    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))?;
-    Ok(is_asking)
+    })?;
+    Ok(is_question_open)
 }
 
 /// Draws progress until the run is over.
 fn watch(
     runner: &Runner,
     woken: &Receiver<()>,
-    mut asking: Option<Asking>,
+    mut prompts: Option<OperatorPrompts>,
     output: &Output,
 ) -> Result<Arc<Snapshot>, Failure> {
     let bar = output.bar(1000);
@@ -319,8 +303,8 @@ fn watch(
         let Some(view) = &snapshot.run else { continue };
         bar.set_position((view.fraction * 1000.0) as u64);
         bar.set_message(progress_text(view));
-        if let Some(asking) = &mut asking {
-            bar.suspend(|| asking.look(view, output));
+        if let Some(prompts) = &mut prompts {
+            bar.suspend(|| prompts.update(view, output));
         }
         if view.outcome.is_some() {
             drop(bar);

@@ -1,7 +1,8 @@
 //! One axis: motion at the sample clock, the smoothing filter of the pulses, switches and stop codes.
 
-use super::profile::Profile;
-use super::settings::{NO_LIMIT, Setting, Settings, speed_taken};
+use super::profile::AxisProfile;
+use super::scope::bits;
+use super::settings::{AxisSetting, AxisSettings, NO_LIMIT, round_speed};
 use palpate_drivers::galil::ErrorCode;
 
 /// Counts of a position register: 32 bits.
@@ -13,20 +14,17 @@ const NEAR: f64 = 1e-6;
 /// documented; so it is some ten samples.
 const SETTLED: f64 = 1e-3;
 
-/// What the axis is about to do or does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Motion {
-    /// Nothing.
+pub enum AxisMotion {
     Rest,
-    /// A place is approached.
+    /// A move to a position.
     Target(f64),
-    /// A speed is kept, with its sign.
+    /// A constant velocity.
     Jog(f64),
     /// Coming to rest at a place, at a rate, with this stop code.
     Stopping(f64, f64, u8),
-    /// Until the home switch changes, in a direction; then [`Motion::Stopping`], then a homing goes back.
+    /// Until the home switch changes, in a direction; then [`AxisMotion::Stopping`], then a homing goes back.
     Edge {
-        /// 1 or -1.
         side: f64,
         /// State of the input at the start.
         was: bool,
@@ -35,7 +33,6 @@ pub enum Motion {
     },
     /// Second stage of a homing: braked, then slowly back to the edge.
     Back {
-        /// 1 or -1.
         side: f64,
         /// State of the input that ends it.
         until: bool,
@@ -46,9 +43,9 @@ pub enum Motion {
     Contour,
 }
 
-/// What `BG` will start.
+/// The motion that `BG` starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Prepared {
+pub enum PreparedMotion {
     /// `PA`.
     Target(f64),
     /// `PR`: again with every `BG`.
@@ -64,46 +61,40 @@ pub enum Prepared {
 
 /// Levels of the axis's inputs: true is high, which is open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Inputs {
+pub struct AxisInputs {
     /// Forward limit switch.
     pub forward: bool,
     /// Reverse limit switch.
     pub reverse: bool,
-    /// Home switch.
     pub home: bool,
 }
 
-/// What a sample brought about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// A limit, of whichever kind, was met.
+pub enum AxisEvent {
+    /// A limit switch or a software limit was met.
     Limit,
-    /// A homing has ended: the place becomes zero.
+    /// A homing has ended: the position becomes zero.
     Homed,
 }
 
-/// What `CN` says of inputs.
+/// Polarity of the inputs (`CN`).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polarity {
+pub struct InputPolarity {
     /// 1 when a high level is a closed limit switch, -1 when a low one is.
     pub limit: f64,
     /// -1 when homing starts forwards on a low level, 1 on a high one.
     pub home: f64,
 }
 
-/// One axis.
 #[derive(Clone, Debug)]
-pub struct Axis {
-    /// Its numbers.
-    pub settings: Settings,
-    /// Whether it is enabled.
+pub struct GalilAxis {
+    pub settings: AxisSettings,
     pub is_on: bool,
-    /// What it does.
-    pub motion: Motion,
-    /// What `BG` starts.
-    pub prepared: Prepared,
+    pub motion: AxisMotion,
+    /// Started by `BG`.
+    pub prepared: PreparedMotion,
     /// Commanded place and velocity.
-    pub profile: Profile,
+    pub profile: AxisProfile,
     /// Behind the smoothing filter, in counts.
     pub filtered: f64,
     /// Encoder input, in counts: nothing is connected to it on a stepper axis.
@@ -111,37 +102,37 @@ pub struct Axis {
     /// Of `SC`.
     pub stop_code: u8,
     /// Inputs at the newest sample.
-    pub inputs: Inputs,
+    pub inputs: AxisInputs,
 }
 
-impl Axis {
+impl GalilAxis {
     /// As after a reset: motor off, everything at zero.
     pub fn new(is_stepper: bool) -> Self {
-        let mut settings = Settings::new();
+        let mut settings = AxisSettings::new();
         if is_stepper {
             // Active-low pulses (Galil application note 2446).
-            settings.set(Setting::MotorType, 2.0);
+            settings.set(AxisSetting::MotorType, 2.0);
         }
         Self {
             settings,
             is_on: false,
-            motion: Motion::Rest,
-            prepared: Prepared::Target(0.0),
-            profile: Profile::default(),
+            motion: AxisMotion::Rest,
+            prepared: PreparedMotion::Target(0.0),
+            profile: AxisProfile::default(),
             filtered: 0.0,
             encoder: 0.0,
             stop_code: 1,
-            inputs: Inputs { forward: true, reverse: true, home: true },
+            inputs: AxisInputs { forward: true, reverse: true, home: true },
         }
     }
 
-    fn get(&self, setting: Setting) -> f64 {
+    fn get(&self, setting: AxisSetting) -> f64 {
         self.settings.get(setting)
     }
 
     /// Whether pulses drive it.
     pub fn is_stepper(&self) -> bool {
-        self.get(Setting::MotorType).abs() >= 2.0
+        self.get(AxisSetting::MotorType).abs() >= 2.0
     }
 
     /// `RP`: whole counts at or below the commanded place.
@@ -155,13 +146,13 @@ impl Axis {
     }
 
     /// `TP`: the encoder. A servo here follows its command without error.
-    pub fn told_position(&self) -> f64 {
+    pub fn encoder_position(&self) -> f64 {
         if self.is_stepper() { self.encoder } else { self.reference() }
     }
 
     /// `_BG`: whether the profile is under way. It ends before the filter has given its last pulses.
     pub fn is_running(&self) -> bool {
-        self.motion != Motion::Rest
+        self.motion != AxisMotion::Rest
     }
 
     /// `DP`: sets step count and reference alike. Returns by how much the count has become smaller.
@@ -172,8 +163,8 @@ impl Axis {
         let shift = self.filtered - counts;
         self.profile.place = counts;
         self.filtered = counts;
-        // `PA?` tells the place; other motions are as they were prepared.
-        if let Prepared::Target(target) = &mut self.prepared {
+        // `PA?` reads the position; other prepared motions stay.
+        if let PreparedMotion::Target(target) = &mut self.prepared {
             *target = counts;
         }
         Ok(shift)
@@ -184,12 +175,12 @@ impl Axis {
         let shift = self.profile.place;
         self.profile.place = 0.0;
         self.filtered -= shift;
-        self.prepared = Prepared::Target(0.0);
+        self.prepared = PreparedMotion::Target(0.0);
         shift
     }
 
-    fn is_limit_active(&self, side: f64, polarity: Polarity) -> bool {
-        let disabled = self.get(Setting::LimitDisable) as u8;
+    fn is_limit_active(&self, side: f64, polarity: InputPolarity) -> bool {
+        let disabled = self.get(AxisSetting::LimitDisable) as u8;
         let is_high_active = polarity.limit > 0.0;
         if side > 0.0 {
             disabled & 1 == 0 && self.inputs.forward == is_high_active
@@ -200,7 +191,8 @@ impl Axis {
 
     /// Whether a place is beyond the software limit in a direction: "activated at n + 1" (`FL`).
     fn is_beyond(&self, side: f64) -> bool {
-        let (forward, reverse) = (self.get(Setting::ForwardLimit), self.get(Setting::ReverseLimit));
+        let (forward, reverse) =
+            (self.get(AxisSetting::ForwardLimit), self.get(AxisSetting::ReverseLimit));
         if side > 0.0 {
             forward < NO_LIMIT && self.profile.place > forward
         } else {
@@ -209,7 +201,7 @@ impl Axis {
     }
 
     /// `BG`.
-    pub fn begin(&mut self, polarity: Polarity) -> Result<(), ErrorCode> {
+    pub fn begin(&mut self, polarity: InputPolarity) -> Result<(), ErrorCode> {
         if !self.is_on {
             return Err(ErrorCode::MOTOR_OFF);
         }
@@ -220,17 +212,19 @@ impl Axis {
         // "-1 configures HM to drive the motor in the forward direction when the input is low" (`CN`).
         let edge_side = if home == (polarity.home > 0.0) { 1.0 } else { -1.0 };
         let (motion, side) = match self.prepared {
-            Prepared::Target(target) => (Motion::Target(target), target - self.profile.place),
-            Prepared::Relative(way) => {
-                let target = self.profile.place.round() + way;
+            PreparedMotion::Target(target) => {
+                (AxisMotion::Target(target), target - self.profile.place)
+            }
+            PreparedMotion::Relative(distance) => {
+                let target = self.profile.place.round() + distance;
                 if target.abs() > COUNTS_MAX {
                     return Err(ErrorCode::OUT_OF_RANGE);
                 }
-                (Motion::Target(target), way)
+                (AxisMotion::Target(target), distance)
             }
-            Prepared::Jog(speed) => (Motion::Jog(speed), speed),
-            Prepared::Edge { is_homing } => {
-                let motion = Motion::Edge { side: edge_side, was: home, is_homing };
+            PreparedMotion::Jog(speed) => (AxisMotion::Jog(speed), speed),
+            PreparedMotion::Edge { is_homing } => {
+                let motion = AxisMotion::Edge { side: edge_side, was: home, is_homing };
                 (motion, edge_side)
             }
         };
@@ -242,11 +236,11 @@ impl Axis {
         Ok(())
     }
 
-    /// Comes to rest at a rate and then has a stop code.
-    pub fn stop(&mut self, rate: Setting, code: u8) {
-        if !matches!(self.motion, Motion::Rest | Motion::Stopping(..)) {
+    /// Brakes at a rate and ends with a stop code.
+    pub fn stop(&mut self, rate: AxisSetting, code: u8) {
+        if !matches!(self.motion, AxisMotion::Rest | AxisMotion::Stopping(..)) {
             let rate = self.get(rate);
-            self.motion = Motion::Stopping(self.profile.rest(rate), rate, code);
+            self.motion = AxisMotion::Stopping(self.profile.rest(rate), rate, code);
             self.stop_code = code;
         }
     }
@@ -254,104 +248,104 @@ impl Axis {
     /// `AB`: at rest at once.
     pub fn abort(&mut self, code: u8) {
         if self.is_running() {
-            self.motion = Motion::Rest;
-            self.profile = Profile { place: self.reference(), velocity: 0.0 };
+            self.motion = AxisMotion::Rest;
+            self.profile = AxisProfile { place: self.reference(), velocity: 0.0 };
             self.stop_code = code;
         }
     }
 
     /// `JG`: takes effect at once where the axis already jogs.
     pub fn jog(&mut self, speed: f64, tm: f64) {
-        let speed = speed_taken(speed, tm);
-        self.prepared = Prepared::Jog(speed);
-        if matches!(self.motion, Motion::Jog(_)) {
-            self.motion = Motion::Jog(speed);
+        let speed = round_speed(speed, tm);
+        self.prepared = PreparedMotion::Jog(speed);
+        if matches!(self.motion, AxisMotion::Jog(_)) {
+            self.motion = AxisMotion::Jog(speed);
         }
     }
 
-    /// One sample of `dt` seconds; limits are left at `limit_rate`.
-    pub fn sample(&mut self, dt: f64, polarity: Polarity, limit_rate: Setting) -> Option<Event> {
-        let ac = self.get(Setting::Acceleration);
-        let dc = self.get(Setting::Deceleration);
-        let speed = self.get(Setting::Speed);
+    /// One sample of `dt` seconds; the axis brakes at `limit_rate` at a limit.
+    pub fn sample(
+        &mut self,
+        dt: f64,
+        polarity: InputPolarity,
+        limit_rate: AxisSetting,
+    ) -> Option<AxisEvent> {
+        let ac = self.get(AxisSetting::Acceleration);
+        let dc = self.get(AxisSetting::Deceleration);
+        let speed = self.get(AxisSetting::Speed);
         match self.motion {
-            Motion::Rest | Motion::Contour => {}
-            Motion::Target(target) => {
+            AxisMotion::Rest | AxisMotion::Contour => {}
+            AxisMotion::Target(target) => {
                 if self.profile.towards(target, speed, ac, dc, dt) {
                     self.end(1);
                 }
             }
-            Motion::Jog(speed) => self.profile.jog(speed, ac, dc, dt),
-            Motion::Stopping(place, rate, code) => {
+            AxisMotion::Jog(speed) => self.profile.jog(speed, ac, dc, dt),
+            AxisMotion::Stopping(place, rate, code) => {
                 let fast = self.profile.velocity.abs();
                 if self.profile.towards(place, fast, rate, rate, dt) {
                     self.end(code);
                 }
             }
-            Motion::Edge { side, was, is_homing } => {
+            AxisMotion::Edge { side, was, is_homing } => {
                 self.profile.jog(side * speed, ac, dc, dt);
                 if self.inputs.home != was {
                     if is_homing {
-                        self.motion = Motion::Back { side: -side, until: was, is_braked: false };
+                        self.motion =
+                            AxisMotion::Back { side: -side, until: was, is_braked: false };
                     } else {
-                        self.stop(Setting::Deceleration, 9);
+                        self.stop(AxisSetting::Deceleration, 9);
                     }
                 }
             }
-            Motion::Back { side, until, is_braked } => {
+            AxisMotion::Back { side, until, is_braked } => {
                 // 256 counts/s (DMC-18x2 command reference, `HM`, the second stage), `HV` where it is set.
-                let slow = if is_braked { self.get(Setting::HomeSpeed) } else { 0.0 };
+                let slow = if is_braked { self.get(AxisSetting::HomeSpeed) } else { 0.0 };
                 self.profile.jog(side * slow, ac, dc, dt);
                 let is_braked = is_braked || self.profile.velocity == 0.0;
-                self.motion = Motion::Back { side, until, is_braked };
+                self.motion = AxisMotion::Back { side, until, is_braked };
                 if is_braked && self.inputs.home == until {
                     self.abort(10);
-                    return Some(Event::Homed);
+                    return Some(AxisEvent::Homed);
                 }
             }
         }
         let side = self.profile.velocity;
         let is_met = side != 0.0
-            && !matches!(self.motion, Motion::Stopping(..))
+            && !matches!(self.motion, AxisMotion::Stopping(..))
             && (self.is_limit_active(side, polarity) || self.is_beyond(side));
         if is_met {
             self.stop(limit_rate, if side > 0.0 { 2 } else { 3 });
         }
-        is_met.then_some(Event::Limit)
+        is_met.then_some(AxisEvent::Limit)
     }
 
     fn end(&mut self, code: u8) {
-        self.motion = Motion::Rest;
+        self.motion = AxisMotion::Rest;
         self.stop_code = code;
     }
 
     /// The smoothing filter of the pulses at a sample: a single pole whose time constant is 3 KS samples
     /// (DMC-2x00 user manual, pages 117-118: KS 1.313 is 3.939 samples).
-    pub fn filter(&mut self) {
+    pub fn smooth_pulses(&mut self) {
         if !self.is_stepper() {
             self.filtered = self.profile.place;
             return;
         }
-        let left = self.profile.place - self.filtered;
-        let keeps = (-1.0 / (3.0 * self.get(Setting::Smoothing))).exp();
-        if !self.is_running() && left.abs() < SETTLED {
+        let remaining = self.profile.place - self.filtered;
+        let keeps = (-1.0 / (3.0 * self.get(AxisSetting::Smoothing))).exp();
+        if !self.is_running() && remaining.abs() < SETTLED {
             self.filtered = self.profile.place;
         } else {
-            self.filtered = self.profile.place - keeps * left;
+            self.filtered = self.profile.place - keeps * remaining;
         }
     }
 
     /// The byte of `TS` (DMC-1400 user manual, page 211).
     pub fn switches(&self) -> u8 {
-        let bits = [
-            (self.is_running(), 7),
-            (!self.is_on, 5),
-            (self.inputs.forward, 3),
-            (self.inputs.reverse, 2),
-            (self.inputs.home, 1),
-            // No latch is armed or has occurred.
-            (true, 0),
-        ];
-        bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |byte, (_, bit)| byte | 1 << bit)
+        let AxisInputs { forward, reverse, home } = self.inputs;
+        // Bit 0: no latch is armed or has occurred. Bits 4 and 6 are not used.
+        let all = [true, home, reverse, forward, false, !self.is_on, false, self.is_running()];
+        bits(all.into_iter())
     }
 }

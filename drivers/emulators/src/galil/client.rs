@@ -1,6 +1,6 @@
-//! One client: the line it writes, what it downloads, and what waits to be sent to it.
+//! One client: its input line, its download, and the bytes for it.
 
-use super::input::Input;
+use super::input::InputLine;
 use palpate_model::Nanos;
 use std::collections::VecDeque;
 
@@ -9,10 +9,8 @@ const OUT_MAX: usize = 1 << 20;
 /// Bytes that wait for a controller that is busy.
 const WAITING_MAX: usize = 1024;
 
-/// What a client's bytes are.
 #[derive(Clone, Debug, Default)]
-pub enum Mode {
-    /// Statements.
+pub enum ClientMode {
     #[default]
     Commands,
     /// Lines of a program, after `DL`.
@@ -24,7 +22,6 @@ pub enum Mode {
     },
     /// Values of an array, after `QD`.
     Values {
-        /// The array.
         name: String,
         /// The next element.
         next: usize,
@@ -32,20 +29,15 @@ pub enum Mode {
         end: usize,
         /// The value under way.
         value: Vec<u8>,
-        /// Something was wrong.
         is_wrong: bool,
     },
 }
 
-/// One client.
 #[derive(Clone, Debug, Default)]
-pub struct Client {
-    /// Whether somebody is connected.
+pub struct GalilClient {
     pub is_open: bool,
-    /// The line being written.
-    pub input: Input,
-    /// What its bytes are.
-    pub mode: Mode,
+    pub input: InputLine,
+    pub mode: ClientMode,
     /// `EO 1`: characters received are sent back.
     pub has_echo: bool,
     /// The controller has closed the connection.
@@ -58,14 +50,13 @@ pub struct Client {
     out: Vec<u8>,
 }
 
-impl Client {
-    /// Somebody who has just connected.
-    pub fn opened(has_echo: bool) -> Self {
+impl GalilClient {
+    pub fn connected(has_echo: bool) -> Self {
         Self { is_open: true, has_echo, ..Self::default() }
     }
 
-    /// Somebody whose connection the controller has just closed.
-    pub fn hung_up() -> Self {
+    /// The controller has just closed the connection.
+    pub fn dropped() -> Self {
         Self { is_hung_up: true, ..Self::default() }
     }
 
@@ -85,17 +76,15 @@ impl Client {
         }
     }
 
-    /// What has to be sent.
     pub fn take_out(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.out)
     }
 
-    /// Whether bytes have to wait.
     pub fn is_busy(&self) -> bool {
         self.busy_until.is_some()
     }
 
-    /// Keeps a byte for later; an input buffer has an end.
+    /// Queues a byte for later, as far as the input buffer has room.
     pub fn wait(&mut self, byte: u8) {
         if self.waiting.len() < WAITING_MAX {
             self.waiting.push_back(byte);

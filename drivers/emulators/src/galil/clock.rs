@@ -61,7 +61,6 @@ impl SampleClock {
         })
     }
 
-    /// Counts a sample.
     pub fn advance(&mut self) {
         self.since_base += 1;
         self.count += 1;

@@ -1,26 +1,23 @@
-//! From a statement to what it does: assignments, then two letters and their arguments.
+//! Carries out statements: assignments, then commands of two letters with their arguments.
 
 use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
 use super::scope::axis_of;
-use super::settings::{STEPPER_SPEED_MAX, Setting};
+use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
 use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
-/// Words whose arguments are numbers of axes, beside the [`Setting`]s.
+/// Words whose arguments are numbers of axes, in addition to the [`AxisSetting`]s.
 const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
 
-/// One argument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Argument {
     /// `?`.
     Query,
-    /// A number.
     Number(f64),
 }
 
 impl GalilEmulator {
-    /// Does what a statement says.
     pub(super) fn execute(&mut self, origin: Origin, text: &str) -> Result<Answer, ErrorCode> {
         if !text.is_ascii() {
             return Err(ErrorCode::UNRECOGNIZED);
@@ -41,19 +38,19 @@ impl GalilEmulator {
             return Err(ErrorCode::UNRECOGNIZED);
         };
         let arguments = arguments.trim();
-        if let Some(setting) = Setting::named(word) {
+        if let Some(setting) = AxisSetting::from_word(word) {
             return self.set(setting, arguments);
         }
-        if let Some(answer) = self.move_word(origin, word, arguments) {
+        if let Some(answer) = self.axis_command(origin, word, arguments) {
             return answer;
         }
-        if let Some(answer) = self.transfer_word(origin, word, arguments) {
+        if let Some(answer) = self.transfer_command(origin, word, arguments) {
             return answer;
         }
-        self.system_word(origin, word, arguments)
+        self.system_command(origin, word, arguments)
     }
 
-    /// `name=expression`, `name[index]=expression`, `name=` to be told; `None` when it is a command.
+    /// `name=expression`, `name[index]=expression`, `name=` to read it; `None` when it is a command.
     fn assignment(&mut self, text: &str) -> Option<Result<Answer, ErrorCode>> {
         let mut cursor = Cursor::new(text);
         let name = cursor.take_while(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
@@ -106,9 +103,8 @@ impl GalilEmulator {
         arguments: &str,
     ) -> Result<Vec<(usize, Argument)>, ErrorCode> {
         let axes = self.axes.len();
-        if let Some((who, value)) = arguments.split_once('=') {
-            let who = who.trim();
-            let mut letters = who.chars();
+        if let Some((letter, value)) = arguments.split_once('=') {
+            let mut letters = letter.trim().chars();
             if let (Some(letter), None) = (letters.next(), letters.next()) {
                 let argument = self.argument(value.trim())?;
                 if letter == '*' {
@@ -167,7 +163,12 @@ impl GalilEmulator {
             .collect()
     }
 
-    /// A list of axes such as `AC`; no list is all of them.
+    /// The number in the first field.
+    pub(super) fn first_number(&self, arguments: &str) -> Result<f64, ErrorCode> {
+        self.numbers(arguments)?.first().copied().flatten().ok_or(ErrorCode::FEW_FIELDS)
+    }
+
+    /// A list of axes such as `AC`; an empty list is all of them.
     pub(super) fn axis_list(&self, arguments: &str) -> Result<Vec<usize>, ErrorCode> {
         let letters: Vec<char> =
             arguments.chars().filter(|letter| !matches!(letter, ' ' | ',')).collect();
@@ -182,40 +183,42 @@ impl GalilEmulator {
             .collect()
     }
 
-    fn set(&mut self, setting: Setting, arguments: &str) -> Result<Answer, ErrorCode> {
-        let mut told = Vec::new();
+    fn set(&mut self, setting: AxisSetting, arguments: &str) -> Result<Answer, ErrorCode> {
+        let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
             match argument {
                 Argument::Query => {
-                    let format =
-                        super::Format { decimals: setting.decimals(), ..self.position_format };
-                    told.push(format.write(self.axes[axis].settings.get(setting)));
+                    let format = super::NumberFormat {
+                        decimals: setting.decimals(),
+                        ..self.position_format
+                    };
+                    values.push(format.write(self.axes[axis].settings.get(setting)));
                 }
                 Argument::Number(value) => {
-                    let value = setting.taken(value, self.settings.model, self.clock.tm())?;
-                    if setting == Setting::Speed
+                    let value = setting.round(value, self.settings.model, self.clock.tm())?;
+                    if setting == AxisSetting::Speed
                         && self.axes[axis].is_stepper()
                         && value > STEPPER_SPEED_MAX
                     {
                         return Err(ErrorCode::OUT_OF_RANGE);
                     }
-                    if setting == Setting::MotorType && self.axes[axis].is_running() {
+                    if setting == AxisSetting::MotorType && self.axes[axis].is_running() {
                         return Err(ErrorCode::RUNNING);
                     }
                     self.axes[axis].settings.set(setting, value);
                 }
             }
         }
-        Ok(listed(told))
+        Ok(join_values(values))
     }
 }
 
-/// Answers of several axes in one line, parted by commas; each begins with its sign's place.
-pub fn listed(told: Vec<String>) -> Answer {
-    if told.is_empty() { Answer::Done } else { Answer::Text(told.join(",")) }
+/// Values of several axes in one line, separated by commas; each begins with the place of its sign.
+pub fn join_values(values: Vec<String>) -> Answer {
+    if values.is_empty() { Answer::Done } else { Answer::Text(values.join(",")) }
 }
 
-/// Fields parted by commas that stand in no brackets or parentheses.
+/// Fields between commas outside brackets and parentheses.
 pub fn fields(text: &str) -> Vec<&str> {
     let mut depth = 0_i32;
     text.split(|c: char| {
@@ -241,7 +244,7 @@ fn is_axis_command(name: &str) -> bool {
         (Some(letter), None) => axis_of(letter).is_some(),
         _ => false,
     };
-    is_axis && (Setting::named(word).is_some() || AXIS_WORDS.contains(&word))
+    is_axis && (AxisSetting::from_word(word).is_some() || AXIS_WORDS.contains(&word))
 }
 
 /// Whether a name before `[` begins with the letters of a command that takes arrays.

@@ -1,6 +1,6 @@
 //! Contour mode: increments over 2^n samples, between which the controller goes straight.
 //!
-//! DMC-40x0 command reference, `CM`, `CD`, `DT`: a buffer of 511 segments, `_CM` tells the free ones.
+//! DMC-40x0 command reference, `CM`, `CD`, `DT`: a buffer of 511 segments, `_CM` is the number of free ones.
 
 use palpate_drivers::galil::ErrorCode;
 use std::collections::VecDeque;
@@ -10,7 +10,6 @@ pub const SEGMENTS: usize = 511;
 /// `DT n`: 2^n samples, n up to 8.
 const INTERVAL_MAX: f64 = 8.0;
 
-/// One segment.
 #[derive(Clone, Debug, PartialEq)]
 struct Segment {
     increments: Vec<f64>,
@@ -18,9 +17,8 @@ struct Segment {
     samples: u32,
 }
 
-/// The contour mode.
 #[derive(Clone, Debug, Default)]
-pub struct Contour {
+pub struct ContourMode {
     /// Axes in the mode; empty while it is off.
     pub axes: Vec<usize>,
     /// Of `DT`; 0 ends the mode with the next `CD`, -1 pauses.
@@ -28,22 +26,20 @@ pub struct Contour {
     buffer: VecDeque<Segment>,
     /// The segment under way and samples of it that are over.
     current: Option<(Segment, u32)>,
-    /// Segments done, as `_CS` tells.
+    /// Segments done, `_CS`.
     pub done: u32,
 }
 
-/// What a sample of the contour mode asks of the axes.
+/// Motion of the axes in one sample.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
-    /// Nothing to do.
+pub enum ContourStep {
     Idle,
     /// Increments of this sample, in counts, in the order of the axes.
     By(Vec<f64>),
-    /// The mode has ended.
     End,
 }
 
-impl Contour {
+impl ContourMode {
     /// Whether the mode is on.
     pub fn is_on(&self) -> bool {
         !self.axes.is_empty()
@@ -95,24 +91,23 @@ impl Contour {
         self.is_on() && self.buffer.len() > 1
     }
 
-    /// One sample.
-    pub fn sample(&mut self) -> Step {
+    pub fn sample(&mut self) -> ContourStep {
         if !self.is_on() {
-            return Step::Idle;
+            return ContourStep::Idle;
         }
         // `DT -1` holds what is under way where it is.
         if self.current.is_none() && self.interval < 0.0 {
-            return Step::Idle;
+            return ContourStep::Idle;
         }
         if self.current.is_none() {
             self.current = self.buffer.pop_front().map(|segment| (segment, 0));
         }
         let Some((segment, over)) = &mut self.current else {
-            return Step::Idle;
+            return ContourStep::Idle;
         };
         if segment.samples == 0 {
             *self = Self { done: self.done, ..Self::default() };
-            return Step::End;
+            return ContourStep::End;
         }
         let share = 1.0 / f64::from(segment.samples);
         let by = segment.increments.iter().map(|counts| counts * share).collect();
@@ -121,10 +116,9 @@ impl Contour {
             self.current = None;
             self.done = self.done.wrapping_add(1);
         }
-        Step::By(by)
+        ContourStep::By(by)
     }
 
-    /// Leaves the mode at once.
     pub fn cancel(&mut self) {
         *self = Self::default();
     }
@@ -136,7 +130,7 @@ mod tests {
 
     #[test]
     fn increments_are_spread_over_their_samples() {
-        let mut contour = Contour::default();
+        let mut contour = ContourMode::default();
         contour.begin(vec![0]);
         assert_eq!(contour.push(vec![1.0], None), Err(ErrorCode::NO_TIME));
         contour.set_interval(2.0).unwrap();
@@ -145,17 +139,26 @@ mod tests {
         contour.push(vec![0.0], Some(0.0)).unwrap();
         assert_eq!(contour.free(), SEGMENTS - 3);
         let steps: Vec<_> = (0..8).map(|_| contour.sample()).collect();
-        let by = |counts: f64| Step::By(vec![counts]);
+        let by = |counts: f64| ContourStep::By(vec![counts]);
         assert_eq!(
             steps,
-            [by(2.0), by(2.0), by(2.0), by(2.0), by(-2.0), by(-2.0), Step::End, Step::Idle]
+            [
+                by(2.0),
+                by(2.0),
+                by(2.0),
+                by(2.0),
+                by(-2.0),
+                by(-2.0),
+                ContourStep::End,
+                ContourStep::Idle
+            ]
         );
         assert!(!contour.is_on());
     }
 
     #[test]
     fn the_buffer_has_an_end() {
-        let mut contour = Contour::default();
+        let mut contour = ContourMode::default();
         contour.begin(vec![0]);
         contour.set_interval(1.0).unwrap();
         for _ in 0..SEGMENTS {

@@ -2,16 +2,15 @@
 //!
 //! Layouts of `gclib_record.h` for the 4000 and 2103 series, bits as `GalilController.cpp` of EPICS reads them.
 
-use super::axis::{Axis, Motion};
+use super::axis::{AxisMotion, GalilAxis};
 use super::model::GalilModel;
-use super::settings::Setting;
+use super::settings::AxisSetting;
 
-/// What a record holds beside its axes.
+/// Content of a record apart from its axes.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct General {
+pub struct GeneralBlock {
     /// Samples since the reset, of which 16 bits are sent.
     pub sample: u64,
-    /// Digital outputs.
     pub outputs: u16,
     /// Number of the last error.
     pub error: u8,
@@ -44,7 +43,12 @@ pub fn lengths(model: GalilModel) -> String {
 }
 
 /// One record: every block is present. `analog` holds the 16-bit reading that goes with an axis.
-pub fn record(model: GalilModel, general: &General, axes: &[Axis], analog: &[u16]) -> Vec<u8> {
+pub fn build_record(
+    model: GalilModel,
+    general: &GeneralBlock,
+    axes: &[GalilAxis],
+    analog: &[u16],
+) -> Vec<u8> {
     let size = head(model) + axis_length(model) * axes.len();
     let mut bytes = vec![0_u8; size];
     let mut put = |at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
@@ -75,16 +79,16 @@ pub fn record(model: GalilModel, general: &General, axes: &[Axis], analog: &[u16
         put(at + 2, &[switches(axis), axis.stop_code]);
         let counts = |value: f64| (value as i32).to_le_bytes();
         put(at + 4, &counts(axis.reference()));
-        put(at + 8, &counts(axis.told_position()));
+        put(at + 8, &counts(axis.encoder_position()));
         put(at + 12, &counts(0.0));
         put(at + 16, &counts(axis.pulses()));
-        // 64 times what TV tells.
+        // 64 times TV.
         put(at + 20, &counts(64.0 * axis.profile.velocity));
         let analog = analog.get(index).copied().unwrap_or(0).to_le_bytes();
         // Torque stays zero: nothing holds a load.
         put(at + if model.is_21x3() { 26 } else { 28 }, &analog);
         if !model.is_21x3() {
-            let user = axis.settings.get(Setting::UserVariable);
+            let user = axis.settings.get(AxisSetting::UserVariable);
             put(at + 32, &counts(user));
         }
     }
@@ -92,18 +96,17 @@ pub fn record(model: GalilModel, general: &General, axes: &[Axis], analog: &[u16
 }
 
 /// The status word of an axis.
-fn status(axis: &Axis, is_contouring: bool, model: GalilModel) -> u16 {
+fn status(axis: &GalilAxis, is_contouring: bool, model: GalilModel) -> u16 {
     let is = |bit: u32, is_set: bool| u16::from(is_set) << bit;
     let velocity = axis.profile.velocity;
     let speed = match axis.motion {
-        Motion::Jog(speed) => speed.abs(),
-        _ => axis.settings.get(Setting::Speed),
+        AxisMotion::Jog(speed) => speed.abs(),
+        _ => axis.settings.get(AxisSetting::Speed),
     };
-    let is_edge =
-        |homing: bool| matches!(axis.motion, Motion::Edge { is_homing, .. } if is_homing == homing);
-    let is_back = matches!(axis.motion, Motion::Back { .. });
-    let is_target = matches!(axis.motion, Motion::Target(_));
-    let is_off_on_error = axis.settings.get(Setting::OffOnError) > 0.0;
+    let is_edge = |homing: bool| matches!(axis.motion, AxisMotion::Edge { is_homing, .. } if is_homing == homing);
+    let is_back = matches!(axis.motion, AxisMotion::Back { .. });
+    let is_target = matches!(axis.motion, AxisMotion::Target(_));
+    let is_off_on_error = axis.settings.get(AxisSetting::OffOnError) > 0.0;
     is(15, axis.is_running())
         | is(14, is_target)
         | is(13, is_target)
@@ -113,13 +116,13 @@ fn status(axis: &Axis, is_contouring: bool, model: GalilModel) -> u16 {
         | is(7, velocity < 0.0)
         | is(6, is_contouring)
         | is(5, velocity != 0.0 && velocity.abs() == speed)
-        | is(4, matches!(axis.motion, Motion::Stopping(..)))
+        | is(4, matches!(axis.motion, AxisMotion::Stopping(..)))
         | is(1, model.is_21x3() && is_off_on_error)
         | is(0, !axis.is_on)
 }
 
 /// The switch byte of an axis: limits and home as levels, and whether it is a stepper.
-fn switches(axis: &Axis) -> u8 {
+fn switches(axis: &GalilAxis) -> u8 {
     let inputs = axis.inputs;
     u8::from(inputs.forward) << 3
         | u8::from(inputs.reverse) << 2
@@ -143,29 +146,30 @@ mod tests {
     fn lengths_are_those_of_the_header_file() {
         assert_eq!(lengths(GalilModel::Dmc4143), "4, 52, 26, 36");
         assert_eq!(lengths(GalilModel::Dmc2143), "4, 24, 16, 28");
-        let axes = vec![Axis::new(true); 8];
-        let general = General::default();
-        assert_eq!(record(GalilModel::Dmc4183, &general, &axes, &[]).len(), 370);
-        let short = record(GalilModel::Dmc2143, &general, &axes[..4], &[]);
+        let axes = vec![GalilAxis::new(true); 8];
+        let general = GeneralBlock::default();
+        assert_eq!(build_record(GalilModel::Dmc4183, &general, &axes, &[]).len(), 370);
+        let short = build_record(GalilModel::Dmc2143, &general, &axes[..4], &[]);
         assert_eq!(short.len(), 156);
         assert_eq!(u16_at(&short, 2), 156);
     }
 
     #[test]
     fn fields_are_where_clients_read_them() {
-        let mut axes = vec![Axis::new(true), Axis::new(false)];
+        let mut axes = vec![GalilAxis::new(true), GalilAxis::new(false)];
         axes[1].profile.place = -123.0;
         axes[1].profile.velocity = -50.0;
         axes[1].is_on = true;
-        axes[1].motion = Motion::Target(-500.0);
-        axes[1].settings.set(Setting::Speed, 50.0);
+        axes[1].motion = AxisMotion::Target(-500.0);
+        axes[1].settings.set(AxisSetting::Speed, 50.0);
         axes[1].stop_code = 0;
         axes[0].filtered = 77.0;
-        let general = General { sample: 65_536 + 258, error: 6, threads: 5, ..General::default() };
+        let general =
+            GeneralBlock { sample: 65_536 + 258, error: 6, threads: 5, ..GeneralBlock::default() };
         for (model, head, length, analog, error) in
             [(GalilModel::Dmc4143, 82, 36, 28, 50), (GalilModel::Dmc2143, 44, 28, 26, 26)]
         {
-            let bytes = record(model, &general, &axes, &[0x1234, 0xfffe]);
+            let bytes = build_record(model, &general, &axes, &[0x1234, 0xfffe]);
             assert_eq!(u16_at(&bytes, 4), 258);
             assert_eq!(bytes[error], 6);
             let b = head + length;

@@ -2,7 +2,8 @@
 //!
 //! DMC-40x0 user manual, chapter 7: parentheses come first, all operators have equal rank.
 
-use super::format::held;
+use super::format::quantise;
+use super::scope::truth;
 use palpate_drivers::galil::ErrorCode;
 
 /// Characters of a name (DMC-40x0 user manual: "up to eight").
@@ -10,9 +11,10 @@ pub const NAME_MAX: usize = 8;
 /// Parentheses and brackets within each other: as many as half a line holds.
 const DEPTH_MAX: usize = 40;
 
-/// Where names get their values.
+/// What a binary operator does to its operands.
+type Operator = fn(f64, f64) -> f64;
+
 pub trait Scope {
-    /// A variable.
     fn variable(&self, name: &str) -> Option<f64>;
     /// An element of an array; index -1 is its length.
     fn element(&self, name: &str, index: f64) -> Result<f64, ErrorCode>;
@@ -84,7 +86,12 @@ impl<'a> Cursor<'a> {
         let mut value = self.primary(scope)?;
         while let Some(operator) = self.operator() {
             let right = self.primary(scope)?;
-            value = held(operator.apply(value, right)?);
+            value = operator(value, right);
+            // A division by zero.
+            if !value.is_finite() {
+                return Err(ErrorCode::OUT_OF_RANGE);
+            }
+            value = quantise(value);
         }
         self.depth -= 1;
         Ok(value)
@@ -93,20 +100,21 @@ impl<'a> Cursor<'a> {
     fn operator(&mut self) -> Option<Operator> {
         let first = self.peek()?;
         let second = self.text.as_bytes().get(self.at + 1).copied();
-        let (operator, length) = match (first, second) {
-            (b'<', Some(b'=')) => (Operator::AtMost, 2),
-            (b'>', Some(b'=')) => (Operator::AtLeast, 2),
-            (b'<', Some(b'>')) => (Operator::Differs, 2),
-            (b'<', _) => (Operator::Less, 1),
-            (b'>', _) => (Operator::Greater, 1),
-            (b'=', _) => (Operator::Equals, 1),
-            (b'+', _) => (Operator::Add, 1),
-            (b'-', _) => (Operator::Subtract, 1),
-            (b'*', _) => (Operator::Multiply, 1),
-            (b'/', _) => (Operator::Divide, 1),
-            (b'%', _) => (Operator::Remainder, 1),
-            (b'&', _) => (Operator::And, 1),
-            (b'|', _) => (Operator::Or, 1),
+        let (operator, length): (Operator, usize) = match (first, second) {
+            (b'<', Some(b'=')) => (|l, r| truth(l <= r), 2),
+            (b'>', Some(b'=')) => (|l, r| truth(l >= r), 2),
+            (b'<', Some(b'>')) => (|l, r| truth(l != r), 2),
+            (b'<', _) => (|l, r| truth(l < r), 1),
+            (b'>', _) => (|l, r| truth(l > r), 1),
+            (b'=', _) => (|l, r| truth(l == r), 1),
+            (b'+', _) => (|l, r| l + r, 1),
+            (b'-', _) => (|l, r| l - r, 1),
+            (b'*', _) => (|l, r| l * r, 1),
+            (b'/', _) => (|l, r| l / r, 1),
+            (b'%', _) => (|l, r| l % r, 1),
+            // Casts saturate; the numbers are far inside i64.
+            (b'&', _) => (|l, r| ((l as i64) & (r as i64)) as f64, 1),
+            (b'|', _) => (|l, r| ((l as i64) | (r as i64)) as f64, 1),
             _ => return None,
         };
         self.at += length;
@@ -138,12 +146,12 @@ impl<'a> Cursor<'a> {
                 self.at += 1;
                 let name = self.take_while(|byte| byte.is_ascii_uppercase());
                 let argument = self.bracketed(scope, ErrorCode::BAD_FUNCTION)?;
-                scope.function(name, argument).map(held)
+                scope.function(name, argument).map(quantise)
             }
             b'_' => {
                 self.at += 1;
                 let name = self.take_while(|byte| byte.is_ascii_alphanumeric());
-                scope.operand(name).map(held)
+                scope.operand(name).map(quantise)
             }
             b'$' => {
                 self.at += 1;
@@ -154,7 +162,7 @@ impl<'a> Cursor<'a> {
             }
             b'"' => {
                 self.at += 1;
-                packed(self.quoted()?)
+                pack_text(self.quoted()?)
             }
             byte if byte.is_ascii_digit() || byte == b'.' => self.number(),
             byte if byte.is_ascii_alphabetic() => {
@@ -180,10 +188,9 @@ impl<'a> Cursor<'a> {
 
     fn number(&mut self) -> Result<f64, ErrorCode> {
         let digits = self.take_while(|byte| byte.is_ascii_digit() || byte == b'.');
-        digits.parse().map(held).map_err(|_| ErrorCode::NOT_A_NUMBER)
+        digits.parse().map(quantise).map_err(|_| ErrorCode::NOT_A_NUMBER)
     }
 
-    /// What is left.
     pub fn rest(&mut self) -> &'a str {
         self.peek();
         self.text.get(self.at..).unwrap_or("")
@@ -202,7 +209,7 @@ pub fn evaluate(text: &str, scope: &dyn Scope) -> Result<f64, ErrorCode> {
 }
 
 /// A string of up to six characters as a number holds it: four bytes before and two behind the point.
-fn packed(text: &str) -> Result<f64, ErrorCode> {
+fn pack_text(text: &str) -> Result<f64, ErrorCode> {
     if text.len() > 6 {
         return Err(ErrorCode::QUOTE);
     }
@@ -212,53 +219,13 @@ fn packed(text: &str) -> Result<f64, ErrorCode> {
 }
 
 /// The characters that a number holds.
-pub fn unpacked(value: f64) -> String {
+pub fn unpack_text(value: f64) -> String {
     let bits = (value * 65_536.0) as u64;
     bits.to_be_bytes()[2..]
         .iter()
         .filter(|byte| byte.is_ascii_graphic() || **byte == b' ')
         .map(|byte| char::from(*byte))
         .collect()
-}
-
-#[derive(Clone, Copy)]
-enum Operator {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    Remainder,
-    And,
-    Or,
-    Less,
-    Greater,
-    Equals,
-    AtMost,
-    AtLeast,
-    Differs,
-}
-
-impl Operator {
-    fn apply(self, left: f64, right: f64) -> Result<f64, ErrorCode> {
-        let truth = |is_so: bool| if is_so { 1.0 } else { 0.0 };
-        Ok(match self {
-            Self::Add => left + right,
-            Self::Subtract => left - right,
-            Self::Multiply => left * right,
-            Self::Divide | Self::Remainder if right == 0.0 => return Err(ErrorCode::OUT_OF_RANGE),
-            Self::Divide => left / right,
-            Self::Remainder => left % right,
-            // Casts saturate; numbers held are far inside i64.
-            Self::And => ((left as i64) & (right as i64)) as f64,
-            Self::Or => ((left as i64) | (right as i64)) as f64,
-            Self::Less => truth(left < right),
-            Self::Greater => truth(left > right),
-            Self::Equals => truth(left == right),
-            Self::AtMost => truth(left <= right),
-            Self::AtLeast => truth(left >= right),
-            Self::Differs => truth(left != right),
-        })
-    }
 }
 
 #[cfg(test)]
@@ -300,7 +267,7 @@ mod tests {
         ] {
             assert_eq!(evaluate(text, &Names), Ok(value), "{text}");
         }
-        assert_eq!(unpacked(packed("GO 12").unwrap()), "GO 12");
+        assert_eq!(unpack_text(pack_text("GO 12").unwrap()), "GO 12");
     }
 
     #[test]

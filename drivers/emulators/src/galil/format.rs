@@ -6,7 +6,7 @@ const FRACTION: f64 = 65_536.0;
 const LARGEST: f64 = 2_147_483_647.0 + 65_535.0 / FRACTION;
 
 /// The number that the controller holds for a value.
-pub fn held(value: f64) -> f64 {
+pub fn quantise(value: f64) -> f64 {
     if value.is_nan() {
         return 0.0;
     }
@@ -15,7 +15,7 @@ pub fn held(value: f64) -> f64 {
 
 /// How a number is written: `PF`, `VF` and the braces of `MG`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Format {
+pub struct NumberFormat {
     /// Digits before the point.
     pub whole: usize,
     /// Digits behind it.
@@ -26,7 +26,7 @@ pub struct Format {
     pub is_hex: bool,
 }
 
-impl Format {
+impl NumberFormat {
     /// Decimal without leading zeros.
     pub const fn decimal(whole: usize, decimals: usize) -> Self {
         Self { whole, decimals, has_zeros: false, is_hex: false }
@@ -82,26 +82,26 @@ mod tests {
 
     #[test]
     fn numbers_are_written_as_captured_and_documented() {
-        let vf = Format::decimal(10, 4);
+        let vf = NumberFormat::decimal(10, 4);
         assert_eq!(vf.write(0.0), " 0.0000");
         assert_eq!(vf.write(-1.5), "-1.5000");
         assert_eq!(vf.write(-0.00001), " 0.0000");
-        let pf = Format::decimal(10, 0);
+        let pf = NumberFormat::decimal(10, 0);
         assert_eq!(pf.write(1234.0), " 1234");
         // DMC-1700/1800 user manual, page 84: `TP X` with leading zeros.
-        let zeros = Format { has_zeros: true, ..pf };
+        let zeros = NumberFormat { has_zeros: true, ..pf };
         assert_eq!(zeros.write(0.0), " 0000000000");
-        assert_eq!(Format::decimal(3, 2).write(12_345.0), " 999.99");
-        assert_eq!(Format::from_number(-4.2, false).write(255.5), "$00FF.80");
-        assert_eq!(Format::from_number(-4.0, false).write(-1.0), "$FFFF");
-        assert_eq!(Format::from_number(10.4, false), vf);
+        assert_eq!(NumberFormat::decimal(3, 2).write(12_345.0), " 999.99");
+        assert_eq!(NumberFormat::from_number(-4.2, false).write(255.5), "$00FF.80");
+        assert_eq!(NumberFormat::from_number(-4.0, false).write(-1.0), "$FFFF");
+        assert_eq!(NumberFormat::from_number(10.4, false), vf);
     }
 
     #[test]
     fn numbers_have_sixteen_bits_behind_the_point() {
-        assert_eq!(held(0.1), 6553.0 / 65_536.0);
-        assert_eq!(held(1e300), LARGEST);
-        assert_eq!(held(f64::NAN), 0.0);
-        assert_eq!(held(-2.5), -2.5);
+        assert_eq!(quantise(0.1), 6553.0 / 65_536.0);
+        assert_eq!(quantise(1e300), LARGEST);
+        assert_eq!(quantise(f64::NAN), 0.0);
+        assert_eq!(quantise(-2.5), -2.5);
     }
 }

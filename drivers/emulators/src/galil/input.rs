@@ -1,7 +1,7 @@
 //! From bytes to statements: one input line per client, as the controller reads it.
 //!
 //! Carriage return and `;` execute, line feed is white space, a line has 80 characters. Every terminator is
-//! answered once, also the one of an empty statement: a client is told to send its carriage return
+//! answered once, also the one of an empty statement: a client has to send its carriage return
 //! "without a preceding ;" (github.com/baileyji/M2FS-Control, `m2fscontrol/galil.py`, a DMC-4183).
 
 pub use palpate_drivers::galil::protocol::LINE_MAX;
@@ -17,7 +17,7 @@ pub enum Statement {
 
 /// The line that a client is writing.
 #[derive(Clone, Debug, Default)]
-pub struct Input {
+pub struct InputLine {
     statement: Vec<u8>,
     /// Characters since the line began.
     length: usize,
@@ -25,7 +25,7 @@ pub struct Input {
     is_too_long: bool,
 }
 
-impl Input {
+impl InputLine {
     /// Takes a byte; returns what it completed.
     pub fn take(&mut self, byte: u8) -> Option<Statement> {
         match byte {
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     fn all(bytes: &[u8]) -> Vec<Statement> {
-        let mut input = Input::default();
+        let mut input = InputLine::default();
         bytes.iter().filter_map(|byte| input.take(*byte)).collect()
     }
 
@@ -110,7 +110,7 @@ mod tests {
             all(format!("{fits};bc;d\rTP\r").as_bytes()),
             [whole(&[&fits]), vec![Statement::TooLong], whole(&["TP"])].concat()
         );
-        let mut input = Input::default();
+        let mut input = InputLine::default();
         for _ in 0..100 {
             for byte in b"MG _TPA" {
                 assert_eq!(input.take(*byte), None);

@@ -1,13 +1,13 @@
-//! What becomes of a byte: echo, statement, line of a download; and what is answered.
+//! Handles each byte of a client: echo, statement or line of a download; and sends the answer.
 
-use super::client::Mode;
+use super::client::ClientMode;
 use super::input::Statement;
 use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
-    /// Takes one byte of a client, or keeps it while the controller is busy with that client.
-    pub(super) fn feed(&mut self, channel: usize, byte: u8) {
+    /// Takes one byte of a client, or queues it while the controller is busy with that client.
+    pub(super) fn receive_byte(&mut self, channel: usize, byte: u8) {
         if self.boots_until.is_some() || !self.clients[channel].is_open {
             return;
         }
@@ -18,8 +18,8 @@ impl GalilEmulator {
         }
     }
 
-    /// Bytes that waited, and lines that paused, as time passes.
-    pub(super) fn feed_waiting(&mut self) {
+    /// Takes queued bytes, and notes pauses in lines.
+    pub(super) fn take_waiting_bytes(&mut self) {
         for channel in 0..self.clients.len() {
             let now = self.now;
             while let Some(byte) = self.clients[channel].take_waiting(now) {
@@ -35,9 +35,9 @@ impl GalilEmulator {
             client.send(&[byte]);
         }
         match client.mode {
-            Mode::Program { .. } => self.take_program(channel, byte),
-            Mode::Values { .. } => self.take_value(channel, byte),
-            Mode::Commands => {
+            ClientMode::Program { .. } => self.take_program_byte(channel, byte),
+            ClientMode::Values { .. } => self.take_value_byte(channel, byte),
+            ClientMode::Commands => {
                 if let Some(statement) = client.input.take(byte) {
                     self.answer(channel, &statement);
                 }
@@ -68,8 +68,8 @@ impl GalilEmulator {
         self.clients[channel].answer(&bytes);
     }
 
-    /// Text of a program, of which nobody asked; lines end with CR LF.
-    pub(super) fn say(&mut self, text: &str) {
+    /// Sends unsolicited text of a program; lines end with CR LF.
+    pub(super) fn send_unsolicited(&mut self, text: &str) {
         let mark = if self.is_marked { 0x80 } else { 0 };
         let bytes: Vec<u8> = text.bytes().map(|byte| byte | mark).collect();
         if let Some(client) = self

@@ -10,7 +10,7 @@ const ARRAYS_MAX: usize = 30;
 
 /// What a program and its clients keep.
 #[derive(Clone, Debug, Default)]
-pub struct Memory {
+pub struct ControllerMemory {
     variables: BTreeMap<String, f64>,
     arrays: BTreeMap<String, Vec<f64>>,
 }
@@ -22,8 +22,7 @@ pub fn is_name(text: &str) -> bool {
         && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
 
-impl Memory {
-    /// A variable.
+impl ControllerMemory {
     pub fn variable(&self, name: &str) -> Option<f64> {
         self.variables.get(name).copied()
     }
@@ -85,7 +84,7 @@ impl Memory {
     }
 
     /// `DA` of one name or of all arrays or variables.
-    pub fn forget(&mut self, name: &str) -> Result<(), ErrorCode> {
+    pub fn deallocate(&mut self, name: &str) -> Result<(), ErrorCode> {
         match name {
             "*" => self.variables.clear(),
             "*[]" | "*[0]" => self.arrays.clear(),
@@ -102,7 +101,6 @@ impl Memory {
         Ok(())
     }
 
-    /// An array.
     pub fn array(&self, name: &str) -> Result<&[f64], ErrorCode> {
         self.arrays.get(name).map(Vec::as_slice).ok_or(ErrorCode::NO_ARRAY)
     }
@@ -121,7 +119,6 @@ impl Memory {
         position(array.len(), index).map(|at| array[at])
     }
 
-    /// Sets an element.
     pub fn set_element(&mut self, name: &str, index: f64, value: f64) -> Result<(), ErrorCode> {
         let array = self.array_mut(name)?;
         let at = position(array.len(), index)?;
@@ -145,7 +142,7 @@ mod tests {
     #[test]
     fn memory_is_bounded() {
         let model = GalilModel::Dmc4143;
-        let mut memory = Memory::default();
+        let mut memory = ControllerMemory::default();
         assert_eq!(memory.dimension("a", 8000.0, model), Ok(()));
         assert_eq!(memory.dimension("b", 8000.0, model), Ok(()));
         assert_eq!(memory.dimension("c", 1.0, model), Err(ErrorCode::ARRAY_SPACE));
@@ -159,8 +156,8 @@ mod tests {
             assert_eq!(memory.set(&format!("v{at}"), 1.0, model), Ok(()));
         }
         assert_eq!(memory.set("w", 1.0, model), Err(ErrorCode::TOO_MANY_NAMES));
-        assert_eq!(memory.forget("a[]"), Ok(()));
-        assert_eq!(memory.forget("*"), Ok(()));
+        assert_eq!(memory.deallocate("a[]"), Ok(()));
+        assert_eq!(memory.deallocate("*"), Ok(()));
         assert_eq!(memory.variables().count() + memory.arrays().count(), 1);
     }
 }

@@ -1,14 +1,14 @@
 //! `MG`: texts and numbers, each in a form of its own.
 
-use super::expression::{Cursor, unpacked};
-use super::format::Format;
+use super::expression::{Cursor, unpack_text};
+use super::format::NumberFormat;
 use super::{Answer, GalilEmulator};
 use palpate_drivers::galil::ErrorCode;
 
 /// What braces ask for.
 enum Brace {
     /// `{Fm.n}`, `{Zm.n}`, `{$m.n}`.
-    Number(Format),
+    Number(NumberFormat),
     /// `{Sn}`: the characters that a number holds.
     Characters(usize),
     /// `{N}`: no line end.
@@ -22,7 +22,7 @@ enum Brace {
 /// How the numbers of a message are written.
 #[derive(Clone, Copy)]
 enum Form {
-    Number(Format),
+    Number(NumberFormat),
     Characters(usize),
 }
 
@@ -30,7 +30,7 @@ impl Form {
     fn write(self, value: f64) -> String {
         match self {
             Self::Number(format) => format.write(value),
-            Self::Characters(count) => unpacked(value).chars().take(count).collect(),
+            Self::Characters(count) => unpack_text(value).chars().take(count).collect(),
         }
     }
 }
@@ -105,19 +105,19 @@ fn brace(word: &str) -> Result<Brace, ErrorCode> {
     let mut letters = word.chars();
     let kind = letters.next().ok_or(ErrorCode::BRACES)?;
     let rest = letters.as_str();
-    let size = || -> Result<Format, ErrorCode> {
+    let size = || -> Result<NumberFormat, ErrorCode> {
         let (whole, decimals) = rest.split_once('.').unwrap_or((rest, "0"));
         let whole: usize = whole.parse().map_err(|_| ErrorCode::BRACES)?;
         let decimals: usize = decimals.parse().map_err(|_| ErrorCode::BRACES)?;
         if whole > 15 || decimals > 4 {
             return Err(ErrorCode::BRACES);
         }
-        Ok(Format::decimal(whole, decimals))
+        Ok(NumberFormat::decimal(whole, decimals))
     };
     Ok(match kind {
-        'F' => Brace::Number(Format { has_zeros: true, ..size()? }),
+        'F' => Brace::Number(NumberFormat { has_zeros: true, ..size()? }),
         'Z' => Brace::Number(size()?),
-        '$' => Brace::Number(Format { is_hex: true, ..size()? }),
+        '$' => Brace::Number(NumberFormat { is_hex: true, ..size()? }),
         'S' if rest.is_empty() => Brace::Characters(6),
         'S' => {
             let count = size()?.whole;

@@ -32,34 +32,31 @@ mod transfer;
 
 pub use model::{GalilModel, GalilModelError};
 
-use super::Device;
+use super::EmulatedDevice;
 use super::faults::DeviceFault;
-use super::plant::{CellFault, Plant};
+use super::plant::{CellFault, EmulatedPlant};
 use analog::Analog;
-use axis::{Axis, Polarity};
-use client::Client;
+use axis::{GalilAxis, InputPolarity};
+use client::GalilClient;
 use clock::SampleClock;
-use contour::Contour;
-use format::Format;
-use memory::Memory;
+use contour::ContourMode;
+use format::NumberFormat;
+use memory::ControllerMemory;
 use palpate_drivers::galil::ErrorCode;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::HandAction;
 use palpate_model::{Nanos, Position, Seconds};
-use program::{Program, Thread};
-use record::Recorder;
+use program::{Program, ProgramThread};
+use record::ArrayRecorder;
 
 /// Connections of a controller on a network: handles A to H.
 const HANDLES: usize = 8;
 /// From a reset to the first answer. Not confirmed: long enough to be noticed, short for a test.
 const BOOT: Nanos = Nanos(300_000_000);
 
-/// What makes one emulated controller differ from another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GalilSettings {
-    /// Bench, tissue, cell and seed.
     pub sim: SimSettings,
-    /// Which controller.
     pub model: GalilModel,
     /// Bits of the analog inputs' converter, 12 or 16; `None` without analog inputs.
     pub converter: Option<u32>,
@@ -69,7 +66,6 @@ pub struct GalilSettings {
     pub has_echo: bool,
     /// By how many parts in a million the crystal is fast.
     pub clock_ppm: f64,
-    /// Serial number.
     pub serial_number: u32,
 }
 
@@ -87,14 +83,22 @@ impl Default for GalilSettings {
     }
 }
 
-/// Who gave a statement.
+/// A client or a thread of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Origin {
     Client(usize),
     Thread(usize),
 }
 
-/// What a statement is answered with.
+impl Origin {
+    fn client(self) -> Option<usize> {
+        match self {
+            Self::Client(channel) => Some(channel),
+            Self::Thread(_) => None,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Answer {
     /// `:`.
@@ -105,7 +109,6 @@ enum Answer {
     Open(String),
     /// Bytes, then `:`.
     Bytes(Vec<u8>),
-    /// Nothing yet.
     Silent,
 }
 
@@ -113,26 +116,26 @@ enum Answer {
 #[derive(Clone, Debug)]
 pub struct GalilEmulator {
     settings: GalilSettings,
-    plant: Plant,
+    plant: EmulatedPlant,
     clock: SampleClock,
-    axes: Vec<Axis>,
-    polarity: Polarity,
+    axes: Vec<GalilAxis>,
+    polarity: InputPolarity,
     /// The rest of `CN`.
     other_inputs: [f64; 3],
-    memory: Memory,
-    recorder: Recorder,
-    contour: Contour,
+    memory: ControllerMemory,
+    recorder: ArrayRecorder,
+    contour: ContourMode,
     analog: Option<Analog>,
     program: Program,
     /// The program that `BP` keeps over a reset.
     burned: Option<Program>,
-    threads: Vec<Thread>,
-    clients: Vec<Client>,
+    threads: Vec<ProgramThread>,
+    clients: Vec<GalilClient>,
     /// `TC`, and thread and line of the last error of a program.
     error: ErrorCode,
     error_at: (usize, usize),
-    position_format: Format,
-    variable_format: Format,
+    position_format: NumberFormat,
+    variable_format: NumberFormat,
     /// `PF`, `VF`, `LZ` as they were set.
     format_numbers: (f64, f64, f64),
     /// `CW 1`: unsolicited characters have their top bit set.
@@ -142,92 +145,87 @@ pub struct GalilEmulator {
     outputs: u16,
     /// `DR`: samples between records, and to whom.
     pushed: Option<(u64, usize)>,
-    /// Nothing is answered before.
+    /// No answer before then.
     boots_until: Option<Nanos>,
     now: Nanos,
-    /// Somebody put another controller on the wire.
+    /// Another controller is on the wire.
     is_wrong: bool,
 }
 
 impl GalilEmulator {
     /// A controller just switched on at time zero.
-    #[must_use]
     pub fn new(settings: GalilSettings) -> Self {
-        let clock = SampleClock::new(Nanos::ZERO, settings.clock_ppm);
-        let plant = Plant::new(&settings.sim, clock.period());
+        let plant = EmulatedPlant::new(
+            &settings.sim,
+            SampleClock::new(Nanos::ZERO, settings.clock_ppm).period(),
+        );
         let channels = if settings.is_serial { 1 } else { HANDLES };
-        let mut emulator = Self {
-            settings,
-            plant,
-            clock,
-            axes: Vec::new(),
-            polarity: Polarity { limit: -1.0, home: -1.0 },
-            other_inputs: [-1.0, 0.0, 0.0],
-            memory: Memory::default(),
-            recorder: Recorder::default(),
-            contour: Contour::default(),
-            analog: None,
-            program: Program::default(),
-            burned: None,
-            threads: Vec::new(),
-            clients: vec![Client::default(); channels],
-            error: ErrorCode(0),
-            error_at: (0, 0),
-            position_format: Format::decimal(10, 0),
-            variable_format: Format::decimal(10, 4),
-            format_numbers: (10.0, 10.4, 1.0),
-            is_marked: false,
-            unsolicited_to: None,
-            outputs: 0,
-            pushed: None,
-            boots_until: None,
-            now: Nanos::ZERO,
-            is_wrong: false,
-        };
-        emulator.initialise();
+        let mut emulator =
+            Self::start(settings, plant, None, vec![GalilClient::default(); channels], Nanos::ZERO);
         if settings.is_serial {
-            emulator.clients[0] = Client::opened(settings.has_echo);
+            emulator.clients[0] = GalilClient::connected(settings.has_echo);
         }
         emulator
     }
 
-    /// All that a reset forgets. The slide stays where it stands, at zero counts.
-    fn initialise(&mut self) {
-        if let Some(slide) = self.axes.first() {
-            self.plant.shift(slide.filtered * palpate_drivers::sim::MM_PER_PULSE);
+    /// The state after power-up or a reset, with what survives one. The slide is at zero counts.
+    fn start(
+        settings: GalilSettings,
+        plant: EmulatedPlant,
+        burned: Option<Program>,
+        clients: Vec<GalilClient>,
+        now: Nanos,
+    ) -> Self {
+        let program = burned.clone().unwrap_or_default();
+        let mut threads = vec![ProgramThread::idle(); settings.model.threads()];
+        if let Some(line) = program.find("AUTO") {
+            threads[0].start(line, 0);
         }
-        let axes = self.settings.model.axes();
-        self.clock = SampleClock::new(self.now, self.settings.clock_ppm);
-        self.axes = (0..axes).map(|axis| Axis::new(axis == 0)).collect();
-        self.polarity = Polarity { limit: -1.0, home: -1.0 };
-        self.other_inputs = [-1.0, 0.0, 0.0];
-        self.memory = Memory::default();
-        self.recorder = Recorder::default();
-        self.contour = Contour::default();
-        self.analog = self.settings.converter.map(Analog::new);
-        self.program = self.burned.clone().unwrap_or_default();
-        self.threads = vec![Thread::idle(); self.settings.model.threads()];
-        self.error = ErrorCode(0);
-        self.position_format = Format::decimal(10, 0);
-        self.variable_format = Format::decimal(10, 4);
-        self.format_numbers = (10.0, 10.4, 1.0);
-        self.is_marked = false;
-        self.unsolicited_to = self.settings.is_serial.then_some(0);
-        self.outputs = 0;
-        self.pushed = None;
-        if let Some(line) = self.program.find("AUTO") {
-            self.threads[0].start(line, 0);
+        Self {
+            settings,
+            plant,
+            clock: SampleClock::new(now, settings.clock_ppm),
+            axes: (0..settings.model.axes()).map(|axis| GalilAxis::new(axis == 0)).collect(),
+            polarity: InputPolarity { limit: -1.0, home: -1.0 },
+            other_inputs: [-1.0, 0.0, 0.0],
+            memory: ControllerMemory::default(),
+            recorder: ArrayRecorder::default(),
+            contour: ContourMode::default(),
+            analog: settings.converter.map(Analog::new),
+            program,
+            burned,
+            threads,
+            clients,
+            error: ErrorCode(0),
+            error_at: (0, 0),
+            position_format: NumberFormat::decimal(10, 0),
+            variable_format: NumberFormat::decimal(10, 4),
+            format_numbers: (10.0, 10.4, 1.0),
+            is_marked: false,
+            unsolicited_to: settings.is_serial.then_some(0),
+            outputs: 0,
+            pushed: None,
+            boots_until: None,
+            now,
+            is_wrong: false,
         }
     }
 
     /// `RS`, and a reset by fault: connections on a network are dropped.
     fn reset(&mut self) {
-        self.initialise();
+        // The slide stays where it stands.
+        let counts = self.axes[0].filtered;
+        self.plant.shift_counter(counts * palpate_drivers::sim::MM_PER_PULSE);
+        let (burned, clients) = (self.burned.take(), std::mem::take(&mut self.clients));
+        *self = Self {
+            is_wrong: self.is_wrong,
+            ..Self::start(self.settings, self.plant.clone(), burned, clients, self.now)
+        };
         for client in &mut self.clients {
             if self.settings.is_serial {
-                *client = Client::opened(self.settings.has_echo);
+                *client = GalilClient::connected(self.settings.has_echo);
             } else if client.is_open {
-                *client = Client::hung_up();
+                *client = GalilClient::dropped();
             }
         }
         self.boots_until = Some(self.now + BOOT);
@@ -238,23 +236,22 @@ impl GalilEmulator {
         self.clock.period()
     }
 
-    /// The bench behind the controller, for tests and demonstrations.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &EmulatedPlant {
         &self.plant
     }
 
-    /// Whether an axis, counted from 0, is moving, for tests and demonstrations.
+    /// Whether an axis, counted from 0, is moving, for tests.
     pub fn is_running(&self, axis: usize) -> bool {
-        self.axes.get(axis).is_some_and(Axis::is_running)
+        self.axes.get(axis).is_some_and(GalilAxis::is_running)
     }
 
-    /// True position of the slide from home, whatever the counter says, for tests and demonstrations.
+    /// True position of the slide from home, whatever the counter says, for tests.
     pub fn slide(&self) -> Position {
         self.plant.axis()
     }
 }
 
-impl Device for GalilEmulator {
+impl EmulatedDevice for GalilEmulator {
     fn channels(&self) -> usize {
         self.clients.len()
     }
@@ -265,7 +262,7 @@ impl Device for GalilEmulator {
             && let Some(client) = self.clients.get_mut(channel)
         {
             // Echo is for terminals on a serial line.
-            *client = Client::opened(false);
+            *client = GalilClient::connected(false);
         }
     }
 
@@ -274,7 +271,7 @@ impl Device for GalilEmulator {
         if !self.settings.is_serial
             && let Some(client) = self.clients.get_mut(channel)
         {
-            *client = Client::default();
+            *client = GalilClient::default();
             self.pushed = self.pushed.filter(|(_, to)| *to != channel);
             if self.unsolicited_to == Some(channel) {
                 self.unsolicited_to = None;
@@ -289,36 +286,38 @@ impl Device for GalilEmulator {
         self.advance(now);
         if channel < self.clients.len() {
             for byte in bytes {
-                self.feed(channel, *byte);
+                self.receive_byte(channel, *byte);
             }
         }
     }
 
     fn advance(&mut self, now: Nanos) {
-        self.advance_to(now);
+        self.run_samples_until(now);
     }
 
     fn transmit(&mut self, channel: usize) -> Vec<u8> {
-        self.clients.get_mut(channel).map(Client::take_out).unwrap_or_default()
+        self.clients.get_mut(channel).map(GalilClient::take_out).unwrap_or_default()
     }
 
     fn take_hang_up(&mut self, channel: usize) -> bool {
         self.clients.get_mut(channel).is_some_and(|client| std::mem::take(&mut client.is_hung_up))
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         self.advance(now);
         match fault {
             DeviceFault::Reset if is_on => self.reset(),
             DeviceFault::Reset => {}
-            DeviceFault::Stuck => self.plant.spoil(is_on.then_some(CellFault::Stuck)),
-            DeviceFault::Saturated => self.plant.spoil(is_on.then_some(CellFault::Saturated)),
+            DeviceFault::Stuck => self.plant.set_cell_fault(is_on.then_some(CellFault::Stuck)),
+            DeviceFault::Saturated => {
+                self.plant.set_cell_fault(is_on.then_some(CellFault::Saturated))
+            }
             DeviceFault::WrongDevice => self.is_wrong = is_on,
         }
     }
 
-    fn by_hand(&mut self, now: Nanos, action: HandAction) {
+    fn apply_hand_action(&mut self, now: Nanos, action: HandAction) {
         self.advance(now);
-        self.plant.by_hand(action);
+        self.plant.apply_hand_action(action);
     }
 }

@@ -25,8 +25,6 @@ palpate_model::named! {
 pub struct GalilModelError(String);
 
 impl GalilModel {
-    /// Number of axes.
-    #[must_use]
     pub const fn axes(self) -> usize {
         match self {
             Self::Dmc4183 => 8,
@@ -35,19 +33,16 @@ impl GalilModel {
     }
 
     /// Whether it is of the older series with short data records and without analog inputs of its own.
-    #[must_use]
     pub const fn is_21x3(self) -> bool {
         matches!(self, Self::Dmc2143)
     }
 
     /// Whether it is of the 40x0 series, whose digital I/O is configured with `CO`.
-    #[must_use]
     pub const fn is_40x0(self) -> bool {
         matches!(self, Self::Dmc4040)
     }
 
     /// What `^R^V` answers. The first as captured by users of the EPICS driver, the others of its form.
-    #[must_use]
     pub const fn revision(self) -> &'static str {
         match self {
             Self::Dmc4143 => "DMC4143 Rev 1.3a",
@@ -59,7 +54,6 @@ impl GalilModel {
 
     /// Shortest sample period in us: Accelera boards, normal firmware (DMC-40x0 command reference, `TM`). That of
     /// the 21x3 series is not confirmed; 250 us per two axes is the figure of its optima relatives.
-    #[must_use]
     pub const fn tm_min(self) -> f64 {
         match self {
             Self::Dmc4143 | Self::Dmc4040 => 125.0,
@@ -69,38 +63,32 @@ impl GalilModel {
     }
 
     /// Largest acceleration in counts/s^2.
-    #[must_use]
     pub const fn acceleration_max(self) -> f64 {
         if self.is_21x3() { 67_107_840.0 } else { 1_073_740_800.0 }
     }
 
     /// Threads of application programs.
-    #[must_use]
     pub const fn threads(self) -> usize {
         8
     }
 
     /// Lines of an application program. Not confirmed for either series.
-    #[must_use]
     pub const fn program_lines(self) -> usize {
         if self.is_21x3() { 1000 } else { 2000 }
     }
 
     /// Elements of all arrays together. Not confirmed for either series.
-    #[must_use]
     pub const fn array_elements(self) -> usize {
         if self.is_21x3() { 8000 } else { 16_000 }
     }
 
     /// Variables. Not confirmed for either series.
-    #[must_use]
     pub const fn variables(self) -> usize {
         if self.is_21x3() { 254 } else { 510 }
     }
 
     /// Statements a thread executes in one sample: some tens of microseconds each on Accelera boards, about
     /// ten times slower on older ones. Not confirmed.
-    #[must_use]
     pub const fn statements_per_sample(self) -> usize {
         if self.is_21x3() { 2 } else { 10 }
     }

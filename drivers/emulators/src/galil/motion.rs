@@ -1,23 +1,23 @@
-//! Commands that move, define or tell the place of an axis.
+//! Commands that move an axis, or set or report its position.
 
-use super::axis::{COUNTS_MAX, Motion, Prepared};
-use super::commands::{Argument, listed};
-use super::format::Format;
-use super::program::Thread;
-use super::settings::{STEPPER_SPEED_MAX, Setting};
+use super::axis::{AxisMotion, COUNTS_MAX, PreparedMotion};
+use super::commands::{Argument, join_values};
+use super::format::NumberFormat;
+use super::program::ProgramThread;
+use super::settings::{AxisSetting, STEPPER_SPEED_MAX};
 use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
     /// A command about axes; `None` when it is another one.
-    pub(super) fn move_word(
+    pub(super) fn axis_command(
         &mut self,
         origin: Origin,
         word: &str,
         arguments: &str,
     ) -> Option<Result<Answer, ErrorCode>> {
         Some(match word {
-            "PA" | "PR" | "JG" | "DP" | "DE" => self.place_word(word, arguments),
+            "PA" | "PR" | "JG" | "DP" | "DE" => self.position_command(word, arguments),
             "BG" => self.begin(arguments),
             "ST" => self.stop(origin, arguments),
             "AB" => self.abort(arguments),
@@ -25,20 +25,21 @@ impl GalilEmulator {
             "HM" | "FE" => self.prepare_edge(word == "HM", arguments),
             // Nothing here has an index pulse.
             "FI" => Err(ErrorCode::NOT_FOR_STEPPER),
-            "TP" | "RP" | "TD" | "TE" | "TV" | "TS" | "TT" | "RL" => self.tell(word, arguments),
-            "SC" => self.tell(word, arguments),
-            "CM" | "DT" | "CD" => self.contour_word(word, arguments),
+            "TP" | "RP" | "TD" | "TE" | "TV" | "TS" | "TT" | "RL" => {
+                self.query_axes(word, arguments)
+            }
+            "SC" => self.query_axes(word, arguments),
+            "CM" | "DT" | "CD" => self.contour_command(word, arguments),
             _ => return None,
         })
     }
 
-    fn place_word(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
-        let mut told = Vec::new();
+    fn position_command(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
+        let mut values = Vec::new();
         for (axis, argument) in self.axis_arguments(arguments)? {
             let Argument::Number(value) = argument else {
-                let word = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.told(word, axis).unwrap_or(0.0);
-                told.push(self.position_format.write(value));
+                let value = self.axis_operand(word, axis).unwrap_or(0.0);
+                values.push(self.position_format.write(value));
                 continue;
             };
             let value = value.trunc();
@@ -54,15 +55,15 @@ impl GalilEmulator {
                 "DE" => state.encoder = value,
                 // A new target needs a new begin.
                 "PA" | "PR" if state.is_running() => return Err(ErrorCode::RUNNING),
-                "PA" => state.prepared = Prepared::Target(value),
-                "PR" => state.prepared = Prepared::Relative(value),
+                "PA" => state.prepared = PreparedMotion::Target(value),
+                "PR" => state.prepared = PreparedMotion::Relative(value),
                 _ => {
                     let shift = state.define(value)?;
-                    self.shift(axis, shift);
+                    self.shift_counter(axis, shift);
                 }
             }
         }
-        Ok(listed(told))
+        Ok(join_values(values))
     }
 
     fn begin(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
@@ -79,9 +80,9 @@ impl GalilEmulator {
     fn stop(&mut self, origin: Origin, arguments: &str) -> Result<Answer, ErrorCode> {
         let axes = self.axis_list(arguments)?;
         for axis in axes {
-            self.axes[axis].stop(Setting::Deceleration, 4);
+            self.axes[axis].stop(AxisSetting::Deceleration, 4);
         }
-        if arguments.is_empty() && matches!(origin, Origin::Client(_)) {
+        if arguments.is_empty() && origin.client().is_some() {
             self.halt_threads();
         }
         Ok(Answer::Done)
@@ -105,7 +106,7 @@ impl GalilEmulator {
     }
 
     pub(super) fn halt_threads(&mut self) {
-        self.threads.fill(Thread::idle());
+        self.threads.fill(ProgramThread::idle());
     }
 
     fn enable(&mut self, is_on: bool, arguments: &str) -> Result<Answer, ErrorCode> {
@@ -123,28 +124,27 @@ impl GalilEmulator {
             if self.axes[axis].is_running() {
                 return Err(ErrorCode::RUNNING);
             }
-            self.axes[axis].prepared = Prepared::Edge { is_homing };
+            self.axes[axis].prepared = PreparedMotion::Edge { is_homing };
         }
         Ok(Answer::Done)
     }
 
-    fn tell(&self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
-        let letters = [word.as_bytes()[0], word.as_bytes()[1]];
+    fn query_axes(&self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
         let format = match word {
-            "TT" => Format::decimal(10, 4),
+            "TT" => NumberFormat::decimal(10, 4),
             // Stop codes and switch bytes have three digits.
-            "SC" | "TS" => Format { whole: 3, ..self.position_format },
+            "SC" | "TS" => NumberFormat { whole: 3, ..self.position_format },
             _ => self.position_format,
         };
-        let told = self
+        let values = self
             .axis_list(arguments)?
             .into_iter()
-            .map(|axis| format.write(self.told(letters, axis).unwrap_or(0.0)))
+            .map(|axis| format.write(self.axis_operand(word, axis).unwrap_or(0.0)))
             .collect();
-        Ok(listed(told))
+        Ok(join_values(values))
     }
 
-    fn contour_word(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn contour_command(&mut self, word: &str, arguments: &str) -> Result<Answer, ErrorCode> {
         match word {
             "CM" if arguments == "?" => {
                 let free = self.contour.free() as f64;
@@ -161,15 +161,12 @@ impl GalilEmulator {
                     }
                 }
                 for axis in &axes {
-                    self.axes[*axis].motion = Motion::Contour;
+                    self.axes[*axis].motion = AxisMotion::Contour;
                     self.axes[*axis].stop_code = 50;
                 }
                 self.contour.begin(axes);
             }
-            "DT" => match self.numbers(arguments)?.as_slice() {
-                [Some(n)] => self.contour.set_interval(*n)?,
-                _ => return Err(ErrorCode::FEW_FIELDS),
-            },
+            "DT" => self.contour.set_interval(self.first_number(arguments)?)?,
             _ => self.contour_data(arguments)?,
         }
         Ok(Answer::Done)
@@ -182,10 +179,7 @@ impl GalilEmulator {
         }
         let is_letter = arguments.starts_with(|c: char| c.is_ascii_uppercase());
         let (list, time) = match arguments.split_once('=') {
-            Some((list, time)) if !is_letter => {
-                let time = self.numbers(time)?.first().copied().flatten();
-                (list.trim(), Some(time.ok_or(ErrorCode::FEW_FIELDS)?))
-            }
+            Some((list, time)) if !is_letter => (list.trim(), Some(self.first_number(time)?)),
             _ => (arguments, None),
         };
         let mut increments = vec![0.0; self.contour.axes.len()];

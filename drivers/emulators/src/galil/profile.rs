@@ -2,37 +2,36 @@
 
 /// A commanded place that moves, in counts and counts per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Profile {
-    /// Commanded place.
+pub struct AxisProfile {
     pub place: f64,
     /// Commanded velocity.
     pub velocity: f64,
 }
 
-impl Profile {
+impl AxisProfile {
     /// One sample towards a target, arriving at rest. Returns whether it has arrived.
     ///
-    /// The next speed is the largest from which the way left suffices to stop, so that accelerating, slewing and
-    /// decelerating follow without a plan, and speed and rates may change on the way.
+    /// The next speed is the largest from which the remaining distance suffices to stop, so that accelerating, slewing and
+    /// decelerating follow without a precomputed plan, and speed and rates may change during the move.
     pub fn towards(&mut self, target: f64, speed: f64, ac: f64, dc: f64, dt: f64) -> bool {
-        let way = target - self.place;
-        let side = if way < 0.0 { -1.0 } else { 1.0 };
-        let (left, v) = (way.abs(), self.velocity * side);
+        let distance = target - self.place;
+        let side = if distance < 0.0 { -1.0 } else { 1.0 };
+        let (remaining, v) = (distance.abs(), self.velocity * side);
         if v < 0.0 {
             // Under way in the other direction: to rest first.
             self.velocity = side * (v + dc * dt).min(0.0);
             self.place += side * 0.5 * (v + self.velocity * side) * dt;
             return false;
         }
-        // (v + w) dt / 2 + w^2 / (2 dc) = left, for w.
-        let room = left - 0.5 * v * dt;
+        // (v + w) dt / 2 + w^2 / (2 dc) = remaining, for w.
+        let room = remaining - 0.5 * v * dt;
         let half = 0.5 * dc * dt;
         let stoppable =
             if room > 0.0 { (half * half + 2.0 * dc * room).sqrt() - half } else { 0.0 };
         let w = (v + ac * dt).min(speed.max(v - dc * dt)).min(stoppable);
         let step = 0.5 * (v + w) * dt;
         // Less than this is rounding: places stay below 2^31 counts.
-        if step >= left - 1e-6 || left < 1e-6 {
+        if step >= remaining - 1e-6 || remaining < 1e-6 {
             *self = Self { place: target, velocity: 0.0 };
             return true;
         }
@@ -87,7 +86,7 @@ mod tests {
             (100_000.0, 25_000.0, 256_000.0),
         ] {
             let oracle = closed(to, speed, rate);
-            let mut profile = Profile::default();
+            let mut profile = AxisProfile::default();
             let mut samples = 0;
             loop {
                 let is_there = profile.towards(to, speed, rate, rate, DT);
@@ -113,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_stop_ends_on_a_whole_count_at_most_one_further() {
-        let mut profile = Profile::default();
+        let mut profile = AxisProfile::default();
         for _ in 0..777 {
             profile.jog(-1332.0, 4096.0, 4096.0, DT);
         }

@@ -7,13 +7,11 @@ use palpate_drivers::galil::ErrorCode;
 /// Subroutines within each other (`TC` 12).
 const STACK_MAX: usize = 16;
 
-/// Where a thread is: line and statement within it.
-pub type Place = (usize, usize);
+/// Line and statement within it.
+pub type StatementPlace = (usize, usize);
 
-/// What a thread waits for.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Wait {
-    /// Nothing.
+pub enum ThreadWait {
     None,
     /// `WT`, `AT`: a sample.
     Until(u64),
@@ -29,28 +27,25 @@ pub enum Wait {
 
 /// A thread of the program.
 #[derive(Clone, Debug)]
-pub struct Thread {
-    /// Whether it runs.
+pub struct ProgramThread {
     pub is_running: bool,
     /// The next statement.
-    pub at: Place,
-    /// What it waits for.
-    pub wait: Wait,
+    pub at: StatementPlace,
+    pub wait: ThreadWait,
     /// Where subroutines return to, and what was waited for there.
-    stack: Vec<(Place, Wait)>,
+    stack: Vec<(StatementPlace, ThreadWait)>,
     /// Reference of `AT`.
     pub since: u64,
     /// Depth of the stack below which an automatic subroutine runs.
     pub automatic: Option<usize>,
 }
 
-impl Thread {
-    /// One that does not run.
+impl ProgramThread {
     pub const fn idle() -> Self {
         Self {
             is_running: false,
             at: (0, 0),
-            wait: Wait::None,
+            wait: ThreadWait::None,
             stack: Vec::new(),
             since: 0,
             automatic: None,
@@ -67,7 +62,7 @@ impl Thread {
         if self.stack.len() >= STACK_MAX {
             return Err(ErrorCode::SUBROUTINES);
         }
-        let wait = std::mem::replace(&mut self.wait, Wait::None);
+        let wait = std::mem::replace(&mut self.wait, ThreadWait::None);
         self.stack.push((self.at, wait));
         self.at = (line, 0);
         Ok(())
@@ -84,7 +79,7 @@ impl Thread {
     }
 
     /// `EN`, `RE`: back to the caller, or the end.
-    pub fn back(&mut self) {
+    pub fn return_from_call(&mut self) {
         match self.stack.pop() {
             Some((at, wait)) => {
                 self.at = at;
@@ -142,7 +137,7 @@ impl Program {
     }
 
     /// The statement at a place and the place behind it, empty lines skipped; `None` behind the end.
-    pub fn fetch(&self, (mut line, mut at): Place) -> Option<(&str, Place)> {
+    pub fn fetch(&self, (mut line, mut at): StatementPlace) -> Option<(&str, StatementPlace)> {
         loop {
             let statements = self.statements.get(line)?;
             match statements.get(at) {
@@ -153,7 +148,7 @@ impl Program {
     }
 
     /// Behind the `ENDIF` of the `IF` before a place, or with `may_else` behind its `ELSE`.
-    pub fn skip(&self, from: Place, may_else: bool) -> Result<Place, ErrorCode> {
+    pub fn skip(&self, from: StatementPlace, may_else: bool) -> Result<StatementPlace, ErrorCode> {
         let mut at = from;
         let mut depth = 0;
         while let Some((text, next)) = self.fetch(at) {
@@ -188,7 +183,7 @@ pub fn check_line(line: &str) -> Result<(), ErrorCode> {
     Ok(())
 }
 
-/// Statements of a line; `;` within quotes joins nothing, comments are left out.
+/// Statements of a line; `;` within quotes joins nothing, comments are skipped.
 fn split(line: &str) -> Vec<String> {
     let mut all = Vec::new();
     let mut is_quoted = false;
@@ -247,21 +242,21 @@ mod tests {
 
     #[test]
     fn subroutines_return_with_what_was_waited_for() {
-        let mut thread = Thread::idle();
+        let mut thread = ProgramThread::idle();
         thread.start(3, 0);
-        thread.wait = Wait::Until(9);
+        thread.wait = ThreadWait::Until(9);
         thread.call_automatic(7);
         thread.call_automatic(8);
-        assert_eq!((thread.at, &thread.wait), ((7, 0), &Wait::None));
-        thread.back();
-        assert_eq!((thread.at, &thread.wait), ((3, 0), &Wait::Until(9)));
+        assert_eq!((thread.at, &thread.wait), ((7, 0), &ThreadWait::None));
+        thread.return_from_call();
+        assert_eq!((thread.at, &thread.wait), ((3, 0), &ThreadWait::Until(9)));
         for _ in 0..16 {
             thread.call(1).unwrap();
         }
         assert_eq!(thread.call(1), Err(ErrorCode::SUBROUTINES));
         for _ in 0..17 {
             assert!(thread.is_running);
-            thread.back();
+            thread.return_from_call();
         }
         assert!(!thread.is_running);
     }

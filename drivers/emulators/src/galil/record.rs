@@ -8,25 +8,25 @@ const ARRAYS_MAX: usize = 8;
 const INTERVAL_MAX: f64 = 8.0;
 
 /// Which number an array records.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RecordSource {
     /// `TIME`.
     Time,
     /// An analog input, in counts.
     Analog(usize),
     /// Two letters and an axis.
-    Axis([u8; 2], usize),
+    Axis(String, usize),
     /// `_TI`, `_OP` and others without an axis.
-    Plain([u8; 2]),
+    Controller(String),
 }
 
 /// What is recorded, where, and how far it is.
 #[derive(Clone, Debug, Default)]
-pub struct Recorder {
+pub struct ArrayRecorder {
     /// Names of `RA`.
     pub arrays: Vec<String>,
     /// Sources of `RD`.
-    pub sources: Vec<Source>,
+    pub sources: Vec<RecordSource>,
     /// Samples from one element to the next; 0 while nothing is recorded.
     interval: u64,
     /// Elements recorded before it ends.
@@ -37,7 +37,7 @@ pub struct Recorder {
     started: u64,
 }
 
-impl Recorder {
+impl ArrayRecorder {
     /// `_RC`.
     pub fn is_running(&self) -> bool {
         self.interval > 0
@@ -48,26 +48,24 @@ impl Recorder {
         self.interval = 0;
     }
 
+    fn check_change(&self, count: usize) -> Result<(), ErrorCode> {
+        match count {
+            _ if self.is_running() => Err(ErrorCode::RECORDING),
+            ..=ARRAYS_MAX => Ok(()),
+            _ => Err(ErrorCode::TOO_MANY_ELEMENTS),
+        }
+    }
+
     /// `RA`.
     pub fn set_arrays(&mut self, names: Vec<String>) -> Result<(), ErrorCode> {
-        if self.is_running() {
-            return Err(ErrorCode::RECORDING);
-        }
-        if names.len() > ARRAYS_MAX {
-            return Err(ErrorCode::TOO_MANY_ELEMENTS);
-        }
+        self.check_change(names.len())?;
         self.arrays = names;
         Ok(())
     }
 
     /// `RD`.
-    pub fn set_sources(&mut self, sources: Vec<Source>) -> Result<(), ErrorCode> {
-        if self.is_running() {
-            return Err(ErrorCode::RECORDING);
-        }
-        if sources.len() > ARRAYS_MAX {
-            return Err(ErrorCode::TOO_MANY_ELEMENTS);
-        }
+    pub fn set_sources(&mut self, sources: Vec<RecordSource>) -> Result<(), ErrorCode> {
+        self.check_change(sources.len())?;
         self.sources = sources;
         Ok(())
     }
@@ -124,10 +122,10 @@ impl Recorder {
 mod tests {
     use super::*;
 
-    fn ready() -> Recorder {
-        let mut recorder = Recorder::default();
+    fn ready() -> ArrayRecorder {
+        let mut recorder = ArrayRecorder::default();
         recorder.set_arrays(vec!["a".into(), "b".into()]).unwrap();
-        recorder.set_sources(vec![Source::Time, Source::Analog(0)]).unwrap();
+        recorder.set_sources(vec![RecordSource::Time, RecordSource::Analog(0)]).unwrap();
         recorder
     }
 
@@ -156,12 +154,12 @@ mod tests {
 
     #[test]
     fn mistakes_have_their_numbers() {
-        let mut recorder = Recorder::default();
+        let mut recorder = ArrayRecorder::default();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
         recorder = ready();
         assert_eq!(recorder.start(9.0, None, 5, 0), Err(ErrorCode::OUT_OF_RANGE));
         assert_eq!(recorder.start(1.0, Some(6.0), 5, 0), Err(ErrorCode::TOO_MANY_ELEMENTS));
-        recorder.set_sources(vec![Source::Time]).unwrap();
+        recorder.set_sources(vec![RecordSource::Time]).unwrap();
         assert_eq!(recorder.start(1.0, None, 5, 0), Err(ErrorCode::NO_SOURCE));
     }
 }

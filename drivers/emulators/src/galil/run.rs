@@ -1,7 +1,7 @@
-//! Threads of the application program at a sample.
+//! Runs the threads of the application program at each sample.
 
 use super::expression::evaluate;
-use super::program::{Thread, Wait};
+use super::program::{ProgramThread, ThreadWait};
 use super::{GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
@@ -12,11 +12,11 @@ fn samples_of(ms: f64, tm: f64) -> f64 {
 }
 
 impl GalilEmulator {
-    /// Lets every thread go on, as far as a sample lasts.
+    /// Runs every thread for as long as a sample lasts.
     pub(super) fn run_threads(&mut self) {
         for index in 0..self.threads.len() {
             for _ in 0..self.settings.model.statements_per_sample() {
-                if !self.threads[index].is_running || !self.is_over(index) {
+                if !self.threads[index].is_running || !self.has_wait_ended(index) {
                     break;
                 }
                 self.step(index);
@@ -24,22 +24,21 @@ impl GalilEmulator {
         }
     }
 
-    /// Whether what a thread waits for has come.
-    fn is_over(&mut self, index: usize) -> bool {
+    fn has_wait_ended(&mut self, index: usize) -> bool {
         let is_over = match &self.threads[index].wait {
-            Wait::None => true,
-            Wait::Until(sample) => self.clock.count() >= *sample,
-            Wait::Rest(axes) => axes.iter().all(|axis| !self.axes[*axis].is_running()),
-            Wait::Pulses(axes) => axes.iter().all(|axis| {
+            ThreadWait::None => true,
+            ThreadWait::Until(sample) => self.clock.count() >= *sample,
+            ThreadWait::Rest(axes) => axes.iter().all(|axis| !self.axes[*axis].is_running()),
+            ThreadWait::Pulses(axes) => axes.iter().all(|axis| {
                 let axis = &self.axes[*axis];
                 !axis.is_running() && axis.filtered == axis.profile.place
             }),
-            Wait::Contour => !self.contour.is_behind(),
+            ThreadWait::Contour => !self.contour.is_behind(),
             // Inputs are open, which is high.
-            Wait::Input(_, is_high) => *is_high,
+            ThreadWait::Input(_, is_high) => *is_high,
         };
         if is_over {
-            self.threads[index].wait = Wait::None;
+            self.threads[index].wait = ThreadWait::None;
         }
         is_over
     }
@@ -52,18 +51,18 @@ impl GalilEmulator {
         };
         let (text, line) = (text.to_owned(), next.0);
         self.threads[index].at = next;
-        if let Err(code) = self.perform(index, &text) {
+        if let Err(code) = self.run_statement(index, &text) {
             self.fail(index, line, &text, code);
         }
     }
 
-    /// An error ends its thread; `#CMDERR` runs in thread 0 if the program has one, else the line is told
+    /// An error ends its thread; `#CMDERR` runs in thread 0 if the program has one, else the line is sent
     /// (gclib.h: `?55 i=var`).
     fn fail(&mut self, index: usize, line: usize, text: &str, code: ErrorCode) {
         self.error = code;
         self.error_at = (line, index);
         let was_automatic = self.threads[index].automatic.is_some();
-        self.threads[index] = Thread::idle();
+        self.threads[index] = ProgramThread::idle();
         match self.program.find("CMDERR") {
             Some(routine) if !was_automatic => {
                 if self.threads[0].is_running {
@@ -74,11 +73,11 @@ impl GalilEmulator {
                     self.threads[0].automatic = Some(0);
                 }
             }
-            _ => self.say(&format!("?{line} {text}\r\n")),
+            _ => self.send_unsolicited(&format!("?{line} {text}\r\n")),
         }
     }
 
-    fn perform(&mut self, index: usize, text: &str) -> Result<(), ErrorCode> {
+    fn run_statement(&mut self, index: usize, text: &str) -> Result<(), ErrorCode> {
         if text.starts_with('#') {
             return Ok(());
         }
@@ -97,46 +96,43 @@ impl GalilEmulator {
                 self.threads[index].at = self.program.skip(at, false)?;
             }
             "EN" if text.starts_with("ENDIF") => {}
-            "EN" | "RE" => self.threads[index].back(),
+            "EN" | "RE" => self.threads[index].return_from_call(),
             "JP" | "JS" => self.jump(index, word == "JS", arguments)?,
             "ZS" => self.threads[index].clear_stack(),
             "WT" => {
-                let numbers = self.numbers(arguments)?;
-                let (length, unit) = (numbers.first(), numbers.get(1));
-                let length = length.copied().flatten().ok_or(ErrorCode::FEW_FIELDS)?;
-                let is_samples = unit.copied().flatten() == Some(1.0);
+                let length = self.first_number(arguments)?;
+                let is_samples = self.numbers(arguments)?.get(1) == Some(&Some(1.0));
                 self.wait_samples(index, length, is_samples, self.clock.count())?;
             }
             "AT" => {
-                let number = self.numbers(arguments)?.first().copied().flatten();
-                let number = number.ok_or(ErrorCode::FEW_FIELDS)?;
+                let number = self.first_number(arguments)?;
                 if number == 0.0 {
                     self.threads[index].since = self.clock.count();
                 } else {
                     let since = self.threads[index].since;
                     self.wait_samples(index, number.abs(), false, since)?;
                     if number < 0.0
-                        && let Wait::Until(until) = self.threads[index].wait
+                        && let ThreadWait::Until(until) = self.threads[index].wait
                     {
                         self.threads[index].since = until;
                     }
                 }
             }
-            "AM" => self.threads[index].wait = Wait::Rest(self.axis_list(arguments)?),
-            "MC" => self.threads[index].wait = Wait::Pulses(self.axis_list(arguments)?),
-            "WC" => self.threads[index].wait = Wait::Contour,
+            "AM" => self.threads[index].wait = ThreadWait::Rest(self.axis_list(arguments)?),
+            "MC" => self.threads[index].wait = ThreadWait::Pulses(self.axis_list(arguments)?),
+            "WC" => self.threads[index].wait = ThreadWait::Contour,
             "AI" => {
                 let number = evaluate(arguments, self)?;
                 if !(1.0..=16.0).contains(&number.abs()) {
                     return Err(ErrorCode::OUT_OF_RANGE);
                 }
                 let input = number.abs() as usize;
-                self.threads[index].wait = Wait::Input(input, number > 0.0);
+                self.threads[index].wait = ThreadWait::Input(input, number > 0.0);
             }
             "DL" | "QD" | "QR" | "BN" | "BP" | "BV" => return Err(ErrorCode::NOT_IN_PROGRAM),
             _ => {
                 let answer = self.execute(Origin::Thread(index), text)?;
-                self.say_answer(answer);
+                self.send_program_output(answer);
             }
         }
         Ok(())
@@ -154,7 +150,7 @@ impl GalilEmulator {
         }
         let samples = if is_samples { length } else { samples_of(length, self.clock.tm()) };
         // A cast saturates; 2^31 samples are 24 days.
-        self.threads[index].wait = Wait::Until(since + samples.ceil() as u64);
+        self.threads[index].wait = ThreadWait::Until(since + samples.ceil() as u64);
         Ok(())
     }
 

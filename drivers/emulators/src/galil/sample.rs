@@ -1,17 +1,17 @@
 //! One sample of the controller after the other.
 
-use super::axis::{Event, Motion};
-use super::contour::Step;
-use super::data_record::{General, record};
-use super::record::Source;
-use super::settings::Setting;
+use super::axis::{AxisEvent, AxisMotion};
+use super::contour::ContourStep;
+use super::data_record::{GeneralBlock, build_record};
+use super::record::RecordSource;
+use super::scope::bits;
+use super::settings::AxisSetting;
 use super::{Answer, GalilEmulator};
 use palpate_drivers::sim::MM_PER_PULSE;
 use palpate_model::Nanos;
 
 impl GalilEmulator {
-    /// All samples up to a time.
-    pub(super) fn advance_to(&mut self, now: Nanos) {
+    pub(super) fn run_samples_until(&mut self, now: Nanos) {
         while let Some(at) = self.clock.next_at().filter(|at| *at <= now) {
             self.now = at;
             self.sample();
@@ -20,11 +20,11 @@ impl GalilEmulator {
         if self.boots_until.is_some_and(|until| until <= now) {
             self.boots_until = None;
             if self.settings.is_serial {
-                // The answer to the `RS` that was sent, or to nobody.
+                // The answer to `RS`; after a reset by fault no client waits for it.
                 self.clients[0].send(b":");
             }
         }
-        self.feed_waiting();
+        self.take_waiting_bytes();
     }
 
     fn sample(&mut self) {
@@ -32,22 +32,22 @@ impl GalilEmulator {
         self.read_switches();
         let dt = self.clock.nominal_period();
         let rate = if self.settings.model.is_21x3() {
-            Setting::Deceleration
+            AxisSetting::Deceleration
         } else {
-            Setting::LimitDeceleration
+            AxisSetting::LimitDeceleration
         };
         self.contour_sample(dt);
         let mut is_limit_met = false;
         for index in 0..self.axes.len() {
             match self.axes[index].sample(dt, self.polarity, rate) {
-                Some(Event::Limit) => is_limit_met = true,
-                Some(Event::Homed) => {
+                Some(AxisEvent::Limit) => is_limit_met = true,
+                Some(AxisEvent::Homed) => {
                     let shift = self.axes[index].zero();
-                    self.shift(index, shift);
+                    self.shift_counter(index, shift);
                 }
                 None => {}
             }
-            self.axes[index].filter();
+            self.axes[index].smooth_pulses();
         }
         let place = self.axes[0].filtered * MM_PER_PULSE;
         self.plant.advance(place, self.clock.period());
@@ -59,10 +59,10 @@ impl GalilEmulator {
         self.push_record();
     }
 
-    /// The slide's counter has become smaller by so many counts.
-    pub(super) fn shift(&mut self, axis: usize, counts: f64) {
+    /// Accounts for a counter that was lowered by `counts`.
+    pub(super) fn shift_counter(&mut self, axis: usize, counts: f64) {
         if axis == 0 {
-            self.plant.shift(counts * MM_PER_PULSE);
+            self.plant.shift_counter(counts * MM_PER_PULSE);
         }
     }
 
@@ -76,29 +76,29 @@ impl GalilEmulator {
 
     fn contour_sample(&mut self, dt: f64) {
         // A stop, a limit or an abort takes an axis out of the mode, and with it the mode ends.
-        let is_left =
-            self.contour.axes.iter().any(|axis| self.axes[*axis].motion != Motion::Contour);
-        if is_left {
+        let has_axis_left =
+            self.contour.axes.iter().any(|axis| self.axes[*axis].motion != AxisMotion::Contour);
+        if has_axis_left {
             for axis in self.contour.axes.clone() {
-                self.axes[axis].stop(Setting::Deceleration, 51);
+                self.axes[axis].stop(AxisSetting::Deceleration, 51);
             }
             self.contour.cancel();
         }
         let axes = self.contour.axes.clone();
         let step = self.contour.sample();
         let by = match &step {
-            Step::By(by) => by.as_slice(),
-            Step::Idle | Step::End => &[],
+            ContourStep::By(by) => by.as_slice(),
+            ContourStep::Idle | ContourStep::End => &[],
         };
         for (index, axis) in axes.iter().enumerate() {
             let axis = &mut self.axes[*axis];
             let counts = by.get(index).copied().unwrap_or(0.0);
             axis.profile.place += counts;
             axis.profile.velocity = counts / dt;
-            if step == Step::End {
+            if step == ContourStep::End {
                 // Increments are whole counts; what is not is rounding of their shares.
                 axis.profile.place = axis.profile.place.round();
-                axis.motion = Motion::Rest;
+                axis.motion = AxisMotion::Rest;
                 axis.stop_code = 51;
             }
         }
@@ -109,7 +109,7 @@ impl GalilEmulator {
             return;
         };
         for index in 0..self.recorder.arrays.len() {
-            let value = self.recorded(self.recorder.sources[index]);
+            let value = self.recorded(&self.recorder.sources[index]);
             let name = &self.recorder.arrays[index];
             // An array that was taken away or made smaller meanwhile records nothing.
             if let Ok(array) = self.memory.array_mut(name)
@@ -121,18 +121,18 @@ impl GalilEmulator {
     }
 
     /// The number that a source gives at this sample.
-    fn recorded(&self, source: Source) -> f64 {
+    fn recorded(&self, source: &RecordSource) -> f64 {
         match source {
-            Source::Time => self.clock.count() as f64,
-            Source::Analog(input) => self.analog.as_ref().map_or(0.0, |analog| {
-                let counts = analog.counts(input, self.input_volts(input));
-                match analog.range(input) {
+            RecordSource::Time => self.clock.count() as f64,
+            RecordSource::Analog(input) => self.analog.as_ref().map_or(0.0, |analog| {
+                let counts = analog.counts(*input, self.input_volts(*input));
+                match analog.range(*input) {
                     Some(range) if range.abs() > 2.0 => f64::from(counts),
                     _ => f64::from(counts.cast_signed()),
                 }
             }),
-            Source::Axis(word, axis) => self.told(word, axis).unwrap_or(0.0),
-            Source::Plain(word) => self.told_plain(word).unwrap_or(0.0),
+            RecordSource::Axis(word, axis) => self.axis_operand(word, *axis).unwrap_or(0.0),
+            RecordSource::Controller(word) => self.controller_operand(word).unwrap_or(0.0),
         }
     }
 
@@ -143,31 +143,22 @@ impl GalilEmulator {
 
     /// `QR`.
     pub(super) fn data_record(&self) -> Vec<u8> {
-        let threads = self.running_threads();
-        let mut contouring = 0;
-        for axis in &self.contour.axes {
-            contouring |= 1 << axis;
-        }
-        let mut handles = 0;
-        for (at, client) in self.clients.iter().enumerate() {
-            handles |= u8::from(client.is_open) << at;
-        }
-        let general = General {
+        let general = GeneralBlock {
             sample: self.clock.count(),
             outputs: self.outputs,
             error: self.error.0,
-            threads,
+            threads: self.running_threads(),
             has_echo: self.clients[0].has_echo,
             contour: (self.contour.done, self.contour.free() as u16),
-            contouring,
-            handles,
+            contouring: bits((0..8).map(|axis| self.contour.axes.contains(&axis))),
+            handles: bits(self.clients.iter().map(|client| client.is_open)),
         };
         let analog: Vec<u16> = self.analog.as_ref().map_or_else(Vec::new, |analog| {
             (0..self.axes.len())
                 .map(|input| analog.counts(input, self.input_volts(input)))
                 .collect()
         });
-        record(self.settings.model, &general, &self.axes, &analog)
+        build_record(self.settings.model, &general, &self.axes, &analog)
     }
 
     fn push_record(&mut self) {
@@ -179,11 +170,11 @@ impl GalilEmulator {
         }
     }
 
-    /// The answer of a program's statement is text that nobody asked for.
-    pub(super) fn say_answer(&mut self, answer: Answer) {
+    /// The answer to a statement of a program is unsolicited text.
+    pub(super) fn send_program_output(&mut self, answer: Answer) {
         match answer {
-            Answer::Text(text) => self.say(&format!("{text}\r\n")),
-            Answer::Open(text) => self.say(&text),
+            Answer::Text(text) => self.send_unsolicited(&format!("{text}\r\n")),
+            Answer::Open(text) => self.send_unsolicited(&text),
             Answer::Done | Answer::Bytes(_) | Answer::Silent => {}
         }
     }

@@ -1,10 +1,10 @@
-//! What operands and functions give.
+//! Values of operands and functions.
 
 use super::GalilEmulator;
 use super::analog::INPUTS;
-use super::axis::Prepared;
+use super::axis::PreparedMotion;
 use super::expression::Scope;
-use super::settings::Setting;
+use super::settings::AxisSetting;
 use palpate_drivers::galil::ErrorCode;
 
 /// The axis that a letter stands for.
@@ -19,102 +19,99 @@ pub fn axis_of(letter: char) -> Option<usize> {
     }
 }
 
-fn truth(is_so: bool) -> f64 {
+/// One bit for each flag, the first the lowest.
+pub fn bits(flags: impl Iterator<Item = bool>) -> u8 {
+    flags.enumerate().fold(0, |bits, (at, is_set)| bits | u8::from(is_set) << at)
+}
+
+pub fn truth(is_so: bool) -> f64 {
     if is_so { 1.0 } else { 0.0 }
 }
 
 impl GalilEmulator {
-    /// An axis's number by its two letters; `None` where there is no such operand.
-    pub(super) fn told(&self, word: [u8; 2], index: usize) -> Option<f64> {
+    /// An operand of an axis by its two letters; `None` where there is no such operand.
+    pub(super) fn axis_operand(&self, word: &str, index: usize) -> Option<f64> {
         let axis = self.axes.get(index)?;
-        Some(match &word {
-            b"BG" => truth(axis.is_running()),
-            b"MO" => truth(!axis.is_on),
-            b"SH" => axis.reference(),
-            b"RP" => axis.reference(),
-            b"TD" => axis.pulses(),
+        Some(match word {
+            "BG" => truth(axis.is_running()),
+            "MO" => truth(!axis.is_on),
+            "SH" | "RP" | "DP" => axis.reference(),
+            "TD" => axis.pulses(),
             // "On a stepper axis the step-count register" (DMC-2x00 user manual, page 117).
-            b"DE" if axis.is_stepper() => axis.pulses(),
-            b"TP" | b"DE" => axis.told_position(),
-            b"DP" => axis.reference(),
-            b"TE" | b"TT" | b"RL" | b"QS" | b"YR" => 0.0,
-            b"TV" => axis.profile.velocity,
-            b"TS" => f64::from(axis.switches()),
-            b"SC" => f64::from(axis.stop_code),
-            b"LF" => truth(axis.inputs.forward),
-            b"LR" => truth(axis.inputs.reverse),
-            b"HM" => truth(axis.inputs.home),
-            b"PA" => self.target(index),
-            b"PR" => match axis.prepared {
-                Prepared::Relative(way) => way,
+            "DE" if axis.is_stepper() => axis.pulses(),
+            "TP" | "DE" => axis.encoder_position(),
+            "TE" | "TT" | "RL" | "QS" | "YR" => 0.0,
+            "TV" => axis.profile.velocity,
+            "TS" => f64::from(axis.switches()),
+            "SC" => f64::from(axis.stop_code),
+            "LF" => truth(axis.inputs.forward),
+            "LR" => truth(axis.inputs.reverse),
+            "HM" => truth(axis.inputs.home),
+            "PA" => self.target(index),
+            "PR" | "JG" => match axis.prepared {
+                PreparedMotion::Relative(distance) if word == "PR" => distance,
+                PreparedMotion::Jog(speed) if word == "JG" => speed,
                 _ => 0.0,
             },
-            b"JG" => match axis.prepared {
-                Prepared::Jog(speed) => speed,
-                _ => 0.0,
-            },
-            _ => {
-                let word = std::str::from_utf8(&word).ok()?;
-                axis.settings.get(Setting::named(word)?)
-            }
+            _ => axis.settings.get(AxisSetting::from_word(word)?),
         })
     }
 
-    /// Where the axis goes or would go.
+    /// Target of the axis.
     pub(super) fn target(&self, axis: usize) -> f64 {
         match self.axes[axis].prepared {
-            Prepared::Target(target) => target,
+            PreparedMotion::Target(target) => target,
             _ => self.axes[axis].reference(),
         }
     }
 
     /// A number of the controller as a whole.
-    pub(super) fn told_plain(&self, word: [u8; 2]) -> Option<f64> {
-        Some(match &word {
-            b"TM" => self.clock.tm(),
-            b"TC" => f64::from(self.error.0),
-            b"TB" => f64::from(self.status_byte()),
+    pub(super) fn controller_operand(&self, word: &str) -> Option<f64> {
+        Some(match word {
+            "TM" => self.clock.tm(),
+            "TC" => f64::from(self.error.0),
+            "TB" => f64::from(self.status_byte()),
             // Inputs are pulled up and open.
-            b"TI" => 255.0,
-            b"OP" => f64::from(self.outputs),
-            b"RC" => truth(self.recorder.is_running()),
-            b"RD" => self.recorder.next as f64,
-            b"NO" => f64::from(self.running_threads()),
-            b"BN" => f64::from(self.serial_number()),
-            b"AB" => 1.0,
-            b"CM" => self.contour.free() as f64,
-            b"CS" => f64::from(self.contour.done),
-            b"DM" => self.memory.free(self.settings.model) as f64,
-            b"ED" => self.error_at.0 as f64,
-            b"PF" => self.format_numbers.0,
-            b"VF" => self.format_numbers.1,
-            b"LZ" => self.format_numbers.2,
-            b"CW" => 2.0 - truth(self.is_marked),
-            b"CA" => 0.0,
-            b"CO" if self.settings.model.is_40x0() => 0.0,
-            b"EO" => truth(self.clients[0].has_echo),
+            "TI" => 255.0,
+            "OP" => f64::from(self.outputs),
+            "RC" => truth(self.recorder.is_running()),
+            "RD" => self.recorder.next as f64,
+            "NO" => f64::from(self.running_threads()),
+            "BN" => f64::from(self.serial_number()),
+            "AB" => 1.0,
+            "CM" => self.contour.free() as f64,
+            "CS" => f64::from(self.contour.done),
+            "DM" => self.memory.free(self.settings.model) as f64,
+            "ED" => self.error_at.0 as f64,
+            "PF" => self.format_numbers.0,
+            "VF" => self.format_numbers.1,
+            "LZ" => self.format_numbers.2,
+            "CW" => 2.0 - truth(self.is_marked),
+            "CA" => 0.0,
+            "CO" if self.settings.model.is_40x0() => 0.0,
+            "EO" => truth(self.clients[0].has_echo),
             _ => return None,
         })
     }
 
     /// An operand with a number behind its letters.
-    fn told_numbered(&self, word: [u8; 2], number: usize) -> Result<f64, ErrorCode> {
+    fn numbered_operand(&self, word: &str, number: usize) -> Result<f64, ErrorCode> {
         let thread = || self.threads.get(number).ok_or(ErrorCode::OUT_OF_RANGE);
-        match &word {
-            b"XQ" => {
+        match word {
+            "XQ" => {
                 thread().map(|thread| if thread.is_running { thread.at.0 as f64 } else { -1.0 })
             }
-            b"HX" => thread().map(|thread| truth(thread.is_running)),
-            b"ED" if number == 1 => Ok(self.error_at.1 as f64),
-            b"AQ" => {
+            "HX" => thread().map(|thread| truth(thread.is_running)),
+            "ED" if number == 1 => Ok(self.error_at.1 as f64),
+            "AQ" => {
                 let analog = self.analog.as_ref().ok_or(ErrorCode::NO_ANALOG)?;
                 number
                     .checked_sub(1)
                     .and_then(|input| analog.range(input))
                     .ok_or(ErrorCode::OUT_OF_RANGE)
             }
-            b"DQ" => Ok(2.0),
-            b"CN" => {
+            "DQ" => Ok(2.0),
+            "CN" => {
                 let all = [self.polarity.limit, self.polarity.home];
                 all.iter()
                     .chain(&self.other_inputs)
@@ -122,17 +119,13 @@ impl GalilEmulator {
                     .copied()
                     .ok_or(ErrorCode::OUT_OF_RANGE)
             }
-            _ => self.told_plain(word).ok_or(ErrorCode::BAD_RESPONSE),
+            _ => self.controller_operand(word).ok_or(ErrorCode::BAD_RESPONSE),
         }
     }
 
     /// Threads that run, one bit each.
     pub(super) fn running_threads(&self) -> u8 {
-        let mut bits = 0;
-        for (at, thread) in self.threads.iter().enumerate() {
-            bits |= u8::from(thread.is_running) << at;
-        }
-        bits
+        bits(self.threads.iter().map(|thread| thread.is_running))
     }
 
     /// The byte of `TB`.
@@ -173,23 +166,20 @@ impl Scope for GalilEmulator {
     }
 
     fn operand(&self, name: &str) -> Result<f64, ErrorCode> {
-        let (Some([first, second]), rest) = (name.as_bytes().first_chunk::<2>(), name.get(2..))
-        else {
-            return Err(ErrorCode::BAD_RESPONSE);
-        };
-        let (word, rest) = ([*first, *second], rest.unwrap_or(""));
+        let (word, rest) = name.split_at_checked(2).ok_or(ErrorCode::BAD_RESPONSE)?;
         if let Ok(number) = rest.parse() {
-            return self.told_numbered(word, number);
+            return self.numbered_operand(word, number);
         }
         let mut letters = rest.chars();
         match (letters.next(), letters.next()) {
-            (None, _) => {
-                self.told_plain(word).or_else(|| self.told(word, 0)).ok_or(ErrorCode::BAD_RESPONSE)
-            }
+            (None, _) => self
+                .controller_operand(word)
+                .or_else(|| self.axis_operand(word, 0))
+                .ok_or(ErrorCode::BAD_RESPONSE),
             // The coordinate systems never run.
-            (Some('S' | 'T'), None) if &word == b"BG" => Ok(0.0),
+            (Some('S' | 'T'), None) if word == "BG" => Ok(0.0),
             (Some(letter), None) => axis_of(letter)
-                .and_then(|axis| self.told(word, axis))
+                .and_then(|axis| self.axis_operand(word, axis))
                 .ok_or(ErrorCode::BAD_RESPONSE),
             _ => Err(ErrorCode::BAD_RESPONSE),
         }

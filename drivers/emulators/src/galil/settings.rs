@@ -1,4 +1,4 @@
-//! The numbers that a command sets for an axis and gives back: their ranges, roundings and first values.
+//! Numbers of an axis that a command sets and reads: ranges, rounding and initial values.
 
 use super::model::GalilModel;
 use palpate_drivers::galil::ErrorCode;
@@ -7,15 +7,15 @@ macro_rules! settings {
     ($($name:ident = $word:literal, $first:expr, $min:expr, $max:expr, $decimals:literal;)*) => {
         /// A number of an axis.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Setting {
+        pub enum AxisSetting {
             $(
                 #[doc = $word]
                 $name,
             )*
         }
 
-        const TABLE: &[(&str, Setting, f64, f64, f64, usize)] = &[
-            $(($word, Setting::$name, $first, $min, $max, $decimals),)*
+        const TABLE: &[(&str, AxisSetting, f64, f64, f64, usize)] = &[
+            $(($word, AxisSetting::$name, $first, $min, $max, $decimals),)*
         ];
     };
 }
@@ -69,22 +69,21 @@ settings! {
     DualLoop = "DV", 0.0, 0.0, 1.0, 0;
 }
 
-impl Setting {
-    /// Their number.
+impl AxisSetting {
     pub const COUNT: usize = TABLE.len();
 
     /// The setting that a command of two letters sets.
-    pub fn named(word: &str) -> Option<Self> {
+    pub fn from_word(word: &str) -> Option<Self> {
         TABLE.iter().find(|row| row.0 == word).map(|row| row.1)
     }
 
-    /// Digits behind the point when it is asked for.
+    /// Decimals of its answer.
     pub fn decimals(self) -> usize {
         TABLE[self as usize].5
     }
 
-    /// The value that the controller takes for a wish.
-    pub fn taken(self, value: f64, model: GalilModel, tm: f64) -> Result<f64, ErrorCode> {
+    /// The value that the controller sets when `value` is requested.
+    pub fn round(self, value: f64, model: GalilModel, tm: f64) -> Result<f64, ErrorCode> {
         let (_, _, _, min, max, _) = TABLE[self as usize];
         let max = match self {
             Self::Acceleration | Self::Deceleration | Self::LimitDeceleration => {
@@ -98,7 +97,7 @@ impl Setting {
         }
         Ok(match self {
             // Resolution 2 * (1000 / TM) counts/s (DMC-40x0 command reference, `SP`).
-            Self::Speed => speed_taken(value, tm),
+            Self::Speed => round_speed(value, tm),
             // "73422 -> 72704": a DMC-30010 as quoted in ESRF BLISS 2.4.0, controllers/motors/galil.
             Self::Acceleration | Self::Deceleration | Self::LimitDeceleration => {
                 (value / 1024.0).floor() * 1024.0
@@ -112,28 +111,26 @@ impl Setting {
 }
 
 /// A speed with its sign, towards zero to the controller's resolution.
-pub fn speed_taken(value: f64, tm: f64) -> f64 {
+pub fn round_speed(value: f64, tm: f64) -> f64 {
     let quantum = 2.0 * 1000.0 / tm;
     (value / quantum).trunc() * quantum
 }
 
-/// The settings of one axis.
 #[derive(Clone, Debug)]
-pub struct Settings([f64; Setting::COUNT]);
+pub struct AxisSettings([f64; AxisSetting::COUNT]);
 
-impl Settings {
+impl AxisSettings {
     /// As after a reset.
     pub fn new() -> Self {
         Self(std::array::from_fn(|i| TABLE[i].2))
     }
 
-    /// What is set.
-    pub fn get(&self, setting: Setting) -> f64 {
+    pub fn get(&self, setting: AxisSetting) -> f64 {
         self.0[setting as usize]
     }
 
-    /// Sets what [`Setting::taken`] gave.
-    pub fn set(&mut self, setting: Setting, value: f64) {
+    /// Sets what [`AxisSetting::round`] gave.
+    pub fn set(&mut self, setting: AxisSetting, value: f64) {
         self.0[setting as usize] = value;
     }
 }
@@ -146,21 +143,21 @@ mod tests {
     fn the_table_is_in_the_order_of_its_names() {
         for (at, row) in TABLE.iter().enumerate() {
             assert_eq!(row.1 as usize, at);
-            assert_eq!(Setting::named(row.0), Some(row.1));
+            assert_eq!(AxisSetting::from_word(row.0), Some(row.1));
         }
     }
 
     #[test]
     fn speeds_and_accelerations_are_rounded_down() {
         let model = GalilModel::Dmc4143;
-        let taken = |setting: Setting, value, tm| setting.taken(value, model, tm).unwrap();
-        assert_eq!(taken(Setting::Acceleration, 73_422.0, 1000.0), 72_704.0);
-        assert_eq!(taken(Setting::Speed, 51.9, 1000.0), 50.0);
-        assert_eq!(taken(Setting::Speed, 51.9, 500.0), 48.0);
-        assert_eq!(speed_taken(-51.9, 1000.0), -50.0);
+        let rounded = |setting: AxisSetting, value, tm| setting.round(value, model, tm).unwrap();
+        assert_eq!(rounded(AxisSetting::Acceleration, 73_422.0, 1000.0), 72_704.0);
+        assert_eq!(rounded(AxisSetting::Speed, 51.9, 1000.0), 50.0);
+        assert_eq!(rounded(AxisSetting::Speed, 51.9, 500.0), 48.0);
+        assert_eq!(round_speed(-51.9, 1000.0), -50.0);
         for wrong in [1023.0, -1.0, 1.1e9, f64::NAN] {
             assert_eq!(
-                Setting::Acceleration.taken(wrong, model, 1000.0),
+                AxisSetting::Acceleration.round(wrong, model, 1000.0),
                 Err(ErrorCode::OUT_OF_RANGE)
             );
         }

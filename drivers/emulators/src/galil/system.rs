@@ -3,7 +3,7 @@
 use super::analog::Analog;
 use super::data_record::lengths;
 use super::expression::evaluate;
-use super::format::Format;
+use super::format::NumberFormat;
 use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 use palpate_model::Nanos;
@@ -22,7 +22,7 @@ impl GalilEmulator {
     }
 
     /// All commands that are about no axis and move no data.
-    pub(super) fn system_word(
+    pub(super) fn system_command(
         &mut self,
         origin: Origin,
         word: &str,
@@ -30,31 +30,33 @@ impl GalilEmulator {
     ) -> Result<Answer, ErrorCode> {
         match word {
             "MG" => return self.message(arguments),
-            "TC" => return self.tell_error(arguments),
+            "TC" => return self.query_error(arguments),
             "TB" | "TI" => {
-                let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.told_plain(letters).unwrap_or(0.0);
-                let format = Format { whole: 3, ..self.position_format };
+                let value = self.controller_operand(word).unwrap_or(0.0);
+                let format = NumberFormat { whole: 3, ..self.position_format };
                 return Ok(Answer::Text(format.write(value)));
             }
             "ID" => return Ok(Answer::Text(self.identity())),
-            "WH" => return Ok(Answer::Text(self.who(origin))),
-            "TH" => return Ok(Answer::Text(self.handles())),
+            "WH" => return Ok(Answer::Text(self.connection_name(origin))),
+            "TH" => return Ok(Answer::Text(self.list_handles())),
             "QZ" => return Ok(Answer::Text(lengths(self.settings.model))),
-            "QR" => return self.query_record(origin),
+            // Which blocks a client asks for is ignored: all come.
+            "QR" if origin.client().is_some() => {
+                return Ok(Answer::Bytes(self.data_record()));
+            }
+            "QR" => return Err(ErrorCode::NOT_IN_PROGRAM),
             "RS" => {
                 self.reset();
                 return Ok(Answer::Silent);
             }
             "TM" | "PF" | "VF" | "LZ" if arguments == "?" => {
-                let letters = [word.as_bytes()[0], word.as_bytes()[1]];
-                let value = self.told_plain(letters).unwrap_or(0.0);
+                let value = self.controller_operand(word).unwrap_or(0.0);
                 return Ok(Answer::Text(self.variable_format.write(value)));
             }
             "TM" => self.set_tm(arguments)?,
             "PF" | "VF" | "LZ" => self.set_format(word, arguments)?,
             "EO" => {
-                let has_echo = self.one_of(arguments, &[0.0, 1.0])? == 1.0;
+                let has_echo = self.allowed_number(arguments, &[0.0, 1.0])? == 1.0;
                 // Echo is for the serial line.
                 if self.settings.is_serial {
                     self.clients[0].has_echo = has_echo;
@@ -62,15 +64,13 @@ impl GalilEmulator {
             }
             "CW" => {
                 // A second field, for terminals without hardware handshake, changes nothing here.
-                let mark = self.numbers(arguments)?.first().copied().flatten();
-                self.is_marked = match mark {
-                    Some(1.0) => true,
-                    Some(2.0 | 0.0) => false,
-                    Some(_) => return Err(ErrorCode::OUT_OF_RANGE),
-                    None => return Err(ErrorCode::FEW_FIELDS),
+                self.is_marked = match self.first_number(arguments)? {
+                    1.0 => true,
+                    2.0 | 0.0 => false,
+                    _ => return Err(ErrorCode::OUT_OF_RANGE),
                 };
             }
-            "CF" => self.unsolicited_to = self.handle_named(origin, arguments)?,
+            "CF" => self.unsolicited_to = self.parse_handle(origin, arguments)?,
             "CN" => self.configure_inputs(arguments)?,
             "AQ" => self.set_analog(arguments)?,
             "SB" | "CB" => self.set_output(word == "SB", arguments)?,
@@ -85,8 +85,10 @@ impl GalilEmulator {
                 Some(value) if (0.0..=65_535.0).contains(&value) => self.outputs = value as u16,
                 _ => return Err(ErrorCode::OUT_OF_RANGE),
             },
-            // The addresses that the DMC-30010's answer to `TH` tells too.
-            "IA" if arguments == "?" => return Ok(Answer::Text("127, 0, 0, 1".to_owned())),
+            // As in the DMC-30010's answer to `TH`.
+            "IA" if arguments == "?" => {
+                return Ok(Answer::Text("127, 0, 0, 1".to_owned()));
+            }
             "CO" if !self.settings.model.is_40x0() => return Err(ErrorCode::UNRECOGNIZED),
             // Stored on the controller; nothing here depends on them.
             "CO" | "AO" | "DQ" | "TW" | "TR" | "IA" | "IK" | "SM" | "DH" | "PW" => {
@@ -102,9 +104,7 @@ impl GalilEmulator {
             "NO" => {}
             // Interrupts are for boards on a computer's bus.
             "EI" | "UI" => return Err(ErrorCode::NOT_SUPPORTED),
-            "ED" | "LS" if matches!(origin, Origin::Client(_)) => {
-                return Err(ErrorCode::NOT_SUPPORTED);
-            }
+            "ED" | "LS" if origin.client().is_some() => return Err(ErrorCode::NOT_SUPPORTED),
             "AM" | "MC" | "WT" | "WC" | "AT" | "AI" | "JP" | "JS" | "IF" | "EN" | "RE" | "ZS" => {
                 return Err(ErrorCode::PROGRAM_ONLY);
             }
@@ -113,7 +113,7 @@ impl GalilEmulator {
         Ok(Answer::Done)
     }
 
-    fn one_of(&self, arguments: &str, allowed: &[f64]) -> Result<f64, ErrorCode> {
+    fn allowed_number(&self, arguments: &str, allowed: &[f64]) -> Result<f64, ErrorCode> {
         match self.numbers(arguments)?.as_slice() {
             [Some(value)] if allowed.contains(value) => Ok(*value),
             [Some(_)] => Err(ErrorCode::OUT_OF_RANGE),
@@ -121,8 +121,8 @@ impl GalilEmulator {
         }
     }
 
-    /// `TC`, `TC0`: the number; `TC1`: number and text. Telling clears it.
-    fn tell_error(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    /// `TC`, `TC0`: the number; `TC1`: number and text. The answer clears it.
+    fn query_error(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let has_text = match arguments {
             "" | "0" | "?" => false,
             "1" => true,
@@ -146,7 +146,7 @@ impl GalilEmulator {
         )
     }
 
-    fn who(&self, origin: Origin) -> String {
+    fn connection_name(&self, origin: Origin) -> String {
         match origin {
             Origin::Client(channel) if !self.settings.is_serial => {
                 format!("IH{}", handle_letter(channel))
@@ -156,7 +156,7 @@ impl GalilEmulator {
     }
 
     /// Of the form that a DMC-30010 gave in ESRF BLISS 2.4.0, `controllers/motors/galil`.
-    fn handles(&self) -> String {
+    fn list_handles(&self) -> String {
         let mut text =
             "CONTROLLER IP ADDRESS 127,0,0,1 ETHERNET ADDRESS 00-50-4C-00-07-1C".to_owned();
         if self.settings.is_serial {
@@ -173,20 +173,9 @@ impl GalilEmulator {
         text
     }
 
-    fn query_record(&self, origin: Origin) -> Result<Answer, ErrorCode> {
-        match origin {
-            // Which blocks a client asks for is ignored: all come.
-            Origin::Client(_) => Ok(Answer::Bytes(self.data_record())),
-            Origin::Thread(_) => Err(ErrorCode::NOT_IN_PROGRAM),
-        }
-    }
-
     fn set_tm(&mut self, arguments: &str) -> Result<(), ErrorCode> {
-        let Some(tm) = self.numbers(arguments)?.first().copied().flatten() else {
-            return Err(ErrorCode::FEW_FIELDS);
-        };
         // The period is a whole number of 1/16 us (62.5 and 187.5 are among the least ones).
-        let tm = (tm * 16.0).round() / 16.0;
+        let tm = (self.first_number(arguments)? * 16.0).round() / 16.0;
         if tm > 0.0 && !(self.settings.model.tm_min()..=TM_MAX).contains(&tm) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
@@ -206,19 +195,15 @@ impl GalilEmulator {
         }
         let (position, variable, removes_zeros) = self.format_numbers;
         let has_zeros = removes_zeros == 0.0;
-        self.position_format = Format::from_number(position, has_zeros);
-        self.variable_format = Format::from_number(variable, has_zeros);
+        self.position_format = NumberFormat::from_number(position, has_zeros);
+        self.variable_format = NumberFormat::from_number(variable, has_zeros);
         Ok(())
     }
 
     /// `A` to `H`, `S` for the serial line, `I` for the connection that asks.
-    fn handle_named(&self, origin: Origin, name: &str) -> Result<Option<usize>, ErrorCode> {
-        let asking = match origin {
-            Origin::Client(channel) => Some(channel),
-            Origin::Thread(_) => None,
-        };
+    fn parse_handle(&self, origin: Origin, name: &str) -> Result<Option<usize>, ErrorCode> {
         match name.as_bytes() {
-            b"I" => Ok(asking),
+            b"I" => Ok(origin.client()),
             b"S" => Ok(self.settings.is_serial.then_some(0)),
             [letter @ b'A'..=b'H'] if !self.settings.is_serial => {
                 Ok(Some(usize::from(letter - b'A')))
@@ -280,7 +265,7 @@ impl GalilEmulator {
         if !(PUSH_MIN..=30_000.0).contains(&interval) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let to = self.handle_named(origin, handle.trim())?;
+        let to = self.parse_handle(origin, handle.trim())?;
         let to = to.filter(|to| self.clients[*to].is_open);
         self.pushed = Some((interval as u64, to.ok_or(ErrorCode::CLOSED_HANDLE)?));
         Ok(())
@@ -290,7 +275,7 @@ impl GalilEmulator {
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        if let Origin::Client(channel) = origin {
+        if let Some(channel) = origin.client() {
             self.clients[channel].busy_until = Some(self.now + BURN);
         }
         Ok(())
@@ -299,18 +284,15 @@ impl GalilEmulator {
     /// `IHT=>-3` closes all other handles, `IHS=>-2` the one that sent it, `IHN=>-2` all but that one, `IHC=>-1` one
     /// (DMC-1400 command reference, `IH`; `GalilConnector.cpp` of EPICS).
     fn close_handles(&mut self, origin: Origin, arguments: &str) -> Result<(), ErrorCode> {
-        let Some((who, how)) = arguments.split_once("=>") else {
+        let Some((selection, how)) = arguments.split_once("=>") else {
             // Opening a connection of its own to another device.
             return Err(ErrorCode::NOT_SUPPORTED);
         };
         if !["-1", "-2", "-3"].contains(&how.trim()) {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        let asking = match origin {
-            Origin::Client(channel) => Some(channel),
-            Origin::Thread(_) => None,
-        };
-        let which: Vec<usize> = match who.trim().as_bytes() {
+        let asking = origin.client();
+        let closed: Vec<usize> = match selection.trim().as_bytes() {
             b"S" => asking.into_iter().collect(),
             b"T" | b"N" => (0..self.clients.len()).filter(|at| Some(*at) != asking).collect(),
             [letter @ b'A'..=b'H'] => vec![usize::from(letter - b'A')],
@@ -319,7 +301,7 @@ impl GalilEmulator {
         if self.settings.is_serial {
             return Ok(());
         }
-        for channel in which {
+        for channel in closed {
             let client = &mut self.clients[channel];
             if client.is_open {
                 client.is_open = false;

@@ -1,10 +1,10 @@
-//! Arrays and programs: made, recorded, sent up and down.
+//! Arrays and programs: dimension, record, upload and download.
 
-use super::client::Mode;
+use super::client::ClientMode;
 use super::commands::fields;
 use super::expression::evaluate;
 use super::program::{Program, check_line};
-use super::record::Source;
+use super::record::RecordSource;
 use super::scope::axis_of;
 use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
@@ -19,7 +19,7 @@ const fn ends_download(byte: u8) -> bool {
 
 impl GalilEmulator {
     /// A command about arrays or programs; `None` when it is another one.
-    pub(super) fn transfer_word(
+    pub(super) fn transfer_command(
         &mut self,
         origin: Origin,
         word: &str,
@@ -27,10 +27,21 @@ impl GalilEmulator {
     ) -> Option<Result<Answer, ErrorCode>> {
         let result = match word {
             "DM" => self.dimension(arguments),
-            "DA" => self.forget(arguments),
-            "LV" => Ok(self.list_variables()),
-            "LA" => Ok(self.list_arrays()),
-            "LL" => Ok(self.list_labels()),
+            "DA" => self.deallocate(arguments),
+            "LV" => {
+                let format = self.variable_format;
+                let line =
+                    |(name, value): (&String, f64)| format!("{name}={}", format.write(value));
+                Ok(join_lines(self.memory.variables().map(line)))
+            }
+            "LA" => {
+                let line = |(name, length)| format!("{name}[{length}]");
+                Ok(join_lines(self.memory.arrays().map(line)))
+            }
+            "LL" => {
+                let line = |(name, line)| format!("#{name}={line}");
+                Ok(join_lines(self.program.labels().map(line)))
+            }
             "RA" => self.record_arrays(arguments),
             "RD" => self.record_sources(arguments),
             "RC" => self.record(arguments),
@@ -59,32 +70,11 @@ impl GalilEmulator {
         Ok(Answer::Done)
     }
 
-    fn forget(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+    fn deallocate(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         for field in fields(arguments) {
-            self.memory.forget(field)?;
+            self.memory.deallocate(field)?;
         }
         Ok(Answer::Done)
-    }
-
-    fn list_variables(&self) -> Answer {
-        let lines: Vec<String> = self
-            .memory
-            .variables()
-            .map(|(name, value)| format!("{name}={}", self.variable_format.write(value)))
-            .collect();
-        lines_or_nothing(&lines)
-    }
-
-    fn list_arrays(&self) -> Answer {
-        let lines: Vec<String> =
-            self.memory.arrays().map(|(name, length)| format!("{name}[{length}]")).collect();
-        lines_or_nothing(&lines)
-    }
-
-    fn list_labels(&self) -> Answer {
-        let lines: Vec<String> =
-            self.program.labels().map(|(name, line)| format!("#{name}={line}")).collect();
-        lines_or_nothing(&lines)
     }
 
     /// `RA force[],pos[]`.
@@ -101,39 +91,35 @@ impl GalilEmulator {
 
     /// `RD _AFX,_TDA`.
     fn record_sources(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
-        let sources: Result<Vec<Source>, ErrorCode> =
+        let sources: Result<Vec<RecordSource>, ErrorCode> =
             fields(arguments).into_iter().map(|field| self.source(field)).collect();
         self.recorder.set_sources(sources?)?;
         Ok(Answer::Done)
     }
 
-    fn source(&self, field: &str) -> Result<Source, ErrorCode> {
+    fn source(&self, field: &str) -> Result<RecordSource, ErrorCode> {
         let name = field.strip_prefix('_').unwrap_or(field);
         if name == "TIME" {
-            return Ok(Source::Time);
+            return Ok(RecordSource::Time);
         }
-        let (Some([first, second]), Some(rest)) =
-            (name.as_bytes().first_chunk::<2>(), name.get(2..))
-        else {
-            return Err(ErrorCode::NO_SOURCE);
-        };
-        let word = [*first, *second];
+        let (word, rest) = name.split_at_checked(2).ok_or(ErrorCode::NO_SOURCE)?;
         let mut letters = rest.chars();
         let index = match (letters.next(), letters.next()) {
             (None, _) => None,
             (Some(letter), None) => Some(axis_of(letter).ok_or(ErrorCode::NO_SOURCE)?),
             _ => return Err(ErrorCode::NO_SOURCE),
         };
-        match (&word, index) {
+        match (word, index) {
             // Inputs go by the letters of axes (DMC-1700/1800 user manual, page 159).
-            (b"AF", Some(_)) if self.analog.is_none() => Err(ErrorCode::NO_ANALOG),
-            (b"AF", Some(input)) => Ok(Source::Analog(input)),
+            ("AF", Some(_)) if self.analog.is_none() => Err(ErrorCode::NO_ANALOG),
+            ("AF", Some(input)) => Ok(RecordSource::Analog(input)),
             (
-                b"DE" | b"TP" | b"TE" | b"SH" | b"RL" | b"TS" | b"SC" | b"TT" | b"RP" | b"TD"
-                | b"TV",
+                "DE" | "TP" | "TE" | "SH" | "RL" | "TS" | "SC" | "TT" | "RP" | "TD" | "TV",
                 Some(axis),
-            ) if axis < self.axes.len() => Ok(Source::Axis(word, axis)),
-            (b"NO", Some(_)) | (b"TI" | b"OP" | b"NO", None) => Ok(Source::Plain(word)),
+            ) if axis < self.axes.len() => Ok(RecordSource::Axis(word.to_owned(), axis)),
+            ("NO", Some(_)) | ("TI" | "OP" | "NO", None) => {
+                Ok(RecordSource::Controller(word.to_owned()))
+            }
             _ => Err(ErrorCode::NO_SOURCE),
         }
     }
@@ -144,9 +130,7 @@ impl GalilEmulator {
             let is_running = f64::from(u8::from(self.recorder.is_running()));
             return Ok(Answer::Text(self.position_format.write(is_running)));
         }
-        let numbers = self.numbers(arguments)?;
-        let n = numbers.first().copied().flatten();
-        let n = n.ok_or(ErrorCode::FEW_FIELDS)?;
+        let n = self.first_number(arguments)?;
         if n == 0.0 {
             self.recorder.stop();
             return Ok(Answer::Done);
@@ -158,7 +142,7 @@ impl GalilEmulator {
             .map(|name| self.memory.array(name).map(<[f64]>::len))
             .collect();
         let shortest = lengths?.into_iter().min().unwrap_or(0);
-        let m = numbers.get(1).copied().flatten();
+        let m = self.numbers(arguments)?.get(1).copied().flatten();
         let now = self.clock.count();
         self.recorder.start(n, m, shortest, now)?;
         Ok(Answer::Done)
@@ -210,32 +194,28 @@ impl GalilEmulator {
     }
 
     fn download_values(&mut self, origin: Origin, arguments: &str) -> Result<Answer, ErrorCode> {
-        let Origin::Client(channel) = origin else {
-            return Err(ErrorCode::NOT_IN_PROGRAM);
-        };
+        let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         let (name, next, end, _) = self.range_of(arguments)?;
         self.clients[channel].mode =
-            Mode::Values { name, next, end, value: Vec::new(), is_wrong: false };
+            ClientMode::Values { name, next, end, value: Vec::new(), is_wrong: false };
         Ok(Answer::Silent)
     }
 
     fn download(&mut self, origin: Origin) -> Result<Answer, ErrorCode> {
-        let Origin::Client(channel) = origin else {
-            return Err(ErrorCode::NOT_IN_PROGRAM);
-        };
+        let channel = origin.client().ok_or(ErrorCode::NOT_IN_PROGRAM)?;
         if self.running_threads() != 0 {
             return Err(ErrorCode::PROGRAM_RUNNING);
         }
-        self.clients[channel].mode = Mode::Program { lines: Vec::new(), line: Vec::new() };
+        self.clients[channel].mode = ClientMode::Program { lines: Vec::new(), line: Vec::new() };
         Ok(Answer::Silent)
     }
 
     /// A byte of a program. Silence until the end, then two prompts, one of them that of `DL`; a line that is
     /// refused gives its `?` before (`GalilConnector.cpp` of EPICS, galil-io of TMT).
-    pub(super) fn take_program(&mut self, channel: usize, byte: u8) {
+    pub(super) fn take_program_byte(&mut self, channel: usize, byte: u8) {
         let model = self.settings.model;
         let client = &mut self.clients[channel];
-        let Mode::Program { lines, line } = &mut client.mode else {
+        let ClientMode::Program { lines, line } = &mut client.mode else {
             return;
         };
         let is_end = ends_download(byte);
@@ -264,7 +244,7 @@ impl GalilEmulator {
         let finished = is_end.then(|| std::mem::take(lines));
         client.send(answer);
         if let Some(lines) = finished {
-            client.mode = Mode::Commands;
+            client.mode = ClientMode::Commands;
             match Program::new(lines, model) {
                 Ok(program) => {
                     self.program = program;
@@ -279,9 +259,9 @@ impl GalilEmulator {
     }
 
     /// A byte of an array's values, which a comma or a carriage return ends.
-    pub(super) fn take_value(&mut self, channel: usize, byte: u8) {
+    pub(super) fn take_value_byte(&mut self, channel: usize, byte: u8) {
         let client = &mut self.clients[channel];
-        let Mode::Values { name, next, end, value, is_wrong } = &mut client.mode else {
+        let ClientMode::Values { name, next, end, value, is_wrong } = &mut client.mode else {
             return;
         };
         let is_end = ends_download(byte);
@@ -291,7 +271,7 @@ impl GalilEmulator {
             if !text.is_empty() {
                 match text.parse::<f64>() {
                     Ok(number) if number.is_finite() && *next < *end => {
-                        let held = super::format::held(number);
+                        let held = super::format::quantise(number);
                         let is_set = self.memory.set_element(name, *next as f64, held).is_ok();
                         *is_wrong |= !is_set;
                         *next += 1;
@@ -311,7 +291,7 @@ impl GalilEmulator {
         }
         if is_end {
             let is_wrong = *is_wrong;
-            client.mode = Mode::Commands;
+            client.mode = ClientMode::Commands;
             client.send(if is_wrong { b"?" } else { b":" });
         }
     }
@@ -350,11 +330,12 @@ impl GalilEmulator {
         if !is_one {
             return Err(ErrorCode::OUT_OF_RANGE);
         }
-        self.threads[number as usize] = super::Thread::idle();
+        self.threads[number as usize] = super::ProgramThread::idle();
         Ok(Answer::Done)
     }
 }
 
-fn lines_or_nothing(lines: &[String]) -> Answer {
+fn join_lines(lines: impl Iterator<Item = String>) -> Answer {
+    let lines: Vec<String> = lines.collect();
     if lines.is_empty() { Answer::Done } else { Answer::Text(lines.join("\r\n")) }
 }

@@ -2,49 +2,15 @@
 
 use std::collections::BTreeMap;
 
-/// As a board is after `$RST=*` (doc/markdown/interface.md, print-out of `$$`; `$10` as in defaults.h of 1.1h).
-const FACTORY: [(u16, f64); 34] = [
-    (0, 10.0),
-    (1, 25.0),
-    (2, 0.0),
-    (3, 0.0),
-    (4, 0.0),
-    (5, 0.0),
-    (6, 0.0),
-    (10, 1.0),
-    (11, 0.010),
-    (12, 0.002),
-    (13, 0.0),
-    (20, 0.0),
-    (21, 0.0),
-    (22, 0.0),
-    (23, 0.0),
-    (24, 25.0),
-    (25, 500.0),
-    (26, 250.0),
-    (27, 1.0),
-    (30, 1000.0),
-    (31, 0.0),
-    (32, 0.0),
-    (100, 250.0),
-    (101, 250.0),
-    (102, 250.0),
-    (110, 500.0),
-    (111, 500.0),
-    (112, 500.0),
-    (120, 10.0),
-    (121, 10.0),
-    (122, 10.0),
-    (130, 200.0),
-    (131, 200.0),
-    (132, 200.0),
-];
+/// After `$RST=*` (doc/markdown/interface.md, print-out of `$$`; `$10` as in defaults.h of 1.1h).
+const FACTORY: &str = "0=10 1=25 2=0 3=0 4=0 5=0 6=0 10=1 11=0.010 12=0.002 13=0 20=0 21=0 22=0 23=0 24=25 25=500 \
+    26=250 27=1 30=1000 31=0 32=0 100=250 101=250 102=250 110=500 111=500 112=500 120=10 121=10 122=10 130=200 \
+    131=200 132=200";
 
 /// What the slide of this bench needs: a motor that stays on, steps, speed, acceleration and travel.
 const SLIDE: [(u16, f64); 6] =
     [(1, 255.0), (23, 1.0), (100, 400.0), (110, 1500.0), (120, 60.0), (130, 150.0)];
 
-/// All settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Eeprom {
     values: BTreeMap<u16, f64>,
@@ -55,40 +21,39 @@ pub struct Eeprom {
 }
 
 impl Eeprom {
-    /// As after `$RST=*`.
-    #[must_use]
+    /// After `$RST=*`.
     pub fn factory() -> Self {
         Self {
-            values: FACTORY.into_iter().collect(),
-            build_info: String::new(),
-            startup: [String::new(), String::new()],
+            values: FACTORY
+                .split_whitespace()
+                .filter_map(|line| line.split_once('='))
+                .filter_map(|(number, value)| Some((number.parse().ok()?, value.parse().ok()?)))
+                .collect(),
+            ..Self::default()
         }
     }
 
-    /// As somebody has set the slide up.
-    #[must_use]
+    /// Set up for the slide.
     pub fn slide() -> Self {
         let mut eeprom = Self::factory();
         eeprom.values.extend(SLIDE);
         eeprom
     }
 
-    /// The numbered settings of another.
-    pub fn take_numbers_of(&mut self, other: &Self) {
+    pub fn copy_numbers_from(&mut self, other: &Self) {
         self.values.clone_from(&other.values);
     }
 
-    /// A value; zero for a number that there is not.
-    pub fn get(&self, number: u16) -> f64 {
+    /// A value; zero for an unknown number.
+    pub fn value(&self, number: u16) -> f64 {
         self.values.get(&number).copied().unwrap_or(0.0)
     }
 
-    /// Whether a flag is set.
-    pub fn flag(&self, number: u16) -> bool {
-        self.get(number) != 0.0
+    pub fn is_set(&self, number: u16) -> bool {
+        self.value(number) != 0.0
     }
 
-    /// Stores a value, or tells the error (settings.c, `settings_store_global_setting`).
+    /// Stores a value, or returns the error number (settings.c, `settings_store_global_setting`).
     pub fn set(&mut self, number: u16, value: f64) -> Result<(), u8> {
         if value < 0.0 {
             return Err(4);
@@ -98,7 +63,7 @@ impl Eeprom {
         }
         match number {
             0 if value < 3.0 => return Err(6),
-            20 if value != 0.0 && !self.flag(22) => return Err(10),
+            20 if value != 0.0 && !self.is_set(22) => return Err(10),
             // Without homing there are no soft limits.
             22 if value == 0.0 => {
                 self.values.insert(20, 0.0);
@@ -117,11 +82,8 @@ impl Eeprom {
         let mut text = String::new();
         for (number, value) in &self.values {
             let is_real = matches!(number, 11 | 12 | 24 | 25 | 27) || *number >= 100;
-            if is_real {
-                text.push_str(&format!("${number}={value:.3}\r\n"));
-            } else {
-                text.push_str(&format!("${number}={value:.0}\r\n"));
-            }
+            let decimals = if is_real { 3 } else { 0 };
+            text.push_str(&format!("${number}={value:.decimals$}\r\n"));
         }
         text
     }
@@ -132,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_listing_is_that_of_the_manual() {
+    fn listing_is_that_of_the_manual() {
         let listing = Eeprom::factory().listing();
         assert!(listing.starts_with("$0=10\r\n$1=25\r\n$2=0\r\n"), "{listing}");
         assert!(listing.contains("$10=1\r\n$11=0.010\r\n$12=0.002\r\n$13=0\r\n$20=0\r\n"));
@@ -140,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_allowed_has_its_error() {
+    fn forbidden_values_have_their_error_number() {
         let mut eeprom = Eeprom::factory();
         assert_eq!(eeprom.set(0, 2.0), Err(6));
         assert_eq!(eeprom.set(20, 1.0), Err(10));
@@ -149,7 +111,7 @@ mod tests {
         assert_eq!(eeprom.set(22, 1.0), Ok(()));
         assert_eq!(eeprom.set(20, 1.0), Ok(()));
         assert_eq!(eeprom.set(22, 0.0), Ok(()));
-        assert!(!eeprom.flag(20));
+        assert!(!eeprom.is_set(20));
         assert_eq!(eeprom.set(100, 66.667), Ok(()));
         assert!(eeprom.listing().contains("$100=66.667\r\n"));
     }

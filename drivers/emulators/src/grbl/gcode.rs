@@ -1,20 +1,20 @@
-//! Words of a block of G-code: what it asks for, or why it is refused (gnea/grbl, gcode.c; doc/csv/error_codes_en_US.csv).
-//! Arcs alone are left out: a slide has no plane. They are read, and refused as not supported if nothing else is wrong.
+//! Parses a block of G-code, or refuses it with its error number (gnea/grbl, gcode.c; doc/csv/error_codes_en_US.csv).
+//! Only arcs are missing: a slide has no plane. They are read, and refused as not supported if nothing else is wrong.
 
-use super::meaning::finish;
-use super::planner::{AXES, Place};
-use super::words::{Words, number, take_g, take_m, take_value};
+use super::block_check::check_block;
+use super::planner::{AXES, Coordinates};
+use super::words::{BlockWords, number, take_g, take_m, take_value};
 
 /// Modes that stay from block to block.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Modes {
+pub struct ModalState {
     /// 0 to 3, 80, or 382 to 385 for `G38.2` to `G38.5`.
     pub motion: u16,
     /// 17, 18 or 19.
     pub plane: u8,
     pub is_inch: bool,
     pub is_relative: bool,
-    /// `G93`: `F` tells how many such blocks a minute has.
+    /// `G93`: `F` is the number of such blocks per minute.
     pub is_inverse: bool,
     /// Of `G54` to `G59`, from 0 on.
     pub system: usize,
@@ -28,7 +28,7 @@ pub struct Modes {
     pub spindle_speed: f64,
 }
 
-impl Default for Modes {
+impl Default for ModalState {
     fn default() -> Self {
         Self {
             motion: 0,
@@ -46,9 +46,8 @@ impl Default for Modes {
     }
 }
 
-impl Modes {
-    /// What `M2` and `M30` leave of them.
-    #[must_use]
+impl ModalState {
+    /// After `M2` and `M30`.
     pub fn after_end(self) -> Self {
         Self {
             is_inch: self.is_inch,
@@ -61,46 +60,43 @@ impl Modes {
     }
 }
 
-/// Coordinate systems and places that are stored, in mm of the machine.
+/// Coordinate systems and stored positions, in machine coordinates in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Offsets {
+pub struct CoordinateOffsets {
     /// `G54` to `G59`.
-    pub systems: [Place; 6],
+    pub systems: [Coordinates; 6],
     /// `G28` and `G30`.
-    pub stored: [Place; 2],
+    pub stored: [Coordinates; 2],
     /// `G92`.
-    pub shift: Place,
+    pub shift: Coordinates,
     /// `G43.1`, of Z.
     pub tool: f64,
 }
 
-impl Offsets {
-    /// Work coordinates are those of the machine less this.
-    pub fn of(&self, system: usize) -> Place {
-        let mut all: Place =
+impl CoordinateOffsets {
+    /// Work coordinates are machine coordinates minus this.
+    pub fn of(&self, system: usize) -> Coordinates {
+        let mut all: Coordinates =
             std::array::from_fn(|axis| self.systems[system][axis] + self.shift[axis]);
         all[AXES - 1] += self.tool;
         all
     }
 }
 
-/// A motion that a block asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
+pub struct GcodeMotion {
     /// 0, 1, or 382 to 385.
     pub kind: u16,
-    /// Where to, in machine coordinates.
-    pub to: Place,
+    /// Target in machine coordinates.
+    pub to: Coordinates,
     /// mm/min.
     pub feed: f64,
-    /// It was asked for with `$J=`.
+    /// Requested with `$J=`.
     pub is_jog: bool,
 }
 
-/// What becomes of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flow {
-    /// It goes on.
+pub enum ProgramFlow {
     Runs,
     /// `M0`.
     Pauses,
@@ -108,46 +104,42 @@ pub enum Flow {
     Ends,
 }
 
-/// What a block does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parsed {
-    /// Modes after it.
-    pub modes: Modes,
+pub struct ParsedBlock {
+    pub modes: ModalState,
     /// Coordinates after it.
-    pub offsets: Offsets,
+    pub offsets: CoordinateOffsets,
     /// `G4`, in s.
     pub dwell: Option<f64>,
-    /// A first way, of `G28` and `G30`.
-    pub via: Option<Motion>,
-    /// Its motion, if it has one.
-    pub motion: Option<Motion>,
-    /// What becomes of the program.
-    pub flow: Flow,
-    /// It is done only when all before it is.
+    /// First motion of `G28` and `G30`.
+    pub via: Option<GcodeMotion>,
+    pub motion: Option<GcodeMotion>,
+    pub flow: ProgramFlow,
+    /// It begins only after all earlier blocks have ended.
     pub waits_for_rest: bool,
 }
 
 /// Reads a block, or a jog without its `$J=`. `here` is where the last block ends, in machine coordinates.
 pub fn parse(
     line: &str,
-    modes: Modes,
+    modes: ModalState,
     is_jog: bool,
-    here: Place,
-    offsets: &Offsets,
-) -> Result<Parsed, u8> {
+    here: Coordinates,
+    offsets: &CoordinateOffsets,
+) -> Result<ParsedBlock, u8> {
     let mut block = modes;
     if is_jog {
         block.motion = 1;
     }
-    let mut words = Words::default();
-    let mut flow = Flow::Runs;
+    let mut words = BlockWords::default();
+    let mut flow = ProgramFlow::Runs;
     let mut rest = line;
     while let Some(letter) = rest.chars().next() {
         if !letter.is_ascii_uppercase() {
             return Err(1);
         }
-        let (value, behind) = number(&rest[1..]).ok_or(2_u8)?;
-        rest = behind;
+        let (value, after) = number(&rest[1..]).ok_or(2_u8)?;
+        rest = after;
         let whole = value.trunc() as i64;
         let part = (100.0 * (value - value.trunc())).round() as i64;
         match letter {
@@ -156,39 +148,38 @@ pub fn parse(
             _ => take_value(&mut words, letter, value)?,
         }
     }
-    let line = Line { block, before: modes, is_jog, here };
-    finish(line, *offsets, words, flow)
+    let line = BlockContext { block, before: modes, is_jog, here };
+    check_block(line, *offsets, words, flow)
 }
 
-/// What a block is read with.
-pub struct Line {
-    /// As the words left them.
-    pub block: Modes,
-    /// As the last block left them.
-    pub before: Modes,
+pub struct BlockContext {
+    /// After the words of this block.
+    pub block: ModalState,
+    /// After the last block.
+    pub before: ModalState,
     /// It came with `$J=`.
     pub is_jog: bool,
     /// Where the last block ends.
-    pub here: Place,
+    pub here: Coordinates,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn jog(line: &str) -> Result<Parsed, u8> {
-        let offsets = Offsets { shift: [2.0, 0.0, 0.0], ..Offsets::default() };
-        parse(line, Modes::default(), true, [1.0, 0.0, 0.0], &offsets)
+    fn jog(line: &str) -> Result<ParsedBlock, u8> {
+        let offsets = CoordinateOffsets { shift: [2.0, 0.0, 0.0], ..CoordinateOffsets::default() };
+        parse(line, ModalState::default(), true, [1.0, 0.0, 0.0], &offsets)
     }
 
     #[test]
-    fn jogs_are_those_of_the_manual() {
+    fn jogs_match_the_manual() {
         // doc/markdown/jogging.md: examples.
         let to = |line| jog(line).unwrap().motion.unwrap().to;
         assert_eq!(to("X10.0Y-1.5F100"), [12.0, -1.5, 0.0]);
         assert_eq!(to("G91G20X0.5F10"), [13.7, 0.0, 0.0]);
         assert_eq!(to("G53Y5.0F100"), [1.0, 5.0, 0.0]);
-        assert_eq!(jog("G91X1F5").unwrap().modes, Modes::default());
+        assert_eq!(jog("G91X1F5").unwrap().modes, ModalState::default());
         for (line, error) in [
             ("X1", 22),
             ("G1X1F1", 16),
@@ -208,21 +199,22 @@ mod tests {
 
     #[test]
     fn blocks_keep_their_modes() {
-        let block = |line, modes| parse(line, modes, false, [0.0; 3], &Offsets::default());
-        let first = block("G21G91G1X2F60", Modes::default()).unwrap();
+        let block =
+            |line, modes| parse(line, modes, false, [0.0; 3], &CoordinateOffsets::default());
+        let first = block("G21G91G1X2F60", ModalState::default()).unwrap();
         assert_eq!(first.motion.unwrap().feed, 60.0);
         assert!(first.modes.is_relative && first.modes.motion == 1);
         assert_eq!(block("X3", first.modes).unwrap().motion.unwrap().to[0], 3.0);
-        assert_eq!(block("G1X1", Modes::default()), Err(22));
-        assert_eq!(block("G5X1", Modes::default()), Err(20));
-        assert_eq!(block("G80X1", Modes::default()), Err(31));
-        let probe = block("G38.2X-5F30", Modes::default()).unwrap();
+        assert_eq!(block("G1X1", ModalState::default()), Err(22));
+        assert_eq!(block("G5X1", ModalState::default()), Err(20));
+        assert_eq!(block("G80X1", ModalState::default()), Err(31));
+        let probe = block("G38.2X-5F30", ModalState::default()).unwrap();
         assert_eq!(probe.motion.unwrap().kind, 382);
-        assert_eq!(block("M30", Modes::default()).unwrap().flow, Flow::Ends);
+        assert_eq!(block("M30", ModalState::default()).unwrap().flow, ProgramFlow::Ends);
     }
 
     #[test]
-    fn what_is_refused_has_the_number_of_the_table() {
+    fn refused_blocks_have_the_error_number_of_the_table() {
         // doc/csv/error_codes_en_US.csv, and which check of gcode.c comes first.
         for (line, error) in [
             ("G1", 22),
@@ -258,29 +250,30 @@ mod tests {
             ("G", 2),
             ("F-1", 4),
         ] {
-            let done = parse(line, Modes::default(), false, [0.0; 3], &Offsets::default());
-            assert_eq!(done.err().unwrap_or(0), error, "{line}");
+            let parsed =
+                parse(line, ModalState::default(), false, [0.0; 3], &CoordinateOffsets::default());
+            assert_eq!(parsed.err().unwrap_or(0), error, "{line}");
         }
     }
 
     #[test]
-    fn coordinates_shift_and_are_shifted_back() {
-        let mut offsets = Offsets::default();
-        let mut modes = Modes::default();
-        let mut obey = |line: &str, here: Place| {
-            let done = parse(line, modes, false, here, &offsets).unwrap();
-            (modes, offsets) = (done.modes, done.offsets);
-            done
+    fn coordinate_offsets_are_set_and_cleared() {
+        let mut offsets = CoordinateOffsets::default();
+        let mut modes = ModalState::default();
+        let mut apply_block = |line: &str, here: Coordinates| {
+            let parsed = parse(line, modes, false, here, &offsets).unwrap();
+            (modes, offsets) = (parsed.modes, parsed.offsets);
+            parsed
         };
         let here = [5.0, 0.0, 0.0];
-        assert_eq!(obey("G10L20P1X0", here).offsets.systems[0][0], 5.0);
-        assert_eq!(obey("G0X1", here).motion.unwrap().to[0], 6.0);
-        assert_eq!(obey("G55X1", here).motion.unwrap().to[0], 1.0);
-        assert_eq!(obey("G92X2", here).offsets.shift[0], 3.0);
-        assert_eq!(obey("X2", here).motion.unwrap().to[0], 5.0);
-        assert_eq!(obey("G54G92.1", here).offsets.shift[0], 0.0);
-        obey("G28.1", here);
-        let home = obey("G28X1", [9.0, 0.0, 0.0]);
+        assert_eq!(apply_block("G10L20P1X0", here).offsets.systems[0][0], 5.0);
+        assert_eq!(apply_block("G0X1", here).motion.unwrap().to[0], 6.0);
+        assert_eq!(apply_block("G55X1", here).motion.unwrap().to[0], 1.0);
+        assert_eq!(apply_block("G92X2", here).offsets.shift[0], 3.0);
+        assert_eq!(apply_block("X2", here).motion.unwrap().to[0], 5.0);
+        assert_eq!(apply_block("G54G92.1", here).offsets.shift[0], 0.0);
+        apply_block("G28.1", here);
+        let home = apply_block("G28X1", [9.0, 0.0, 0.0]);
         assert_eq!(home.via.unwrap().to[0], 6.0);
         assert_eq!(home.motion.unwrap().to[0], 5.0);
         assert_eq!(modes.after_end().motion, 1);

@@ -1,26 +1,26 @@
-//! Lines: read out of the buffer one after the other, each answered by `ok` or `error:N`.
+//! Reads lines from the buffer one after the other and answers each with `ok` or `error:N`.
 
-use super::gcode::{self, Flow, Motion, Parsed};
-use super::homing::Homing;
+use super::gcode::{self, GcodeMotion, ParsedBlock, ProgramFlow};
+use super::homing::HomingCycle;
 use super::words;
 use super::{FEED_MIN, Grbl, LINE_MAX, State};
 use palpate_model::Nanos;
 
 /// A line whose answer comes later.
 #[derive(Clone, Debug)]
-pub(super) enum Pending {
-    /// Ways that wait for room in the planner.
-    Room(Vec<Motion>),
-    /// All before it is to be done first.
-    Rest(Box<Parsed>),
-    /// The place of a probe that found nothing is told after its alarm.
-    Probed,
-    /// A dwell, and the ways after it.
-    Until(Nanos, Vec<Motion>),
+pub(super) enum PendingLine {
+    /// Motions that wait for room in the planner.
+    Room(Vec<GcodeMotion>),
+    /// Waits for all earlier blocks.
+    Rest(Box<ParsedBlock>),
+    /// The position of a probe that found nothing is reported after its alarm.
+    ProbeReport,
+    /// A dwell, and the motions after it.
+    Until(Nanos, Vec<GcodeMotion>),
 }
 
 impl Grbl {
-    /// Takes lines while there is nothing to wait for.
+    /// Reads lines until one has to wait.
     pub(super) fn read_lines(&mut self) {
         loop {
             let is_blocked = self.is_waiting_for_reset
@@ -35,7 +35,7 @@ impl Grbl {
                 return;
             }
             if let Some(pending) = self.waiting.take() {
-                let result = self.go_on(pending);
+                let result = self.continue_line(pending);
                 self.answer(result);
                 if self.waiting.is_some() {
                     self.start();
@@ -47,16 +47,16 @@ impl Grbl {
                 self.start();
                 return;
             };
-            self.take(byte);
+            self.take_byte(byte);
         }
     }
 
     /// Comments and blanks go, letters become capitals (protocol.c).
-    fn take(&mut self, byte: u8) {
+    fn take_byte(&mut self, byte: u8) {
         match byte {
             b'\r' | b'\n' => {
-                // What was asked for at once is told before a line is done (protocol.c).
-                self.tell_status();
+                // A requested status is sent before a line is executed (protocol.c).
+                self.send_status_if_requested();
                 let line = std::mem::take(&mut self.line);
                 let is_overlong = std::mem::take(&mut self.is_overlong);
                 self.is_comment = None;
@@ -79,14 +79,14 @@ impl Grbl {
 
     fn answer(&mut self, result: Result<bool, u8>) {
         match result {
-            Ok(true) => self.say("ok\r\n"),
+            Ok(true) => self.send("ok\r\n"),
             // Its `ok` comes when it is done.
             Ok(false) => {}
-            Err(code) => self.say(&format!("error:{code}\r\n")),
+            Err(code) => self.send(&format!("error:{code}\r\n")),
         }
     }
 
-    /// Does a line; `false` when its answer comes later.
+    /// Executes a line; `false` when its answer comes later.
     pub(super) fn execute(&mut self, line: &str) -> Result<bool, u8> {
         if line.is_empty() {
             return Ok(true);
@@ -100,22 +100,21 @@ impl Grbl {
         let here = self.planner.end();
         let parsed = gcode::parse(line, self.modes, false, here, &self.offsets)?;
         if parsed.waits_for_rest && !self.planner.is_idle() && self.state != State::Check {
-            self.waiting = Some(Pending::Rest(Box::new(parsed)));
+            self.waiting = Some(PendingLine::Rest(Box::new(parsed)));
             return Ok(false);
         }
-        self.obey(parsed)
+        self.apply_block(parsed)
     }
 
-    /// Goes on with a line that had to wait.
-    fn go_on(&mut self, pending: Pending) -> Result<bool, u8> {
+    fn continue_line(&mut self, pending: PendingLine) -> Result<bool, u8> {
         match pending {
-            Pending::Rest(parsed) if self.planner.is_idle() => self.obey(*parsed),
-            Pending::Until(until, motions) if self.now >= until => self.queue(motions),
-            Pending::Probed => {
-                self.say_probe();
+            PendingLine::Rest(parsed) if self.planner.is_idle() => self.apply_block(*parsed),
+            PendingLine::Until(until, motions) if self.now >= until => self.queue(motions),
+            PendingLine::ProbeReport => {
+                self.send_probe();
                 Ok(true)
             }
-            Pending::Room(motions) if !self.planner.is_full() => self.queue(motions),
+            PendingLine::Room(motions) if !self.planner.is_full() => self.queue(motions),
             other => {
                 self.waiting = Some(other);
                 Ok(false)
@@ -123,33 +122,33 @@ impl Grbl {
         }
     }
 
-    fn obey(&mut self, parsed: Parsed) -> Result<bool, u8> {
+    fn apply_block(&mut self, parsed: ParsedBlock) -> Result<bool, u8> {
         let (modes, before) = (parsed.modes, self.modes);
         if parsed.offsets != self.offsets || modes.system != before.system {
-            self.reports.tell_offset();
+            self.reports.report_offset();
         }
-        let is_told = |modes: &gcode::Modes| (modes.spindle, modes.has_coolant);
-        if is_told(&modes) != is_told(&before) {
-            self.reports.tell_overrides();
+        let accessories = |modes: &gcode::ModalState| (modes.spindle, modes.has_coolant);
+        if accessories(&modes) != accessories(&before) {
+            self.reports.report_overrides();
         }
         (self.modes, self.offsets) = (modes, parsed.offsets);
         match parsed.flow {
-            Flow::Runs => {}
-            Flow::Pauses if self.state == State::Check => {}
-            Flow::Pauses => self.state = State::Hold,
-            Flow::Ends => {
+            ProgramFlow::Runs => {}
+            ProgramFlow::Pauses if self.state == State::Check => {}
+            ProgramFlow::Pauses => self.state = State::Hold,
+            ProgramFlow::Ends => {
                 self.modes = modes.after_end();
-                self.reports.tell_offset();
-                self.say("[MSG:Pgm End]\r\n");
+                self.reports.report_offset();
+                self.send("[MSG:Pgm End]\r\n");
             }
         }
         if self.state == State::Check {
             return Ok(true);
         }
-        let motions: Vec<Motion> = parsed.via.into_iter().chain(parsed.motion).collect();
+        let motions: Vec<GcodeMotion> = parsed.via.into_iter().chain(parsed.motion).collect();
         if let Some(seconds) = parsed.dwell {
             let until = self.now + Nanos((seconds * 1e9) as u64);
-            self.waiting = Some(Pending::Until(until, motions));
+            self.waiting = Some(PendingLine::Until(until, motions));
             return Ok(false);
         }
         match motions[..] {
@@ -159,9 +158,9 @@ impl Grbl {
     }
 
     /// `G38.2` to `G38.5` from rest (motion_control.c, `mc_probe_cycle`).
-    fn probe(&mut self, motion: Motion) -> Result<bool, u8> {
+    fn probe(&mut self, motion: GcodeMotion) -> Result<bool, u8> {
         self.is_probe_away = motion.kind >= 384;
-        self.probed.1 = false;
+        self.probe_result.1 = false;
         if self.is_probe() != self.is_probe_away {
             self.alarm(4, false);
             return Ok(true);
@@ -172,16 +171,16 @@ impl Grbl {
         Ok(false)
     }
 
-    fn queue(&mut self, mut motions: Vec<Motion>) -> Result<bool, u8> {
+    fn queue(&mut self, mut motions: Vec<GcodeMotion>) -> Result<bool, u8> {
         while !motions.is_empty() {
-            if self.eeprom.flag(20) && self.is_beyond(&motions[0]) {
-                // Grbl brakes before it tells; here it stands. The line is done with the reset.
+            if self.eeprom.is_set(20) && self.is_beyond(&motions[0]) {
+                // Grbl brakes first; here the axis stands at once. The reset answers the line.
                 self.alarm(2, true);
                 self.is_line_owed = true;
                 return Ok(false);
             }
             if self.planner.is_full() {
-                self.waiting = Some(Pending::Room(motions));
+                self.waiting = Some(PendingLine::Room(motions));
                 return Ok(false);
             }
             self.plan(motions.remove(0));
@@ -189,8 +188,8 @@ impl Grbl {
         Ok(true)
     }
 
-    fn plan(&mut self, motion: Motion) {
-        // A place between two steps is the nearest step.
+    fn plan(&mut self, motion: GcodeMotion) {
+        // A position between two steps is the nearest step.
         let to = std::array::from_fn(|axis| {
             let scale = self.steps_per_mm(axis);
             (motion.to[axis] * scale).round() / scale
@@ -203,10 +202,10 @@ impl Grbl {
         }
     }
 
-    /// Whether a place is outside the travel, which is from 0 to `-$130` (system.c).
-    fn is_beyond(&self, motion: &Motion) -> bool {
+    /// Whether the target is outside the travel, which is from 0 to `-$130` (system.c).
+    fn is_beyond(&self, motion: &GcodeMotion) -> bool {
         (0..motion.to.len()).any(|axis| {
-            let travel = self.eeprom.get(130 + axis as u16);
+            let travel = self.eeprom.value(130 + axis as u16);
             motion.to[axis] > 0.0 || motion.to[axis] < -travel
         })
     }
@@ -220,8 +219,8 @@ impl Grbl {
         };
         let here = self.planner.end();
         let parsed = gcode::parse(words, self.modes, true, here, &self.offsets)?;
-        let motions: Vec<Motion> = parsed.motion.into_iter().collect();
-        if self.eeprom.flag(20) && motions.iter().any(|motion| self.is_beyond(motion)) {
+        let motions: Vec<GcodeMotion> = parsed.motion.into_iter().collect();
+        if self.eeprom.is_set(20) && motions.iter().any(|motion| self.is_beyond(motion)) {
             return Err(15);
         }
         self.queue(motions)
@@ -229,7 +228,9 @@ impl Grbl {
 
     fn system(&mut self, command: &str) -> Result<bool, u8> {
         if command.is_empty() {
-            self.say("[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n");
+            self.send(
+                "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]\r\n",
+            );
             return Ok(true);
         }
         if let Some(rest) = command.strip_prefix('J') {
@@ -242,58 +243,58 @@ impl Grbl {
             "$" if matches!(self.state, State::Run | State::Hold) => return Err(8),
             "$" => {
                 let listing = self.eeprom.listing();
-                self.say(&listing);
+                self.send(&listing);
             }
-            "G" => self.say_modes(),
+            "G" => self.send_modes(),
             "C" if self.state == State::Check => {
-                self.say("[MSG:Disabled]\r\nok\r\n");
+                self.send("[MSG:Disabled]\r\nok\r\n");
                 self.state = State::Idle;
-                self.say_hello();
+                self.start_over();
                 return Ok(false);
             }
             "C" if self.state == State::Idle => {
                 self.state = State::Check;
-                self.say("[MSG:Enabled]\r\n");
+                self.send("[MSG:Enabled]\r\n");
             }
             "C" => return Err(8),
             "X" => {
                 if self.state == State::Alarm {
-                    self.say("[MSG:Caution: Unlocked]\r\n");
+                    self.send("[MSG:Caution: Unlocked]\r\n");
                     self.state = State::Idle;
                 }
             }
             _ if !is_free => return Err(8),
-            "#" => self.say_offsets(),
-            "I" => self.say_build(),
+            "#" => self.send_offsets(),
+            "I" => self.send_build(),
             "N" => {
                 for (number, line) in self.eeprom.startup.clone().iter().enumerate() {
-                    self.say(&format!("$N{number}={line}\r\n"));
+                    self.send(&format!("$N{number}={line}\r\n"));
                 }
             }
-            _ if command.starts_with('H') && !self.eeprom.flag(22) => return Err(5),
+            _ if command.starts_with('H') && !self.eeprom.is_set(22) => return Err(5),
             "H" => {
                 self.state = State::Home;
-                self.homing = Some(Homing::default());
+                self.homing = Some(HomingCycle::default());
                 return Ok(false);
             }
             "SLP" => {
                 self.state = State::Sleep;
-                self.say("ok\r\n[MSG:Sleeping]\r\n");
+                self.send("ok\r\n[MSG:Sleeping]\r\n");
                 return Ok(false);
             }
             "RST=$" | "RST=#" | "RST=*" => {
                 let factory = super::Eeprom::factory();
                 if command != "RST=#" {
-                    self.eeprom.take_numbers_of(&factory);
+                    self.eeprom.copy_numbers_from(&factory);
                 }
                 if command != "RST=$" {
-                    self.offsets = gcode::Offsets::default();
+                    self.offsets = gcode::CoordinateOffsets::default();
                 }
                 if command == "RST=*" {
                     self.eeprom = factory;
                 }
-                self.say("[MSG:Restoring defaults]\r\nok\r\n");
-                self.say_hello();
+                self.send("[MSG:Restoring defaults]\r\nok\r\n");
+                self.start_over();
                 return Ok(false);
             }
             _ if command.starts_with(['#', 'H', 'S', 'R']) => return Err(3),
@@ -316,12 +317,12 @@ impl Grbl {
             if self.state != State::Idle {
                 return Err(8);
             }
-            // Only what can be done is kept, and so it is done.
+            // Only what can be done is decimals_kept, and so it is done.
             if !value.is_empty() {
                 self.execute(value)?;
             }
-            let place = self.eeprom.startup.get_mut(key as usize).ok_or(3)?;
-            value.clone_into(place);
+            let stored = self.eeprom.startup.get_mut(key as usize).ok_or(3)?;
+            value.clone_into(stored);
             return Ok(());
         }
         let (value, rest) = words::number(value).ok_or(2)?;

@@ -2,13 +2,13 @@
 //!
 //! Facts are those of the project's documents, gnea/grbl doc/markdown/{interface,commands,jogging,settings}.md, and of
 //! what its sources do (protocol.c, system.c, report.c, planner.c); nothing is copied. [`Grbl`] is the board alone,
-//! moved by [`super::bench::Bench`], which has the slide and the load cell.
+//! moved by [`super::bench::EmulatedBench`], which has the slide and the load cell.
 
+mod block_check;
 mod eeprom;
 mod gcode;
 mod homing;
 mod lines;
-mod meaning;
 mod planner;
 mod real_time;
 mod report;
@@ -18,11 +18,11 @@ mod words;
 pub use eeprom::Eeprom;
 
 use super::DeviceFault;
-use super::bench::{EmulatedAxis, Switches};
-use gcode::{Modes, Offsets};
-use homing::Homing;
+use super::bench::{EmulatedAxis, SlideSwitches};
+use gcode::{CoordinateOffsets, ModalState};
+use homing::HomingCycle;
 use palpate_model::Nanos;
-use planner::{AXES, Place, Planner};
+use planner::{AXES, Coordinates, Planner};
 use std::collections::VecDeque;
 
 /// `RX_BUFFER_SIZE` (serial.h).
@@ -33,7 +33,7 @@ const LINE_MAX: usize = 79;
 const FEED_MIN: f64 = 1.0;
 /// From the reset of an Uno to the first words of its program: its boot loader waits for a new one so long.
 const BOOT: Nanos = Nanos::from_millis(1_500);
-/// An alarm is given so much time to be read, in which nothing else is done (report.c, `report_alarm_message`).
+/// Pause after an alarm, in which no line is read (report.c, `report_alarm_message`).
 const ALARM_PAUSE: Nanos = Nanos::from_millis(500);
 
 /// How the slide's switches are wired.
@@ -46,24 +46,21 @@ pub enum HomeWiring {
     Probe,
 }
 
-/// What kind of board.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GrblSettings {
-    /// What it has stored.
+pub struct EmulatedGrblSettings {
     pub eeprom: Eeprom,
-    /// Its switches.
     pub home: HomeWiring,
-    /// Way of the slide for a step of the motor, in mm.
+    /// Travel of the slide per step of the motor, in mm.
     pub mm_per_step: f64,
     /// The memory was never written: the first start says `error:7` and fills it.
     pub is_unused: bool,
     /// Rate of its clock. Resonators of Arduinos are right to half a percent.
     pub resonator: f64,
-    /// Every jog cancel is looked at when the jog has just ended: it takes no line until a cycle start.
+    /// Every jog cancel is handled just after the jog has ended, so that no line is read until a cycle start.
     pub is_suspending: bool,
 }
 
-impl Default for GrblSettings {
+impl Default for EmulatedGrblSettings {
     fn default() -> Self {
         Self {
             eeprom: Eeprom::slide(),
@@ -84,7 +81,7 @@ enum State {
     Run,
     Jog,
     Hold,
-    /// The safety door was said to be open.
+    /// After a safety door command.
     Door,
     Alarm,
     Home,
@@ -92,22 +89,20 @@ enum State {
     Sleep,
 }
 
-/// The board.
 #[derive(Clone, Debug, Default)]
 pub struct Grbl {
-    settings: GrblSettings,
+    settings: EmulatedGrblSettings,
     eeprom: Eeprom,
     state: State,
-    /// After a hard or soft limit nothing but a reset is heard.
+    /// After a hard or soft limit only a reset is accepted.
     is_waiting_for_reset: bool,
     is_cancelling: bool,
     /// A line that a soft limit has ended is answered with the reset.
     is_line_owed: bool,
-    /// Nothing is done before.
+    /// No line is read before then.
     busy_until: Nanos,
-    /// A reset is under way.
     is_resetting: bool,
-    /// Silent until then.
+    /// The boot loader runs until then.
     boots_at: Option<Nanos>,
     is_first_start: bool,
     now: Nanos,
@@ -115,26 +110,26 @@ pub struct Grbl {
     line: Vec<u8>,
     is_comment: Option<u8>,
     is_overlong: bool,
-    /// A line that is not answered yet.
-    waiting: Option<lines::Pending>,
+    /// A line without its answer yet.
+    waiting: Option<lines::PendingLine>,
     tx: Vec<u8>,
     planner: Planner,
-    modes: Modes,
-    offsets: Offsets,
-    probed: (Place, bool),
+    modes: ModalState,
+    offsets: CoordinateOffsets,
+    probe_result: (Coordinates, bool),
     is_probing: bool,
     is_probe_away: bool,
-    homing: Option<Homing>,
+    homing: Option<HomingCycle>,
     steps: [i64; AXES],
-    /// What the counter reads less than it did, in mm, not told yet.
+    /// Decrease of the counter that no motion explains, in mm, not reported yet.
     shift: f64,
     speed: f64,
-    switches: Switches,
+    switches: SlideSwitches,
     was_limit: bool,
-    is_asked: bool,
+    is_status_requested: bool,
     /// Of feed, rapids and spindle, in percent.
     overrides: [u16; 3],
-    reports: report::Counters,
+    reports: report::ReportCounters,
     is_wrong: bool,
     /// Time of its own clock that has not been stepped yet, in steps.
     credit: f64,
@@ -143,9 +138,7 @@ pub struct Grbl {
 }
 
 impl Grbl {
-    /// As it is switched on.
-    #[must_use]
-    pub fn new(settings: GrblSettings) -> Self {
+    pub fn new(settings: EmulatedGrblSettings) -> Self {
         let mut grbl = Self {
             eeprom: settings.eeprom.clone(),
             is_first_start: settings.is_unused,
@@ -156,35 +149,35 @@ impl Grbl {
         grbl
     }
 
-    fn say(&mut self, text: &str) {
+    fn send(&mut self, text: &str) {
         self.tx.extend_from_slice(text.as_bytes());
     }
 
     fn steps_per_mm(&self, axis: usize) -> f64 {
-        self.eeprom.get(100 + axis as u16).max(1e-3)
+        self.eeprom.value(100 + axis as u16).max(1e-3)
     }
 
-    /// Where it is, in mm of the machine's coordinates.
-    fn machine(&self) -> Place {
+    /// Position in machine coordinates, in mm.
+    fn machine(&self) -> Coordinates {
         std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm(axis))
     }
 
     fn limits(&self) -> [(f64, f64); AXES] {
         std::array::from_fn(|axis| {
             let axis = axis as u16;
-            (self.eeprom.get(110 + axis) / 60.0, self.eeprom.get(120 + axis))
+            (self.eeprom.value(110 + axis) / 60.0, self.eeprom.value(120 + axis))
         })
     }
 
     fn is_limit(&self) -> bool {
-        let Switches { is_home, is_forward, is_reverse } = self.switches;
+        let SlideSwitches { is_home, is_forward, is_reverse } = self.switches;
         match self.settings.home {
             HomeWiring::Limit => is_home || is_reverse || is_forward,
             HomeWiring::Probe => is_reverse || is_forward,
         }
     }
 
-    /// The button at the hold pin, which does as `!` when it goes down.
+    /// The button at the hold pin acts like `!` when it goes down.
     pub fn press_hold(&mut self, is_pressed: bool) {
         if is_pressed && !std::mem::replace(&mut self.is_hold_pressed, is_pressed) {
             self.real_time(b'!');
@@ -205,9 +198,9 @@ impl Grbl {
         self.waiting.is_some() || self.homing.is_some() || self.is_probing
     }
 
-    fn tell_status(&mut self) {
-        if self.now >= self.busy_until && std::mem::take(&mut self.is_asked) {
-            self.say_status();
+    fn send_status_if_requested(&mut self) {
+        if self.now >= self.busy_until && std::mem::take(&mut self.is_status_requested) {
+            self.send_status();
         }
     }
 
@@ -218,7 +211,7 @@ impl Grbl {
         }
     }
 
-    /// The axis for a millisecond.
+    /// Advances the axis by a millisecond.
     fn step(&mut self) {
         if let Some(homing) = self.homing.take() {
             self.home(homing);
@@ -228,7 +221,7 @@ impl Grbl {
             }
             self.speed = point.speed;
             if self.is_probing && self.is_probe() != self.is_probe_away {
-                self.probed = (self.machine(), true);
+                self.probe_result = (self.machine(), true);
                 self.planner.hold();
             }
         }
@@ -238,10 +231,10 @@ impl Grbl {
                 State::Jog | State::Run if self.is_cancelling || self.is_probing => {
                     self.state = State::Idle;
                     self.is_suspended = self.is_cancelling && self.settings.is_suspending;
-                    self.finish_early();
+                    self.finish_cancelled_motion();
                 }
                 // A jog does not go on behind a door.
-                State::Door if self.is_cancelling => self.finish_early(),
+                State::Door if self.is_cancelling => self.finish_cancelled_motion(),
                 State::Jog | State::Run => self.state = State::Idle,
                 _ => {}
             }
@@ -250,7 +243,7 @@ impl Grbl {
         // Opening is a change as well (limits.c, the pin's interrupt).
         let has_changed = is_limit != std::mem::replace(&mut self.was_limit, is_limit);
         if has_changed
-            && self.eeprom.flag(21)
+            && self.eeprom.is_set(21)
             && self.homing.is_none()
             && self.state != State::Alarm
         {
@@ -258,21 +251,21 @@ impl Grbl {
         }
     }
 
-    /// A jog was cancelled, or a probing has ended.
-    fn finish_early(&mut self) {
+    /// Ends a cancelled jog or a probing.
+    fn finish_cancelled_motion(&mut self) {
         self.planner.clear(self.machine());
         self.is_cancelling = false;
         if !std::mem::take(&mut self.is_probing) {
             return;
         }
-        let is_error = !self.probed.1 && matches!(self.modes.motion, 382 | 384);
-        if !self.probed.1 && !is_error {
-            self.probed.0 = self.machine();
+        let is_error = !self.probe_result.1 && matches!(self.modes.motion, 382 | 384);
+        if !self.probe_result.1 && !is_error {
+            self.probe_result.0 = self.machine();
         }
         if is_error {
             self.alarm(5, false);
         }
-        self.waiting = Some(lines::Pending::Probed);
+        self.waiting = Some(lines::PendingLine::ProbeReport);
     }
 }
 
@@ -288,7 +281,7 @@ impl EmulatedAxis for Grbl {
                 continue;
             }
             if self.rx.len() >= RX_MAX {
-                // Where it waits for nothing, it reads faster than bytes can come.
+                // A board that waits for nothing reads faster than bytes arrive.
                 self.read_lines();
             }
             if self.rx.len() < RX_MAX {
@@ -298,7 +291,7 @@ impl EmulatedAxis for Grbl {
         self.read_lines();
     }
 
-    fn advance(&mut self, now: Nanos, switches: Switches) {
+    fn advance(&mut self, now: Nanos, switches: SlideSwitches) {
         self.now = now;
         self.switches = switches;
         if let Some(at) = self.boots_at {
@@ -315,10 +308,10 @@ impl EmulatedAxis for Grbl {
         }
         self.finish_reset();
         self.read_lines();
-        self.tell_status();
+        self.send_status_if_requested();
     }
 
-    fn place_mm(&self) -> f64 {
+    fn counter_mm(&self) -> f64 {
         self.steps[0] as f64 * self.settings.mm_per_step
     }
 
@@ -326,14 +319,14 @@ impl EmulatedAxis for Grbl {
         std::mem::take(&mut self.tx)
     }
 
-    fn take_shift(&mut self) -> f64 {
+    fn take_counter_shift(&mut self) -> f64 {
         std::mem::take(&mut self.shift)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => {
-                self.shift += self.place_mm();
+                self.shift += self.counter_mm();
                 self.tx.clear();
                 self.planner.clear([0.0; AXES]);
                 self.steps = [0; AXES];

@@ -1,15 +1,15 @@
-//! The planner and the segments before it: what makes blocks of way into places over time.
+//! The planner and its segments: they turn blocks of motion into positions over time.
 //!
 //! As in Grbl (gnea/grbl, planner.c and stepper.c): the newest block ends at rest; blocks join at full speed where they
-//! go straight on; the way is cut into segments of a hundredth of a second, a few of which are made ahead and cannot be
-//! changed any more, so that a stop begins up to 50 ms late.
+//! go straight on; motion is cut into segments of a hundredth of a second, a few of which are prepared ahead and cannot be
+//! changed, so that a stop begins up to 50 ms late.
 
 use std::collections::VecDeque;
 
 /// Axes of the board.
 pub const AXES: usize = 3;
-/// A place, in mm.
-pub type Place = [f64; AXES];
+/// In mm.
+pub type Coordinates = [f64; AXES];
 
 /// Blocks that wait or are under way at most: `BLOCK_BUFFER_SIZE` 16 less the one that is always empty (planner.h).
 pub const BLOCKS_MAX: usize = 15;
@@ -19,16 +19,15 @@ pub const STEP: f64 = 0.001;
 const SEGMENT: usize = 10;
 /// Steps made ahead: `SEGMENT_BUFFER_SIZE` 6 less the one that is always empty (stepper.h).
 const AHEAD: usize = 5 * SEGMENT;
-/// Less way than this, in mm, is rounding.
+/// A shorter distance than this, in mm, is rounding.
 const TINY: f64 = 1e-9;
 
-/// A straight way.
+/// A straight motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Block {
-    /// Where it ends.
-    pub to: Place,
+pub struct MotionBlock {
+    pub to: Coordinates,
     /// Its direction, of length one.
-    pub unit: Place,
+    pub unit: Coordinates,
     /// Its length in mm.
     pub length: f64,
     /// Its speed in mm/s.
@@ -39,68 +38,60 @@ pub struct Block {
     entry: f64,
 }
 
-/// A place of the near future.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    /// Where.
-    pub place: Place,
-    /// How fast, in mm/s.
+pub struct PathPoint {
+    pub place: Coordinates,
+    /// In mm/s.
     pub speed: f64,
 }
 
-/// Blocks that wait, and what was made of them.
 #[derive(Clone, Debug, Default)]
 pub struct Planner {
-    blocks: VecDeque<Block>,
-    ahead: VecDeque<Point>,
+    blocks: VecDeque<MotionBlock>,
+    ahead: VecDeque<PathPoint>,
     /// Where the newest segment ends.
-    place: Place,
+    place: Coordinates,
     speed: f64,
     /// Of the first block.
-    left: f64,
+    remaining: f64,
     /// Where the newest block ends.
-    end: Place,
+    end: Coordinates,
     is_holding: bool,
 }
 
 impl Planner {
-    /// At rest at a place.
-    #[must_use]
-    pub fn at(place: Place) -> Self {
+    pub fn at(place: Coordinates) -> Self {
         Self { place, end: place, ..Self::default() }
     }
 
     /// Where the newest block ends.
-    pub const fn end(&self) -> Place {
+    pub const fn end(&self) -> Coordinates {
         self.end
     }
 
-    /// Whether a block more finds no room.
     pub fn is_full(&self) -> bool {
         self.blocks.len() >= BLOCKS_MAX
     }
 
-    /// Free places for blocks.
     pub fn free(&self) -> usize {
         BLOCKS_MAX - self.blocks.len()
     }
 
-    /// Whether nothing is left to do.
     pub fn is_idle(&self) -> bool {
         self.ahead.is_empty() && (self.blocks.is_empty() || (self.is_holding && self.speed == 0.0))
     }
 
-    /// Adds a way; nothing where there is none. `limits` gives speed and acceleration of each axis.
-    pub fn push(&mut self, to: Place, speed: f64, limits: &[(f64, f64); AXES]) {
-        let way: Vec<f64> = to.iter().zip(self.end).map(|(to, from)| to - from).collect();
-        let length = way.iter().map(|way| way * way).sum::<f64>().sqrt();
+    /// Adds a motion unless its length is zero. `limits` holds speed and acceleration of each axis.
+    pub fn push(&mut self, to: Coordinates, speed: f64, limits: &[(f64, f64); AXES]) {
+        let distance: Vec<f64> = to.iter().zip(self.end).map(|(to, from)| to - from).collect();
+        let length = distance.iter().map(|distance| distance * distance).sum::<f64>().sqrt();
         if length < TINY {
             return;
         }
         let mut unit = [0.0; AXES];
         let (mut most, mut acceleration) = (f64::INFINITY, f64::INFINITY);
         for axis in 0..AXES {
-            unit[axis] = way[axis] / length;
+            unit[axis] = distance[axis] / length;
             if unit[axis].abs() > TINY {
                 most = most.min(limits[axis].0 / unit[axis].abs());
                 acceleration = acceleration.min(limits[axis].1 / unit[axis].abs());
@@ -113,29 +104,28 @@ impl Planner {
             _ => 0.0,
         };
         if self.blocks.is_empty() {
-            self.left = length;
+            self.remaining = length;
         }
         self.end = to;
-        self.blocks.push_back(Block { to, unit, length, speed, acceleration, entry });
+        self.blocks.push_back(MotionBlock { to, unit, length, speed, acceleration, entry });
     }
 
-    /// Brakes, and keeps what is left of the blocks.
+    /// Brakes, and keeps the rest of the blocks.
     pub fn hold(&mut self) {
         self.is_holding = true;
     }
 
-    /// Goes on after a hold.
     pub fn resume(&mut self) {
         self.is_holding = false;
     }
 
-    /// Throws all blocks away, at rest where it is.
-    pub fn clear(&mut self, place: Place) {
+    /// Drops all blocks and rests.
+    pub fn clear(&mut self, place: Coordinates) {
         *self = Self::at(place);
     }
 
     /// One step of [`STEP`]: the place now, while something moves.
-    pub fn advance(&mut self) -> Option<Point> {
+    pub fn advance(&mut self) -> Option<PathPoint> {
         while self.ahead.len() + SEGMENT <= AHEAD && self.make_segment() {}
         self.ahead.pop_front()
     }
@@ -153,21 +143,21 @@ impl Planner {
     }
 
     /// The fastest speed at the end of the next step from which every block ahead can be done, the last ending at rest:
-    /// the root `w` of `(v + w) dt / 2 + (w^2 - c^2) / (2 a) = way` for each speed `c` at the end of a way.
-    fn fastest(&self, block: &Block) -> f64 {
+    /// the root `w` of `(v + w) dt / 2 + (w^2 - c^2) / (2 a) = distance` for each speed `c` at the end of a block.
+    fn fastest(&self, block: &MotionBlock) -> f64 {
         let (v, a) = (self.speed, block.acceleration);
         let half = 0.5 * a * STEP;
-        let reach = |way: f64, c: f64| {
-            let room = half * half + c * c + 2.0 * a * (way - 0.5 * v * STEP);
+        let reach = |distance: f64, c: f64| {
+            let room = half * half + c * c + 2.0 * a * (distance - 0.5 * v * STEP);
             room.max(half * half).sqrt() - half
         };
-        let mut way = self.left;
+        let mut distance = self.remaining;
         let mut fastest = f64::INFINITY;
         for next in self.blocks.iter().skip(1) {
-            fastest = fastest.min(reach(way, next.entry));
-            way += next.length;
+            fastest = fastest.min(reach(distance, next.entry));
+            distance += next.length;
         }
-        fastest.min(reach(way, 0.0))
+        fastest.min(reach(distance, 0.0))
     }
 
     fn make_step(&mut self) {
@@ -181,30 +171,30 @@ impl Planner {
             let nominal = block.speed.max(v - change);
             (v + change).min(nominal).min(self.fastest(&block))
         };
-        let mut way = 0.5 * (v + w) * STEP;
+        let mut distance = 0.5 * (v + w) * STEP;
         self.speed = w;
         while let Some(block) = self.blocks.front().copied() {
             let is_last = self.blocks.len() == 1;
-            if way < self.left - TINY {
-                self.left -= way;
+            if distance < self.remaining - TINY {
+                self.remaining -= distance;
                 for axis in 0..AXES {
-                    self.place[axis] = block.to[axis] - block.unit[axis] * self.left;
+                    self.place[axis] = block.to[axis] - block.unit[axis] * self.remaining;
                 }
                 break;
             }
-            way -= self.left;
+            distance -= self.remaining;
             self.place = block.to;
             self.blocks.pop_front();
-            self.left = self.blocks.front().map_or(0.0, |next| next.length);
+            self.remaining = self.blocks.front().map_or(0.0, |next| next.length);
             if is_last {
                 self.speed = 0.0;
             }
         }
-        self.ahead.push_back(Point { place: self.place, speed: self.speed });
+        self.ahead.push_back(PathPoint { place: self.place, speed: self.speed });
     }
 }
 
-fn dot(one: &Place, other: &Place) -> f64 {
+fn dot(one: &Coordinates, other: &Coordinates) -> f64 {
     one.iter().zip(other).map(|(a, b)| a * b).sum()
 }
 
@@ -216,12 +206,12 @@ mod tests {
 
     const LIMITS: [(f64, f64); AXES] = [(25.0, 50.0); AXES];
 
-    fn run(planner: &mut Planner) -> Vec<Point> {
+    fn run(planner: &mut Planner) -> Vec<PathPoint> {
         std::iter::from_fn(|| planner.advance()).collect()
     }
 
     #[test]
-    fn one_block_or_many_make_the_same_trapezoid() {
+    fn one_block_or_many_give_the_same_trapezoid() {
         for pieces in [1, 2, 7, 15] {
             let mut planner = Planner::default();
             for piece in 1..=pieces {
@@ -241,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_that_comes_too_late_costs_speed() {
+    fn late_block_costs_speed() {
         let mut planner = Planner::default();
         planner.push([3.0, 0.0, 0.0], 9.0, &LIMITS);
         // Braking takes 0.81 mm.
@@ -256,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_brakes_after_the_segments_that_are_made() {
+    fn hold_brakes_after_the_prepared_segments() {
         let mut planner = Planner::default();
         planner.push([-100.0, 0.0, 0.0], 9.0, &LIMITS);
         for _ in 0..1000 {
@@ -265,9 +255,9 @@ mod tests {
         let before = planner.advance().unwrap().place[0];
         planner.hold();
         let end = run(&mut planner).last().unwrap().place[0];
-        let way = before - end;
+        let distance = before - end;
         // 81 / 100 mm of braking, and 40 to 50 ms before it.
-        assert!((0.81 + 0.36..0.81 + 0.46).contains(&way), "{way}");
+        assert!((0.81 + 0.36..0.81 + 0.46).contains(&distance), "{distance}");
         assert!(planner.is_idle());
         planner.resume();
         assert_eq!(run(&mut planner).last().unwrap().place[0], -100.0);

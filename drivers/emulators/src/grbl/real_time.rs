@@ -6,17 +6,12 @@ impl Grbl {
     /// A byte that is never queued; `false` for all others.
     pub(super) fn real_time(&mut self, byte: u8) -> bool {
         match byte {
-            // It is known already.
             0x18 if self.is_resetting => {}
-            b'?' => self.is_asked = self.homing.is_none() && !self.is_waiting_for_reset,
+            b'?' => self.is_status_requested = self.homing.is_none() && !self.is_waiting_for_reset,
             0x18 => self.reset(),
             _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
-            0x85 if self.state == State::Jog => {
-                self.is_cancelling = true;
-                self.planner.hold();
-            }
-            // A hold of a jog is its end (doc/markdown/jogging.md).
-            b'!' if self.state == State::Jog => {
+            // A hold of a jog ends it (doc/markdown/jogging.md).
+            0x85 | b'!' if self.state == State::Jog => {
                 self.is_cancelling = true;
                 self.planner.hold();
             }
@@ -25,7 +20,7 @@ impl Grbl {
                 self.planner.hold();
             }
             0x84 if matches!(self.state, State::Run | State::Idle | State::Hold | State::Jog) => {
-                self.say("[MSG:Check Door]\r\n");
+                self.send("[MSG:Check Door]\r\n");
                 self.is_cancelling = self.state == State::Jog;
                 self.state = State::Door;
                 self.planner.hold();
@@ -36,10 +31,10 @@ impl Grbl {
                 self.start();
             }
             b'~' if self.state == State::Idle => self.is_suspended = false,
-            0x90..=0x9d => self.override_by(byte),
+            0x90..=0x9d => self.change_override(byte),
             0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
                 self.modes.has_coolant = !self.modes.has_coolant;
-                self.reports.tell_overrides();
+                self.reports.report_overrides();
             }
             b'!' | b'~' | 0x80.. => {}
             _ => return false,
@@ -47,15 +42,15 @@ impl Grbl {
         true
     }
 
-    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); told, and nothing more.
-    fn override_by(&mut self, byte: u8) {
+    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); only reported.
+    fn change_override(&mut self, byte: u8) {
         let [feed, rapid, spindle] = &mut self.overrides;
         let (value, what) = match byte {
             0x90..=0x94 => (feed, byte - 0x90),
             0x99.. => (spindle, byte - 0x99),
             0x95..=0x97 => {
                 *rapid = [100, 50, 25][usize::from(byte - 0x95)];
-                return self.reports.tell_overrides();
+                return self.reports.report_overrides();
             }
             _ => return,
         };
@@ -67,6 +62,6 @@ impl Grbl {
             _ => value.saturating_sub(1),
         };
         *value = changed.clamp(10, 200);
-        self.reports.tell_overrides();
+        self.reports.report_overrides();
     }
 }

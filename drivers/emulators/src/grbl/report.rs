@@ -1,6 +1,6 @@
-//! Status reports and what the queries print (doc/markdown/interface.md; forms as in report.c).
+//! Status reports and answers to queries (doc/markdown/interface.md; forms as in report.c).
 
-use super::planner::Place;
+use super::planner::Coordinates;
 use super::{Grbl, RX_MAX, State};
 use std::fmt::Write;
 
@@ -9,31 +9,35 @@ const OFFSET_BUSY: u32 = 30;
 const OVERRIDES_BUSY: u32 = 20;
 const REST: u32 = 10;
 
-/// Reports still to come before the fields that come now and then.
+/// Reports until the periodic fields are due again.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Counters {
+pub struct ReportCounters {
     offset: u32,
     overrides: u32,
 }
 
-impl Counters {
-    /// In the next report.
-    pub fn tell_offset(&mut self) {
+impl ReportCounters {
+    pub fn report_offset(&mut self) {
         self.offset = 0;
     }
 
-    /// In the next report.
-    pub fn tell_overrides(&mut self) {
+    pub fn report_overrides(&mut self) {
         self.overrides = 0;
     }
 }
 
-fn list(place: &Place) -> String {
+/// A field with the letters that are on; empty if none is.
+fn letters(head: &str, all: &[(bool, char)]) -> String {
+    let on: String = all.iter().filter(|(is_on, _)| *is_on).map(|(_, letter)| *letter).collect();
+    if on.is_empty() { on } else { format!("{head}{on}") }
+}
+
+fn list(place: &Coordinates) -> String {
     format!("{:.3},{:.3},{:.3}", place[0], place[1], place[2])
 }
 
 impl Grbl {
-    pub(super) fn say_status(&mut self) {
+    pub(super) fn send_status(&mut self) {
         let name = match self.state {
             State::Idle => "Idle",
             State::Run => "Run",
@@ -47,9 +51,9 @@ impl Grbl {
             State::Check => "Check",
             State::Sleep => "Sleep",
         };
-        let inch = if self.eeprom.flag(13) { 1.0 / 25.4 } else { 1.0 };
-        let scaled = |place: Place| place.map(|mm| mm * inch);
-        let mask = self.eeprom.get(10) as u32;
+        let inch = if self.eeprom.is_set(13) { 1.0 / 25.4 } else { 1.0 };
+        let scaled = |place: Coordinates| place.map(|mm| mm * inch);
+        let mask = self.eeprom.value(10) as u32;
         let here = self.machine();
         let offset = self.offsets.of(self.modes.system);
         let mut text = if mask & 1 == 0 {
@@ -64,70 +68,56 @@ impl Grbl {
         }
         let spindle = if self.modes.spindle == 5 { 0.0 } else { self.modes.spindle_speed };
         let _ = write!(text, "|FS:{:.0},{spindle:.0}", self.speed * 60.0 * inch);
-        if self.is_probe() || self.is_limit() || self.is_hold_pressed {
-            text.push_str("|Pn:");
-            if self.is_probe() {
-                text.push('P');
-            }
-            if self.is_limit() {
-                text.push('X');
-            }
-            if self.is_hold_pressed {
-                text.push('H');
-            }
-        }
-        self.add_now_and_then(&mut text, list(&scaled(offset)));
+        text += &letters(
+            "|Pn:",
+            &[(self.is_probe(), 'P'), (self.is_limit(), 'X'), (self.is_hold_pressed, 'H')],
+        );
+        self.add_periodic_fields(&mut text, list(&scaled(offset)));
         self.reports.offset = self.reports.offset.saturating_sub(1);
         self.reports.overrides = self.reports.overrides.saturating_sub(1);
         text.push_str(">\r\n");
-        self.say(&text);
+        self.send(&text);
     }
 
-    /// What only some reports have: the offset of the work coordinates, else the overrides.
-    fn add_now_and_then(&mut self, text: &mut String, offset: String) {
+    /// Fields of some reports only: the offset of the work coordinates, else the overrides.
+    fn add_periodic_fields(&mut self, text: &mut String, offset: String) {
         let is_busy = self.is_moving();
-        let again = |busy| if is_busy { busy } else { REST };
+        let interval = |busy| if is_busy { busy } else { REST };
         if self.reports.offset == 0 {
-            self.reports.offset = again(OFFSET_BUSY);
+            self.reports.offset = interval(OFFSET_BUSY);
             // The overrides follow in the next report.
             self.reports.overrides = self.reports.overrides.max(1);
             let _ = write!(text, "|WCO:{}", offset);
         } else if self.reports.overrides == 0 {
-            self.reports.overrides = again(OVERRIDES_BUSY);
+            self.reports.overrides = interval(OVERRIDES_BUSY);
             let [feed, rapid, of_spindle] = self.overrides;
             let _ = write!(text, "|Ov:{feed},{rapid},{of_spindle}");
-            let accessories: String = [
-                (self.modes.spindle == 3, 'S'),
-                (self.modes.spindle == 4, 'C'),
-                (self.modes.has_coolant, 'F'),
-            ]
-            .into_iter()
-            .filter_map(|(is_on, letter)| is_on.then_some(letter))
-            .collect();
-            if !accessories.is_empty() {
-                let _ = write!(text, "|A:{accessories}");
-            }
+            let modes = self.modes;
+            *text += &letters(
+                "|A:",
+                &[(modes.spindle == 3, 'S'), (modes.spindle == 4, 'C'), (modes.has_coolant, 'F')],
+            );
         }
     }
 
-    pub(super) fn say_probe(&mut self) {
-        let (place, is_found) = self.probed;
-        self.say(&format!("[PRB:{}:{}]\r\n", list(&place), u8::from(is_found)));
+    pub(super) fn send_probe(&mut self) {
+        let (place, is_found) = self.probe_result;
+        self.send(&format!("[PRB:{}:{}]\r\n", list(&place), u8::from(is_found)));
     }
 
-    pub(super) fn say_offsets(&mut self) {
+    pub(super) fn send_offsets(&mut self) {
         let offsets = self.offsets;
         let names = ["G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92"];
         let shift = [offsets.shift];
         let places = offsets.systems.iter().chain(&offsets.stored).chain(&shift);
         for (name, place) in names.iter().zip(places) {
-            self.say(&format!("[{name}:{}]\r\n", list(place)));
+            self.send(&format!("[{name}:{}]\r\n", list(place)));
         }
-        self.say(&format!("[TLO:{:.3}]\r\n", offsets.tool));
-        self.say_probe();
+        self.send(&format!("[TLO:{:.3}]\r\n", offsets.tool));
+        self.send_probe();
     }
 
-    pub(super) fn say_modes(&mut self) {
+    pub(super) fn send_modes(&mut self) {
         let modes = self.modes;
         let motion = match modes.motion {
             probe @ 382.. => format!("38.{}", probe - 380),
@@ -137,15 +127,15 @@ impl Grbl {
         let distance = if modes.is_relative { 91 } else { 90 };
         let feed_mode = if modes.is_inverse { 93 } else { 94 };
         let coolant = if modes.has_coolant { 8 } else { 9 };
-        self.say(&format!(
+        self.send(&format!(
             "[GC:G{motion} G{} G{} G{units} G{distance} G{feed_mode} M{} M{coolant} T{} F{:.0} S{:.0}]\r\n",
             54 + modes.system, modes.plane, modes.spindle, modes.tool, modes.feed, modes.spindle_speed
         ));
     }
 
-    pub(super) fn say_build(&mut self) {
+    pub(super) fn send_build(&mut self) {
         let version = if self.is_wrong { "0.9j.20160303" } else { "1.1h.20190830" };
         let info = self.eeprom.build_info.clone();
-        self.say(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
+        self.send(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
     }
 }

@@ -1,12 +1,12 @@
-//! A block of G-code cut into its words (gnea/grbl, gcode.c, step 2; nuts_bolts.c).
+//! Splits a block of G-code into words (gnea/grbl, gcode.c, step 2; nuts_bolts.c).
 
-use super::gcode::{Flow, Modes};
+use super::gcode::{ModalState, ProgramFlow};
 use super::planner::AXES;
 
-/// `MAX_INT_DIGITS` (nuts_bolts.c): digits after these are passed over.
+/// `MAX_INT_DIGITS` (nuts_bolts.c): later digits are ignored.
 const DIGITS_MAX: usize = 8;
 
-/// A number at the start of a text, and what is behind it (nuts_bolts.c, `read_float`).
+/// A number at the start of a text, and the text after it (nuts_bolts.c, `read_float`).
 pub fn number(text: &str) -> Option<(f64, &str)> {
     let unsigned = text.strip_prefix(['-', '+']).unwrap_or(text);
     let mut has_point = false;
@@ -20,13 +20,12 @@ pub fn number(text: &str) -> Option<(f64, &str)> {
     if whole.is_empty() && part.is_empty() {
         return None;
     }
-    let kept = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
-    let value: f64 = format!("0{whole}.{}0", &part[..kept]).parse().ok()?;
+    let decimals = DIGITS_MAX.saturating_sub(whole.len()).min(part.len());
+    let value: f64 = format!("0{whole}.{}0", &part[..decimals]).parse().ok()?;
     let sign = if text.starts_with('-') { -1.0 } else { 1.0 };
     Some((sign * value, rest))
 }
 
-/// What the axis words of a block are for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum AxisUse {
     Motion,
@@ -36,7 +35,7 @@ pub enum AxisUse {
 
 /// Words of one block.
 #[derive(Default)]
-pub struct Words {
+pub struct BlockWords {
     /// Values of the letters from A on.
     pub values: [Option<f64>; 26],
     /// Modal groups that have a word: `G` words in the lower half, `M` words in the upper one.
@@ -48,12 +47,12 @@ pub struct Words {
     pub tool_length: Option<bool>,
 }
 
-impl Words {
+impl BlockWords {
     pub fn value(&self, letter: char) -> Option<f64> {
         self.values[letter as usize - 'A' as usize]
     }
 
-    /// The value of a letter that is used up by it.
+    /// Takes the value of a letter, so that it counts as used.
     pub fn take(&mut self, letter: char) -> Option<f64> {
         self.values[letter as usize - 'A' as usize].take()
     }
@@ -79,8 +78,13 @@ impl Words {
     }
 }
 
-pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Result<(), u8> {
-    let mut left = part;
+pub fn take_g(
+    block: &mut ModalState,
+    words: &mut BlockWords,
+    whole: i64,
+    part: i64,
+) -> Result<(), u8> {
+    let mut unused_part = part;
     let group = match whole {
         4 | 10 | 28 | 30 | 53 | 92 => {
             let has_axes = matches!(whole, 10 | 28 | 30 | 92) && part == 0;
@@ -95,7 +99,7 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
                 if part == 10 {
                     words.non_modal = whole as u16 * 10 + 1;
                 }
-                left = 0;
+                unused_part = 0;
             }
             0
         }
@@ -110,7 +114,7 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
                     return Err(20);
                 }
                 block.motion = 380 + part as u16 / 10;
-                left = 0;
+                unused_part = 0;
             }
             1
         }
@@ -123,7 +127,7 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
             3
         }
         91 if part == 10 => {
-            left = 0;
+            unused_part = 0;
             4
         }
         93 | 94 => {
@@ -141,7 +145,7 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
                 return Err(20);
             }
             words.tool_length = Some(whole == 43);
-            left = 0;
+            unused_part = 0;
             8
         }
         54..=59 => {
@@ -151,16 +155,16 @@ pub fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Re
         61 if part == 0 => 13,
         _ => return Err(20),
     };
-    if left > 0 {
+    if unused_part > 0 {
         return Err(23);
     }
     words.group(group)
 }
 
 pub fn take_m(
-    block: &mut Modes,
-    words: &mut Words,
-    flow: &mut Flow,
+    block: &mut ModalState,
+    words: &mut BlockWords,
+    flow: &mut ProgramFlow,
     whole: i64,
     part: i64,
 ) -> Result<(), u8> {
@@ -170,9 +174,9 @@ pub fn take_m(
     let group = match whole {
         0 | 1 | 2 | 30 => {
             match whole {
-                0 => *flow = Flow::Pauses,
-                2 | 30 => *flow = Flow::Ends,
-                // A stop that may be chosen is never chosen here.
+                0 => *flow = ProgramFlow::Pauses,
+                2 | 30 => *flow = ProgramFlow::Ends,
+                // The optional stop is off.
                 _ => {}
             }
             16
@@ -190,7 +194,7 @@ pub fn take_m(
     words.group(group)
 }
 
-pub fn take_value(words: &mut Words, letter: char, value: f64) -> Result<(), u8> {
+pub fn take_value(words: &mut BlockWords, letter: char, value: f64) -> Result<(), u8> {
     if !matches!(letter, 'F' | 'I'..='L' | 'N' | 'P' | 'R'..='T' | 'X'..='Z') {
         return Err(20);
     }

@@ -1,7 +1,8 @@
-//! A Mark-10 gauge of Series 5 as it answers (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
+//! A Mark-10 gauge of Series 5 (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
 
 use crate::DeviceFault;
-use crate::cell::{EmulatedCell, Felt};
+use crate::cell::{CellLoad, EmulatedCell};
+use crate::wire::Outbox;
 use palpate_drivers::mark10::gauge::{FILTER_MAX, RATES};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::sim::{Cause, Random};
@@ -20,21 +21,17 @@ const SAMPLES_PER_MS: f64 = 7.0;
 const STEPS_MAX: usize = 147;
 /// Longest command; more is an illegal one.
 const COMMAND_MAX: usize = 32;
-/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
-const OUTPUT_MAX: usize = 4096;
 /// From its supply to the first answer: a guess.
 const START: Nanos = Nanos::from_millis(500);
 
-/// What an emulated gauge is like.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmulatedGaugeSettings {
-    /// Serial number that it tells.
+    /// Serial number that it reports.
     pub serial_number: String,
     /// Whether `AOUT1` gives 50 readings a second, as on the 7i.
     pub is_7i: bool,
     /// Unit it is switched on with.
     pub unit: ForceUnit,
-    /// Seed of its noise.
     pub seed: u64,
 }
 
@@ -57,9 +54,9 @@ enum Mode {
     PeakCompression,
 }
 
-/// What commands set; lost with its supply, as nothing is saved.
+/// What commands set. A loss of supply resets it, as nothing is saved.
 #[derive(Clone, Debug)]
-struct Set {
+struct GaugeState {
     unit: ForceUnit,
     mode: Mode,
     filter_displayed: u8,
@@ -71,7 +68,7 @@ struct Set {
     is_unsigned: bool,
 }
 
-impl Set {
+impl GaugeState {
     fn new(unit: ForceUnit) -> Self {
         Self {
             unit,
@@ -87,14 +84,13 @@ impl Set {
     }
 }
 
-/// The gauge.
 pub struct EmulatedGauge {
     settings: EmulatedGaugeSettings,
-    set: Set,
+    state: GaugeState,
     noise: Random,
     command: Vec<u8>,
-    /// Force in N at the newest ms each, with its noise, newest last.
-    felt: VecDeque<f64>,
+    /// Force with noise in N, one value a ms, newest last.
+    forces: VecDeque<f64>,
     zero: f64,
     peaks: (f64, f64),
     next: Nanos,
@@ -102,19 +98,18 @@ pub struct EmulatedGauge {
     is_stuck: bool,
     is_saturated: bool,
     is_other: bool,
-    output: Vec<u8>,
+    output: Outbox,
 }
 
 impl EmulatedGauge {
     /// A gauge that has been on for a while, not zeroed.
-    #[must_use]
     pub fn new(settings: EmulatedGaugeSettings) -> Self {
         Self {
-            set: Set::new(settings.unit),
+            state: GaugeState::new(settings.unit),
             noise: Random::new(settings.seed, Cause::Noise),
             settings,
             command: Vec::new(),
-            felt: VecDeque::from([0.0]),
+            forces: VecDeque::from([0.0]),
             zero: 0.0,
             peaks: (0.0, 0.0),
             next: Nanos::ZERO,
@@ -122,117 +117,108 @@ impl EmulatedGauge {
             is_stuck: false,
             is_saturated: false,
             is_other: false,
-            output: Vec::new(),
+            output: Outbox::default(),
         }
     }
 
-    /// Its reading of the moment as `?` gives it, for a stand that it sits on.
-    pub fn displayed(&self) -> String {
-        let force = match self.set.mode {
-            Mode::Current => self.filtered(self.set.filter_displayed),
+    /// The present reading as `?` gives it; a stand passes it on.
+    pub fn displayed_reading(&self) -> String {
+        let force = match self.state.mode {
+            Mode::Current => self.filtered(self.state.filter_displayed),
             Mode::PeakTension => self.peaks.0,
             Mode::PeakCompression => self.peaks.1,
         };
-        self.words(force)
+        self.format_force(force)
     }
 
     /// Mean of the newest 2^n samples above zero.
     fn filtered(&self, exponent: u8) -> f64 {
         let samples = f64::from(1_u32 << exponent.min(FILTER_MAX));
         let steps = (samples / SAMPLES_PER_MS).ceil() as usize;
-        let newest = self.felt.iter().rev().take(steps);
+        let newest = self.forces.iter().rev().take(steps);
         let count = newest.len();
         newest.sum::<f64>() / count as f64 - self.zero
     }
 
-    fn words(&self, newtons: f64) -> String {
+    fn format_force(&self, newtons: f64) -> String {
         if self.is_saturated || (newtons + self.zero).abs() > 1.1 * CAPACITY {
             return "OVER".into();
         }
-        let unit = self.set.unit;
+        let unit = self.state.unit;
         // As many digits as its step in newtons has in that unit; -0 has no sign.
         let step = STEP / unit.newtons();
         let decimals = (-step.log10()).ceil().clamp(0.0, 5.0) as usize;
         let rounded = (newtons / STEP).round() * STEP / unit.newtons();
-        let sign = if self.set.is_inverted { -1.0 } else { 1.0 };
-        let signed = if self.set.is_unsigned { rounded.abs() } else { sign * rounded };
+        let sign = if self.state.is_inverted { -1.0 } else { 1.0 };
+        let signed = if self.state.is_unsigned { rounded.abs() } else { sign * rounded };
         let text = format!("{signed:.decimals$}");
         let is_zero = text.bytes().all(|b| !(b'1'..=b'9').contains(&b));
         let text = if is_zero { text.trim_start_matches('-').to_owned() } else { text };
-        if self.set.is_full { format!("{text} {}", unit.name()) } else { text }
+        if self.state.is_full { format!("{text} {}", unit.name()) } else { text }
     }
 
     fn list(&self) -> String {
-        let set = &self.set;
-        let mode = match set.mode {
+        let state = &self.state;
+        let mode = match state.mode {
             Mode::Current => "CUR",
             Mode::PeakTension => "PT",
             Mode::PeakCompression => "PC",
         };
         format!(
             "V1.00;{};{mode};FLTC{};FLTP{};AOUT{:02};AOFF{};{};MIT;POL;IPOL{};OPOL{};B0",
-            set.unit.name().to_ascii_uppercase(),
-            set.filter_displayed,
-            set.filter_current,
-            set.auto_transmit,
-            set.auto_off,
-            if set.is_full { "FULL" } else { "NUM" },
-            u8::from(set.is_inverted),
-            u8::from(set.is_unsigned),
+            state.unit.name().to_ascii_uppercase(),
+            state.filter_displayed,
+            state.filter_current,
+            state.auto_transmit,
+            state.auto_off,
+            if state.is_full { "FULL" } else { "NUM" },
+            u8::from(state.is_inverted),
+            u8::from(state.is_unsigned),
         )
     }
 
-    fn say(&mut self, text: &str) {
-        if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
-            self.output.extend_from_slice(text.as_bytes());
-            self.output.extend_from_slice(b"\r\n");
-        }
+    fn send_line(&mut self, text: &str) {
+        self.output.push(format!("{text}\r\n").as_bytes());
     }
 
-    fn run(&mut self, now: Nanos, command: &str) {
-        if let Some(answer) = self.answer(now, command) {
-            self.say(&answer);
-        }
-    }
-
-    /// What it answers; nothing when something was set.
+    /// The answer to a command; none where it sets something.
     fn answer(&mut self, now: Nanos, command: &str) -> Option<String> {
-        let set = &mut self.set;
+        let state = &mut self.state;
         match command {
             "" => {}
-            "?" => return Some(self.displayed()),
-            "?C" => return Some(self.words(self.filtered(self.set.filter_current))),
-            "?PT" => return Some(self.words(self.peaks.0)),
-            "?PC" => return Some(self.words(self.peaks.1)),
+            "?" => return Some(self.displayed_reading()),
+            "?C" => return Some(self.format_force(self.filtered(self.state.filter_current))),
+            "?PT" => return Some(self.format_force(self.peaks.0)),
+            "?PC" => return Some(self.format_force(self.peaks.1)),
             "LIST" => return Some(self.list()),
             "RN" => return Some("Series 5 Force Gauge".into()),
             "RM" => return Some("M5-5".into()),
             "RV" => return Some("V1.00".into()),
             "RS" if self.is_other => return Some("9999999".into()),
             "RS" => return Some(self.settings.serial_number.clone()),
-            "CUR" => set.mode = Mode::Current,
-            "PT" => set.mode = Mode::PeakTension,
-            "PC" => set.mode = Mode::PeakCompression,
-            "FULL" => set.is_full = true,
-            "NUM" => set.is_full = false,
+            "CUR" => state.mode = Mode::Current,
+            "PT" => state.mode = Mode::PeakTension,
+            "PC" => state.mode = Mode::PeakCompression,
+            "FULL" => state.is_full = true,
+            "NUM" => state.is_full = false,
             "CLR" => self.peaks = (0.0, 0.0),
             "Z" => {
-                self.zero += self.filtered(self.set.filter_displayed);
+                self.zero += self.filtered(self.state.filter_displayed);
                 self.peaks = (0.0, 0.0);
             }
             "SAVE" => {}
             "?ET" | "?A" | "AM" | "PM" => return Some("*11".into()),
-            _ => return self.with_number(now, command),
+            _ => return self.answer_numbered(now, command),
         }
         None
     }
 
-    fn with_number(&mut self, now: Nanos, command: &str) -> Option<String> {
+    fn answer_numbered(&mut self, now: Nanos, command: &str) -> Option<String> {
         if let Some(unit) = match command {
             "N" | "MN" | "KN" | "LB" | "KG" | "G" | "OZ" => ForceUnit::parse(command),
             _ => None,
         } {
-            self.set.unit = unit;
+            self.state.unit = unit;
             return None;
         }
         let digits = command.trim_start_matches(|c: char| c.is_ascii_uppercase());
@@ -243,26 +229,26 @@ impl EmulatedGauge {
         let Ok(number) = digits.parse::<u16>() else {
             return Some("*12".into());
         };
-        let set = &mut self.set;
+        let state = &mut self.state;
         let small = number.min(255) as u8;
         match (name, number) {
-            ("FLTC", 0..=10) => set.filter_displayed = small,
-            ("FLTP", 0..=10) => set.filter_current = small,
-            ("AOFF", 0..=30) => set.auto_off = small,
+            ("FLTC", 0..=10) => state.filter_displayed = small,
+            ("FLTP", 0..=10) => state.filter_current = small,
+            ("AOFF", 0..=30) => state.auto_off = small,
             ("FLTC" | "FLTP" | "AOFF", _) => return Some("*22".into()),
             ("AOUT", n) if n == 0 || RATES.contains(&n) => {
-                set.auto_transmit = n;
+                state.auto_transmit = n;
                 self.next = now + self.period();
             }
-            ("IPOL", 0 | 1) => set.is_inverted = number == 1,
-            ("OPOL", 0 | 1) => set.is_unsigned = number == 1,
+            ("IPOL", 0 | 1) => state.is_inverted = number == 1,
+            ("OPOL", 0 | 1) => state.is_unsigned = number == 1,
             _ => return Some("*12".into()),
         }
         None
     }
 
     fn period(&self) -> Nanos {
-        let rate = match self.set.auto_transmit {
+        let rate = match self.state.auto_transmit {
             1 if self.settings.is_7i => 50,
             rate => rate.max(1),
         };
@@ -270,12 +256,12 @@ impl EmulatedGauge {
     }
 
     fn restart(&mut self, now: Nanos) {
-        self.set = Set::new(self.settings.unit);
+        self.state = GaugeState::new(self.settings.unit);
         self.off_until = now + START;
         self.command.clear();
         self.output.clear();
         // It zeroes itself when it is switched on.
-        self.zero = self.felt.back().copied().unwrap_or(0.0);
+        self.zero = self.forces.back().copied().unwrap_or(0.0);
         self.peaks = (0.0, 0.0);
     }
 }
@@ -289,7 +275,9 @@ impl EmulatedCell for EmulatedGauge {
             match byte {
                 b'\r' => {
                     let command = std::mem::take(&mut self.command);
-                    self.run(now, &String::from_utf8_lossy(&command));
+                    if let Some(answer) = self.answer(now, &String::from_utf8_lossy(&command)) {
+                        self.send_line(&answer);
+                    }
                 }
                 // "where the Line Feed, 0x0A, is ignored" (Series 5 user's guide, page 17).
                 b'\n' => {}
@@ -299,31 +287,31 @@ impl EmulatedCell for EmulatedGauge {
         }
     }
 
-    fn advance(&mut self, now: Nanos, felt: Felt) {
+    fn advance(&mut self, now: Nanos, load: CellLoad) {
         if !self.is_stuck {
-            let force = felt.force.0 + NOISE * self.noise.normal();
-            if self.felt.len() >= STEPS_MAX {
-                self.felt.pop_front();
+            let force = load.force.0 + NOISE * self.noise.normal();
+            if self.forces.len() >= STEPS_MAX {
+                self.forces.pop_front();
             }
-            self.felt.push_back(force);
+            self.forces.push_back(force);
             let above = force - self.zero;
             self.peaks = (self.peaks.0.min(above), self.peaks.1.max(above));
         }
-        if now < self.off_until || self.set.auto_transmit == 0 {
+        if now < self.off_until || self.state.auto_transmit == 0 {
             return;
         }
         while self.next <= now {
-            let text = self.displayed();
-            self.say(&text);
+            let text = self.displayed_reading();
+            self.send_line(&text);
             self.next = self.next + self.period();
         }
     }
 
     fn transmit(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.output)
+        self.output.take()
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
         match fault {
             DeviceFault::Reset if is_on => self.restart(now),
             DeviceFault::Reset => {}

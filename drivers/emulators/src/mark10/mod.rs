@@ -1,4 +1,4 @@
-//! A Mark-10 gauge as it answers, and a stand with one on it.
+//! An emulated Mark-10 gauge, and a stand with one on it.
 
 mod gauge;
 mod stand;

@@ -1,4 +1,4 @@
-//! A stand ESM301 or ESM303 with a gauge on it, as it answers (ESM301 user's guide, page 24; ESM303 user's guide, pages
+//! A stand ESM301 or ESM303 with a gauge on it (ESM301 user's guide, page 24; ESM303 user's guide, pages
 //! 31 and 32).
 //!
 //! Guesses, as the guides do not say: answers end with CR LF and have units; setting something is silent; `p` gives three
@@ -6,14 +6,15 @@
 //! unknown letters are passed over.
 
 use super::gauge::{EmulatedGauge, EmulatedGaugeSettings};
-use crate::cell::{EmulatedCell, Felt};
-use crate::{Device, DeviceFault, Plant};
+use crate::cell::{CellLoad, EmulatedCell};
+use crate::wire::Outbox;
+use crate::{DeviceFault, EmulatedDevice, EmulatedPlant};
 use palpate_drivers::sim::SimSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
 
-/// The plant and the gauge are looked at so often.
+/// Time step of the plant and the gauge.
 const STEP: Nanos = Nanos::from_millis(1);
 /// Guessed acceleration of the crosshead, in mm/s².
 const ACCELERATION: f64 = 100.0;
@@ -21,21 +22,17 @@ const ACCELERATION: f64 = 100.0;
 const SPEED_MIN: f64 = 0.5;
 const SPEED_MAX: f64 = 1_100.0;
 const INCH: f64 = 25.4;
-/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
-const OUTPUT_MAX: usize = 4096;
 /// Longest time that is caught up in one go.
 const CATCH_UP: Nanos = Nanos::from_millis(2_000);
 
-/// What an emulated stand is like.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EmulatedStandSettings {
-    /// Specimen, seed and so on, as of the simulated rig.
+    /// Specimen, seed and so on, as for the simulated rig.
     pub sim: SimSettings,
-    /// The gauge on it.
     pub gauge: EmulatedGaugeSettings,
-    /// Without the option PC Control: letters that move or set something are passed over.
+    /// Without the option PC Control the stand ignores letters that move or set something.
     pub is_without_control: bool,
-    /// From a letter that moves the crosshead to its first step.
+    /// Delay from a letter that moves the crosshead to its first step.
     pub reaction: Nanos,
 }
 
@@ -53,13 +50,12 @@ struct Number {
     text: String,
 }
 
-/// The stand.
 pub struct EmulatedStand {
     settings: EmulatedStandSettings,
-    plant: Plant,
+    plant: EmulatedPlant,
     gauge: EmulatedGauge,
     now: Nanos,
-    is_to_gauge: bool,
+    is_gauge_addressed: bool,
     number: Option<Number>,
     mode: Mode,
     is_inches: bool,
@@ -74,24 +70,23 @@ pub struct EmulatedStand {
     zero: f64,
     /// In mm/s, upwards.
     velocity: f64,
-    /// 1 up, -1 down, 0 to rest.
-    way: f64,
-    /// It moves from then on.
+    /// Commanded direction: 1 up, -1 down, 0 stop.
+    direction: f64,
+    /// When a motion that was commanded begins.
     moves_from: Nanos,
-    output: Vec<u8>,
+    output: Outbox,
 }
 
 impl EmulatedStand {
     /// A stand in manual mode, its travel zero where it is.
-    #[must_use]
     pub fn new(settings: EmulatedStandSettings) -> Self {
         let tick = Seconds(STEP.0 as f64 * 1e-9);
         Self {
-            plant: Plant::new(&settings.sim, tick),
+            plant: EmulatedPlant::new(&settings.sim, tick),
             gauge: EmulatedGauge::new(settings.gauge.clone()),
             settings,
             now: Nanos::ZERO,
-            is_to_gauge: false,
+            is_gauge_addressed: false,
             number: None,
             mode: Mode::Manual,
             is_inches: false,
@@ -103,14 +98,13 @@ impl EmulatedStand {
             position: 0.0,
             zero: 0.0,
             velocity: 0.0,
-            way: 0.0,
+            direction: 0.0,
             moves_from: Nanos::ZERO,
-            output: Vec::new(),
+            output: Outbox::default(),
         }
     }
 
-    /// What really is so, for tests: the plant behind it.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &EmulatedPlant {
         &self.plant
     }
 
@@ -124,11 +118,8 @@ impl EmulatedStand {
         self.velocity != 0.0
     }
 
-    fn say(&mut self, text: &str) {
-        if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
-            self.output.extend_from_slice(text.as_bytes());
-            self.output.extend_from_slice(b"\r\n");
-        }
+    fn send_line(&mut self, text: &str) {
+        self.output.push(format!("{text}\r\n").as_bytes());
     }
 
     fn length(&self, mm: f64) -> String {
@@ -142,12 +133,10 @@ impl EmulatedStand {
     }
 
     fn status(&self) -> String {
-        let crosshead = if self.velocity > 0.0 {
-            "U"
-        } else if self.velocity < 0.0 {
-            "D"
-        } else {
-            "S"
+        let crosshead = match self.velocity {
+            up if up > 0.0 => "U",
+            0.0 => "S",
+            _ => "D",
         };
         let mode = match self.mode {
             Mode::Manual => "M",
@@ -164,30 +153,30 @@ impl EmulatedStand {
         format!("{crosshead} {mode}{switch}")
     }
 
-    fn take(&mut self, byte: u8) {
-        if self.is_to_gauge {
+    fn take_byte(&mut self, byte: u8) {
+        if self.is_gauge_addressed {
             if byte == b'\\' {
-                self.is_to_gauge = false;
+                self.is_gauge_addressed = false;
             } else {
                 self.gauge.receive(self.now, &[byte]);
-                self.pass_on();
+                self.forward_gauge_output();
             }
             return;
         }
         if let Some(mut number) = self.number.take() {
             number.text.push(char::from(byte));
-            if !self.is_whole(&number) {
-                self.number = Some(number);
-            } else {
+            if self.is_complete(&number) {
                 self.set(&number);
+            } else {
+                self.number = Some(number);
             }
             return;
         }
-        self.letter(byte);
+        self.handle_letter(byte);
     }
 
     /// Whether a number is complete or can no longer become one.
-    fn is_whole(&self, number: &Number) -> bool {
+    fn is_complete(&self, number: &Number) -> bool {
         let digits = number.text.strip_prefix('-').unwrap_or(&number.text);
         let length = match (number.letter, self.is_inches) {
             (b'e', false) | (b'g' | b'h', _) => 6,
@@ -217,23 +206,33 @@ impl EmulatedStand {
         }
     }
 
-    fn letter(&mut self, byte: u8) {
-        match byte {
-            b'/' => self.is_to_gauge = true,
+    /// The answer to a letter; none where it sets something or is unknown.
+    fn answer(&self, byte: u8) -> Option<String> {
+        Some(match byte {
             b'n' => {
-                let force = self.gauge.displayed();
-                let travel = self.length(self.travel());
-                self.say(&format!("{force}\r\n{travel}"));
+                format!("{}\r\n{}", self.gauge.displayed_reading(), self.length(self.travel()))
             }
-            b'x' => {
-                let travel = self.length(self.travel());
-                self.say(&travel);
-            }
+            b'x' => self.length(self.travel()),
             // Readings without slashes (ESM303 user's guide, page 32).
-            b'X' | b'?' => {
-                let force = self.gauge.displayed();
-                self.say(&force);
-            }
+            b'X' | b'?' => self.gauge.displayed_reading(),
+            _ if self.settings.is_without_control => return None,
+            b'a' if self.is_inches => format!("{:.2} in/min", self.speed / INCH),
+            b'a' => format!("{:.1} mm/min", self.speed),
+            b'v' => self.length(self.upper),
+            b'w' => self.length(self.lower),
+            b'p' => self.status(),
+            b'q' => "0".to_owned(),
+            b'r' => self.cycles.to_string(),
+            _ => return None,
+        })
+    }
+
+    fn handle_letter(&mut self, byte: u8) {
+        if let Some(answer) = self.answer(byte) {
+            return self.send_line(&answer);
+        }
+        match byte {
+            b'/' => self.is_gauge_addressed = true,
             b'e' | b'f' | b'g' | b'h' => {
                 self.number = Some(Number { letter: byte, text: String::new() });
             }
@@ -246,10 +245,10 @@ impl EmulatedStand {
     fn control(&mut self, byte: u8) {
         match byte {
             b'u' | b'd' => {
-                self.way = if byte == b'u' { 1.0 } else { -1.0 };
+                self.direction = if byte == b'u' { 1.0 } else { -1.0 };
                 self.moves_from = self.now + self.settings.reaction;
             }
-            b's' => self.way = 0.0,
+            b's' => self.direction = 0.0,
             b'i' => self.is_inches = false,
             b'b' => self.is_inches = true,
             b'z' => self.zero = self.position,
@@ -259,89 +258,69 @@ impl EmulatedStand {
             b'j' => self.speed = SPEED_MAX,
             b'k' => self.speed = SPEED_MIN,
             b'o' => self.speed = self.programmed,
-            b'a' => {
-                let text = if self.is_inches {
-                    format!("{:.2} in/min", self.speed / INCH)
-                } else {
-                    format!("{:.1} mm/min", self.speed)
-                };
-                self.say(&text);
-            }
-            b'v' => {
-                let text = self.length(self.upper);
-                self.say(&text);
-            }
-            b'w' => {
-                let text = self.length(self.lower);
-                self.say(&text);
-            }
-            b'p' => {
-                let text = self.status();
-                self.say(&text);
-            }
-            b'q' => self.say("0"),
-            b'r' => self.say(&self.cycles.to_string()),
             _ => {}
         }
     }
 
-    /// How far it may still go, in mm, in the direction of `way`.
-    fn room(&self, way: f64) -> f64 {
-        let is_switched =
-            if way > 0.0 { self.plant.is_reverse_limit() } else { self.plant.is_forward_limit() };
+    /// Distance to the next limit in a direction, in mm.
+    fn room(&self, direction: f64) -> f64 {
+        let is_switched = if direction > 0.0 {
+            self.plant.is_reverse_limit()
+        } else {
+            self.plant.is_forward_limit()
+        };
         if is_switched {
             return 0.0;
         }
         if self.mode == Mode::Manual {
             return f64::INFINITY;
         }
-        let end = if way > 0.0 { self.upper } else { self.lower };
-        (way * (end - self.travel())).max(0.0)
+        let end = if direction > 0.0 { self.upper } else { self.lower };
+        (direction * (end - self.travel())).max(0.0)
     }
 
-    fn move_on(&mut self, dt: f64) {
-        let way = if self.velocity == 0.0 { self.way } else { self.velocity.signum() };
-        if way == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
+    fn move_crosshead(&mut self, dt: f64) {
+        let direction = if self.velocity == 0.0 { self.direction } else { self.velocity.signum() };
+        if direction == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
             return;
         }
-        let room = self.room(way);
+        let room = self.room(direction);
         // The fastest speed from which it comes to rest in the room there is; steps of dt make it a little less.
         let brake = ACCELERATION * dt;
         let end_speed = (brake * brake / 4.0 + 2.0 * ACCELERATION * room).sqrt() - brake / 2.0;
-        let wanted = if self.way == way { (self.speed / 60.0).min(end_speed) } else { 0.0 };
+        let target =
+            if self.direction == direction { (self.speed / 60.0).min(end_speed) } else { 0.0 };
         let speed = self.velocity.abs();
-        let speed = if wanted > speed {
-            (speed + brake).min(wanted)
+        let speed = if target > speed {
+            (speed + brake).min(target)
         } else if room == 0.0 {
             0.0
         } else {
-            (speed - brake).max(wanted)
+            (speed - brake).max(target)
         };
         let step = (speed * dt).min(room);
-        self.position += way * step;
+        self.position += direction * step;
         // Less than a tenth of its resolution is there.
         let is_there = self.mode != Mode::Manual && room - step < 1e-3;
         if is_there {
-            self.position += way * (room - step);
+            self.position += direction * (room - step);
         }
         let is_over = is_there || speed == 0.0;
-        self.velocity = if is_over { 0.0 } else { way * speed };
-        if is_over && self.way == way {
-            self.way = 0.0;
+        self.velocity = if is_over { 0.0 } else { direction * speed };
+        if is_over && self.direction == direction {
+            self.direction = 0.0;
         }
     }
 
-    fn pass_on(&mut self) {
-        let said = self.gauge.transmit();
-        let room = OUTPUT_MAX.saturating_sub(self.output.len());
-        self.output.extend(said.into_iter().take(room));
+    fn forward_gauge_output(&mut self) {
+        self.output.push(&self.gauge.transmit());
     }
 
     fn restart(&mut self) {
         let fresh = Self::new(self.settings.clone());
         self.zero = self.position;
-        (self.velocity, self.way) = (0.0, 0.0);
-        (self.mode, self.is_inches, self.is_to_gauge) = (Mode::Manual, false, false);
+        (self.velocity, self.direction) = (0.0, 0.0);
+        (self.mode, self.is_inches, self.is_gauge_addressed) = (Mode::Manual, false, false);
         (self.speed, self.programmed) = (fresh.speed, fresh.programmed);
         (self.lower, self.upper) = (fresh.lower, fresh.upper);
         self.number = None;
@@ -349,42 +328,42 @@ impl EmulatedStand {
     }
 }
 
-impl Device for EmulatedStand {
+impl EmulatedDevice for EmulatedStand {
     fn receive(&mut self, now: Nanos, _channel: usize, bytes: &[u8]) {
         self.advance(now);
         for byte in bytes {
-            self.take(*byte);
+            self.take_byte(*byte);
         }
     }
 
     fn advance(&mut self, now: Nanos) {
-        // Who was away for long finds it at rest where it would have been stopped by then, or two seconds on.
+        // After a long gap only its last two seconds are simulated: enough for the crosshead to reach its end.
         if now.since(self.now) > CATCH_UP {
             self.now = Nanos(now.0 - CATCH_UP.0);
         }
         while self.now + STEP <= now {
             self.now = self.now + STEP;
             let dt = STEP.0 as f64 * 1e-9;
-            self.move_on(dt);
+            self.move_crosshead(dt);
             self.plant.advance(-self.position, Seconds(dt));
-            let felt = Felt { volts: self.plant.volts(), force: self.plant.on_cell() };
-            self.gauge.advance(self.now, felt);
-            self.pass_on();
+            let load = CellLoad { volts: self.plant.volts(), force: self.plant.cell_force() };
+            self.gauge.advance(self.now, load);
+            self.forward_gauge_output();
         }
     }
 
     fn transmit(&mut self, _channel: usize) -> Vec<u8> {
-        std::mem::take(&mut self.output)
+        self.output.take()
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
-        self.gauge.suffer(now, fault, is_on);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.gauge.apply_fault(now, fault, is_on);
         if fault == DeviceFault::Reset && is_on || fault == DeviceFault::WrongDevice {
             self.restart();
         }
     }
 
-    fn by_hand(&mut self, _now: Nanos, action: HandAction) {
-        self.plant.by_hand(action);
+    fn apply_hand_action(&mut self, _now: Nanos, action: HandAction) {
+        self.plant.apply_hand_action(action);
     }
 }

@@ -3,7 +3,7 @@
 use palpate_drivers::cell::{CellDialogue, CellSample};
 use palpate_drivers::wire::{HostClock, Link};
 use palpate_emulators::DeviceFault;
-use palpate_emulators::cell::{EmulatedCell, Felt};
+use palpate_emulators::cell::{CellLoad, EmulatedCell};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 use std::io;
@@ -16,7 +16,7 @@ const STEP: Nanos = Nanos(500_000);
 
 struct State<E> {
     cell: E,
-    felt: Felt,
+    felt: CellLoad,
     out: Vec<u8>,
     is_unplugged: bool,
     is_mute: bool,
@@ -36,7 +36,7 @@ impl<E> Clone for CellBench<E> {
 
 impl<E: EmulatedCell> CellBench<E> {
     pub fn new(cell: E) -> Self {
-        let felt = Felt { volts: Volts(0.0), force: Newtons(0.0) };
+        let felt = CellLoad { volts: Volts(0.0), force: Newtons(0.0) };
         let state = State { cell, felt, out: Vec::new(), is_unplugged: false, is_mute: false };
         Self { state: Arc::new(Mutex::new(state)), now: Arc::new(AtomicU64::new(1_000_000_000)) }
     }
@@ -47,13 +47,13 @@ impl<E: EmulatedCell> CellBench<E> {
     }
 
     pub fn feel(&self, volts: f64, force: f64) {
-        let felt = Felt { volts: Volts(volts), force: Newtons(force) };
+        let felt = CellLoad { volts: Volts(volts), force: Newtons(force) };
         self.state.lock().expect("the bench").felt = felt;
     }
 
-    pub fn suffer(&self, fault: DeviceFault, is_on: bool) {
+    pub fn apply_fault(&self, fault: DeviceFault, is_on: bool) {
         let now = Nanos(self.now.load(Ordering::SeqCst));
-        self.with(|cell| cell.suffer(now, fault, is_on));
+        self.with(|cell| cell.apply_fault(now, fault, is_on));
     }
 
     pub fn with<T>(&self, act: impl FnOnce(&mut E) -> T) -> T {
@@ -145,9 +145,9 @@ impl EmulatedCell for Stranger {
     fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {
         self.1.extend_from_slice(self.0.as_bytes());
     }
-    fn advance(&mut self, _now: Nanos, _felt: Felt) {}
+    fn advance(&mut self, _now: Nanos, _felt: CellLoad) {}
     fn transmit(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.1)
     }
-    fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+    fn apply_fault(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
 }

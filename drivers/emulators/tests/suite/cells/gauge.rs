@@ -139,7 +139,7 @@ fn an_overload_reads_the_end_of_the_range() {
     assert!(cell.dialogue.take_trouble().expect("a trouble").contains("range"));
     bench.feel(0.0, 1.0);
     bench.run(cell.dialogue.as_mut(), 100);
-    bench.suffer(DeviceFault::Saturated, true);
+    bench.apply_fault(DeviceFault::Saturated, true);
     let samples = bench.run(cell.dialogue.as_mut(), 50);
     assert_eq!(samples.last().expect("samples").counts, 27_500);
 }
@@ -150,12 +150,12 @@ fn a_stuck_a_restarted_and_an_unplugged_gauge() {
     let mut cell = opened(&bench, &GaugeSettings::default()).expect("a gauge");
     bench.feel(0.0, 2.0);
     bench.run(cell.dialogue.as_mut(), 100);
-    bench.suffer(DeviceFault::Stuck, true);
+    bench.apply_fault(DeviceFault::Stuck, true);
     bench.feel(0.0, 5.0);
     let samples = bench.run(cell.dialogue.as_mut(), 100);
     assert!((samples.last().expect("samples").volts.0 - 2.0).abs() < 0.02);
     // Its settings are gone with its supply: it is silent.
-    bench.suffer(DeviceFault::Reset, true);
+    bench.apply_fault(DeviceFault::Reset, true);
     bench.run(cell.dialogue.as_mut(), 1_100);
     let why = cell.dialogue.is_dead(bench.clock()()).expect("dead");
     assert!(why.contains("silent"), "{why}");

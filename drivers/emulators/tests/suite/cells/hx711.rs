@@ -104,7 +104,7 @@ fn the_boards_clock_may_wrap() {
 fn a_restart_is_told_and_values_come_again() {
     let (mut bench, mut cell) = usual();
     bench.run(cell.dialogue.as_mut(), 100);
-    bench.suffer(DeviceFault::Reset, true);
+    bench.apply_fault(DeviceFault::Reset, true);
     let now = bench.clock();
     bench.run(cell.dialogue.as_mut(), 1_100);
     // The boot loader takes longer than a cell may be silent.
@@ -117,24 +117,24 @@ fn a_restart_is_told_and_values_come_again() {
 #[test]
 fn a_saturated_a_stuck_and_a_missing_chip() {
     let (mut bench, mut cell) = usual();
-    bench.suffer(DeviceFault::Saturated, true);
+    bench.apply_fault(DeviceFault::Saturated, true);
     let samples = bench.run(cell.dialogue.as_mut(), 50);
     assert!(samples.last().expect("samples").volts.0 > 4.999);
     assert!(cell.dialogue.take_trouble().expect("a trouble").contains("beyond"));
-    bench.suffer(DeviceFault::Saturated, false);
+    bench.apply_fault(DeviceFault::Saturated, false);
     // The amplifier at its end saturates it too.
     bench.feel(12.0, 0.0);
     let samples = bench.run(cell.dialogue.as_mut(), 100);
     assert_eq!(samples.last().expect("samples").counts, 8_388_607);
     bench.feel(1.0, 0.0);
     bench.run(cell.dialogue.as_mut(), 50);
-    bench.suffer(DeviceFault::Stuck, true);
+    bench.apply_fault(DeviceFault::Stuck, true);
     bench.feel(2.0, 0.0);
     let samples = bench.run(cell.dialogue.as_mut(), 50);
     assert!((samples.last().expect("samples").volts.0 - 1.0).abs() < 1e-6);
 
     cell.dialogue.take_trouble();
-    bench.with(|board| board.lose_chip(true));
+    bench.with(|board| board.set_chip_missing(true));
     assert!(bench.run(cell.dialogue.as_mut(), 700).is_empty());
     assert!(cell.dialogue.take_trouble().expect("a trouble").contains("DOUT"));
     bench.run(cell.dialogue.as_mut(), 700);
@@ -149,7 +149,7 @@ fn who_does_not_fit_is_told_in_words() {
     assert!(err.contains("emulated") && err.contains("bench-2"), "{err}");
 
     let dead = bench(EmulatedHx711Settings::default());
-    dead.with(|board| board.lose_chip(true));
+    dead.with(|board| board.set_chip_missing(true));
     let err = opened(&dead, &Hx711Settings::default()).err().expect("no chip").to_string();
     assert!(err.contains("DOUT"), "{err}");
 
@@ -177,7 +177,7 @@ fn who_does_not_fit_is_told_in_words() {
 #[test]
 fn another_board_in_mid_run_and_a_mute_line_end_it() {
     let (mut bench, mut cell) = usual();
-    bench.suffer(DeviceFault::WrongDevice, true);
+    bench.apply_fault(DeviceFault::WrongDevice, true);
     bench.run(cell.dialogue.as_mut(), 2_500);
     let why = cell.dialogue.is_dead(bench.clock()()).expect("dead");
     assert!(why.contains("another"), "{why}");

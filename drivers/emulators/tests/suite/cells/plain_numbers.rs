@@ -6,7 +6,7 @@ use palpate_drivers::plain_numbers::PlainNumbers;
 use palpate_drivers::rig_file::Fields;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
-use palpate_emulators::cell::{EmulatedCell, Felt, emulated_cell, emulated_cells};
+use palpate_emulators::cell::{CellLoad, EmulatedCell, emulated_cell, emulated_cells};
 use palpate_model::Nanos;
 
 /// A board that says the next of some lines every so many ms, and then the last again and again.
@@ -32,7 +32,7 @@ impl EmulatedCell for Script {
     fn receive(&mut self, _now: Nanos, bytes: &[u8]) {
         panic!("nothing is ever written to it: {bytes:?}");
     }
-    fn advance(&mut self, now: Nanos, _felt: Felt) {
+    fn advance(&mut self, now: Nanos, _felt: CellLoad) {
         if now >= self.next {
             let line = if self.lines.len() > 1 {
                 self.lines.pop().expect("one is left")
@@ -46,7 +46,7 @@ impl EmulatedCell for Script {
     fn transmit(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.out)
     }
-    fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+    fn apply_fault(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
 }
 
 /// What the emulated one is like.
@@ -72,14 +72,14 @@ impl EmulatedCell for Emulated {
     fn receive(&mut self, now: Nanos, bytes: &[u8]) {
         self.0.receive(now, bytes);
     }
-    fn advance(&mut self, now: Nanos, felt: Felt) {
+    fn advance(&mut self, now: Nanos, felt: CellLoad) {
         self.0.advance(now, felt);
     }
     fn transmit(&mut self) -> Vec<u8> {
         self.0.transmit()
     }
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
-        self.0.suffer(now, fault, is_on);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.0.apply_fault(now, fault, is_on);
     }
 }
 
@@ -111,7 +111,7 @@ fn numbers_follow_the_signal() {
     }
     assert_eq!(dialogue.garbled(), 0);
     // Another board in its place says other things.
-    bench.suffer(DeviceFault::WrongDevice, true);
+    bench.apply_fault(DeviceFault::WrongDevice, true);
     assert!(bench.run(dialogue.as_mut(), 1_200).is_empty());
     assert!(dialogue.garbled() > 50);
     assert!(dialogue.is_dead(bench.clock()()).expect("it is gone").contains("no number"));
@@ -121,7 +121,7 @@ fn numbers_follow_the_signal() {
 fn a_drop_of_the_supply_is_silence_and_then_numbers_again() {
     let mut bench = emulated();
     let mut cell = opened(&bench, USUAL).expect("a cell").dialogue;
-    bench.suffer(DeviceFault::Reset, true);
+    bench.apply_fault(DeviceFault::Reset, true);
     bench.run(cell.as_mut(), 1_500);
     assert!(cell.is_dead(bench.clock()()).is_some());
     assert!(!bench.run(cell.as_mut(), 500).is_empty());
@@ -146,7 +146,7 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
     struct Booting(Nanos, u32, Vec<u8>);
     impl EmulatedCell for Booting {
         fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
-        fn advance(&mut self, now: Nanos, _felt: Felt) {
+        fn advance(&mut self, now: Nanos, _felt: CellLoad) {
             if now >= self.0 {
                 self.1 += 1;
                 self.2.extend_from_slice(b"100\r\n");
@@ -157,7 +157,7 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
         fn transmit(&mut self) -> Vec<u8> {
             std::mem::take(&mut self.2)
         }
-        fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+        fn apply_fault(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
     }
     let bench = CellBench::new(Booting(Nanos::ZERO, 0, Vec::new()));
     let rate = opened(&bench, USUAL).expect("a cell").description.rate;

@@ -8,7 +8,7 @@ use palpate_drivers::mark10::gauge::{GaugeDialogue, GaugeScale, GaugeSettings};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
-use palpate_emulators::cell::{EmulatedCell, Felt};
+use palpate_emulators::cell::{CellLoad, EmulatedCell};
 use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_model::Nanos;
@@ -103,7 +103,7 @@ fn board() -> Hx711Dialogue {
 type Told = (Vec<CellSample>, Vec<String>, u64, Option<String>);
 
 /// All that a dialogue makes of a stream in pieces of a length, all of it arriving at one time.
-fn told(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
+fn printed(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
     let at = Nanos::from_millis(20);
     for part in bytes.chunks(piece) {
         dialogue.received(at, part);
@@ -120,7 +120,7 @@ fn told(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
 fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
     let streams = std::env::var("PALPATE_STREAMS");
     let streams = streams.map_or(20_000, |count| count.parse().expect("a number of streams"));
-    let felt = Felt { volts: Volts(1.0), force: Newtons(1.0) };
+    let felt = CellLoad { volts: Volts(1.0), force: Newtons(1.0) };
     let mut emulators: [Box<dyn EmulatedCell>; 2] = [
         Box::new(EmulatedHx711::new(EmulatedHx711Settings::default())),
         Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default())),
@@ -129,13 +129,13 @@ fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
         let mut dice = Dice(Pcg64::new(u128::from(stream), 11));
         let bytes = dice.stream();
         let piece = 1 + dice.below(9);
-        assert_eq!(told(gauge(), &bytes, piece), told(gauge(), &bytes, 4096), "{stream}");
-        assert_eq!(told(board(), &bytes, piece), told(board(), &bytes, 4096), "{stream}");
+        assert_eq!(printed(gauge(), &bytes, piece), printed(gauge(), &bytes, 4096), "{stream}");
+        assert_eq!(printed(board(), &bytes, piece), printed(board(), &bytes, 4096), "{stream}");
         let now = Nanos::from_millis(stream);
         for emulator in &mut emulators {
             emulator.receive(now, &bytes);
             emulator.advance(now, felt);
-            // What nobody reads is lost after 4 kB.
+            // Unread bytes are dropped after 4 kB.
             if stream % 100 == 0 {
                 assert!(emulator.transmit().len() <= 4096);
             }
@@ -148,8 +148,8 @@ fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
     {
         emulators[emulator].transmit();
         emulators[emulator].receive(now, ask.as_bytes());
-        let said = String::from_utf8_lossy(&emulators[emulator].transmit()).into_owned();
-        assert!(said.contains(answer), "{said}");
+        let message = String::from_utf8_lossy(&emulators[emulator].transmit()).into_owned();
+        assert!(message.contains(answer), "{message}");
     }
     println!("{streams} streams of random bytes");
 }
@@ -159,11 +159,11 @@ struct Babbler(Dice);
 
 impl EmulatedCell for Babbler {
     fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
-    fn advance(&mut self, _now: Nanos, _felt: Felt) {}
+    fn advance(&mut self, _now: Nanos, _felt: CellLoad) {}
     fn transmit(&mut self) -> Vec<u8> {
         if self.0.below(20) == 0 { self.0.stream() } else { Vec::new() }
     }
-    fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+    fn apply_fault(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
 }
 
 #[test]
@@ -182,7 +182,7 @@ fn opening_comes_to_an_end_whoever_answers() {
     }
 }
 
-/// Half a minute is the end of anybody's patience; what was opened is sensible, what was not is told.
+/// Half a minute is the limit; what was opened is sensible, what was not is told.
 fn check(bench: &CellBench<Babbler>, opened: Result<OpenedCell, DeviceError>, seed: u128) {
     let passed = bench.clock()().since(Nanos::from_millis(1_000));
     assert!(passed < Nanos::from_millis(30_000), "seed {seed}: {passed:?}");

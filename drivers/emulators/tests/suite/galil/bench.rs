@@ -1,6 +1,6 @@
 //! A controller in simulated time.
 
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
 use palpate_model::Nanos;
 

@@ -1,7 +1,7 @@
 //! Record arrays and data records.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{GalilModel, GalilSettings};
 
 #[test]

@@ -1,7 +1,7 @@
 //! Terminators, prompts, numbers, errors: byte for byte.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{GalilModel, GalilSettings};
 
 /// Where it is from, what is sent, what comes back. One controller, in this order.
@@ -66,7 +66,7 @@ const TRANSCRIPT: &[(&str, &str, &str)] = &[
     ("more values than elements", "QD d[]\r1,2,3,4\\TC1\r", "?84 Too many elements\r\n:"),
     ("record errors of their own", "RC 1;TC1\r", "?81 No array or source specified\r\n:"),
     ("no such array", "RA b[];TC1\r", "?82 Undefined Array\r\n:"),
-    ("a name that is not known", "MG nobody;TC1\r", "?9 Variable error\r\n:"),
+    ("a name that is not known", "MG unknown;TC1\r", "?9 Variable error\r\n:"),
     ("no such operand", "MG _GNX;TC1\r", "?58 Bad command response (i.e._GNX)\r\n:"),
     (
         "ESRF BLISS 2.4.0, get_axis_pid: eight axes asked of any board",

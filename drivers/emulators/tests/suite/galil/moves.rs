@@ -27,12 +27,12 @@ fn a_move_follows_its_trapezoid_and_pulses_come_later() {
         bench.sample();
         at += 1;
         let line = bench.ask("MG _RPA,_TDA,_BGA,_SCA");
-        let told: Vec<f64> = line
+        let printed: Vec<f64> = line
             .trim_end_matches("\r\n:")
             .split_whitespace()
             .map(|number| number.parse().unwrap())
             .collect();
-        let [rp, td, bg, sc] = told[..] else { panic!("{line}") };
+        let [rp, td, bg, sc] = printed[..] else { panic!("{line}") };
         let place = exact.position(Seconds(f64::from(at) * SAMPLE)).0;
         // Whole counts below the place, and a corner of the trapezoid within a sample.
         assert!(rp <= place + 0.01 && rp >= place - 1.01, "{at}: {rp} {place}");

@@ -1,7 +1,7 @@
 //! Programs: download, threads, automatic subroutines, a watchdog, unsolicited text.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::GalilModel;
 
 fn with(program: &str) -> Bench {
@@ -25,7 +25,7 @@ fn a_program_comes_back_as_it_was_sent() {
     assert_eq!(bench.emulator.transmit(0), b"x;y 1.0000\r\n");
     assert_eq!(bench.number("_XQ1"), -1.0);
     assert_eq!(bench.ask("XQ #B;TC1"), "?10 Empty program line or undefined label\r\n:");
-    // A line that is refused is told at once.
+    // A refused line is answered at once.
     assert_eq!(bench.raw(0, b"DL\r"), b"");
     let long = format!("{}\rEN\r", "a".repeat(81));
     assert_eq!(bench.raw(0, long.as_bytes()), b"?");

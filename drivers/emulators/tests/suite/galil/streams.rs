@@ -1,7 +1,7 @@
 //! Random bytes: no panic, an end to every answer, bounded memory.
 
 use super::bench::Bench;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::GalilModel;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;

@@ -15,14 +15,14 @@ use std::thread::JoinHandle;
 struct Served {
     address: String,
     orders: SyncSender<String>,
-    told: Receiver<Told>,
+    printed: Receiver<Told>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 fn start(place: Place, is_serial: bool) -> Served {
     let (orders, received) = sync_channel(16);
-    let (sender, told) = sync_channel(64);
+    let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);
     let thread = std::thread::Builder::new()
@@ -37,14 +37,14 @@ fn start(place: Place, is_serial: bool) -> Served {
                 faults: Vec::new(),
                 seed: 1,
             };
-            let mut tell = |told| sender.try_send(told).expect("room for what is told");
+            let mut tell = |printed| sender.try_send(printed).expect("room for what is printed");
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
-    Served { address, orders, told, stop, thread: Some(thread) }
+    Served { address, orders, printed, stop, thread: Some(thread) }
 }
 
 impl Drop for Served {
@@ -111,7 +111,7 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     port.write_all(b"MG 2\r").unwrap();
     assert_eq!(read_prompts(&mut port, 1), " 2.0000\r\n:");
     drop(port);
-    assert_eq!(served.told.try_iter().count(), 2);
+    assert_eq!(served.printed.try_iter().count(), 2);
     drop(served);
     assert!(!link.exists());
     std::fs::remove_dir_all(&folder).unwrap();

@@ -6,7 +6,7 @@ use palpate_drivers::galil::{
     connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{self, GalilEmulator};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand, RigDescription};
@@ -18,7 +18,7 @@ use std::time::Duration;
 
 /// One way over the wire.
 const DELAY: Nanos = Nanos(60_000);
-/// Simulated time goes on in such steps while somebody waits.
+/// Step of simulated time while a test waits.
 const STEP: Nanos = Nanos(50_000);
 
 pub struct Wire {
@@ -49,7 +49,7 @@ pub struct Shared(pub Arc<Mutex<Wire>>);
 
 impl Shared {
     pub fn lock(&self) -> MutexGuard<'_, Wire> {
-        self.0.lock().expect("nobody panics with the wire")
+        self.0.lock().expect("no panic holds the wire")
     }
 }
 

@@ -8,7 +8,7 @@ use super::wires::opened;
 use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
 use palpate_drivers::wire::Place;
 use palpate_drivers::{Rig, RigEventBody};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
 use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
@@ -50,7 +50,7 @@ struct Watched {
     most: f64,
 }
 
-impl Device for Watched {
+impl EmulatedDevice for Watched {
     fn receive(&mut self, now: Nanos, channel: usize, bytes: &[u8]) {
         self.inner.receive(now, channel, bytes);
         self.heard_at = self.inner.slide().0;
@@ -67,12 +67,12 @@ impl Device for Watched {
         self.inner.transmit(channel)
     }
 
-    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
-        self.inner.suffer(now, fault, is_on);
+    fn apply_fault(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.inner.apply_fault(now, fault, is_on);
     }
 
-    fn by_hand(&mut self, now: Nanos, action: HandAction) {
-        self.inner.by_hand(now, action);
+    fn apply_hand_action(&mut self, now: Nanos, action: HandAction) {
+        self.inner.apply_hand_action(now, action);
     }
 }
 
@@ -117,7 +117,7 @@ fn run(seed: u64) -> Result<(), String> {
     let mut random = SplitMix::seeded(seed);
     let mut story = Story { seed, lines: Vec::new() };
     let (orders, received) = sync_channel(16);
-    let (sender, told) = sync_channel(64);
+    let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);
     let served = std::thread::Builder::new()
@@ -136,12 +136,12 @@ fn run(seed: u64) -> Result<(), String> {
                 faults: Vec::new(),
                 seed,
             };
-            let mut tell = |told| drop(sender.try_send(told));
+            let mut tell = |printed| drop(sender.try_send(printed));
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
             device
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         return Err("the emulator did not start".into());
     };
     let place = Place::Serial { port: address, baud: 115_200, has_handshake: false };

@@ -3,7 +3,7 @@
 use super::bench::{Host, thesis, to};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
@@ -32,8 +32,8 @@ fn silence_of_the_host_stops_the_axis_within_the_worst_case() {
     assert!(!wire.emulator.is_running(0));
     wire.emulator.transmit(0);
     wire.emulator.receive(now, 0, b"MG _TDA\r");
-    let told = String::from_utf8(wire.emulator.transmit(0)).unwrap();
-    let rest: f64 = told.split("\r\n").next().unwrap().trim().parse().unwrap();
+    let printed = String::from_utf8(wire.emulator.transmit(0)).unwrap();
+    let rest: f64 = printed.split("\r\n").next().unwrap().trim().parse().unwrap();
     let way = (rest - from as f64) * 0.015;
     assert!(way > 5.0 && way < worst, "{way} mm of {worst} mm");
 }
@@ -53,7 +53,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.emulator.suffer(now, DeviceFault::Reset, true);
+        wire.emulator.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     let before = host.faults.len();
@@ -283,7 +283,7 @@ fn a_reset_while_recording_is_told_as_one() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.emulator.suffer(now, DeviceFault::Reset, true);
+        wire.emulator.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| !host.faults.is_empty());
     host.pass(1.0);

@@ -153,8 +153,8 @@ fn what_cannot_be_done_is_refused_in_words() {
         let now = host.now();
         host.session.command(now, command);
         host.until("a refusal", |host| host.faults.len() > before);
-        let said = host.faults[before].to_string();
-        assert!(said.contains(words), "{said}");
+        let message = host.faults[before].to_string();
+        assert!(message.contains(words), "{message}");
     }
     host.tell(RigCommand::EnableMotor);
     host.tell(to(10, 5.0));

@@ -3,7 +3,7 @@
 use super::bench::{Host, clock_of, thesis, try_connect, wired};
 use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, Sampling, connect};
 use palpate_drivers::wire::pair;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{self, GalilModel};
 use palpate_model::Nanos;
@@ -77,7 +77,7 @@ fn a_controller_without_inputs_is_refused() {
     let err = try_connect(&wire, &thesis()).unwrap_err();
     assert!(err.to_string().contains("no analog inputs"), "{err}");
     let other = wired(galil::GalilSettings::default());
-    other.lock().emulator.suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+    other.lock().emulator.apply_fault(Nanos::ZERO, DeviceFault::WrongDevice, true);
     let err = try_connect(&other, &thesis()).unwrap_err();
     assert!(matches!(err, GalilOpenError::Unsupported { .. }), "{err}");
 }

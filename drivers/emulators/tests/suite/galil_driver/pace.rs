@@ -1,5 +1,5 @@
 //! How fast and how punctual: over pseudo-terminals, in real time. What is counted is printed; nothing is asserted about
-//! speed in the suite, but that nothing is lost without being told.
+//! speed in the suite, but that every loss is reported.
 //!
 //! `PALPATE_GALIL_SECONDS` and `PALPATE_STOPS` ask for more than the suite takes, on a computer that has nothing else to
 //! do: then what is promised is asserted.

@@ -3,7 +3,7 @@
 use super::bench::{Host, Shared, thesis, to, wired};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{self, GalilEmulator, GalilModel};
 use palpate_model::Nanos;
@@ -14,7 +14,7 @@ fn recorded() -> GalilSettings {
     GalilSettings { sampling: Sampling::Record, ..thesis() }
 }
 
-/// Says something to the controller whose answer nobody hears.
+/// Sends a command to the controller and ignores the answer.
 fn unseen(emulator: &mut GalilEmulator, now: Nanos, line: &[u8]) {
     emulator.transmit(0);
     emulator.receive(now, 0, line);
@@ -140,7 +140,7 @@ fn a_garbled_fetch_is_done_again() {
     }
 }
 
-/// Three quarters of four seconds are kept; who comes later finds a gap, told and counted.
+/// Three quarters of four seconds are buffered; a later reader finds a gap, reported and counted.
 #[test]
 fn a_computer_that_is_late_loses_only_what_was_written_over() {
     for (late_ms, is_lost) in [(2_000, false), (5_000, true)] {
@@ -170,7 +170,7 @@ fn a_recording_that_ends_is_told() {
         let now = wire.now;
         unseen(&mut wire.emulator, now, b"RC 0\r");
     }
-    host.until("told", |host| !host.faults.is_empty());
+    host.until("printed", |host| !host.faults.is_empty());
     assert!(host.faults[0].to_string().contains("stopped recording"));
     // Samples go on, so that the run can be ended in good order.
     let before = host.readings.len();
@@ -186,7 +186,7 @@ fn a_reset_ends_the_recording() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.emulator.suffer(now, DeviceFault::Reset, true);
+        wire.emulator.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| host.faults.contains(&Fault::ControllerReset));
     let before = host.readings.len();

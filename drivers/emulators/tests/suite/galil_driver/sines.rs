@@ -30,7 +30,7 @@ fn a_sine_is_made_to_the_tick_and_ends_where_it_began() {
                 let wanted = sine(amplitude, period, cycles);
                 let mut tracker = PathTracker::new(&host.connected.description);
                 for reading in host.readings.drain(..) {
-                    // The way here was not told to it.
+                    // It does not know the way here.
                     if !reading.status.has(AxisStatus::MOVING) && reading.pulses == 40 {
                         tracker.on_reading(&reading).unwrap();
                     }
@@ -89,7 +89,7 @@ fn a_stop_in_the_middle_ends_it() {
 
 #[test]
 fn a_dead_link_lets_the_axis_stand_within_the_lead() {
-    use palpate_emulators::Device;
+    use palpate_emulators::EmulatedDevice;
     let mut host = at_forty(&thesis());
     host.tell(RigCommand::Oscillate(sine(50, 1000, 20)));
     host.pass(1.3);
@@ -117,13 +117,13 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
     host.pass(1.3);
     // For 450 ms nothing is sent, and nothing is read: the buffer is empty, and the watchdog may have stopped the axis.
     {
-        use palpate_emulators::Device;
+        use palpate_emulators::EmulatedDevice;
         let mut wire = host.wire.lock();
         wire.now = wire.now + palpate_model::Nanos::from_millis(450);
         let now = wire.now;
         wire.emulator.advance(now);
     }
-    host.until("told", |host| !host.faults.is_empty());
+    host.until("printed", |host| !host.faults.is_empty());
     assert!(host.faults[0].to_string().contains("broken off"), "{:?}", host.faults);
     host.settle();
     host.tell(to(40, 4.98));
@@ -143,8 +143,8 @@ fn what_the_axis_cannot_follow_is_refused() {
         let now = host.now();
         host.session.command(now, RigCommand::Oscillate(command));
         host.until("refused", |host| host.faults.len() > before);
-        let told = host.faults[before].to_string();
-        assert!(told.contains(why), "{told}");
+        let printed = host.faults[before].to_string();
+        assert!(printed.contains(why), "{printed}");
     }
     assert!(host.is_at_rest());
 }

@@ -28,7 +28,7 @@ pub struct Served {
 
 pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> Served {
     let (orders, received) = sync_channel(16);
-    let (sender, told) = sync_channel(64);
+    let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);
     let thread = std::thread::Builder::new()
@@ -37,11 +37,11 @@ pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> S
             let mut device = GalilEmulator::new(Emulated { is_serial, ..Emulated::default() });
             let options = ServeOptions { place, baud, latency, faults: Vec::new(), seed: 1 };
             // Only where it is matters here.
-            let mut tell = |told| drop(sender.try_send(told));
+            let mut tell = |printed| drop(sender.try_send(printed));
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Served { address, orders, stop, thread: Some(thread) }
@@ -72,7 +72,7 @@ pub fn opened(place: &Place, settings: &GalilSettings) -> Result<GalilRig, OpenE
     until(attempt, || "nothing answers".into())
 }
 
-/// The rig with somebody who takes its reports.
+/// The rig with a reader of its reports.
 pub struct Runner {
     pub rig: GalilRig,
     now: Nanos,
@@ -130,7 +130,7 @@ impl Runner {
         self.newest.is_some_and(|reading| !reading.status.has(AxisStatus::MOVING))
     }
 
-    /// The plug is put back: the same controller, at rest, does what it is told.
+    /// The plug is put back: the same controller, at rest, obeys commands.
     fn reconnect(&mut self) {
         let end = Instant::now() + PATIENCE;
         while let Err(err) = self.rig.reconnect() {

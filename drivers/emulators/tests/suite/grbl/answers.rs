@@ -1,13 +1,13 @@
 //! What the emulated board answers, byte for byte: as gnea/grbl does it (protocol.c, system.c, gcode.c, report.c of 1.1h).
 
-use palpate_emulators::bench::{EmulatedAxis, Switches};
-use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings};
+use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
+use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl};
 use palpate_model::Nanos;
 
 struct Board {
     grbl: Grbl,
     now: Nanos,
-    switches: Switches,
+    switches: SlideSwitches,
 }
 
 impl Board {
@@ -20,9 +20,12 @@ impl Board {
         for (number, value) in values {
             eeprom.set(*number, *value).expect("it takes it");
         }
-        let settings = GrblSettings { eeprom, ..GrblSettings::default() };
-        let mut board =
-            Self { grbl: Grbl::new(settings), now: Nanos::ZERO, switches: Switches::default() };
+        let settings = EmulatedGrblSettings { eeprom, ..EmulatedGrblSettings::default() };
+        let mut board = Self {
+            grbl: Grbl::new(settings),
+            now: Nanos::ZERO,
+            switches: SlideSwitches::default(),
+        };
         board.pass(1);
         board
     }
@@ -84,9 +87,9 @@ fn a_new_zero_is_told_with_the_next_report() {
     board.say("??");
     assert_eq!(board.say("G10L20P1X0\n"), "ok\r\n");
     assert_eq!(board.say("?"), "<Idle|MPos:2.000,0.000,0.000|FS:0,0|WCO:2.000,0.000,0.000>\r\n");
-    let said = board.say("$#\n");
-    assert!(said.starts_with("[G54:2.000,0.000,0.000]\r\n[G55:0.000"), "{said}");
-    assert!(said.ends_with(
+    let message = board.say("$#\n");
+    assert!(message.starts_with("[G54:2.000,0.000,0.000]\r\n[G55:0.000"), "{message}");
+    assert!(message.ends_with(
         "[G92:0.000,0.000,0.000]\r\n[TLO:0.000]\r\n[PRB:0.000,0.000,0.000:0]\r\nok\r\n"
     ));
 }
@@ -192,11 +195,11 @@ fn startup_lines_are_tried_kept_and_done() {
 fn overrides_are_told_at_once() {
     let mut board = Board::new();
     board.say("?");
-    for (byte, told) in
+    for (byte, printed) in
         [(0x91, "110,100,100"), (0x96, "110,50,100"), (0x9b, "110,50,90"), (0x90, "100,50,90")]
     {
         board.byte(byte);
-        assert!(board.say("?").contains(&format!("|Ov:{told}>")));
+        assert!(board.say("?").contains(&format!("|Ov:{printed}>")));
     }
     assert_eq!(board.say("$J=F100\n"), "ok\r\n");
 }
@@ -209,8 +212,8 @@ fn a_door_stops_and_is_closed_again() {
     assert_eq!(board.byte(0x84), "[MSG:Check Door]\r\n");
     assert!(board.say("?").starts_with("<Door:2|"));
     board.pass(500);
-    let said = board.say("?");
-    assert!(said.starts_with("<Door:0|MPos:") && !said.contains("MPos:5.000"), "{said}");
+    let message = board.say("?");
+    assert!(message.starts_with("<Door:0|MPos:") && !message.contains("MPos:5.000"), "{message}");
     board.say("~");
     assert!(board.say("?").starts_with("<Run|"));
     board.pass(2_000);

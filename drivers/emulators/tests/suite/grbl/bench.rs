@@ -7,8 +7,8 @@ use palpate_drivers::grbl::{
 use palpate_drivers::parts::Track;
 use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
-use palpate_emulators::Plant;
-use palpate_emulators::bench::{EmulatedAxis, Switches};
+use palpate_emulators::EmulatedPlant;
+use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
 use palpate_emulators::grbl::{self, Grbl};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand, RigDescription};
@@ -20,12 +20,12 @@ use std::time::Duration;
 
 /// One way over the wire: 3 ms is usual for the USB converter of an Uno.
 const DELAY: Nanos = Nanos(3_000_000);
-/// Simulated time goes on in such steps while somebody waits.
+/// Step of simulated time while a test waits.
 const STEP: Nanos = Nanos(1_000_000);
 
 pub struct Wire {
     pub board: Grbl,
-    pub plant: Plant,
+    pub plant: EmulatedPlant,
     pub now: Nanos,
     stepped: Nanos,
     leaving: VecDeque<(Nanos, u8)>,
@@ -41,7 +41,7 @@ pub struct Wire {
 
 impl Wire {
     /// What is on the way to the host, as text; it does not arrive any more.
-    pub fn take_said(&mut self) -> String {
+    pub fn take_output(&mut self) -> String {
         let bytes: Vec<u8> = self.arriving.drain(..).map(|(_, byte)| byte).collect();
         String::from_utf8_lossy(&bytes).into_owned()
     }
@@ -54,17 +54,17 @@ impl Wire {
             let due = self.leaving.iter().take_while(|(at, _)| *at <= now).count();
             let bytes: Vec<u8> = self.leaving.drain(..due).map(|(_, byte)| byte).collect();
             self.board.receive(now, &bytes);
-            let switches = Switches {
+            let switches = SlideSwitches {
                 is_home: self.plant.is_home(),
                 is_forward: self.plant.is_forward_limit(),
                 is_reverse: self.plant.is_reverse_limit(),
             };
             self.board.advance(now, switches);
-            let shift = self.board.take_shift();
+            let shift = self.board.take_counter_shift();
             if shift != 0.0 {
-                self.plant.shift(shift);
+                self.plant.shift_counter(shift);
             }
-            self.plant.advance(self.board.place_mm(), Seconds(0.001));
+            self.plant.advance(self.board.counter_mm(), Seconds(0.001));
             let at = now + DELAY;
             for byte in self.board.transmit() {
                 let bytes = (self.spoil)(byte);
@@ -79,7 +79,7 @@ pub struct Shared(pub Arc<Mutex<Wire>>);
 
 impl Shared {
     pub fn lock(&self) -> MutexGuard<'_, Wire> {
-        self.0.lock().expect("nobody panics with the wire")
+        self.0.lock().expect("no panic holds the wire")
     }
 }
 
@@ -140,10 +140,10 @@ pub fn slide() -> GrblSettings {
     }
 }
 
-pub fn wired(settings: grbl::GrblSettings) -> Shared {
+pub fn wired(settings: grbl::EmulatedGrblSettings) -> Shared {
     Shared(Arc::new(Mutex::new(Wire {
         board: Grbl::new(settings),
-        plant: Plant::new(&SimSettings::default(), Seconds(0.001)),
+        plant: EmulatedPlant::new(&SimSettings::default(), Seconds(0.001)),
         now: Nanos::ZERO,
         stepped: Nanos::ZERO,
         leaving: VecDeque::new(),
@@ -176,7 +176,7 @@ pub struct Host {
 
 impl Host {
     pub fn new(settings: &GrblSettings) -> Self {
-        Self::on(wired(grbl::GrblSettings::default()), settings)
+        Self::on(wired(grbl::EmulatedGrblSettings::default()), settings)
     }
 
     pub fn on(wire: Shared, settings: &GrblSettings) -> Self {
@@ -264,11 +264,11 @@ impl Host {
     }
 
     pub fn pulses(&self) -> f64 {
-        self.track.lock().expect("nobody panics with it").at(self.now()).pulses
+        self.track.lock().expect("no panic holds it").at(self.now()).pulses
     }
 
     pub fn has(&self, status: AxisStatus) -> bool {
-        self.track.lock().expect("nobody panics with it").at(self.now()).status.has(status)
+        self.track.lock().expect("no panic holds it").at(self.now()).status.has(status)
     }
 
     pub fn settle(&mut self) {
@@ -277,7 +277,7 @@ impl Host {
 
     /// Where the slide really is on the board's counter, in pulses.
     pub fn truth(&self) -> f64 {
-        (self.wire.lock().board.place_mm() / 0.0025).round()
+        (self.wire.lock().board.counter_mm() / 0.0025).round()
     }
 }
 

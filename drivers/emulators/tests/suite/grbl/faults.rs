@@ -26,13 +26,13 @@ fn a_cut_cable_stops_the_axis_within_the_stated_way() {
         host.tell(to(target, speed));
         host.pass(after);
         let mut wire = host.wire.lock();
-        let before = wire.board.place_mm();
+        let before = wire.board.counter_mm();
         wire.is_cut = true;
         wire.pass(Nanos::from_millis(5_000));
-        let way = wire.board.place_mm() - before;
+        let way = wire.board.counter_mm() - before;
         assert!(way > 0.0 && way <= host.connected.worst_case_mm, "{speed}: {way}");
         wire.pass(Nanos::from_millis(1_000));
-        assert_eq!(wire.board.place_mm() - before, way);
+        assert_eq!(wire.board.counter_mm() - before, way);
     }
 }
 
@@ -54,9 +54,9 @@ fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
         // What the board has of the stop and of the jogs is done.
         wire.lock().pass(Nanos::from_millis(5_000));
         let now = wire.lock().now;
-        let placed = track.lock().expect("nobody panics with it").at(now);
+        let placed = track.lock().expect("no panic holds it").at(now);
         assert!(!placed.status.has(AxisStatus::MOVING), "{speed}");
-        let truth = wire.lock().board.place_mm() / 0.0025;
+        let truth = wire.lock().board.counter_mm() / 0.0025;
         assert!(
             (placed.pulses - truth).abs() <= 2.0 + 0.02 * speed / 0.0025,
             "{speed}: {} of {truth}",
@@ -80,7 +80,7 @@ fn a_reset_that_is_lost_is_written_again() {
         host.ask(RigCommand::Halt);
         host.pass(0.05);
         assert!(!host.acks.contains(&RigCommand::Halt));
-        assert!(host.has(AxisStatus::MOVING), "it moves and is said to rest");
+        assert!(host.has(AxisStatus::MOVING), "it moves and is message to rest");
         host.tell(RigCommand::Halt);
         let there = host.truth();
         host.pass(1.0);
@@ -120,7 +120,8 @@ fn a_stop_is_told_when_the_axis_stands() {
 fn a_stop_of_an_axis_that_brakes_slowly_is_answered_within_a_second() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(120, 5.0).expect("it takes it");
-    let wire = wired(grbl::GrblSettings { eeprom, ..grbl::GrblSettings::default() });
+    let wire =
+        wired(grbl::EmulatedGrblSettings { eeprom, ..grbl::EmulatedGrblSettings::default() });
     let acceleration = MmPerS2(5.0);
     let mut host = Host::on(wire, &GrblSettings { acceleration, ..slide() });
     host.tell(RigCommand::MoveTo(MoveTo {
@@ -175,7 +176,7 @@ fn what_waits_is_not_begun_when_nobody_attends_or_the_cell_has_failed() {
     for is_cell in [false, true] {
         let mut host = Host::new(&slide());
         if is_cell {
-            host.track.lock().expect("nobody panics with it").is_stop_wanted = true;
+            host.track.lock().expect("no panic holds it").is_stop_wanted = true;
         } else {
             host.is_attended = false;
             host.pass(0.6);
@@ -222,7 +223,7 @@ fn a_jog_in_doubt_is_cancelled_until_a_second_report_of_rest() {
         b'k' => Vec::new(),
         other => vec![other],
     });
-    host.until("told", |host| !host.faults.is_empty());
+    host.until("printed", |host| !host.faults.is_empty());
     host.pass(1.0);
     let sent = host.wire.lock().sent.clone();
     let resumed: Vec<usize> = (0..sent.len()).filter(|at| sent[*at] == b'~').collect();
@@ -242,16 +243,16 @@ fn silence_counts_as_death() {
 fn a_limit_switch_that_locks_the_board_is_told() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(21, 1.0).expect("it takes it");
-    let wire = wired(grbl::GrblSettings {
+    let wire = wired(grbl::EmulatedGrblSettings {
         eeprom,
         home: HomeWiring::Probe,
-        ..grbl::GrblSettings::default()
+        ..grbl::EmulatedGrblSettings::default()
     });
     let mut host = Host::on(wire, &GrblSettings { home: HomeSwitch::Probe, ..slide() });
     host.tell(to(90_000, 20.0));
     host.until("a fault", |host| !host.faults.is_empty());
-    let said = host.faults[0].to_string();
-    assert!(said.contains("ALARM:1") && said.contains("limit switch"), "{said}");
+    let message = host.faults[0].to_string();
+    assert!(message.contains("ALARM:1") && message.contains("limit switch"), "{message}");
     assert!(host.refused(to(0, 5.0)).contains("ALARM:1"));
     host.tell(RigCommand::Stop);
 }
@@ -263,7 +264,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
     host.pass(0.5);
     {
         let mut wire = host.wire.lock();
-        // Short, as Ctrl-X of somebody else.
+        // Short, like a Ctrl-X of another program.
         let now = wire.now;
         wire.board.receive(now, &[0x18]);
     }
@@ -282,7 +283,7 @@ fn a_drop_of_the_supply_is_noticed() {
     {
         let mut wire = host.wire.lock();
         let now = wire.now;
-        wire.board.suffer(now, DeviceFault::Reset, true);
+        wire.board.apply_fault(now, DeviceFault::Reset, true);
     }
     host.until("noticed", |host| {
         host.faults.contains(&Fault::ControllerReset) || host.session.is_dead(host.now()).is_some()

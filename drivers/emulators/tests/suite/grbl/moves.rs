@@ -30,7 +30,10 @@ fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
 fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
     for resonator in [0.995, 1.005] {
         let mut host = Host::on(
-            wired(grbl::GrblSettings { resonator, ..grbl::GrblSettings::default() }),
+            wired(grbl::EmulatedGrblSettings {
+                resonator,
+                ..grbl::EmulatedGrblSettings::default()
+            }),
             &slide(),
         );
         for (target, worst_s) in [(30_000, 0.03), (0, 0.015)] {
@@ -51,7 +54,8 @@ fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
 
 #[test]
 fn a_board_that_a_cancel_left_suspended_goes_on() {
-    let settings = grbl::GrblSettings { is_suspending: true, ..grbl::GrblSettings::default() };
+    let settings =
+        grbl::EmulatedGrblSettings { is_suspending: true, ..grbl::EmulatedGrblSettings::default() };
     let mut host = Host::on(wired(settings), &slide());
     host.tell(to(8_000, 5.0));
     host.pass(1.0);
@@ -198,12 +202,12 @@ fn home_is_seen_and_the_far_limit_stops() {
     host.tell(to(back, 1.0));
     host.until("off the limit", |host| !host.has(AxisStatus::FORWARD_LIMIT));
     assert_eq!(host.faults, []);
-    host.wire.lock().plant.shift(1.0);
+    host.wire.lock().plant.shift_counter(1.0);
     host.until("a fault", |host| !host.faults.is_empty());
     host.pass(0.5);
     assert!(host.has(AxisStatus::FORWARD_LIMIT) && !host.has(AxisStatus::HOME));
-    let said = host.faults[0].to_string();
-    assert!(said.contains("limit switch"), "{said}");
+    let message = host.faults[0].to_string();
+    assert!(message.contains("limit switch"), "{message}");
     assert!(host.truth() > back as f64 + 400.0);
 }
 
@@ -222,8 +226,8 @@ fn what_cannot_be_done_is_refused_in_words() {
         (to(1 << 40, 5.0), "ten metres"),
         (RigCommand::Oscillate(sine), "no sines"),
     ] {
-        let said = host.refused(command);
-        assert!(said.contains(words), "{said}");
+        let message = host.refused(command);
+        assert!(message.contains(words), "{message}");
     }
     // A way that is none is done.
     host.tell(to(0, 5.0));

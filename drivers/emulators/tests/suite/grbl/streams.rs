@@ -5,8 +5,8 @@ use super::bench::{Host, slide, wired};
 use palpate_drivers::grbl::protocol::{Incoming, Parser};
 use palpate_drivers::wire::Dialogue;
 use palpate_emulators::DeviceFault;
-use palpate_emulators::bench::{EmulatedAxis, Switches};
-use palpate_emulators::grbl::{Grbl, GrblSettings};
+use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
+use palpate_emulators::grbl::{EmulatedGrblSettings, Grbl};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::RigCommand;
@@ -89,14 +89,14 @@ fn streams() -> u64 {
         .map_or(4_000, |count| count.parse().expect("a number of streams"))
 }
 
-fn switches() -> Switches {
-    Switches { is_home: false, is_forward: false, is_reverse: false }
+fn switches() -> SlideSwitches {
+    SlideSwitches { is_home: false, is_forward: false, is_reverse: false }
 }
 
 /// `PALPATE_STREAMS` asks for another number of streams than four thousand.
 #[test]
 fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
-    let mut board = Grbl::new(GrblSettings::default());
+    let mut board = Grbl::new(EmulatedGrblSettings::default());
     for seed in 0..streams() {
         let mut random = SplitMix::seeded(seed);
         let bytes = stream(&mut random);
@@ -113,13 +113,13 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
             board.receive(now, part);
         }
         board.advance(now, switches());
-        assert!(board.place_mm().is_finite(), "{seed}");
-        // What nobody reads is bounded too.
+        assert!(board.counter_mm().is_finite(), "{seed}");
+        // Unread output is bounded too.
         if seed % 50 == 0 {
             assert!(board.transmit().len() < 1 << 16, "{seed}");
         }
     }
-    board.suffer(Nanos::from_millis(10 * streams()), DeviceFault::Reset, true);
+    board.apply_fault(Nanos::from_millis(10 * streams()), DeviceFault::Reset, true);
     let now = Nanos::from_millis(10 * streams() + 10_000);
     board.advance(now, switches());
     board.transmit();
@@ -127,8 +127,8 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
     board.advance(now + Nanos::from_millis(500), switches());
     board.receive(now + Nanos::from_millis(500), b"?");
     board.advance(now + Nanos::from_millis(600), switches());
-    let said = String::from_utf8_lossy(&board.transmit()).into_owned();
-    assert!(said.contains("MPos:"), "{said}");
+    let message = String::from_utf8_lossy(&board.transmit()).into_owned();
+    assert!(message.contains("MPos:"), "{message}");
 }
 
 /// A session in the middle of a motion hears nonsense. Whatever it makes of it, it gives no more way than it states.
@@ -136,7 +136,7 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
 fn streams_to_the_session_end_at_rest() {
     for seed in 0..streams().div_ceil(40) {
         let mut random = SplitMix::seeded(seed);
-        let mut host = Host::on(wired(GrblSettings::default()), &slide());
+        let mut host = Host::on(wired(EmulatedGrblSettings::default()), &slide());
         host.ask(super::bench::to(40_000, 9.0));
         host.pass(0.2);
         for _ in 0..20 {

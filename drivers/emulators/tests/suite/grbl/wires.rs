@@ -5,9 +5,9 @@ use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::HostClock;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::ScheduledFault;
-use palpate_emulators::bench::Bench;
+use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::emulated_cell;
-use palpate_emulators::grbl::{Grbl, GrblSettings};
+use palpate_emulators::grbl::{EmulatedGrblSettings, Grbl};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
@@ -53,13 +53,13 @@ fn start_at(
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     let (orders, received) = sync_channel(4);
-    let (tell, told) = sync_channel(64);
+    let (tell, printed) = sync_channel(64);
     let thread = std::thread::Builder::new()
         .name("emulator".into())
         .spawn(move || {
             let cell = emulated_cell(cell, 1).expect("it is emulated");
-            let board = Grbl::new(GrblSettings::default());
-            let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
+            let board = Grbl::new(EmulatedGrblSettings::default());
+            let mut device = EmulatedBench::new(&SimSettings::default(), Box::new(board), cell);
             let options = ServeOptions {
                 place: Place::Ptys(links),
                 baud: None,
@@ -67,12 +67,12 @@ fn start_at(
                 faults,
                 seed: 1,
             };
-            let mut listener = |said| drop(tell.try_send(said));
+            let mut listener = |message| drop(tell.try_send(message));
             let served = serve(&mut device, &options, &received, &asked, &mut listener);
             served.expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(places)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(places)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Some(Served {
@@ -213,7 +213,7 @@ fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
     client.until("at rest", |client| !client.is_moving());
     assert_eq!(client.faults, []);
     served.orders.send("disconnect:60".into()).expect("it listens");
-    client.until("told", |client| {
+    client.until("printed", |client| {
         let lost = client.faults.iter().filter(|fault| matches!(fault, Fault::LinkLost { .. }));
         lost.count() == 2
     });
@@ -230,7 +230,7 @@ fn a_cell_that_falls_silent_stops_the_axis() {
     client.until("moving", Client::is_moving);
     // Nothing comes from either device for as long as the cell may be silent, and from the board shorter than it may be.
     served.orders.send("mute:0.7".into()).expect("it listens");
-    client.until("told", |client| {
+    client.until("printed", |client| {
         client.faults.iter().any(|fault| fault.to_string().contains("load cell"))
     });
     let before = client.readings.len();
@@ -251,7 +251,7 @@ fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() 
     client.tell(RigCommand::MoveTo(to(40_000, 5.0)));
     client.until("moving", Client::is_moving);
     served.orders.send("disconnect:2".into()).expect("it listens");
-    client.until("told", |client| {
+    client.until("printed", |client| {
         let lost = client.faults.iter().filter(|fault| matches!(fault, Fault::LinkLost { .. }));
         lost.count() == 2
     });

@@ -6,7 +6,7 @@ use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{ConnectedStand, StandSession, StandSettings, connect};
 use palpate_drivers::text::DeviceError;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{
@@ -18,7 +18,7 @@ use std::io::{self, ErrorKind};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-/// Simulated time goes on in such steps while somebody waits.
+/// Step of simulated time while a test waits.
 const STEP: Nanos = Nanos(200_000);
 
 pub struct Wire {
@@ -65,7 +65,7 @@ impl Shared {
     }
 
     pub fn lock(&self) -> MutexGuard<'_, Wire> {
-        self.0.lock().expect("nobody panics with the wire")
+        self.0.lock().expect("no panic holds the wire")
     }
 
     pub fn clock(&self) -> HostClock {

@@ -2,7 +2,7 @@
 
 use super::bench::{Host, to};
 use palpate_drivers::wire::Dialogue;
-use palpate_emulators::{Device, DeviceFault};
+use palpate_emulators::{DeviceFault, EmulatedDevice};
 use palpate_model::rig::{Fault, RigCommand};
 
 #[test]
@@ -18,7 +18,7 @@ fn silence_in_mid_move_ends_at_the_target_at_the_latest() {
         host.turn().expect("the wire is whole");
     }
     assert!(host.now().since(start).0 < 2_000_000_000);
-    // Stops were tried; nobody heard them; the stand's own limit holds.
+    // Stops were sent and did not arrive; the stand's own limit holds.
     assert!(host.sent().contains('s'));
     host.pass(5.0);
     assert!(!host.wire.lock().emulator.is_moving());
@@ -66,7 +66,7 @@ fn somebody_moves_it_at_its_panel() {
     let now = host.now();
     host.wire.lock().emulator.receive(now, 0, b"mu");
     host.pass(1.0);
-    // It was told to rest 3 mm in, and is where it has gone since, by its own travel.
+    // Its target was 3 mm in; it is where it has gone since, by its own travel.
     assert!((host.travel() + 3.0).abs() > 0.1, "{}", host.travel());
     let first = host.path_errors.first().expect("it is noticed");
     assert_eq!(first.expected_pulses, 300.0);
@@ -93,8 +93,8 @@ fn a_stand_that_does_not_begin_is_told() {
         host.turn().expect("the wire is whole");
     }
     host.pass(2.0);
-    let told = host.faults.last().expect("a fault").to_string();
-    assert!(told.contains("not begun"), "{told}");
+    let printed = host.faults.last().expect("a fault").to_string();
+    assert!(printed.contains("not begun"), "{printed}");
     assert_eq!(host.travel(), 0.0);
 }
 
@@ -127,7 +127,7 @@ fn a_key_of_the_gauge_is_noticed() {
 fn an_overload_reads_the_end_of_the_range() {
     let mut host = Host::new();
     let now = host.now();
-    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, true);
     host.pass(0.2);
     assert!((host.newest().volts.0 - 27.5).abs() < 1e-9);
 }
@@ -139,22 +139,22 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     host.pass(1.0);
     let now = host.now();
     let before = host.travel();
-    host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, true);
+    host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, true);
     host.pass(1.0);
     assert!(!host.wire.lock().emulator.is_moving());
     assert!((host.travel() - before).abs() < 0.5, "{}", host.travel());
-    let told = |host: &Host| {
+    let printed = |host: &Host| {
         let is_it = |fault: &&Fault| fault.to_string().contains("range");
         host.faults.iter().filter(is_it).count()
     };
-    assert_eq!(told(&host), 1, "{:?}", host.faults);
+    assert_eq!(printed(&host), 1, "{:?}", host.faults);
     // Within the range and beyond it again.
     for is_on in [false, true] {
         let now = host.now();
-        host.wire.lock().emulator.suffer(now, DeviceFault::Saturated, is_on);
+        host.wire.lock().emulator.apply_fault(now, DeviceFault::Saturated, is_on);
         host.pass(0.2);
     }
-    assert_eq!(told(&host), 2, "{:?}", host.faults);
+    assert_eq!(printed(&host), 2, "{:?}", host.faults);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Moves, stops, limits.
 
 use super::bench::{Host, Shared, to};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::EmulatedStandSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, HandAction, Oscillation, RigCommand};
@@ -36,9 +36,9 @@ fn what_is_told_is_near_where_it_is() {
         host.until("begun", Host::is_moving);
         while host.is_moving() {
             host.turn().expect("the wire is whole");
-            let told = host.newest().pulses as f64 * 0.01;
+            let printed = host.newest().pulses as f64 * 0.01;
             // The sample may be some ms old.
-            let off = (told + host.travel()).abs();
+            let off = (printed + host.travel()).abs();
             assert!(off < 0.05 + 0.15 * speed, "{off} at {speed} mm/s");
         }
         assert_eq!(host.newest().pulses, target);
@@ -59,7 +59,7 @@ fn a_stop_is_written_before_everything_and_repeated() {
     assert!(host.sent().starts_with('s'), "{}", host.sent());
     host.until("at rest", |host| !host.is_moving());
     assert_eq!(host.acks.last(), Some(&RigCommand::Stop));
-    // It braked within v^2/2a of 100 mm/s2 and told the truth about where it rests.
+    // It braked within v^2/2a of 100 mm/s2 and reported its true rest position.
     assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.006);
     assert!(host.path.is_at_rest() && host.path_errors.is_empty(), "{:?}", host.path_errors);
     assert!(host.readings.iter().any(|r| r.status.has(AxisStatus::STOPPING)));
@@ -122,15 +122,15 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
         host.faults.clear();
         host.send(command);
         host.pass(0.5);
-        let told = host.faults.iter().map(ToString::to_string).collect::<String>();
-        assert!(told.contains(word), "{told}");
+        let printed = host.faults.iter().map(ToString::to_string).collect::<String>();
+        assert!(printed.contains(word), "{printed}");
     }
     assert_eq!((host.acks.len(), host.travel()), (0, 0.0));
     host.tell(to(1_000, 1.0));
     host.send(to(2_000, 1.0));
     host.pass(0.2);
-    let told = host.faults.last().expect("a refusal").to_string();
-    assert!(told.contains("still moves"), "{told}");
+    let printed = host.faults.last().expect("a refusal").to_string();
+    assert!(printed.contains("still moves"), "{printed}");
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn pressing_is_felt() {
     assert!(force > 0.3, "{force}");
     assert!((pressed.volts.0 - force).abs() < 0.1, "{pressed:?} {force}");
     let now = host.now();
-    host.wire.lock().emulator.by_hand(now, HandAction::Unmount);
+    host.wire.lock().emulator.apply_hand_action(now, HandAction::Unmount);
     host.pass(0.5);
     assert!(host.newest().volts.0.abs() < 0.02);
 }
@@ -194,8 +194,8 @@ fn samples_come_as_the_description_says() {
         assert!(ticks.windows(2).all(|w| w[0] < w[1]));
         let span = (ticks[ticks.len() - 1] - ticks[0]) as f64;
         let per_sample = span / (ticks.len() - 1) as f64;
-        let told = host.connected.description.ticks_per_sample;
-        assert!(per_sample < 1.5 * told && per_sample > 0.5 * told, "{per_sample} {told}");
+        let printed = host.connected.description.ticks_per_sample;
+        assert!(per_sample < 1.5 * printed && per_sample > 0.5 * printed, "{per_sample} {printed}");
         // In motion nothing else is asked: samples stay younger than the interlock allows at any speed, 20 ms, where the
         // link lets them.
         let moving = host.readings.iter().filter(|r| r.status.has(AxisStatus::MOVING));

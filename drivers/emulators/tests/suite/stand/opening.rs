@@ -6,7 +6,7 @@ use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
 use palpate_drivers::mark10::stand;
 use palpate_drivers::wire::{HostClock, Link, pair};
 use palpate_drivers::{Rig, RigEventBody};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};
@@ -88,7 +88,7 @@ fn who_does_not_fit_is_told_in_words() {
     let err = refused(&stand(), &far);
     assert!(err.contains("999.99"), "{err}");
 
-    // One that makes another limit of -110.00 than it was told.
+    // One that sets another limit than the -110.00 commanded.
     let clipped = stand();
     let mut before = 0;
     clipped.lock().spoil = Box::new(move |byte| {
@@ -175,7 +175,7 @@ fn a_rig_moves_stops_and_says_farewell() {
     let raw = rig.take_raw();
     assert!(raw.iter().any(|piece| piece.is_sent && piece.bytes == b"d"));
     rig.send(RigCommand::Stop);
-    // What is connected anew says farewell first, and that is told too when nobody is there any more.
+    // A reconnect sends closing bytes first; its error names a device that no longer answers.
     let Err(err) = rig.reconnect() else {
         panic!("there is no second link");
     };

@@ -3,7 +3,7 @@
 use super::bench::{Host, Shared, to, usual};
 use palpate_drivers::mark10::stand::protocol::{Pair, Status, number, travel};
 use palpate_drivers::text::{Lines, Taken};
-use palpate_emulators::Device;
+use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use rand_distr::{Distribution, StandardUniform};
@@ -103,8 +103,8 @@ fn the_emulated_stand_takes_anything() {
     stand.receive(now, 0, b"\\999999\\si/AOUT0\rFULL\rN\r\\");
     stand.transmit(0);
     stand.receive(now, 0, b"x");
-    let said = String::from_utf8(stand.transmit(0)).expect("text");
-    assert!(travel(said.trim()).is_some(), "{said}");
+    let message = String::from_utf8(stand.transmit(0)).expect("text");
+    assert!(travel(message.trim()).is_some(), "{message}");
     println!("{count} streams of random bytes");
 }
 

@@ -47,7 +47,7 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
         return;
     }
     let (_orders, received) = sync_channel(16);
-    let (sender, told) = sync_channel(64);
+    let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
     let is_over = Arc::clone(&stop);
     let work = move || {
@@ -60,11 +60,11 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
             seed: 1,
         };
         // Only where it is matters here.
-        let mut tell = |told| drop(sender.try_send(told));
+        let mut tell = |printed| drop(sender.try_send(printed));
         serve(&mut device, &options, &received, &is_over, &mut tell).is_ok()
     };
     let thread = std::thread::Builder::new().name("stand".into()).spawn(work).expect("a thread");
-    let Ok(Told::Ready(port)) = told.recv_timeout(PATIENCE) else {
+    let Ok(Told::Ready(port)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     let place = Place::Serial { port, baud: 115_200, has_handshake: false };

@@ -1,36 +1,35 @@
-//! What is said of a programme before it runs: its mistakes, what is asked and told, what it will do.
+//! Checks and preview of a programme before it runs.
 
 use crate::Failure;
 use crate::protocol::FileReport;
 use crate::rig::{OpenRig, RigArgs};
-use crate::run::{HowArgs, USUAL_INDENTER};
+use crate::run::{SessionArgs, USUAL_INDENTER};
 use palpate_analysis::report::text::in_columns;
 use palpate_model::about::pair_of;
 use palpate_protocols::file::Problem;
 use palpate_runner::programme::{Foreseen, Programme, ProgrammeError, foresee};
 use palpate_sessions::text::read;
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// How what is asked for is told.
-const TELL: &str = "write it into [about] of the file, or into [specimen.N] for one specimen, or add --operator, --specimen or --about KEY=VALUE";
+/// How to supply missing labels.
+const SUPPLY_HINT: &str = "write it into [about] of the file, or into [specimen.N] for one specimen, or add --operator, --specimen or --about KEY=VALUE";
 
-/// The programme of a file; protocols that are not built in lie beside it.
+/// The programme of a file; protocols that are not built in are files in its folder.
 pub(super) fn parse(file: &Path, text: &str) -> Result<Programme, ProgrammeError> {
-    let beside = |name: &str| {
+    let read_protocol = |name: &str| {
         let path = file.parent().unwrap_or(Path::new(".")).join(name);
         read(&path).map_err(|err| {
             format!(
-                "'{name}' is neither a built-in protocol nor a file beside the programme ({err})"
+                "'{name}' is neither a built-in protocol nor a file in the programme's folder ({err})"
             )
         })
     };
-    Programme::read(text, &beside)
+    Programme::read(text, &read_protocol)
 }
 
-/// The first problem, as a protocol's is told.
-pub(super) fn refusal(file: &Path, err: &ProgrammeError) -> Failure {
+/// The first problem, in the form of a protocol's.
+pub(super) fn parse_failure(file: &Path, err: &ProgrammeError) -> Failure {
     let (first, rest) = match err.0.split_first() {
         Some((first, rest)) => (first.to_string(), rest.len()),
         None => (String::new(), 0),
@@ -43,25 +42,28 @@ pub(super) fn refusal(file: &Path, err: &ProgrammeError) -> Failure {
     Failure::usage(format!("{name}, {first}{more}"))
 }
 
-/// What would only be looked at before a check keeps a run from starting.
-pub(super) fn refuse(file: &Path, problem: &Problem) -> Failure {
+/// A problem that a check only reports stops a run.
+pub(super) fn problem_failure(file: &Path, problem: &Problem) -> Failure {
     let error = Problem::error(problem.line, problem.message.clone());
     Failure::usage(format!("{}, {error}", file.display()))
 }
 
-/// What the command line says of every session holds over the file.
-pub(super) fn tell(programme: &mut Programme, how: &HowArgs) -> Result<(), Failure> {
+/// Labels of the command line take precedence over the file.
+pub(super) fn apply_labels(
+    programme: &mut Programme,
+    options: &SessionArgs,
+) -> Result<(), Failure> {
     programme.usual.indenter = USUAL_INDENTER.to_owned();
-    let indenter = how.indenter.as_deref().unwrap_or_default();
+    let indenter = options.indenter.as_deref().unwrap_or_default();
     let labels = [
-        ("operator", how.operator.as_str()),
-        ("specimen", how.specimen.as_str()),
+        ("operator", options.operator.as_str()),
+        ("specimen", options.specimen.as_str()),
         ("indenter", indenter),
     ];
     for (key, value) in labels.into_iter().filter(|(_, value)| !value.is_empty()) {
         programme.tell(key, value).map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
     }
-    for text in &how.about {
+    for text in &options.about {
         pair_of(text)
             .map_err(|err| err.to_string())
             .and_then(|(key, value)| programme.tell(key, value))
@@ -70,24 +72,24 @@ pub(super) fn tell(programme: &mut Programme, how: &HowArgs) -> Result<(), Failu
     Ok(())
 }
 
-/// Refuses while something that protocols ask for is not told.
-pub(super) fn ask(file: &Path, programme: &Programme) -> Result<(), Failure> {
+/// Refuses while labels that protocols ask for are missing.
+pub(super) fn require_labels(file: &Path, programme: &Programme) -> Result<(), Failure> {
     let questions = programme.questions();
     if questions.is_empty() {
         return Ok(());
     }
-    let told: Vec<String> = questions
+    let missing: Vec<String> = questions
         .iter()
         .map(|question| format!("line {}: {}", question.line, question.message))
         .collect();
     Err(Failure::usage(format!(
-        "{}: before it begins, something must be told: {}; {TELL}",
+        "{}: labels are missing: {}; {SUPPLY_HINT}",
         file.display(),
-        told.join("; ")
+        missing.join("; ")
     )))
 }
 
-/// Everything that can be said of a programme file before it runs, in order of lines.
+/// Checks a programme file; problems are in order of lines.
 pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> {
     let text = read(Path::new(file)).map_err(Failure::usage)?;
     let mut report =
@@ -99,17 +101,15 @@ pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> 
             return Ok(report);
         }
     };
-    // What cannot be a setting of the simulated rig is a mistake of the file.
+    // A wrong setting of the simulated rig is a mistake of the file.
     if let Err(err) = with_settings(&RigArgs::default(), &programme.simulated) {
         report.problems.push(Problem::error(0, err.sentence()));
     }
     let questions = programme.questions().into_iter();
-    report.problems.extend(
-        questions.map(|question| {
-            Problem::warning(question.line, format!("{}; {TELL}", question.message))
-        }),
-    );
-    match look_ahead(&programme, bench)? {
+    report.problems.extend(questions.map(|question| {
+        Problem::warning(question.line, format!("{}; {SUPPLY_HINT}", question.message))
+    }));
+    match preview_programme(&programme, bench)? {
         Ok(ahead) => {
             report.expected_s = Some(ahead.expected().0);
             report.problems.extend(ahead.notes);
@@ -122,7 +122,7 @@ pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> 
     Ok(report)
 }
 
-pub(super) fn look_ahead(
+pub(super) fn preview_programme(
     programme: &Programme,
     bench: &OpenRig,
 ) -> Result<Result<Foreseen, ProgrammeError>, Failure> {
@@ -131,7 +131,7 @@ pub(super) fn look_ahead(
     Ok(foresee(programme, rig, &bench.limits, &curve))
 }
 
-/// What the programme says of a simulated rig, where the command line says nothing else.
+/// Settings of the programme for a simulated rig; the command line takes precedence.
 pub(super) fn with_settings(
     args: &RigArgs,
     simulated: &BTreeMap<String, String>,
@@ -151,62 +151,38 @@ pub(super) fn with_settings(
             "rate" if args.rate == usual.rate => {
                 args.rate = value.parse().map_err(|err| wrong(&err))?;
             }
-            // The command line says something else; and what there is not was told when the file was read.
+            // The command line sets another value; an unknown name was refused when the file was read.
             _ => {}
         }
     }
     Ok(args)
 }
 
-/// What a programme will do, as `--preview` tells it.
-#[derive(Serialize)]
-pub(super) struct Ahead<'a> {
-    programme: &'a str,
-    sessions: u32,
-    expected_s: f64,
-    tasks: Vec<AheadTask<'a>>,
+/// The object of `--preview`.
+pub(super) fn preview_object(programme: &Programme, foreseen: &Foreseen) -> serde_json::Value {
+    let tasks = programme.tasks.iter().zip(&foreseen.tasks).map(|(task, ahead)| {
+        serde_json::json!({
+            "task": task.name, "repeats": task.repeats, "expected_s": ahead.expected.0,
+            "longest_s": ahead.longest.0, "force_band_n": ahead.force_band.map(|force| force.0),
+        })
+    });
+    serde_json::json!({
+        "programme": programme.name, "sessions": programme.session_count(),
+        "expected_s": foreseen.expected().0, "tasks": tasks.collect::<Vec<_>>(),
+    })
 }
 
-/// One task of it.
-#[derive(Serialize)]
-struct AheadTask<'a> {
-    task: &'a str,
-    repeats: u32,
-    expected_s: f64,
-    longest_s: f64,
-    force_band_n: [f64; 2],
-}
-
-impl<'a> Ahead<'a> {
-    pub(super) fn of(programme: &'a Programme, foreseen: &Foreseen) -> Self {
-        let pairs = programme.tasks.iter().zip(&foreseen.tasks);
-        Self {
-            programme: &programme.name,
-            sessions: programme.session_count(),
-            expected_s: foreseen.expected().0,
-            tasks: pairs
-                .map(|(task, ahead)| AheadTask {
-                    task: &task.name,
-                    repeats: task.repeats,
-                    expected_s: ahead.expected.0,
-                    longest_s: ahead.longest.0,
-                    force_band_n: ahead.force_band.map(|force| force.0),
-                })
-                .collect(),
-        }
-    }
-}
-
-pub(super) fn contents(programme: &Programme, foreseen: &Ahead<'_>) -> String {
+pub(super) fn preview_table(programme: &Programme, foreseen: &Foreseen) -> String {
     let mut lines =
         vec![["task", "times", "min", "at most", "peak N", "protocol"].map(str::to_owned).to_vec()];
     for (task, ahead) in programme.tasks.iter().zip(&foreseen.tasks) {
+        let [low, high] = ahead.force_band.map(|force| force.0);
         lines.push(vec![
             task.name.clone(),
             task.repeats.to_string(),
-            format!("{:.1}", ahead.expected_s / 60.0),
-            format!("{:.1}", ahead.longest_s / 60.0),
-            format!("{:.1} to {:.1}", ahead.force_band_n[0], ahead.force_band_n[1]),
+            format!("{:.1}", ahead.expected.0 / 60.0),
+            format!("{:.1}", ahead.longest.0 / 60.0),
+            format!("{low:.1} to {high:.1}"),
             task.protocol.title.clone(),
         ]);
     }
@@ -214,7 +190,7 @@ pub(super) fn contents(programme: &Programme, foreseen: &Ahead<'_>) -> String {
         "{}\n{}\n{} sessions, about {:.0} min of session time",
         programme.title,
         in_columns(&lines),
-        foreseen.sessions,
-        foreseen.expected_s / 60.0
+        programme.session_count(),
+        foreseen.expected().0 / 60.0
     )
 }

@@ -1,22 +1,23 @@
-//! What the words of a block mean together, checked in the order in which Grbl does (gnea/grbl, gcode.c, step 3).
+//! Checks the words of a block against each other, in the order of Grbl (gnea/grbl, gcode.c, step 3).
 
-use super::gcode::{Flow, Line, Modes, Motion, Offsets, Parsed};
-use super::planner::{AXES, Place};
-use super::words::{AxisUse, Words};
+use super::gcode::{
+    BlockContext, CoordinateOffsets, GcodeMotion, ModalState, ParsedBlock, ProgramFlow,
+};
+use super::planner::{AXES, Coordinates};
+use super::words::{AxisUse, BlockWords};
 
 const MM_PER_INCH: f64 = 25.4;
 
 /// Values of X, Y and Z in mm, where they are given.
 type Axes = [Option<f64>; AXES];
 
-/// Checks the words against each other.
-pub fn finish(
-    line: Line,
-    mut offsets: Offsets,
-    mut words: Words,
-    flow: Flow,
-) -> Result<Parsed, u8> {
-    let Line { mut block, before, is_jog, here } = line;
+pub fn check_block(
+    line: BlockContext,
+    mut offsets: CoordinateOffsets,
+    mut words: BlockWords,
+    flow: ProgramFlow,
+) -> Result<ParsedBlock, u8> {
+    let BlockContext { mut block, before, is_jog, here } = line;
     let scale = if block.is_inch { MM_PER_INCH } else { 1.0 };
     let axes = words.axes().map(|value| value.map(|value| value * scale));
     if axes.iter().any(Option::is_some) {
@@ -30,7 +31,7 @@ pub fn finish(
     if let Some(speed) = words.value('S') {
         block.spindle_speed = speed;
     }
-    // A block without it forgets it.
+    // A block without it resets it.
     block.tool = words.value('T').map_or(0, |tool| tool as u8);
     let dwell = match words.non_modal {
         4 => Some(words.take('P').ok_or(28_u8)?),
@@ -51,25 +52,17 @@ pub fn finish(
     };
     refuse_leftovers(&mut words, is_jog)?;
     if is_jog {
-        // Only distance, units and G53 beside the way.
+        // Only distance mode, units and G53 are allowed.
         let is_plain = words.groups & !(1 << 0 | 1 << 3 | 1 << 6) == 0;
         if !is_plain || !matches!(words.non_modal, 0 | 53) {
             return Err(16);
         }
-        // A jog leaves everything as it was (doc/markdown/jogging.md).
-        return Ok(Parsed {
-            modes: before,
-            offsets,
-            dwell: None,
-            via: None,
-            motion,
-            flow,
-            waits_for_rest: false,
-        });
+        // A jog changes no mode (doc/markdown/jogging.md).
+        block = before;
     }
     let has_spindle = block.spindle != before.spindle
         || block.spindle != 5 && block.spindle_speed != before.spindle_speed;
-    Ok(Parsed {
+    Ok(ParsedBlock {
         modes: block,
         offsets,
         dwell,
@@ -77,7 +70,7 @@ pub fn finish(
         motion: stored.or(motion),
         flow,
         waits_for_rest: dwell.is_some()
-            || flow != Flow::Runs
+            || flow != ProgramFlow::Runs
             || matches!(words.non_modal, 10 | 281 | 301)
             || motion.is_some_and(|motion| motion.kind > 80)
             || has_spindle
@@ -85,8 +78,14 @@ pub fn finish(
     })
 }
 
-/// Where the axis words lead, in machine coordinates.
-fn target(block: &Modes, words: &Words, axes: Axes, here: Place, offsets: &Offsets) -> Place {
+/// Target of the axis words, in machine coordinates.
+fn target(
+    block: &ModalState,
+    words: &BlockWords,
+    axes: Axes,
+    here: Coordinates,
+    offsets: &CoordinateOffsets,
+) -> Coordinates {
     let own = offsets.of(block.system);
     let is_machine = words.non_modal == 53;
     std::array::from_fn(|axis| match axes[axis] {
@@ -97,18 +96,19 @@ fn target(block: &Modes, words: &Words, axes: Axes, here: Place, offsets: &Offse
     })
 }
 
-/// Words that hold for one block: what they store, and the ways of `G28` and `G30`, over a place and to the stored one.
+/// Words that hold for one block: stores offsets, and returns the motions of `G28` and `G30`, via a position and to the
+/// stored one.
 fn non_modal(
-    offsets: &mut Offsets,
-    words: &mut Words,
+    offsets: &mut CoordinateOffsets,
+    words: &mut BlockWords,
     axes: Axes,
-    block: &Modes,
-    here: Place,
-    target: Place,
-) -> Result<(Option<Motion>, Option<Motion>), u8> {
+    block: &ModalState,
+    here: Coordinates,
+    target: Coordinates,
+) -> Result<(Option<GcodeMotion>, Option<GcodeMotion>), u8> {
     let has_axes = axes.iter().any(Option::is_some);
-    let rapid = |to| Some(Motion { kind: 0, to, feed: block.feed, is_jog: false });
-    let mut ways = (None, None);
+    let rapid = |to| Some(GcodeMotion { kind: 0, to, feed: block.feed, is_jog: false });
+    let mut motions = (None, None);
     match words.non_modal {
         10 => store(offsets, words, axes, block, here)?,
         92 if !has_axes => return Err(26),
@@ -126,7 +126,7 @@ fn non_modal(
                 None if has_axes => target[axis],
                 _ => place[axis],
             });
-            ways = (rapid(target).filter(|_| has_axes), rapid(to));
+            motions = (rapid(target).filter(|_| has_axes), rapid(to));
         }
         281 | 301 => offsets.stored[usize::from(words.non_modal == 301)] = here,
         921 => offsets.shift = [0.0; AXES],
@@ -136,17 +136,17 @@ fn non_modal(
     if block.motion == 80 && has_axes {
         return Err(31);
     }
-    Ok(ways)
+    Ok(motions)
 }
 
-/// The motion that axis words ask for, if there are any.
+/// The motion of the axis words, if there are any.
 fn motion(
-    block: &Modes,
-    words: &Words,
+    block: &ModalState,
+    words: &BlockWords,
     axes: Axes,
-    (here, target): (Place, Place),
+    (here, target): (Coordinates, Coordinates),
     is_jog: bool,
-) -> Result<Option<Motion>, u8> {
+) -> Result<Option<GcodeMotion>, u8> {
     let has_axes = axes.iter().any(Option::is_some);
     if block.motion != 0 && block.feed == 0.0 {
         return Err(22);
@@ -162,10 +162,10 @@ fn motion(
             return Err(33);
         }
     }
-    let way = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
-    let length = way.sum::<f64>().sqrt();
+    let squares = (0..AXES).map(|axis| (target[axis] - here[axis]).powi(2));
+    let length = squares.sum::<f64>().sqrt();
     let share = if block.is_inverse && !is_jog { length } else { 1.0 };
-    Ok(has_axes.then_some(Motion {
+    Ok(has_axes.then_some(GcodeMotion {
         kind: block.motion,
         to: target,
         feed: block.feed * share,
@@ -173,8 +173,8 @@ fn motion(
     }))
 }
 
-/// A word that nothing has used.
-fn refuse_leftovers(words: &mut Words, is_jog: bool) -> Result<(), u8> {
+/// Refuses a word that no other uses.
+fn refuse_leftovers(words: &mut BlockWords, is_jog: bool) -> Result<(), u8> {
     let of_axes = words.axes_for.is_some();
     let used = [("NF", true), ("ST", !is_jog), ("XYZ", of_axes)];
     for letter in used.iter().filter(|(_, is)| *is).flat_map(|(all, _)| all.chars()) {
@@ -188,9 +188,9 @@ fn refuse_leftovers(words: &mut Words, is_jog: bool) -> Result<(), u8> {
 
 /// The feed of a block in mm/min.
 fn feed(
-    block: &Modes,
-    before: Modes,
-    words: &Words,
+    block: &ModalState,
+    before: ModalState,
+    words: &BlockWords,
     is_jog: bool,
     is_motion: bool,
     scale: f64,
@@ -210,8 +210,8 @@ fn feed(
     })
 }
 
-/// Why an arc is refused.
-fn arc(block: &Modes, words: &Words, axes: Axes) -> u8 {
+/// Error number of an arc.
+fn arc(block: &ModalState, words: &BlockWords, axes: Axes) -> u8 {
     let plane = match block.plane {
         17 => [0, 1],
         18 => [2, 0],
@@ -229,11 +229,11 @@ fn arc(block: &Modes, words: &Words, axes: Axes) -> u8 {
 
 /// `G10 L2` and `G10 L20`.
 fn store(
-    offsets: &mut Offsets,
-    words: &mut Words,
+    offsets: &mut CoordinateOffsets,
+    words: &mut BlockWords,
     axes: Axes,
-    block: &Modes,
-    here: Place,
+    block: &ModalState,
+    here: Coordinates,
 ) -> Result<(), u8> {
     if axes.iter().all(Option::is_none) {
         return Err(26);
