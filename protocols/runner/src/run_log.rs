@@ -1,9 +1,9 @@
-//! What the program's log says of a run, at transitions alone: what kind of thing happened to which step, never a sample, a
-//! force or a note. Why stands in the session's own log, and reasons quote what was measured.
+//! Lines of a run in the program's log, at transitions only: the kind of event and the step, never a sample, a force or a
+//! note. Reasons quote measured values, so they are in the session's own log only.
 
 use palpate_model::Nanos;
 use palpate_model::rig::Fault;
-use palpate_protocols::engine::{EndingKind, Input, Outcome, Record, Recovery};
+use palpate_protocols::engine::{EndingKind, FailureResponse, Input, Outcome, Record};
 use palpate_protocols::plans::Plan;
 use std::mem::{Discriminant, discriminant};
 use std::path::Path;
@@ -26,7 +26,6 @@ struct FaultCount {
 }
 
 impl FaultLog {
-    /// Takes a fault of this time.
     pub fn fault(&mut self, now: Nanos, fault: &Fault) {
         let kind = discriminant(fault);
         match self.0.iter_mut().find(|one| one.kind == kind) {
@@ -103,10 +102,10 @@ impl RunLog {
                 warn!(parent: &self.step, "monitor {} tripped", index + 1);
             }
             Record::Refused { .. } => warn!(parent: &self.step, "request refused"),
-            Record::StepFailed { then: Recovery::Retry(count), .. } => {
+            Record::StepFailed { then: FailureResponse::Retry(count), .. } => {
                 warn!(parent: &self.step, "step failed, trying again ({count})");
             }
-            Record::StepFailed { then: Recovery::Skip, .. } => {
+            Record::StepFailed { then: FailureResponse::Skip, .. } => {
                 warn!(parent: &self.step, "step failed, left out");
             }
             _ => {}
@@ -121,7 +120,6 @@ impl RunLog {
         self.step = info_span!(parent: &self.run, "step", number = index + 1, kind);
     }
 
-    /// The log of the session or the computer has something to tell.
     pub fn trouble(&self, text: &str) {
         warn!(parent: &self.step, "{text}");
     }

@@ -95,14 +95,14 @@ fn sim() -> SimRig {
 }
 
 #[test]
-fn a_wall_clock_that_jumps_changes_no_sample_and_is_told() {
+fn wall_clock_jump_changes_no_sample_and_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let fast = TimeScale::Factor(40.0);
     let mut rows = Vec::new();
     for name in ["calm", "jumping"] {
         let start = host_times();
         let is_calm = name == "calm";
-        // An hour back after half a second: somebody set the clock.
+        // An hour back after half a second: as if the clock was set.
         let clock: Clock = Box::new(move || {
             let mut times = alike(start);
             if !is_calm && times.awake > start.awake + Duration::from_millis(500) {
@@ -203,7 +203,7 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
     assert_eq!(events.len(), 1, "{events:?}");
     let text = &events[0].1;
     assert!(text.contains("as if a matrix had no inverse") && text.contains("is off"), "{text}");
-    // At full pace nothing else is told: what is in the log does not depend on the computer.
+    // At full pace the log does not depend on the computer.
     assert_eq!(panicking.beside.health.messages, 1);
     assert_eq!(sound.beside.health.messages, 0);
 }

@@ -4,10 +4,10 @@ use super::args::{Args, COUNT_MAX};
 use super::problem::{Problems, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
-use super::tree::{Node, Table, Value};
+use super::tree::{DocumentNode, DocumentTable, DocumentValue};
 use super::words::{COMMON, Key};
 use crate::plans::{OnFailure, PlannedStep};
-use crate::steps::{Build, Facts, KINDS};
+use crate::steps::{BuildStep, KINDS, StepFacts};
 
 /// Steps and passes of loops in one plan. A day of steps of ten seconds each.
 pub(super) const STEPS_MAX: usize = 10_000;
@@ -15,7 +15,6 @@ pub(super) const STEPS_MAX: usize = 10_000;
 /// Loops in one another.
 const LOOPS_MAX: usize = 6;
 
-/// Keys of a loop, beside what it runs through.
 pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
@@ -31,23 +30,21 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "checkpoint",
         Kind::Text,
-        "name of a place behind each pass where the run may pause",
+        "name of a checkpoint after each pass, where the run may pause",
     ),
-    Key::optional("only_if", Kind::Flag, "leaves the loop out where this is `false` or `\"none\"`"),
+    Key::optional("only_if", Kind::Flag, "skips the loop where this is `false` or `\"none\"`"),
 ];
 
-/// A step with the line it came from.
-pub(super) struct Placed {
+pub(super) struct PlacedStep {
     pub planned: PlannedStep,
     pub line: u32,
 }
 
-/// Writes out the steps.
 pub(super) fn write_out(
-    procedure: &Node,
+    procedure: &DocumentNode,
     scope: &mut Scope,
     problems: &mut Problems,
-) -> Vec<Placed> {
+) -> Vec<PlacedStep> {
     let mut writer =
         Writer { scope, problems, steps: Vec::new(), passes: 0, cycles: 0, is_too_long: false };
     writer.steps(procedure, 0, 0);
@@ -57,16 +54,15 @@ pub(super) fn write_out(
 struct Writer<'a> {
     scope: &'a mut Scope,
     problems: &'a mut Problems,
-    steps: Vec<Placed>,
+    steps: Vec<PlacedStep>,
     passes: usize,
-    /// Repeats of the measurement so far.
     cycles: u32,
     is_too_long: bool,
 }
 
 impl Writer<'_> {
-    fn steps(&mut self, list: &Node, cycle: u32, depth: usize) {
-        let Value::List(items) = &list.value else {
+    fn steps(&mut self, list: &DocumentNode, cycle: u32, depth: usize) {
+        let DocumentValue::List(items) = &list.value else {
             return self.problems.error(
                 list.line,
                 "'steps' must be a list in brackets, such as steps = [ { do = \"tare\" } ]",
@@ -76,10 +72,13 @@ impl Writer<'_> {
             if self.is_too_long || self.problems.is_full() {
                 return;
             }
-            let Value::Table(table) = &item.value else {
+            let DocumentValue::Table(table) = &item.value else {
                 self.problems.error(
                     item.line,
-                    format!("{} is no step; write {{ do = \"ramp\", ... }} in braces", item.kind()),
+                    format!(
+                        "{} is not a step; write {{ do = \"ramp\", ... }} in braces",
+                        item.kind()
+                    ),
                 );
                 continue;
             };
@@ -103,10 +102,10 @@ impl Writer<'_> {
         }
     }
 
-    fn step(&mut self, table: &Table, cycle: u32) {
+    fn step(&mut self, table: &DocumentTable, cycle: u32) {
         let known: Vec<&str> = kinds().map(|(kind, _)| kind.word).collect();
         let name = match table.get("do").map(|node| &node.value) {
-            Some(Value::Text(name)) => name.as_str(),
+            Some(DocumentValue::Text(name)) => name.as_str(),
             _ => {
                 return self.problems.error(
                     table.line,
@@ -125,13 +124,14 @@ impl Writer<'_> {
         let args =
             Args::read(table, &what, &[kind.keys, &COMMON], &["do"], self.scope, self.problems);
         let on_failure = args.text("on_failure").and_then(on_failure);
-        let on_failure = self
-            .problems
-            .take(table.line, on_failure.map_err(|why| format!("'on_failure' of {what}: {why}")));
+        let on_failure = self.problems.take(
+            table.line,
+            on_failure.map_err(|reason| format!("'on_failure' of {what}: {reason}")),
+        );
         if args.is_no("only_if") || self.problems.count() > before {
             return;
         }
-        let built = build(&args).map_err(|why| format!("{what}: {why}"));
+        let built = build(&args).map_err(|reason| format!("{what}: {reason}"));
         let (Some(step), Some(on_failure)) = (self.problems.take(table.line, built), on_failure)
         else {
             return;
@@ -145,10 +145,10 @@ impl Writer<'_> {
             checkpoint: args.maybe_text("checkpoint").map(str::to_owned),
             on_failure,
         };
-        self.steps.push(Placed { planned, line: table.line });
+        self.steps.push(PlacedStep { planned, line: table.line });
     }
 
-    fn run_loop(&mut self, table: &Table, cycle: u32, depth: usize) {
+    fn run_loop(&mut self, table: &DocumentTable, cycle: u32, depth: usize) {
         if depth == LOOPS_MAX {
             let message = format!(
                 "loops can stand in one another {LOOPS_MAX} deep, not deeper; write some steps out"
@@ -160,9 +160,9 @@ impl Writer<'_> {
                 .problems
                 .error(table.line, "a loop needs steps; write steps = [ { do = \"ramp\", ... } ]");
         };
-        let besides = ["repeat", "for_each", "steps"];
+        let other_keys = ["repeat", "for_each", "steps"];
         // The name of a checkpoint may use the loop's own names, so it is read in each pass.
-        let without_name = Table {
+        let without_name = DocumentTable {
             line: table.line,
             entries: table
                 .entries
@@ -171,8 +171,14 @@ impl Writer<'_> {
                 .cloned()
                 .collect(),
         };
-        let args =
-            Args::read(&without_name, "a loop", &[&LOOP_KEYS], &besides, self.scope, self.problems);
+        let args = Args::read(
+            &without_name,
+            "a loop",
+            &[&LOOP_KEYS],
+            &other_keys,
+            self.scope,
+            self.problems,
+        );
         let Some((name, mut values)) = self.values(table) else {
             return;
         };
@@ -213,21 +219,19 @@ impl Writer<'_> {
             self.name_checkpoint(table, begun);
             self.scope.shorten(outside);
         }
-        if count > 0 && matches!(&steps.value, Value::List(items) if items.is_empty()) {
-            self.problems.error(
-                table.line,
-                "the loop has no steps; put some between its brackets or take it out",
-            );
+        if count > 0 && matches!(&steps.value, DocumentValue::List(items) if items.is_empty()) {
+            let message = "the loop has no steps; put some between its brackets or take it out";
+            self.problems.error(table.line, message);
         }
     }
 
     /// Names the checkpoint behind a pass of a loop, whose steps begin at an index.
-    fn name_checkpoint(&mut self, table: &Table, begun: usize) {
+    fn name_checkpoint(&mut self, table: &DocumentTable, begun: usize) {
         let Some(node) = table.get("checkpoint") else {
             return;
         };
         let named = self.scope.value(node, Kind::Text);
-        let named = named.map_err(|why| format!("'checkpoint' of a loop: {why}"));
+        let named = named.map_err(|reason| format!("'checkpoint' of a loop: {reason}"));
         let named = self.problems.take(node.line, named);
         if let Some(last) = self.steps[begun..].last_mut() {
             last.planned.checkpoint = named.map(|given| given.text);
@@ -235,11 +239,11 @@ impl Writer<'_> {
     }
 
     /// What a loop runs through: the name of its values and the values; numbers have no name but `as`.
-    fn values(&mut self, table: &Table) -> Option<(String, Vec<Given>)> {
+    fn values(&mut self, table: &DocumentTable) -> Option<(String, Vec<Given>)> {
         if let Some(node) = table.get("repeat") {
             let count =
                 self.scope.value(node, Kind::Count).and_then(|given| given.number(Kind::Count));
-            let count = count.map_err(|why| format!("'repeat' of a loop: {why}"));
+            let count = count.map_err(|reason| format!("'repeat' of a loop: {reason}"));
             let count = self.problems.take(node.line, count)?;
             if !(1.0..=COUNT_MAX).contains(&count) {
                 let message = format!(
@@ -252,7 +256,9 @@ impl Writer<'_> {
         }
         let node = table.get("for_each")?;
         let entry = match &node.value {
-            Value::Table(variables) if variables.entries.len() == 1 => &variables.entries[0],
+            DocumentValue::Table(variables) if variables.entries.len() == 1 => {
+                &variables.entries[0]
+            }
             _ => {
                 let message = "'for_each' needs one name and its values, such as for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }";
                 self.problems.error(node.line, message);
@@ -262,13 +268,13 @@ impl Writer<'_> {
         let values = self
             .scope
             .list(&entry.node)
-            .map_err(|why| format!("the values of '{}': {why}", entry.key));
+            .map_err(|reason| format!("the values of '{}': {reason}", entry.key));
         let values = self.problems.take(entry.line, values)?;
         if let Some(odd) =
             values.iter().find(|value| matches!(value.what, What::List(_) | What::None))
         {
             let message = format!(
-                "the values of '{}': '{}' is no single value; write each by itself",
+                "the values of '{}': '{}' is not a single value; write each by itself",
                 entry.key, odd.text
             );
             self.problems.error(entry.line, message);
@@ -293,7 +299,7 @@ impl Writer<'_> {
 }
 
 /// The steps that a protocol can ask for, each with what makes it of its keys.
-fn kinds() -> impl Iterator<Item = (&'static Facts, Build)> {
+fn kinds() -> impl Iterator<Item = (&'static StepFacts, BuildStep)> {
     KINDS.iter().filter_map(|kind| Some((*kind, kind.build?)))
 }
 
@@ -302,7 +308,7 @@ fn on_failure(text: &str) -> Result<OnFailure, String> {
     match text.split_once(' ').unwrap_or((text, "")) {
         ("abort", "") => Ok(OnFailure::Abort),
         ("skip", "") => Ok(OnFailure::Skip),
-        // A specimen that fails nine times will fail the tenth.
+        // More than nine retries of one specimen do not help.
         ("retry", count) => match count.trim().parse() {
             Ok(count @ 1..=9) => Ok(OnFailure::Retry(count)),
             _ => Err("a step can be tried again 1 to 9 times; write \"retry 2\"".into()),

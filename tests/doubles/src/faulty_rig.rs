@@ -50,7 +50,6 @@ pub struct FaultyRig<R> {
     unanswered: VecDeque<Sender>,
 }
 
-/// Who sent a command to the rig inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sender {
     Caller,
@@ -58,7 +57,6 @@ enum Sender {
     Double,
 }
 
-/// A controller that began again.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reset {
     /// Tick of the first reading since, once it has come.
@@ -99,7 +97,6 @@ impl<R: Rig> FaultyRig<R> {
         }
     }
 
-    /// The rig inside, such as for its truth.
     pub fn inner(&self) -> &R {
         &self.inner
     }
@@ -148,7 +145,7 @@ impl<R: Rig> FaultyRig<R> {
                 Fault::ControllerReset
             }
             Timed::Refusal => {
-                Fault::CommandRefused { detail: "told to refuse by the test's script".to_owned() }
+                Fault::CommandRefused { detail: "refused by the test's script".to_owned() }
             }
         };
         self.put(at, RigEventBody::Fault(fault));

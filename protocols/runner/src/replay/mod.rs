@@ -18,7 +18,7 @@ use thiserror::Error;
 
 mod player;
 mod source;
-mod words;
+mod wording;
 
 pub use player::Player;
 use source::{RecordedInput, config_of, inputs_of, reading_of};
@@ -31,7 +31,7 @@ pub const TOLERANCE_DERIVED: f64 = 1e-9;
 /// Residuals of the live fit; relative. Its Gram matrices keep about eight digits.
 pub const TOLERANCE_LIVE_RMSE: f64 = 1e-6;
 
-/// Parameters of the live fit, in standard errors: what nobody could see on the display. A
+/// Parameters of the live fit, in standard errors: too little to see on the display. A
 /// parameter that is not identified has no value to agree on.
 pub const TOLERANCE_LIVE_SIGMAS: f64 = 0.01;
 
@@ -44,23 +44,18 @@ pub const TOLERANCE_LIVE_OLD: (f64, f64) = (1e-3, 0.5);
 /// about four digits less than the sum itself.
 pub const TOLERANCE_LIVE_ERROR: f64 = 1e-4;
 
-/// A session cannot be replayed at all.
 #[derive(Debug, Error)]
 pub enum ReplayError {
     /// No rig recorded it, so no engine decided anything.
     #[error(
         "the session was imported from {file} and has no decisions to replay; its numbers can be checked against the original kept beside it"
     )]
-    Imported {
-        /// The file it was made from.
-        file: String,
-    },
+    Imported { file: String },
     /// The manifest's plan or calibration is not what this version knows.
     #[error(
         "the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it"
     )]
     Manifest {
-        /// Plan, calibration or settings.
         what: &'static str,
         /// The parser's words.
         detail: String,
@@ -68,7 +63,6 @@ pub enum ReplayError {
     /// A recorded input is not what this version knows.
     #[error("input {order} of the session cannot be understood ({detail})")]
     Input {
-        /// Its number.
         order: u64,
         /// The parser's words.
         detail: String,
@@ -78,61 +72,47 @@ pub enum ReplayError {
 /// The first place where recorded and recomputed differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// Session time.
     pub at_s: f64,
     /// Samples before it.
     pub after_sample: u64,
     /// What differs: `decision`, `force_N`, `depth_mm`, `phase` or `live fit`.
     pub what: String,
-    /// Number of the decision, for a decision.
     pub decision: Option<usize>,
     /// What the protocol was doing, in its words, such as `step 6 of 8, ramp, cycle 2`.
     pub step: String,
-    /// What the session says.
     pub recorded: Value,
-    /// What the engine says now.
     pub now: Value,
 }
 
 impl Difference {
-    /// What the session says, in words.
     pub fn recorded_words(&self) -> String {
-        words::of(&self.recorded)
+        wording::describe_value(&self.recorded)
     }
 
-    /// What the engine says now, in words.
     pub fn now_words(&self) -> String {
-        words::of(&self.now)
+        wording::describe_value(&self.now)
     }
 }
 
-/// A decision that is allowed to differ, for a reason somebody reviewed.
+/// A decision that is allowed to differ, for a reviewed reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Blessing {
-    /// Number of the decision.
     pub decision: usize,
-    /// What the engine decides now.
     pub now: Value,
-    /// Why that is right.
     pub reason: String,
 }
 
-/// What a replay found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReplayReport {
-    /// Samples fed.
     pub samples: u64,
-    /// Decisions compared.
     pub decisions: usize,
     /// Whether decisions were compared: the engine version is the recorded one.
     pub is_same_engine: bool,
-    /// Decisions that differ as blessed.
     pub blessed: usize,
     /// Largest difference of a derived force, in N.
     pub force_difference_n: f64,
     /// Largest difference of a derived depth, in mm.
     pub depth_difference_mm: f64,
-    /// The first difference that matters, if any.
     pub first_difference: Option<Difference>,
 }
 
@@ -157,7 +137,6 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     }
 }
 
-/// Replays a session.
 pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport, ReplayError> {
     let config = Arc::new(config_of(session)?);
     let mut inputs = inputs_of(session)?;
@@ -320,7 +299,7 @@ impl Replay<'_> {
         recorded: Value,
         now: Value,
     ) {
-        let step = self.state.as_ref().map_or(String::new(), words::of_step);
+        let step = self.state.as_ref().map_or(String::new(), wording::describe_step);
         self.report.first_difference.get_or_insert(Difference {
             step,
             at_s: at.seconds().0,
@@ -333,7 +312,6 @@ impl Replay<'_> {
     }
 }
 
-/// Whether two live fits say the same.
 fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
     let has_verdicts = !a.verdicts.is_empty();
     let (rmse, sigmas) = if has_verdicts {

@@ -41,14 +41,11 @@ pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
     })
 }
 
-/// An input that is no sample.
 #[derive(Clone, Debug)]
 pub(super) struct RecordedInput {
     /// Samples before it.
     pub after_sample: u64,
-    /// When it came.
     pub now: Nanos,
-    /// What came.
     pub input: Input,
 }
 

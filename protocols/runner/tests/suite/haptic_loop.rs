@@ -20,7 +20,7 @@ fn device(period: Period) -> Simulated {
 }
 
 #[test]
-fn a_tick_allocates_nothing() {
+fn haptic_tick_allocates_nothing() {
     let mut device = device(Period::MILLISECOND);
     let mut seen = *device.last();
     let counted = allocation_counter::measure(|| {
@@ -62,7 +62,7 @@ fn waits() -> u64 {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_tick_waits_for_nobody() {
+fn haptic_tick_never_waits() {
     let mut device = device(Period::MILLISECOND);
     let (mut shown, mut seen) = triple_buffer::triple_buffer(device.last());
     let reader = std::thread::Builder::new().spawn(move || {
@@ -114,13 +114,13 @@ fn poked(method: Method) -> impl FnMut(usize) {
             };
             Contact::at(&grid, node, z, side)
         });
-        let told = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
-        assert!(!told.dirty.is_empty() || tick % 4 == 0);
+        let effect = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
+        assert!(!effect.dirty.is_empty() || tick % 4 == 0);
     }
 }
 
 #[test]
-fn a_tick_of_the_surface_allocates_nothing() {
+fn surface_tick_allocates_nothing() {
     for method in Method::ALL {
         let mut tick = poked(method);
         // From the first tick on: all there is was made before.
@@ -131,7 +131,7 @@ fn a_tick_of_the_surface_allocates_nothing() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_tick_of_the_surface_waits_for_nobody() {
+fn surface_tick_never_waits() {
     for method in Method::ALL {
         let mut tick = poked(method);
         // The first ones read the program from the disk.
@@ -146,7 +146,7 @@ fn a_tick_of_the_surface_waits_for_nobody() {
 }
 
 #[test]
-fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
+fn shared_view_is_never_torn_and_never_goes_back_in_time() {
     let period = Period::of_rate(10_000.0).unwrap();
     let device = device(period);
     let first = *device.last();
@@ -170,7 +170,7 @@ fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
 }
 
 #[test]
-fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
+fn overrunning_loop_leaves_the_core_to_other_threads() {
     /// Keeps the core for twice its time, and counts what was due.
     #[derive(Default)]
     struct Heavy {
@@ -201,7 +201,7 @@ fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
 }
 
 #[test]
-fn ticks_that_were_missed_are_told_and_none_is_lost() {
+fn missed_ticks_are_counted_and_none_is_lost() {
     /// Sleeps through some ticks now and then, which a loop must never do.
     struct Sleepy {
         calls: u64,
