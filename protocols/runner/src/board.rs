@@ -234,19 +234,9 @@ impl Board {
             return (Seconds(0.0), 1.0);
         }
         let spent = self.now.since(step_started).seconds().0;
-        let remaining: f64 =
-            self.steps
-                .iter()
-                .enumerate()
-                .skip(step_index)
-                .map(|(i, step)| {
-                    if i == step_index {
-                        (step.expected.0 - spent).max(0.0)
-                    } else {
-                        step.expected.0
-                    }
-                })
-                .sum();
+        let current = self.steps.get(step_index).map_or(0.0, |step| step.expected.0 - spent);
+        let later = self.steps.iter().skip(step_index + 1).map(|step| step.expected.0);
+        let remaining = current.max(0.0) + later.sum::<f64>();
         let done = self.now.seconds().0;
         (Seconds(remaining), done / (done + remaining).max(1e-9))
     }

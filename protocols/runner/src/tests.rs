@@ -166,9 +166,9 @@ fn a_computer_that_was_suspended_ends_the_run() {
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }
 
-struct Panicking(u32);
+struct PanickingEstimator(u32);
 
-impl Estimator for Panicking {
+impl Estimator for PanickingEstimator {
     fn push(&mut self, _: Seconds, _: Depth, _: Newtons, _: Newtons) {
         self.0 += 1;
         assert!(self.0 < 700, "as if a matrix had no inverse");
@@ -189,7 +189,7 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
         let active = main_loop.run.as_mut().unwrap();
         if name == "panicking" {
             let config = active.engine().unwrap().config().clone();
-            active.live = LiveFeed::with(&config, |_| Box::new(Panicking(0)));
+            active.live = LiveFeed::with(&config, |_| Box::new(PanickingEstimator(0)));
         }
         run(main_loop);
         sessions.push(Session::open(&out).unwrap());

@@ -118,15 +118,13 @@ fn check_name(root: &DocumentTable, name: &str, problems: &mut Problems) {
 
 fn version(root: &DocumentTable, problems: &mut Problems) -> u32 {
     let message = "the protocol needs its own version, a whole number from 1; write version = 1 and raise it with every change";
-    let (line, version) = match root.get("version") {
-        Some(node) => match &node.value {
-            DocumentValue::Number(number) => (node.line, number.parse().unwrap_or(0)),
-            _ => (node.line, 0),
-        },
-        None => (1, 0),
+    let node = root.get("version");
+    let version = match node.map(|node| &node.value) {
+        Some(DocumentValue::Number(number)) => number.parse().unwrap_or(0),
+        _ => 0,
     };
     if version == 0 {
-        problems.error(line, message);
+        problems.error(node.map_or(1, |node| node.line), message);
     }
     version
 }
@@ -144,19 +142,17 @@ fn ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {
-            DocumentValue::Text(key) if known.contains(&key.as_str()) => {
-                if !ask.contains(key) {
-                    ask.push(key.clone());
-                }
-            }
+            DocumentValue::Text(key) if ask.contains(key) => {}
+            DocumentValue::Text(key) if known.contains(&key.as_str()) => ask.push(key.clone()),
             DocumentValue::Text(key) => {
                 let message = format!("'{key}' cannot be asked for; {}", suggestion(key, &known));
                 problems.error(item.line, message);
             }
-            _ => problems.error(
-                item.line,
-                format!("{} cannot be asked for; write a text in quotes", item.kind()),
-            ),
+            _ => {
+                let kind = item.kind();
+                let message = format!("{kind} cannot be asked for; write a text in quotes");
+                problems.error(item.line, message);
+            }
         }
     }
     ask
@@ -169,10 +165,9 @@ fn procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode {
         root.entries.iter().any(|entry| entry.key == "steps" || has_steps(&entry.node));
     let Some(node) = root.get("procedure") else {
         // Steps in the wrong table are reported there.
-        if is_misplaced {
-            return nothing;
+        if !is_misplaced {
+            problems.error(1, "the protocol has no steps; write [procedure] and below it steps = [ { do = \"self-test\" }, ... ]");
         }
-        problems.error(1, "the protocol has no steps; write [procedure] and below it steps = [ { do = \"self-test\" }, ... ]");
         return nothing;
     };
     let steps = match &node.value {

@@ -43,6 +43,22 @@ use crate::preview::{DurationEstimate, Walk};
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::units::Depth;
 
+/// What the file of a step works with.
+mod prelude {
+    pub(super) use super::preconditions::{FROM_SURFACE, Need, Preconditions};
+    pub(super) use super::{
+        Executable, MeterSample, MoveRun, PauseBehaviour, Progress, RunningStep, Step, StepEvent,
+        StepFacts, StepKind, StepResult,
+    };
+    pub(super) use crate::engine::{BlockMean, Context, Record};
+    pub(super) use crate::file::{Args, Key, Kind};
+    pub(super) use crate::preview::{DurationEstimate, Reach, Walk};
+    pub(super) use palpate_model::rig::{Phase, Reading};
+    pub(super) use palpate_model::signal::MovingMean;
+    pub(super) use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+    pub(super) use serde::{Deserialize, Serialize};
+}
+
 pub(crate) type BuildStep = fn(&Args) -> Result<Step, String>;
 
 #[derive(Clone, Copy)]

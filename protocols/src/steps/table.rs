@@ -11,7 +11,6 @@ macro_rules! steps {
 
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "step", rename_all = "kebab-case")]
-        #[expect(missing_docs, reason = "each is explained at its own data")]
         pub enum Step { $($name($name)),* }
 
         $(impl HasFacts for $name {

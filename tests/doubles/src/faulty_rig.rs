@@ -17,7 +17,7 @@ const REFUSAL_DELAY: Nanos = Nanos(2_000_000);
 
 /// What happens at a set time whether or not the rig inside reports anything.
 #[derive(Clone, Debug)]
-enum Timed {
+enum TimedFault {
     Disconnect,
     Reset { is_announced: bool },
     Refusal,
@@ -33,7 +33,7 @@ pub struct FaultyRig<R> {
     script: Vec<ScriptedFault>,
     noise: Random,
     /// In order of time.
-    timed: VecDeque<(Nanos, Timed)>,
+    timed: VecDeque<(Nanos, TimedFault)>,
     /// Reports on their way to the caller, in order of time.
     reports: VecDeque<RigEvent>,
     /// Arrival of the newest report put on its way.
@@ -68,13 +68,13 @@ impl<R: Rig> FaultyRig<R> {
     /// `inner` with the faults of `script`; `seed` is that of added noise.
     #[must_use]
     pub fn new(inner: R, script: Vec<ScriptedFault>, seed: u64) -> Self {
-        let mut timed: Vec<(Nanos, Timed)> = script
+        let mut timed: Vec<(Nanos, TimedFault)> = script
             .iter()
             .filter_map(|fault| {
                 let what = match fault.kind {
-                    FaultKind::Disconnect => Timed::Disconnect,
-                    FaultKind::Reset => Timed::Reset { is_announced: true },
-                    FaultKind::UnannouncedReset => Timed::Reset { is_announced: false },
+                    FaultKind::Disconnect => TimedFault::Disconnect,
+                    FaultKind::Reset => TimedFault::Reset { is_announced: true },
+                    FaultKind::UnannouncedReset => TimedFault::Reset { is_announced: false },
                     _ => return None,
                 };
                 Some((fault.at, what))
@@ -114,7 +114,7 @@ impl<R: Rig> FaultyRig<R> {
         self.reports.push_back(RigEvent::new(at, body));
     }
 
-    fn schedule(&mut self, at: Nanos, what: Timed) {
+    fn schedule(&mut self, at: Nanos, what: TimedFault) {
         let place = self.timed.partition_point(|(earlier, _)| *earlier <= at);
         self.timed.insert(place, (at, what));
     }
@@ -125,17 +125,17 @@ impl<R: Rig> FaultyRig<R> {
     }
 
     /// What happens at its time, regardless of the rig inside.
-    fn on_timed(&mut self, at: Nanos, what: Timed) {
+    fn on_timed(&mut self, at: Nanos, what: TimedFault) {
         self.now = self.now.max(at);
         let fault = match what {
-            Timed::Disconnect => {
+            TimedFault::Disconnect => {
                 self.is_linked = false;
                 // Reports still on their way are lost with the link.
                 self.reports.clear();
                 self.newest = self.handed_out;
                 Fault::LinkLost { detail: "no answer, the other end has gone".to_owned() }
             }
-            Timed::Reset { is_announced } => {
+            TimedFault::Reset { is_announced } => {
                 self.reset = Some(Reset::default());
                 self.pass_on(RigCommand::Halt, Sender::Double);
                 self.pass_on(RigCommand::DefinePosition { pulses: 0 }, Sender::Double);
@@ -144,7 +144,7 @@ impl<R: Rig> FaultyRig<R> {
                 }
                 Fault::ControllerReset
             }
-            Timed::Refusal => {
+            TimedFault::Refusal => {
                 Fault::CommandRefused { detail: "refused by the test's script".to_owned() }
             }
         };
@@ -278,7 +278,7 @@ impl<R: Rig> Rig for FaultyRig<R> {
             !reset.is_motor_enabled && is_motion
         });
         if is_motor_off || self.is_active(|kind| kind == FaultKind::RefuseCommands) {
-            self.schedule(self.now + REFUSAL_DELAY, Timed::Refusal);
+            self.schedule(self.now + REFUSAL_DELAY, TimedFault::Refusal);
             return;
         }
         if let (Some(reset), RigCommand::EnableMotor) = (&mut self.reset, command) {

@@ -241,17 +241,13 @@ fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15]
 fn read(fields: &mut Fields) -> SceneFile {
     let mut file = SceneFile::default();
     let most = 1e6;
-    if let Some(name) = fields.text("name") {
-        file.name = name;
-    }
+    file.name = fields.text("name").unwrap_or(file.name);
     let source = fields.text("tissue.source");
     let body = read_body(fields, "tissue");
     if source.is_some() && body.is_some() {
         fields.mistake("tissue.source", "give either a source or parameters, not both");
     }
-    if let Some(body) = body {
-        file.body = body;
-    }
+    file.body = body.unwrap_or(file.body);
     file.source = source.filter(|source| source != THESIS);
     // A spacing from a nanometre to a metre, so that every mesh is possible.
     set(&mut file.side_mm, fields.number("tissue.side_mm", 1.0, 1000.0));
@@ -261,8 +257,7 @@ fn read(fields: &mut Fields) -> SceneFile {
     let nodes = fields.whole("mesh.nodes", NODES[0], NODES[1]);
     match (fields.flag("mesh.auto"), nodes) {
         (Some(true), Some(_)) => {
-            fields
-                .mistake("mesh.auto", "a mesh with nodes is not planned; leave one of the two out");
+            fields.mistake("mesh.auto", "a mesh has a number of nodes or auto, not both");
         }
         (Some(true), None) => file.nodes = None,
         (_, Some(nodes)) => file.nodes = Some(nodes as usize),
@@ -272,9 +267,8 @@ fn read(fields: &mut Fields) -> SceneFile {
     set(&mut file.cut_mm, fields.number("mesh.cut_mm", 0.0, 1000.0));
     let [slowest, fastest] = Period::RATES_HZ;
     set(&mut file.rate_hz, fields.number("loop.rate_hz", slowest, fastest));
-    if let Some(scheme) = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme)) {
-        file.scheme = scheme;
-    }
+    let scheme = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme));
+    file.scheme = scheme.unwrap_or(file.scheme);
     file.is_guarded = fields.flag("loop.guards").unwrap_or(file.is_guarded);
     for (name, value) in device_numbers(&mut file.device) {
         set(value, fields.number(&format!("device.{name}"), 0.0, most));
@@ -282,12 +276,10 @@ fn read(fields: &mut Fields) -> SceneFile {
     if let Err(err) = file.device.checked() {
         fields.mistake("device", &err.to_string());
     }
-    let tolerances = &mut file.tolerances;
-    for (name, value) in [
-        ("force_percent", &mut tolerances.force_percent),
-        ("shape_mm", &mut tolerances.shape_mm),
-        ("tick_us", &mut tolerances.tick_us),
-    ] {
+    let Tolerances { force_percent, shape_mm, tick_us } = &mut file.tolerances;
+    let tolerances =
+        [("force_percent", force_percent), ("shape_mm", shape_mm), ("tick_us", tick_us)];
+    for (name, value) in tolerances {
         // A tolerance of zero could never be met.
         set(value, fields.number(&format!("tolerances.{name}"), 1e-6, most));
     }
@@ -295,9 +287,7 @@ fn read(fields: &mut Fields) -> SceneFile {
 }
 
 fn set(value: &mut f64, given: Option<f64>) {
-    if let Some(given) = given {
-        *value = given;
-    }
+    *value = given.unwrap_or(*value);
 }
 
 fn plain(text: &str) -> String {

@@ -215,26 +215,18 @@ impl Replay<'_> {
         if let Some(estimate) = self.live.push(&reading, state) {
             self.expected_live.push_back(estimate);
         }
-        let force = (row.force, derived.force.map(|force| force.0));
-        let depth = (row.depth, derived.depth.map(|depth| depth.0));
-        for (what, (recorded, now)) in [("force_N", force), ("depth_mm", depth)] {
-            match (recorded, now) {
-                (Some(recorded), Some(now)) => {
-                    let difference = (recorded - now).abs();
-                    let largest = if what == "force_N" {
-                        &mut self.report.force_difference_n
-                    } else {
-                        &mut self.report.depth_difference_mm
-                    };
-                    *largest = largest.max(difference);
-                    if difference <= TOLERANCE_DERIVED {
-                        continue;
-                    }
-                }
-                (None, None) => continue,
-                _ => {}
-            }
-            self.differ(row.host, index, what, None, to_json(&recorded), to_json(&now));
+        let (report, mut differences) = (&mut self.report, Vec::new());
+        for (what, recorded, now, largest) in [
+            ("force_N", row.force, derived.force.map(|it| it.0), &mut report.force_difference_n),
+            ("depth_mm", row.depth, derived.depth.map(|it| it.0), &mut report.depth_difference_mm),
+        ] {
+            let difference = recorded.zip(now).map(|(recorded, now)| (recorded - now).abs());
+            *largest = largest.max(difference.unwrap_or(0.0));
+            let is_same = difference.map_or(recorded == now, |it| it <= TOLERANCE_DERIVED);
+            differences.extend((!is_same).then(|| (what, to_json(&recorded), to_json(&now))));
+        }
+        for (what, recorded, now) in differences {
+            self.differ(row.host, index, what, None, recorded, now);
         }
         // Labels follow decisions: they are the engine's, not arithmetic.
         if self.report.is_same_engine

@@ -173,11 +173,11 @@ fn shared_view_is_never_torn_and_never_goes_back_in_time() {
 fn overrunning_loop_leaves_the_core_to_other_threads() {
     /// Keeps the core for twice its time, and counts what was due.
     #[derive(Default)]
-    struct Heavy {
+    struct HeavyTask {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for Heavy {
+    impl Ticking for HeavyTask {
         type View = u64;
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -192,7 +192,7 @@ fn overrunning_loop_leaves_the_core_to_other_threads() {
         }
     }
     let period = Period::of_rate(250.0).unwrap();
-    let mut beat = Beat::start(Heavy::default(), period, 0).unwrap();
+    let mut beat = Beat::start(HeavyTask::default(), period, 0).unwrap();
     until(|| (*beat.seen() >= 60).then_some(()), || "60 calls".into());
     let task = beat.end().unwrap();
     // 10 ms of work and 4 of rest are three and a half ticks of 4 ms; without the rest two and a half.
@@ -203,11 +203,11 @@ fn overrunning_loop_leaves_the_core_to_other_threads() {
 #[test]
 fn missed_ticks_are_counted_and_none_is_lost() {
     /// Sleeps through some ticks now and then, which a loop must never do.
-    struct Sleepy {
+    struct SleepyTask {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for Sleepy {
+    impl Ticking for SleepyTask {
         type View = (u64, u64);
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -220,7 +220,7 @@ fn missed_ticks_are_counted_and_none_is_lost() {
             *view = (self.calls, self.ticks);
         }
     }
-    let task = Sleepy { calls: 0, ticks: 0 };
+    let task = SleepyTask { calls: 0, ticks: 0 };
     let mut beat = Beat::start(task, Period::MILLISECOND, (0, 0)).unwrap();
     until(|| (beat.seen().0 >= 200).then_some(()), || "200 calls".into());
     let kept = beat.kept();

@@ -177,14 +177,14 @@ fn stored_recording_is_reproduced_bit_by_bit() {
 
 /// A device that is not simulated: its stylus goes where a script says, and it keeps what it was given.
 #[derive(Debug)]
-struct Scripted {
+struct ScriptedDevice {
     settings: DeviceSettings,
     script: fn(u64) -> [f64; 3],
     ticks: u64,
     given: std::sync::mpsc::SyncSender<[f64; 3]>,
 }
 
-impl Scripted {
+impl ScriptedDevice {
     fn new(script: fn(u64) -> [f64; 3]) -> (Box<Self>, std::sync::mpsc::Receiver<[f64; 3]>) {
         let (given, receiver) = std::sync::mpsc::sync_channel(4096);
         let settings = DeviceSettings::default();
@@ -193,7 +193,7 @@ impl Scripted {
     }
 }
 
-impl HapticDevice for Scripted {
+impl HapticDevice for ScriptedDevice {
     fn settings(&self) -> &DeviceSettings {
         &self.settings
     }
@@ -217,7 +217,7 @@ fn pressed(tick: u64) -> [f64; 3] {
 
 #[test]
 fn another_device_takes_the_place_of_the_simulated_one() {
-    let (device, given) = Scripted::new(pressed);
+    let (device, given) = ScriptedDevice::new(pressed);
     let settings = SceneSettings::default();
     let mut task = SceneTask::new(scene(settings), device, None);
     let mut alone = scene(settings);
@@ -236,7 +236,7 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     assert_eq!(task.scene().last().force, [0.0; 3]);
     // Its numbers are those that the scene is guarded by, or there is no scene.
     let stronger = DeviceSettings { force_max_n: 8.0, ..DeviceSettings::default() };
-    let (device, _given) = Scripted::new(pressed);
+    let (device, _given) = ScriptedDevice::new(pressed);
     let refused = SceneLoop::on(device, scene(settings.with_device(stronger)), None);
     assert!(refused.unwrap_err().contains("different device"));
 }
@@ -247,7 +247,7 @@ fn recording_of_another_device_is_reproduced_from_its_poses() {
     let folder = at.path().join("sensed");
     let recorder = SceneRecorder::start(&folder, "", SENSED_COLUMNS).unwrap();
     let settings = SceneSettings::default();
-    let (device, _given) = Scripted::new(pressed);
+    let (device, _given) = ScriptedDevice::new(pressed);
     let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
     assert!(live.is_over());
     until(|| (live.view().tick.tick >= 1200).then_some(()), || "1200 ticks".into());
