@@ -258,7 +258,7 @@ mod tests {
             ("nan", Kind::Time, "is not a time"),
             ("", Kind::Time, "is not a time"),
             ("--1 s", Kind::Time, "is not a time"),
-            ("none", Kind::Time, "no value here"),
+            ("none", Kind::Time, "not a value here"),
             ("2e s", Kind::Time, "of a time"),
         ] {
             let message = Given::of_text(text).number(kind).unwrap_err();

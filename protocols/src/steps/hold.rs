@@ -41,10 +41,9 @@ fn read(args: &Args) -> Result<Step, String> {
         (Some(below_n_per_s), Some(over)) => Some(HoldRate { below_n_per_s, over: Seconds(over) }),
         (None, None) => None,
         _ => {
-            return Err(
-                "'slope' and 'over' go together: how little the force changes, and over how long"
-                    .into(),
-            );
+            let message =
+                "'slope' and 'over' go together: how little the force changes, and over how long";
+            return Err(message.into());
         }
     };
     rate.map_or(Ok(()), |rule| rule.check())?;

@@ -74,10 +74,9 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, Some(specimen), false) => Some(HandAction::Mount { specimen: specimen.into() }),
         (None, None, true) => Some(HandAction::Unmount),
         _ => {
-            return Err(
-                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'"
-                    .into(),
-            );
+            let message =
+                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'";
+            return Err(message.into());
         }
     };
     Ok(Prompt {

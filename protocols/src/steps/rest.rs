@@ -12,10 +12,7 @@ pub struct Rest {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Stay where the probe is and let the tissue recover.",
     keys: &[Key::needed("for", Kind::Time, "how long").zero_allowed()],
-    build: Some(|args| {
-        let duration = args.seconds("for")?;
-        Ok(Rest { duration }.into())
-    }),
+    build: Some(|args| Ok(Rest { duration: args.seconds("for")? }.into())),
     may_touch: false,
     ..StepFacts::of("rest", Phase::Rest, PauseBehaviour::Wait)
 };

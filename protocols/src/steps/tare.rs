@@ -19,10 +19,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         "4 s",
         "whole mains cycles: whole seconds; from 2 s on the drift is measured too",
     )],
-    build: Some(|args| {
-        let duration = args.seconds("for")?;
-        Ok(Tare { duration }.into())
-    }),
+    build: Some(|args| Ok(Tare { duration: args.seconds("for")? }.into())),
     needs: &[Need::Outside],
     gives: &[Need::Tare],
     may_touch: false,

@@ -9,7 +9,6 @@ use palpate_protocols::engine::{Config, Input};
 use palpate_protocols::plans::Plan;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{EntryKind, Row};
-use serde_json::Value;
 use std::collections::VecDeque;
 
 /// The engine's configuration at the start of the session.
@@ -27,11 +26,9 @@ pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
         .map_err(|err| bad("plan", err.to_string()))?;
     let calibration: Calibration = serde_json::from_value(manifest.calibration.clone())
         .map_err(|err| bad("calibration", err.to_string()))?;
-    let is_homed = manifest
-        .settings
-        .get("is_homed_at_start")
-        .and_then(Value::as_bool)
-        .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
+    let is_homed = manifest.settings["is_homed_at_start"].as_bool();
+    let is_homed =
+        is_homed.ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
     Ok(Config {
         rig,
         limits: plan.limits.tighten(limits),
