@@ -134,7 +134,7 @@ impl ActiveRun {
             return;
         };
         *self.time_use.entry(state.phase().name()).or_default() += now.since(self.board.now()).0;
-        self.board.input(now, &input);
+        self.board.push_input(now, &input);
         let (reading, logged) = match &input {
             Input::Reading(reading) => (Some(*reading), None),
             other => (None, Some((kind_of(other), to_json(other)))),
@@ -149,7 +149,7 @@ impl ActiveRun {
         }
         effects.iter().for_each(|effect| self.fidelity.effect(effect));
         if let Some(input) = &reported {
-            self.run_log.input(now, input);
+            self.run_log.log_input(now, input);
         }
         if let Some((kind, body)) = logged {
             self.log(now, kind, body);
@@ -169,8 +169,8 @@ impl ActiveRun {
             match effect {
                 Effect::Command(_) | Effect::ByHand(_) => {}
                 Effect::Record(record) => {
-                    self.run_log.record(&record);
-                    self.board.record(&record);
+                    self.run_log.log_record(&record);
+                    self.board.push_record(&record);
                 }
                 Effect::Finished(outcome) => self.close(outcome),
             }
@@ -224,7 +224,7 @@ impl ActiveRun {
     }
 
     fn report_trouble(&mut self, text: &str) {
-        self.run_log.trouble(text);
+        self.run_log.log_trouble(text);
         self.board.note(text.to_owned(), true);
     }
 
@@ -280,7 +280,7 @@ impl ActiveRun {
 
     fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
         let (derived, cycle) = (state.derived(), state.cycle());
-        self.board.sample(state);
+        self.board.push_sample(state);
         let row = Row {
             tick: reading.tick,
             host: now,
@@ -314,7 +314,7 @@ impl ActiveRun {
     }
 
     fn close(&mut self, outcome: Outcome) {
-        self.board.end(&outcome);
+        self.board.push_outcome(&outcome);
         let now = self.board.now();
         self.log_state(now);
         if let Some(end) = self.watch.as_ref().map(|watch| watch.end(now)) {
@@ -338,7 +338,7 @@ impl ActiveRun {
         {
             self.log_error = Some(err.to_string());
         }
-        self.run_log.closed(&outcome, self.log_error.as_deref());
+        self.run_log.log_end(&outcome, self.log_error.as_deref());
         let (mut verdict, mut reason) = first_verdict(&outcome, self.fidelity.found());
         if let Some(err) = &self.log_error {
             // A measurement with an incomplete log is not valid.

@@ -93,8 +93,8 @@ impl Board {
         self.outcome.as_ref()
     }
 
-    /// Samples come through [`Self::sample`], after the engine has taken them.
-    pub fn input(&mut self, now: Nanos, input: &Input) {
+    /// Samples come through [`Self::push_sample`], after the engine has taken them.
+    pub fn push_input(&mut self, now: Nanos, input: &Input) {
         self.now = now;
         match input {
             Input::Operator { choice } => self.note(format!("operator: {choice}"), false),
@@ -103,7 +103,7 @@ impl Board {
         }
     }
 
-    pub fn sample(&mut self, state: &State) {
+    pub fn push_sample(&mut self, state: &State) {
         self.samples += 1;
         let (cycle, last) = (state.cycle(), self.cycle_starts.last());
         if cycle > 0 && last.is_none_or(|(_, last)| *last != cycle) {
@@ -123,7 +123,7 @@ impl Board {
         }
     }
 
-    pub fn record(&mut self, record: &Record) {
+    pub fn push_record(&mut self, record: &Record) {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((self.now.seconds().0, *phase));
             if *phase == Phase::Contact {
@@ -155,7 +155,7 @@ impl Board {
         self.note(record.to_string(), is_alarm);
     }
 
-    pub fn end(&mut self, outcome: &Outcome) {
+    pub fn push_outcome(&mut self, outcome: &Outcome) {
         let text = format!("{}: {}", outcome.ending, outcome.reason);
         self.note(text, is_alarming(outcome.ending));
         self.outcome = Some(outcome.clone());

@@ -314,7 +314,7 @@ impl MainLoop {
             RigEventBody::Ack(ack) => self.feed(Input::Ack(ack)),
             RigEventBody::Fault(fault) => {
                 if !self.is_running() {
-                    self.faults.fault(self.now, &fault);
+                    self.faults.log_fault(self.now, &fault);
                 }
                 if matches!(fault, Fault::LinkLost { .. } | Fault::ControllerReset) {
                     self.is_homed = false;

@@ -26,7 +26,7 @@ struct FaultCount {
 }
 
 impl FaultLog {
-    pub fn fault(&mut self, now: Nanos, fault: &Fault) {
+    pub fn log_fault(&mut self, now: Nanos, fault: &Fault) {
         let kind = discriminant(fault);
         match self.0.iter_mut().find(|one| one.kind == kind) {
             None => {
@@ -69,15 +69,15 @@ impl RunLog {
         }
     }
 
-    pub fn input(&mut self, now: Nanos, input: &Input) {
+    pub fn log_input(&mut self, now: Nanos, input: &Input) {
         match input {
-            Input::Fault(fault) => self.step.in_scope(|| self.faults.fault(now, fault)),
+            Input::Fault(fault) => self.step.in_scope(|| self.faults.log_fault(now, fault)),
             Input::Operator { choice } => info!(parent: &self.step, "operator: {choice}"),
             _ => {}
         }
     }
 
-    pub fn record(&mut self, record: &Record) {
+    pub fn log_record(&mut self, record: &Record) {
         match record {
             Record::PhaseStarted { step_index, .. } => {
                 self.begin_step(*step_index);
@@ -120,11 +120,11 @@ impl RunLog {
         self.step = info_span!(parent: &self.run, "step", number = index + 1, kind);
     }
 
-    pub fn trouble(&self, text: &str) {
+    pub fn log_trouble(&self, text: &str) {
         warn!(parent: &self.step, "{text}");
     }
 
-    pub fn closed(&self, outcome: &Outcome, log_error: Option<&str>) {
+    pub fn log_end(&self, outcome: &Outcome, log_error: Option<&str>) {
         info!(parent: &self.run, "session closed, {}", outcome.ending);
         if let Some(err) = log_error {
             error!(parent: &self.run, "{err}");

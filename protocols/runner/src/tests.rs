@@ -279,7 +279,7 @@ fn faults_in_turn_leave_a_line_a_minute_of_each_kind() {
                 0 => Fault::SignalInvalid { tick: ms },
                 _ => Fault::CommandRefused { detail: "busy".into() },
             };
-            faults.fault(Nanos::from_millis(ms), &fault);
+            faults.log_fault(Nanos::from_millis(ms), &fault);
         }
     });
     let lines = lines.0.lock().unwrap();

@@ -1,10 +1,10 @@
 //! The keys of one step or monitor, read by their table: kinds, ranges, what is unknown and what is missing.
 
+use super::keys::{Key, KeyNeed, Range};
 use super::problem::{Problems, nearest, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
 use super::tree::DocumentTable;
-use super::words::{Key, KeyNeed, Range};
 use palpate_model::units::{MmPerS, Seconds};
 
 /// Longest time, in s: a day is longer than any specimen lasts.
@@ -80,7 +80,7 @@ impl Args {
             match key.need {
                 KeyNeed::Required if table.get(key.name).is_some() => {}
                 KeyNeed::Required if near_misses.contains(&key.name) => {}
-                KeyNeed::Required => problems.error(table.line, missing(what, key)),
+                KeyNeed::Required => problems.error(table.line, describe_missing(what, key)),
                 KeyNeed::Usual(text) if !args.has(key.name) => {
                     args.0.push((key.name, Given::of_text(text)));
                 }
@@ -189,7 +189,7 @@ pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), S
     })
 }
 
-fn missing(what: &str, key: &Key) -> String {
+fn describe_missing(what: &str, key: &Key) -> String {
     let (name, example) = (key.name, key.kind.example());
     format!("{what} needs '{name}': {}; write {name} = {example}", key.about)
 }

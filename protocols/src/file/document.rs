@@ -59,10 +59,10 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
     let about = text_of("about", "What it is for and what it shows.");
     let source = text_of("source", "Fung 1993, section 7.5");
     check_name(&root, &name, problems);
-    let version = version(&root, problems);
-    let ask = ask(&root, problems);
-    let parameters = parameter::all(&root, problems);
-    let procedure = procedure(&root, problems);
+    let version = read_version(&root, problems);
+    let ask = read_ask(&root, problems);
+    let parameters = parameter::read_parameters(&root, problems);
+    let procedure = find_procedure(&root, problems);
     let protocol = Protocol {
         name,
         version,
@@ -116,7 +116,7 @@ fn check_name(root: &DocumentTable, name: &str, problems: &mut Problems) {
     }
 }
 
-fn version(root: &DocumentTable, problems: &mut Problems) -> u32 {
+fn read_version(root: &DocumentTable, problems: &mut Problems) -> u32 {
     let message = "the protocol needs its own version, a whole number from 1; write version = 1 and raise it with every change";
     let node = root.get("version");
     let version = match node.map(|node| &node.value) {
@@ -129,7 +129,7 @@ fn version(root: &DocumentTable, problems: &mut Problems) -> u32 {
     version
 }
 
-fn ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
+fn read_ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
     let Some(node) = root.get("ask") else {
         return Vec::new();
     };
@@ -158,7 +158,7 @@ fn ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
     ask
 }
 
-fn procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode {
+fn find_procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode {
     let nothing = DocumentNode { line: 1, value: DocumentValue::List(Vec::new()) };
     let has_steps = |node: &DocumentNode| matches!(&node.value, DocumentValue::Table(table) if table.get("steps").is_some());
     let is_misplaced =

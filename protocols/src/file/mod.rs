@@ -7,6 +7,8 @@ mod args;
 mod builtin;
 mod check;
 mod document;
+mod keys;
+mod monitors;
 mod order;
 mod parameter;
 pub mod problem;
@@ -15,17 +17,15 @@ mod quantity;
 mod reference;
 mod scope;
 pub mod tree;
-mod watch;
-mod words;
 
 pub(crate) use args::Args;
 pub use builtin::{BUILT_IN, built_in, nearest_built_in};
 pub use check::{Checked, check};
+pub(crate) use keys::Key;
 pub use parameter::Parameter;
 pub use problem::{Problem, Severity};
 pub use quantity::{Given, Kind, What};
 pub use reference::reference;
-pub(crate) use words::Key;
 
 use crate::plans::{Plan, PlanSource};
 use palpate_model::about::Labels;
@@ -120,8 +120,8 @@ impl Protocol {
             chosen.insert(parameter.name.clone(), given.text.clone());
             scope.push(&parameter.name, given);
         }
-        let limits = watch::limits(self.limits.as_ref(), &scope, problems);
-        let monitors = watch::monitors(self.monitors.as_ref(), &scope, problems);
+        let limits = monitors::read_limits(self.limits.as_ref(), &scope, problems);
+        let monitors = monitors::read_monitors(self.monitors.as_ref(), &scope, problems);
         let before = problems.count();
         let steps = procedure::write_out(&self.procedure, &mut scope, problems);
         // A step that could not be read would be missed by those behind it.

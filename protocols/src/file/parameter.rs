@@ -71,7 +71,7 @@ impl Parameter {
     }
 }
 
-pub(super) fn all(root: &DocumentTable, problems: &mut Problems) -> Vec<Parameter> {
+pub(super) fn read_parameters(root: &DocumentTable, problems: &mut Problems) -> Vec<Parameter> {
     let Some(node) = root.get("parameters") else {
         return Vec::new();
     };
@@ -94,14 +94,14 @@ pub(super) fn all(root: &DocumentTable, problems: &mut Problems) -> Vec<Paramete
             );
             return None;
         };
-        parameter(&entry.key, keys, problems)
+        read_parameter(&entry.key, keys, problems)
     };
     table.entries.iter().filter_map(read).collect()
 }
 
 const PARAMETER_KEYS: [&str; 6] = ["default", "unit", "min", "max", "about", "source"];
 
-fn parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> Option<Parameter> {
+fn read_parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> Option<Parameter> {
     let line = keys.line;
     for entry in &keys.entries {
         if !PARAMETER_KEYS.contains(&entry.key.as_str()) {

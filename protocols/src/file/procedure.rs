@@ -1,11 +1,11 @@
 //! The steps of a protocol written out: loops unrolled, names replaced by values.
 
 use super::args::{Args, COUNT_MAX};
+use super::keys::{COMMON, Key};
 use super::problem::{Problems, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
-use super::words::{COMMON, Key};
 use crate::plans::{OnFailure, PlannedStep};
 use crate::steps::{BuildStep, KINDS, StepFacts};
 

@@ -1,9 +1,9 @@
 //! The reference of the language, written from the table that reads it.
 
+use super::keys::{COMMON, Key, KeyNeed};
+use super::monitors::MONITOR_KEYS;
 use super::procedure::LOOP_KEYS;
 use super::quantity::Kind;
-use super::watch::MONITOR_KEYS;
-use super::words::{COMMON, Key, KeyNeed};
 use crate::steps::KINDS;
 use palpate_model::about::KEYS;
 use std::fmt::Write;

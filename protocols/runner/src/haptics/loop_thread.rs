@@ -67,7 +67,7 @@ impl<T: Ticking> Beat<T> {
     }
 
     pub fn kept(&self) -> Kept {
-        self.timing.kept()
+        self.timing.snapshot()
     }
 
     /// Whether it still ticks; it does until it is ended, unless its work failed.

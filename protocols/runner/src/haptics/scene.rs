@@ -97,7 +97,7 @@ impl SceneFrame {
     }
 
     /// Copies what has moved since the last frame.
-    fn take(&mut self, scene: &Scene) {
+    fn update(&mut self, scene: &Scene) {
         self.tick = scene.last();
         self.copy(scene.field(), self.displaced.union(scene.dirty()));
         self.displaced = scene.dirty();
@@ -179,7 +179,7 @@ impl Ticking for SceneTask {
     }
 
     fn show(&self, view: &mut SceneFrame) {
-        view.take(&self.scene);
+        view.update(&self.scene);
     }
 }
 
@@ -215,7 +215,7 @@ impl SceneLoop {
     ) -> Result<Self, String> {
         let made = Stylus::new(*scene.settings(), path);
         let (device, pointing) = made.map_err(|err| err.to_string())?;
-        let hand = (Mutex::new(pointing), device.over());
+        let hand = (Mutex::new(pointing), device.end_flag());
         let mut live = Self::on(Box::new(device), scene, recorder)?;
         live.hand = Some(hand);
         Ok(live)

@@ -45,11 +45,11 @@ impl Stylus {
     }
 
     /// True from the end of the path on; without a path, from the start.
-    pub(super) fn over(&self) -> Arc<AtomicBool> {
+    pub(super) fn end_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.is_over)
     }
 
-    fn led(&mut self) -> Hand6 {
+    fn next_pose(&mut self) -> Hand6 {
         let t = self.settings.period.time_of(self.ticks).seconds().0;
         match self.path {
             Some(path) if t <= path.seconds() * f64::from(self.laps) => {
@@ -70,7 +70,7 @@ impl HapticDevice for Stylus {
 
     fn sense(&mut self, elapsed: u64) -> Pose {
         self.ticks = self.ticks.saturating_add(elapsed);
-        self.hand = self.led();
+        self.hand = self.next_pose();
         self.device.follow(self.hand, self.force, elapsed);
         self.device.pose()
     }

@@ -115,7 +115,7 @@ pub struct Kept {
 }
 
 impl LoopCounters {
-    pub fn kept(&self) -> Kept {
+    pub fn snapshot(&self) -> Kept {
         Kept {
             period: self.period.spread(),
             late: self.late.spread(),

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 pub(super) fn find_contradictions(task: &Task, before: &[Task]) -> Vec<String> {
     let mut find_contradictions = Vec::new();
     let plan = task.plan(1, None);
-    if task.calibrates && !plan.as_ref().is_some_and(weighs) {
+    if task.calibrates && !plan.as_ref().is_some_and(has_weighing) {
         find_contradictions.push(format!(
             "calibrates = true needs readings under known masses, and protocol {} takes none; remove it, or use load-cell-calibration",
             task.protocol.name
@@ -16,13 +16,13 @@ pub(super) fn find_contradictions(task: &Task, before: &[Task]) -> Vec<String> {
     }
     if let Some(model) = &task.validates {
         let fitted = before.iter().find(|one| one.name == model.task);
-        if let Some(reason) = fitted.and_then(unfitted) {
+        if let Some(reason) = fitted.and_then(reason_unfitted) {
             find_contradictions.push(format!(
                 "validates = \"{}\" needs a task with a fitted model, and that task has none, because {reason}; name a task that is one ramp and hold",
                 model.task
             ));
         }
-        if let Some(reason) = unfitted(task) {
+        if let Some(reason) = reason_unfitted(task) {
             find_contradictions.push(format!(
                 "validates = \"{}\" has nothing to compare, because {reason}; remove it, or use a protocol that is one ramp and hold",
                 model.task
@@ -32,13 +32,13 @@ pub(super) fn find_contradictions(task: &Task, before: &[Task]) -> Vec<String> {
     find_contradictions
 }
 
-fn weighs(plan: &Plan) -> bool {
+fn has_weighing(plan: &Plan) -> bool {
     let is_loaded = |step: &Step| matches!(step, Step::Weigh(weigh) if weigh.mass_g > 0.0);
     plan.steps.iter().any(|planned| is_loaded(&planned.step))
 }
 
 /// Why no session of a task is fitted, if so: the report fits sessions with one loading and no sine.
-fn unfitted(task: &Task) -> Option<String> {
+fn reason_unfitted(task: &Task) -> Option<String> {
     let name = &task.protocol.name;
     if task.calibrates {
         return Some(format!("task '{}' calibrates", task.name));

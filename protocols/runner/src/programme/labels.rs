@@ -31,12 +31,16 @@ impl LabelSettings {
         }
         for entry in &root.entries {
             match (entry.key.as_str(), &entry.node.value) {
-                ("about", DocumentValue::Table(table)) => pairs(table, "", &mut settings.general, problems),
+                ("about", DocumentValue::Table(table)) => {
+                    read_pairs(table, "", &mut settings.general, problems);
+                }
                 ("about", _) => problems.error(
                     entry.line,
                     "[about] must be a table of labels for every session; write the aim of the programme as purpose = \"...\"",
                 ),
-                ("specimen", DocumentValue::Table(table)) => settings.read_specimens(table, problems),
+                ("specimen", DocumentValue::Table(table)) => {
+                    settings.read_specimens(table, problems);
+                }
                 ("specimen", _) => report_specimen(entry, problems),
                 _ => {}
             }
@@ -53,7 +57,7 @@ impl LabelSettings {
             };
             let known = self.specimens.entry(number).or_default();
             known.0 = entry.line;
-            pairs(own, "specimen.", &mut known.1, problems);
+            read_pairs(own, "specimen.", &mut known.1, problems);
         }
     }
 
@@ -75,7 +79,7 @@ fn report_specimen(entry: &DocumentEntry, problems: &mut Problems) {
 }
 
 /// The pairs of a table, `specimen.source = "pig"` like `"specimen.source" = "pig"`.
-fn pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, problems: &mut Problems) {
+fn read_pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, problems: &mut Problems) {
     for entry in &table.entries {
         let key = match (prefix, entry.key.as_str()) {
             ("specimen.", "name") => SPECIMEN.to_owned(),
@@ -84,7 +88,7 @@ fn pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, problems: &
         let value = match &entry.node.value {
             DocumentValue::Text(value) | DocumentValue::Number(value) => value.clone(),
             DocumentValue::Table(inner) if prefix.is_empty() => {
-                pairs(inner, &format!("{key}."), found, problems);
+                read_pairs(inner, &format!("{key}."), found, problems);
                 continue;
             }
             _ => {
@@ -95,7 +99,7 @@ fn pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, problems: &
         };
         let checked = match found.iter().any(|(known, _)| *known == key) {
             true => Err(format!("{key} is given twice; keep one")),
-            false => check(&key, &value),
+            false => check_label(&key, &value),
         };
         if problems.take(entry.line, checked).is_some() {
             found.push((key, value));
@@ -103,7 +107,7 @@ fn pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, problems: &
     }
 }
 
-fn check(key: &str, value: &str) -> Result<(), String> {
+fn check_label(key: &str, value: &str) -> Result<(), String> {
     if key.trim().starts_with("series.") {
         return Err(format!("a programme counts its series itself; leave out {key}"));
     }
@@ -113,7 +117,7 @@ fn check(key: &str, value: &str) -> Result<(), String> {
 impl Programme {
     /// Sets a label of every session from the command line, which overrides the file.
     pub fn tell(&mut self, key: &str, value: &str) -> Result<(), String> {
-        check(key, value)?;
+        check_label(key, value)?;
         self.label_settings.overrides.push((key.trim().to_owned(), value.to_owned()));
         Ok(())
     }

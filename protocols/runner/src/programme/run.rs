@@ -111,14 +111,14 @@ pub fn run(
             conditions: Some(Box::new(conditions)),
         })?;
     }
-    work.settle_last()?;
+    work.complete_journal()?;
     for task in 0..programme.tasks.len() {
         if let Some(folder) = work.progress.finished(task).last() {
             work.calibrate(task, &work.laboratory.folder.join(folder))?;
         }
     }
     while let Some(place) = work.progress.next(programme) {
-        work.one(place)?;
+        work.run_once(place)?;
     }
     Ok(Done { progress: work.progress, calibration: work.laboratory.calibration, was_continued })
 }
@@ -136,7 +136,7 @@ struct ProgrammeRun<'a> {
 impl ProgrammeRun<'_> {
     /// Adds the last run's missing line to the journal after a crash between the end of its log and that line: the session
     /// has its ending. A session that cannot be read, or has no end, was interrupted.
-    fn settle_last(&mut self) -> Result<(), RunError> {
+    fn complete_journal(&mut self) -> Result<(), RunError> {
         let Some((place, session, None)) = self.progress.runs.last().cloned() else {
             return Ok(());
         };
@@ -144,7 +144,7 @@ impl ProgrammeRun<'_> {
         let Some(end) = session.ok().and_then(|session| session.end) else {
             return Ok(());
         };
-        self.end(place, counted(&end.outcome, &end.reason), end.reason)
+        self.end(place, final_outcome(&end.outcome, &end.reason), end.reason)
     }
 
     fn end(&mut self, place: Place, outcome: String, reason: String) -> Result<(), RunError> {
@@ -155,7 +155,7 @@ impl ProgrammeRun<'_> {
     }
 
     /// One run, from its entry in the journal to the next.
-    fn one(&mut self, mut place: Place) -> Result<(), RunError> {
+    fn run_once(&mut self, mut place: Place) -> Result<(), RunError> {
         let programme = self.programme;
         let task = &programme.tasks[place.task];
         // A folder that is there without its line in the journal is what a crash left of an attempt.
@@ -245,9 +245,9 @@ impl ProgrammeRun<'_> {
                 if let Some(Outcome { ending, reason }) = &view.outcome {
                     // What is not on disk did not happen.
                     let broken = view.log_error.as_ref().map(|err| ("abort".into(), err.clone()));
-                    return Ok(
-                        broken.unwrap_or_else(|| (counted(ending.name(), reason), reason.clone()))
-                    );
+                    return Ok(broken.unwrap_or_else(|| {
+                        (final_outcome(ending.name(), reason), reason.clone())
+                    }));
                 }
             }
             if !is_woken && !self.laboratory.runner.is_alive() {
@@ -285,7 +285,7 @@ impl ProgrammeRun<'_> {
 }
 
 /// A run that skipped measurements did not finish.
-fn counted(outcome: &str, reason: &str) -> String {
+fn final_outcome(outcome: &str, reason: &str) -> String {
     match outcome {
         FINISHED if reason != PLAN_COMPLETE => EndingKind::Stop.name().into(),
         outcome => outcome.into(),

@@ -21,7 +21,7 @@ mod source;
 mod wording;
 
 pub use player::Player;
-use source::{RecordedInput, config_of, inputs_of, reading_of};
+use source::{RecordedInput, read_config, read_inputs, read_sample};
 
 /// Force and depth come from the same arithmetic on the same raw numbers; `exp` and friends may
 /// differ in the last digits between platforms, which depth (under 200 mm) and force (under 50 N)
@@ -138,8 +138,8 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
 }
 
 pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport, ReplayError> {
-    let config = Arc::new(config_of(session)?);
-    let mut inputs = inputs_of(session)?;
+    let config = Arc::new(read_config(session)?);
+    let mut inputs = read_inputs(session)?;
     let mut run = Replay {
         live: LiveFeed::new(&config),
         state: Some(State::new(config)),
@@ -205,7 +205,7 @@ impl Replay<'_> {
     }
 
     fn feed_row(&mut self, index: u64, row: &Row) {
-        let Some(reading) = reading_of(row) else {
+        let Some(reading) = read_sample(row) else {
             return;
         };
         self.step(row.host, index + 1, Input::Reading(reading));

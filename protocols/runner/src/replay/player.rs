@@ -1,7 +1,7 @@
 //! A recorded session at any time: its inputs drive the engine again, forward and back.
 
 use super::ReplayError;
-use super::source::{RecordedInput, config_of, inputs_of, reading_of};
+use super::source::{RecordedInput, read_config, read_inputs, read_sample};
 use crate::{Board, LogState, RigView, Snapshot};
 use palpate_model::Nanos;
 use palpate_protocols::engine::{self, Effect, Input, State};
@@ -40,8 +40,8 @@ struct PlaybackPosition {
 impl Player {
     /// At the beginning of a session. `folder` is where it lies.
     pub fn new(session: Session, folder: PathBuf) -> Result<Self, ReplayError> {
-        let config = config_of(&session)?;
-        let inputs: Vec<RecordedInput> = inputs_of(&session)?.into();
+        let config = read_config(&session)?;
+        let inputs: Vec<RecordedInput> = read_inputs(&session)?.into();
         let expected =
             preview(&config.plan, &config.rig, &config.limits, &config.curve, config.is_homed);
         let last_row = session.rows.last().map_or(Nanos::ZERO, |row| row.host);
@@ -117,14 +117,14 @@ impl Player {
             }
             (None, Some(row)) => {
                 current.rows += 1;
-                match reading_of(row) {
+                match read_sample(row) {
                     Some(reading) => (row.host, Input::Reading(reading)),
                     None => return,
                 }
             }
             (None, None) => return,
         };
-        current.take(now, input);
+        current.push(now, input);
         let known = self.frames.last().map_or(0, |place| place.rows);
         if self.current.rows >= known + self.every {
             self.frames.push(self.current.clone());
@@ -140,7 +140,7 @@ impl Player {
         Some(Snapshot {
             rig: RigView {
                 description: Arc::new(state.config().rig.clone()),
-                reading: reading.and_then(reading_of),
+                reading: reading.and_then(read_sample),
                 is_homed: state.is_homed(),
                 link: None,
                 link_error: None,
@@ -153,22 +153,22 @@ impl Player {
 }
 
 impl PlaybackPosition {
-    fn take(&mut self, now: Nanos, input: Input) {
-        self.board.input(now, &input);
+    fn push(&mut self, now: Nanos, input: Input) {
+        self.board.push_input(now, &input);
         let is_sample = matches!(input, Input::Reading(_));
         let Some(state) = self.state.take() else {
             return;
         };
         let (state, effects) = engine::step(state, now, input);
         if is_sample {
-            self.board.sample(&state);
+            self.board.push_sample(&state);
         }
         self.state = Some(state);
         for effect in effects {
             match effect {
                 Effect::Command(_) | Effect::ByHand(_) => {}
-                Effect::Record(record) => self.board.record(&record),
-                Effect::Finished(outcome) => self.board.end(&outcome),
+                Effect::Record(record) => self.board.push_record(&record),
+                Effect::Finished(outcome) => self.board.push_outcome(&outcome),
             }
         }
     }

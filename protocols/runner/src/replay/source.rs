@@ -12,7 +12,7 @@ use palpate_sessions::record::{EntryKind, Row};
 use std::collections::VecDeque;
 
 /// The engine's configuration at the start of the session.
-pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
+pub(super) fn read_config(session: &Session) -> Result<Config, ReplayError> {
     let manifest = &session.manifest;
     let bad = |what, detail: String| ReplayError::Manifest { what, detail };
     if let Some(imported) = &manifest.imported {
@@ -47,7 +47,7 @@ pub(super) struct RecordedInput {
 }
 
 /// Every input that is no sample, in order.
-pub(super) fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
+pub(super) fn read_inputs(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
     session
         .entries
         .iter()
@@ -62,7 +62,7 @@ pub(super) fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, Re
 }
 
 /// The sample as the rig sent it. Every row of a session with a rig has all of it.
-pub(super) fn reading_of(row: &Row) -> Option<Reading> {
+pub(super) fn read_sample(row: &Row) -> Option<Reading> {
     Some(Reading {
         tick: row.tick,
         counts: row.counts,

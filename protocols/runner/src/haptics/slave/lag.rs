@@ -207,7 +207,7 @@ impl SlaveMeter {
         }
     }
 
-    pub fn slaved(&self) -> Option<Slaved> {
+    pub fn report(&self) -> Option<Slaved> {
         let lag_mm = Spread::of(&self.lags_mm)?;
         let lag_ms = Spread::of(&self.lags_ms);
         let [handle_max_n, model_max_n, cell_max_n] = self.maxima;

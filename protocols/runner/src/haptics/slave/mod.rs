@@ -157,12 +157,12 @@ impl SlaveLeader {
 
     /// What came of it; none if nothing was led.
     pub fn slaved(&self) -> Option<Slaved> {
-        let mut slaved = self.meter.slaved()?;
+        let mut report = self.meter.report()?;
         if let Some(MasterDrive::RealTime(beat)) = &self.drive {
-            slaved.master_loop =
+            report.master_loop =
                 Some(MasterLoop { priority: beat.granted().to_string(), kept: beat.kept() });
         }
-        Some(slaved)
+        Some(report)
     }
 
     /// Contact must stand above the noise of this cell, averaged as it is.

@@ -1,11 +1,11 @@
 //! Limits and monitors of a protocol.
 
 use super::args::{Args, check_range};
+use super::keys::{Key, Range};
 use super::problem::{Problem, Problems};
 use super::quantity::Kind;
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
-use super::words::{Key, Range};
 use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
 use palpate_model::units::{Newtons, Position, Seconds};
 
@@ -22,7 +22,7 @@ const LIMIT_KEYS: [Key; 2] = [
     ),
 ];
 
-pub(super) fn limits(
+pub(super) fn read_limits(
     node: Option<&DocumentNode>,
     scope: &Scope,
     problems: &mut Problems,
@@ -76,7 +76,7 @@ pub(super) const MONITOR_KEYS: [Key; 4] = [
     Key::needed("message", Kind::Text, "what the operator reads"),
 ];
 
-pub(super) fn monitors(
+pub(super) fn read_monitors(
     node: Option<&DocumentNode>,
     scope: &Scope,
     problems: &mut Problems,
@@ -92,10 +92,10 @@ pub(super) fn monitors(
         DocumentValue::Table(table) => Some(table),
         _ => None,
     });
-    tables.filter_map(|table| monitor(table, scope, problems)).collect()
+    tables.filter_map(|table| read_monitor(table, scope, problems)).collect()
 }
 
-fn monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
+fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
     let other_keys = ["above", "below", "resume"];
     let args = Args::read(table, "a monitor", &[&MONITOR_KEYS], &other_keys, scope, problems);
     let watch = args.text("watch").ok()?;
