@@ -13,4 +13,4 @@ pub mod preview;
 mod steps;
 pub mod weighed;
 
-pub use steps::{MeterSample, StepMeter, Target};
+pub use steps::{MeterSample, StepMeter, StepTarget};

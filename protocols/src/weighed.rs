@@ -1,20 +1,16 @@
-//! The readings of a load cell under known masses that count: of one that was taken again, the last.
+//! Readings of a load cell under known masses; a repeated reading replaces the earlier one.
 
 use crate::engine::Record;
 use palpate_model::calibration::{Direction, SeriesStep};
 use palpate_model::rig::Phase;
 use palpate_model::units::Volts;
 
-/// One reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weighed {
-    /// Its step of the plan.
     pub step_index: usize,
-    /// Whether masses went up, and which time.
     pub direction: Direction,
     /// Which pass through the masses, from 1.
     pub repeat: u32,
-    /// Mass, signal and how steady it was.
     pub step: SeriesStep,
 }
 
@@ -30,7 +26,6 @@ impl Weighed {
     }
 }
 
-/// Gathers readings from the records of a run, in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Readings {
     all: Vec<Weighed>,
@@ -38,17 +33,15 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// Those of these records.
     pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
         let mut readings = Self::default();
         records.into_iter().for_each(|one| readings.record(one));
         readings
     }
 
-    /// Takes the next record.
     pub fn record(&mut self, record: &Record) {
         match record {
-            // Where the run went back, what was read from there on will be read again.
+            // A run that went back repeats the readings from there on.
             Record::PhaseStarted { phase: Phase::Prompt | Phase::Weigh, step_index } => {
                 self.step_index = *step_index;
                 self.all.retain(|one| one.step_index < *step_index);
@@ -83,7 +76,6 @@ impl Readings {
         }
     }
 
-    /// Those that count so far.
     pub fn all(&self) -> &[Weighed] {
         &self.all
     }
@@ -111,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_again_replaces_what_was_read_from_there_on() {
+    fn repeated_weighing_replaces_readings_from_that_step_on() {
         let mut records = Vec::new();
         for (step, mass, volts) in [(1, 0.0, 1.28), (3, 140.0, 1.4), (5, 240.0, 9.0)] {
             records.extend(reading(step, mass, volts));

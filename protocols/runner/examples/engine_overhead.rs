@@ -1,7 +1,7 @@
 //! What the engine costs a sample, and whether that stays so through a day: a preconditioning plan of as many cycles as
 //! fill 24 h at 1 kHz, every sample judged by every interlock.
 //!
-//! `cargo run -p palpate-protocols --example engine_overhead [HOURS]` prints one JSON object. Beside a peer:
+//! `cargo run -p palpate-runner --example engine_overhead [HOURS]` prints one JSON object. Beside a peer:
 //! `benches/bluesky_messages.py`.
 
 use palpate_model::Nanos;

@@ -2,11 +2,11 @@
 
 use super::board::{Board, LogState};
 use super::clock::wall_now;
-use super::leading::{LeadFeed, Leader};
+use super::leading::LeadFeed;
 use super::live_feed::LiveFeed;
 use super::run_log::RunLog;
 use super::snapshot::{Lateness, RunView};
-use super::start::{AfterStop, Answers};
+use super::start::{AfterStop, Answers, RigContext, RunRequest};
 use super::watch::HostWatch;
 use crate::fidelity::{FidelityMeter, first_verdict};
 use palpate_model::Nanos;
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
+/// How long an unattended run waits for the cause of a pause to pass: longer than any rest of a protocol.
 const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
 
 pub(super) struct ActiveRun {
@@ -41,8 +41,7 @@ pub(super) struct ActiveRun {
     answers: Answers,
     paused_since: Option<Nanos>,
     lateness: Option<Lateness>,
-    /// What was told of time given up.
-    told_given_up: Seconds,
+    reported_given_up: Seconds,
     order: u64,
     pub(super) live: LiveFeed,
     lead: LeadFeed,
@@ -51,7 +50,7 @@ pub(super) struct ActiveRun {
     time_use: BTreeMap<&'static str, u64>,
     /// Why the log failed, and whether the engine knows.
     log_failure: Option<Fault>,
-    is_log_failure_told: bool,
+    is_log_failure_reported: bool,
     log_error: Option<String>,
     verdict_error: Option<String>,
 }
@@ -62,11 +61,9 @@ impl ActiveRun {
         preview: Preview,
         (writer, session_id): (SessionWriter, String),
         folder: PathBuf,
-        origin: Nanos,
-        unattended: (AfterStop, Answers),
-        watch: Option<HostWatch>,
+        request: &RunRequest,
+        RigContext { origin, watch, .. }: RigContext<'_>,
     ) -> Self {
-        let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         let fidelity = FidelityMeter::new(&config.plan, &config.rig);
         let run_log = RunLog::new(&session_id, &folder, &config.plan);
@@ -82,18 +79,18 @@ impl ActiveRun {
             fidelity,
             verdict: None,
             origin,
-            after_stop,
-            answers,
+            after_stop: request.after_stop,
+            answers: request.answers,
             paused_since: None,
             lateness: None,
-            told_given_up: Seconds(0.0),
+            reported_given_up: Seconds(0.0),
             order: 0,
             live,
-            lead: LeadFeed::new(None),
+            lead: LeadFeed::new(request.leader.clone()),
             watch,
             time_use: BTreeMap::new(),
             log_failure: None,
-            is_log_failure_told: false,
+            is_log_failure_reported: false,
             log_error: None,
             verdict_error: None,
         };
@@ -103,18 +100,11 @@ impl ActiveRun {
         run
     }
 
-    /// The same, with what leads its step that follows.
-    pub fn led_by(mut self, leader: Option<Leader>) -> Self {
-        self.lead = LeadFeed::new(leader);
-        self
-    }
-
     /// The engine's state, except inside [`Self::feed`].
     pub fn engine(&self) -> Option<&State> {
         self.engine.as_ref()
     }
 
-    /// Whether the run is over and its log closed.
     pub fn is_over(&self) -> bool {
         self.board.outcome().is_some()
     }
@@ -124,44 +114,42 @@ impl ActiveRun {
         at.since(self.origin)
     }
 
-    /// Takes how the run keeps pace with the wall. Time given up is told each time it has doubled.
-    pub fn keep_lateness(&mut self, lateness: Option<Lateness>) {
+    /// Time given up is reported each time it has doubled, so that a slow computer does not fill the log.
+    pub fn record_lateness(&mut self, lateness: Option<Lateness>) {
         self.lateness = lateness;
         let given_up = lateness.unwrap_or_default().given_up;
-        if given_up.0 > 0.0 && given_up.0 >= 2.0 * self.told_given_up.0 {
-            self.told_given_up = given_up;
-            let text = format!(
+        if given_up.0 > 0.0 && given_up.0 >= 2.0 * self.reported_given_up.0 {
+            self.reported_given_up = given_up;
+            self.report_trouble(&format!(
                 "the computer does not keep up: the run is {:.1} s behind the clock and goes on from there; close other programs",
                 given_up.0
-            );
-            self.run_log.trouble(&text);
-            self.board.note(text, true);
+            ));
         }
     }
 
     /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
     /// written down, other commands after. Commands keep the engine's order.
-    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(ToRig)) {
+    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(RigAction)) {
         let Some(state) = self.engine.take() else {
             return;
         };
         *self.time_use.entry(state.phase().name()).or_default() += now.since(self.board.now()).0;
-        self.board.input(now, &input);
+        self.board.push_input(now, &input);
         let (reading, logged) = match &input {
             Input::Reading(reading) => (Some(*reading), None),
             other => (None, Some((kind_of(other), to_json(other)))),
         };
-        let is_told = matches!(input, Input::Fault(_) | Input::Operator { .. });
-        let told = is_told.then(|| input.clone());
+        let is_reported = matches!(input, Input::Fault(_) | Input::Operator { .. });
+        let reported = is_reported.then(|| input.clone());
         let (state, effects) = engine::step(state, now, input);
-        let commands: Vec<ToRig> = effects.iter().filter_map(to_rig).collect();
-        let is_urgent = commands.iter().any(ToRig::is_stopping);
+        let commands: Vec<RigAction> = effects.iter().filter_map(to_rig).collect();
+        let is_urgent = commands.iter().any(RigAction::is_stopping);
         if is_urgent {
             commands.iter().copied().for_each(&mut *send);
         }
         effects.iter().for_each(|effect| self.fidelity.effect(effect));
-        if let Some(input) = &told {
-            self.run_log.input(now, input);
+        if let Some(input) = &reported {
+            self.run_log.log_input(now, input);
         }
         if let Some((kind, body)) = logged {
             self.log(now, kind, body);
@@ -172,10 +160,8 @@ impl ActiveRun {
         let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
         let lead = reading.and_then(|reading| self.lead.push(now, &reading, &state));
         if let Some(text) = self.live.take_failure() {
-            self.run_log.trouble(&text);
-            self.board.note(text.clone(), true);
-            let told = Told::Event { text };
-            self.log_health(Health { now, told });
+            self.report_trouble(&text);
+            self.log_health(Health { now, told: Told::Event { text } });
         }
         self.engine = Some(state);
         for effect in effects {
@@ -183,8 +169,8 @@ impl ActiveRun {
             match effect {
                 Effect::Command(_) | Effect::ByHand(_) => {}
                 Effect::Record(record) => {
-                    self.run_log.record(&record);
-                    self.board.record(&record);
+                    self.run_log.log_record(&record);
+                    self.board.push_record(&record);
                 }
                 Effect::Finished(outcome) => self.close(outcome),
             }
@@ -201,43 +187,45 @@ impl ActiveRun {
         self.after_feed(now, send);
     }
 
-    /// What the runner owes the engine after each input: news of a failed log, and the choice of
-    /// an operator who is not there.
-    fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(ToRig)) {
-        self.heed_log();
-        if let (Some(fault), false) = (&self.log_failure, self.is_log_failure_told) {
-            self.is_log_failure_told = true;
+    /// Feeds the engine the failure of the log, and the choices of an absent operator.
+    fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(RigAction)) {
+        self.handle_log_notices();
+        if let (Some(fault), false) = (&self.log_failure, self.is_log_failure_reported) {
+            self.is_log_failure_reported = true;
             let fault = Input::Fault(fault.clone());
             self.feed(now, fault, send);
         }
-        let is_holding = self.engine.as_ref().is_some_and(|state| state.holding().is_some());
-        if is_holding && self.after_stop == AfterStop::Close {
-            let choice = Operator::Close;
-            self.feed(now, Input::Operator { choice }, send);
+        let mut choose = |run: &mut Self, choice| run.feed(now, Input::Operator { choice }, send);
+        if self.after_stop == AfterStop::Close && self.is_in(|state| state.holding().is_some()) {
+            choose(self, Operator::Close);
         }
         if self.after_stop != AfterStop::Wait && self.is_left_alone(now) {
-            let choice = Operator::Leave;
-            self.feed(now, Input::Operator { choice }, send);
+            choose(self, Operator::Leave);
         }
-        let is_asked = self.engine.as_ref().is_some_and(|state| state.prompt().is_some());
-        if is_asked && self.answers == Answers::Confirm {
-            let choice = Operator::Confirm;
-            self.feed(now, Input::Operator { choice }, send);
+        if self.answers == Answers::Confirm && self.is_in(|state| state.prompt().is_some()) {
+            choose(self, Operator::Confirm);
         }
     }
 
-    /// News of the log: told, and a failure of the run where the disk will not do much longer.
-    fn heed_log(&mut self) {
+    fn is_in(&self, is_so: impl FnOnce(&State) -> bool) -> bool {
+        self.engine.as_ref().is_some_and(is_so)
+    }
+
+    /// Reports notices of the log; a disk that will soon fail ends the run.
+    fn handle_log_notices(&mut self) {
         let notices = self.writer.as_mut().map(SessionWriter::take_notices);
         for notice in notices.into_iter().flatten() {
-            let text = notice.to_string();
-            self.run_log.trouble(&text);
-            self.board.note(text.clone(), true);
+            let detail = notice.to_string();
+            self.report_trouble(&detail);
             if notice.ends_the_run() {
-                let fault = Fault::LogAtRisk { detail: text };
-                self.log_failure.get_or_insert(fault);
+                self.log_failure.get_or_insert(Fault::LogAtRisk { detail });
             }
         }
+    }
+
+    fn report_trouble(&mut self, text: &str) {
+        self.run_log.log_trouble(text);
+        self.board.note(text.to_owned(), true);
     }
 
     /// Takes what went over the wires, at times of the rig's clock.
@@ -246,14 +234,11 @@ impl ActiveRun {
             piece.at = self.session_time(piece.at);
         }
         let now = self.board.now();
-        if let Some(writer) = &mut self.writer {
-            let result = writer.push_raw(now, raw);
-            self.note_log(result);
-        }
+        self.write(|writer| writer.push_raw(now, raw));
     }
 
     /// Looks at the computer once a turn of the loop, which is `lateness` late at session time `now`.
-    pub fn watch(&mut self, now: Nanos, lateness: Duration, send: &mut dyn FnMut(ToRig)) {
+    pub fn watch(&mut self, now: Nanos, lateness: Duration, send: &mut dyn FnMut(RigAction)) {
         let Some(watch) = &mut self.watch else {
             return;
         };
@@ -279,13 +264,10 @@ impl ActiveRun {
     }
 
     fn log_health(&mut self, health: Health) {
-        if let Some(writer) = &mut self.writer {
-            let result = writer.push_health(health);
-            self.note_log(result);
-        }
+        self.write(|writer| writer.push_health(health));
     }
 
-    /// Whether the run is paused, nobody is there, and it cannot go on by itself or has not for too long.
+    /// Whether a paused run cannot go on by itself, or has not for too long.
     fn is_left_alone(&mut self, now: Nanos) -> bool {
         let pause = self.engine.as_ref().map(State::pause);
         let Some(PauseView::Paused { no_resume }) = pause else {
@@ -298,7 +280,7 @@ impl ActiveRun {
 
     fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
         let (derived, cycle) = (state.derived(), state.cycle());
-        self.board.sample(state);
+        self.board.push_sample(state);
         let row = Row {
             tick: reading.tick,
             host: now,
@@ -313,27 +295,26 @@ impl ActiveRun {
             cycle,
         };
         self.fidelity.row(&row);
-        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_row(row));
-        self.note_log(result);
+        self.write(|writer| writer.push_row(row));
     }
 
     fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
-        let entry =
-            Entry { kind, order: self.order, after_sample: self.board.samples(), now, body };
+        let after_sample = self.board.samples();
+        let entry = Entry { kind, order: self.order, after_sample, now, body };
         self.order += 1;
-        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_entry(entry));
-        self.note_log(result);
+        self.write(|writer| writer.push_entry(entry));
     }
 
-    fn note_log(&mut self, result: Result<(), LogError>) {
-        if let Err(err) = result {
+    /// Writes to the log while it is open. The first error ends the run.
+    fn write(&mut self, push: impl FnOnce(&mut SessionWriter) -> Result<(), LogError>) {
+        if let Some(Err(err)) = self.writer.as_mut().map(push) {
             let detail = err.to_string();
             self.log_failure.get_or_insert(Fault::LogFailed { detail });
         }
     }
 
     fn close(&mut self, outcome: Outcome) {
-        self.board.end(&outcome);
+        self.board.push_outcome(&outcome);
         let now = self.board.now();
         self.log_state(now);
         if let Some(end) = self.watch.as_ref().map(|watch| watch.end(now)) {
@@ -357,20 +338,20 @@ impl ActiveRun {
         {
             self.log_error = Some(err.to_string());
         }
-        self.run_log.closed(&outcome, self.log_error.as_deref());
+        self.run_log.log_end(&outcome, self.log_error.as_deref());
         let (mut verdict, mut reason) = first_verdict(&outcome, self.fidelity.found());
         if let Some(err) = &self.log_error {
-            // Who measured well and kept it badly has nothing that is valid.
+            // A measurement with an incomplete log is not valid.
             if verdict == Verdict::Valid {
                 verdict = Verdict::Suspect;
             }
-            reason = format!("not all of it may be kept: {err}; {reason}");
+            reason = format!("the log may be incomplete: {err}; {reason}");
         }
         self.record_verdict(verdict, &reason);
         self.verdict = Some((verdict, reason));
     }
 
-    /// The first verdict stands beside the log, like those of people after it.
+    /// The automatic assessment is an entry of the edits, as those of reviewers are.
     fn record_verdict(&mut self, verdict: Verdict, reason: &str) {
         let edit = Edit {
             at: wall_now().into(),
@@ -383,7 +364,6 @@ impl ActiveRun {
         }
     }
 
-    /// The run as the world may see it.
     pub fn view(&self) -> Option<RunView> {
         let state = self.engine.as_ref()?;
         let writer = self.writer.as_ref();
@@ -400,21 +380,21 @@ impl ActiveRun {
 
 /// What a run asks of the rig or of the hand beside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum ToRig {
+pub(super) enum RigAction {
     Command(RigCommand),
     Hand(HandAction),
 }
 
-impl ToRig {
+impl RigAction {
     fn is_stopping(&self) -> bool {
         matches!(self, Self::Command(command) if command.is_stopping())
     }
 }
 
-fn to_rig(effect: &Effect) -> Option<ToRig> {
+fn to_rig(effect: &Effect) -> Option<RigAction> {
     match effect {
-        Effect::Command(command) => Some(ToRig::Command(*command)),
-        Effect::ByHand(action) => Some(ToRig::Hand(*action)),
+        Effect::Command(command) => Some(RigAction::Command(*command)),
+        Effect::ByHand(action) => Some(RigAction::Hand(*action)),
         Effect::Record(_) | Effect::Finished(_) => None,
     }
 }

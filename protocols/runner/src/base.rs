@@ -5,7 +5,7 @@ use palpate_sessions::log::Session;
 use palpate_sessions::record::EntryKind;
 use serde::Serialize;
 
-/// What was found; nothing where no step looked for the base.
+/// Empty where no step looked for the base.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct FoundBase {
     /// Position of the base from home in mm.
@@ -19,7 +19,6 @@ pub struct FoundBase {
 }
 
 impl FoundBase {
-    /// What a decision found, if it found a base.
     #[must_use]
     pub fn of(record: &Record) -> Option<Self> {
         let Record::BaseFound {
@@ -42,7 +41,7 @@ impl FoundBase {
         let found = session.entries.iter().rev().find_map(|entry| {
             let is_one = entry.kind == EntryKind::Decision && entry.body["record"] == "base_found";
             let record = is_one.then(|| serde_json::from_value(entry.body.clone()))?;
-            // A decision of another kind that calls itself so tells nothing of a base.
+            // A newer palpate may use the name for another record.
             Self::of(&record.ok()?)
         });
         found.unwrap_or_default()

@@ -27,7 +27,7 @@ pub(crate) struct Board {
     samples: u64,
     trace: Arc<LiveTrace>,
     force_peak: Option<Newtons>,
-    /// Where the tissue was found, should depths count from a base by now.
+    /// Contact position of the tissue, also when depths count from a base.
     tissue: Option<Contact>,
     base: FoundBase,
     events: VecDeque<LogLine>,
@@ -84,7 +84,6 @@ impl Board {
         self.now
     }
 
-    /// Samples taken.
     pub fn samples(&self) -> u64 {
         self.samples
     }
@@ -94,8 +93,8 @@ impl Board {
         self.outcome.as_ref()
     }
 
-    /// An input comes; samples are told once the engine has taken them.
-    pub fn input(&mut self, now: Nanos, input: &Input) {
+    /// Samples come through [`Self::push_sample`], after the engine has taken them.
+    pub fn push_input(&mut self, now: Nanos, input: &Input) {
         self.now = now;
         match input {
             Input::Operator { choice } => self.note(format!("operator: {choice}"), false),
@@ -104,8 +103,7 @@ impl Board {
         }
     }
 
-    /// The engine has taken a sample.
-    pub fn sample(&mut self, state: &State) {
+    pub fn push_sample(&mut self, state: &State) {
         self.samples += 1;
         let (cycle, last) = (state.cycle(), self.cycle_starts.last());
         if cycle > 0 && last.is_none_or(|(_, last)| *last != cycle) {
@@ -125,8 +123,7 @@ impl Board {
         }
     }
 
-    /// The engine writes something down.
-    pub fn record(&mut self, record: &Record) {
+    pub fn push_record(&mut self, record: &Record) {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((self.now.seconds().0, *phase));
             if *phase == Phase::Contact {
@@ -158,14 +155,12 @@ impl Board {
         self.note(record.to_string(), is_alarm);
     }
 
-    /// The run has ended.
-    pub fn end(&mut self, outcome: &Outcome) {
+    pub fn push_outcome(&mut self, outcome: &Outcome) {
         let text = format!("{}: {}", outcome.ending, outcome.reason);
         self.note(text, is_alarming(outcome.ending));
         self.outcome = Some(outcome.clone());
     }
 
-    /// Something happened.
     pub fn note(&mut self, text: String, is_alarm: bool) {
         if self.events.len() == RunView::EVENTS_MAX {
             self.events.pop_front();
@@ -174,7 +169,6 @@ impl Board {
         self.events.push_back(LogLine { at, text, is_alarm });
     }
 
-    /// The run as the world may see it.
     pub fn view(&self, state: &State, log: LogState) -> RunView {
         let (step_index, step_started) = state.step_progress();
         let (time_left, fraction) = self.progress(step_index, step_started);
@@ -225,7 +219,7 @@ impl Board {
         }
     }
 
-    /// Where the tissue begins, though depths may count from the base behind it.
+    /// Contact position of the tissue, also when depths count from the base behind it.
     fn contact(&self, state: &State) -> Option<Contact> {
         let counted = state.contact()?;
         match self.base.base_mm == Some(counted.position.0) {
@@ -240,21 +234,11 @@ impl Board {
             return (Seconds(0.0), 1.0);
         }
         let spent = self.now.since(step_started).seconds().0;
-        let left: f64 =
-            self.steps
-                .iter()
-                .enumerate()
-                .skip(step_index)
-                .map(|(i, step)| {
-                    if i == step_index {
-                        (step.expected.0 - spent).max(0.0)
-                    } else {
-                        step.expected.0
-                    }
-                })
-                .sum();
+        let current = self.steps.get(step_index).map_or(0.0, |step| step.expected.0 - spent);
+        let later = self.steps.iter().skip(step_index + 1).map(|step| step.expected.0);
+        let remaining = current.max(0.0) + later.sum::<f64>();
         let done = self.now.seconds().0;
-        (Seconds(left), done / (done + left).max(1e-9))
+        (Seconds(remaining), done / (done + remaining).max(1e-9))
     }
 }
 
@@ -273,7 +257,7 @@ fn to_weigh(config: &Config) -> Vec<ToWeigh> {
     weigh.collect()
 }
 
-/// The nearest place ahead where a pause spoils nothing, by its name.
+/// Index of the step before it, and its name.
 fn next_checkpoint(state: &State, step_index: usize) -> Option<(usize, String)> {
     let mut ahead = state.config().plan.checkpoints_from(step_index);
     ahead.next().map(|(index, name)| (index, name.to_owned()))

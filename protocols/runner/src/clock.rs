@@ -14,7 +14,6 @@ use std::time::{Duration, Instant, SystemTime};
 pub enum TimeScale {
     /// This many session seconds per second.
     Factor(f64),
-    /// As fast as the computer can.
     Max,
 }
 
@@ -44,13 +43,10 @@ impl fmt::Display for TimeScale {
     }
 }
 
-/// What ended a wait.
 pub(super) enum Wake<T> {
-    /// The time came.
     Time,
     /// A request came; session time has reached this.
     Request(T, Nanos),
-    /// Nobody can send requests any more.
     Disconnected,
 }
 
@@ -64,7 +60,6 @@ pub(super) struct Pacer {
     wall_anchor: Instant,
     time_anchor: Nanos,
     lateness: Lateness,
-    /// How late the last wait was over.
     behind: Duration,
 }
 
@@ -89,8 +84,8 @@ impl Pacer {
             };
         };
         let due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
-        let left = due.saturating_sub(self.wall_anchor.elapsed());
-        let wake = match requests.recv_timeout(left) {
+        let remaining = due.saturating_sub(self.wall_anchor.elapsed());
+        let wake = match requests.recv_timeout(remaining) {
             Ok(request) => Wake::Request(request, self.now().min(at)),
             Err(RecvTimeoutError::Timeout) => Wake::Time,
             Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
@@ -105,7 +100,7 @@ impl Pacer {
         wake
     }
 
-    /// How much later than asked the last wait was over, what happened before it included. Each delay is told once.
+    /// How much too late the last wait ended, earlier delays included; each delay counts once.
     pub fn behind(&self) -> Duration {
         self.behind
     }
@@ -115,7 +110,6 @@ impl Pacer {
         (self.scale != TimeScale::Max).then_some(self.lateness)
     }
 
-    /// Session time that corresponds to the wall now.
     fn now(&self) -> Nanos {
         let TimeScale::Factor(factor) = self.scale else {
             return self.time_anchor;
@@ -150,16 +144,15 @@ impl Throttle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HostTimes {
     pub wall: SystemTime,
-    /// Since some moment, without the time in which the computer was suspended; nobody can set it.
+    /// Since some moment, without the time in which the computer was suspended; it cannot be set.
     pub awake: Duration,
-    /// Since the same moment, that time included.
     pub all: Duration,
 }
 
 /// Reads the computer's clocks.
 pub(super) type HostClock = Arc<dyn Fn() -> HostTimes + Send + Sync>;
 
-/// The real ones (clock_gettime(2)). Where the system has no clock that goes on in suspense, none is seen.
+/// The clocks of the system (clock_gettime(2)). Without a clock that counts suspended time, suspension is not noticed.
 pub(super) fn host_times() -> HostTimes {
     use rustix::time::{ClockId, clock_gettime};
     let read = |id| {
@@ -187,43 +180,28 @@ pub fn driver_clock() -> palpate_drivers::wire::HostClock {
     Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
 }
 
-/// Time since a loop began, and waits until a part of it.
+/// Measures how long something took, and paces haptic loops.
 #[derive(Debug)]
-pub struct Metronome(Instant);
-
-impl Metronome {
-    /// Begins now.
-    #[must_use]
-    pub fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Nanoseconds since it began.
-    pub fn now(&self) -> u64 {
-        self.0.elapsed().as_nanos() as u64
-    }
-
-    /// Sleeps until so many nanoseconds since it began; not at all where they have passed.
-    pub fn wait(&self, until: u64) {
-        let left = until.saturating_sub(self.now());
-        if left > 0 {
-            std::thread::sleep(Duration::from_nanos(left));
-        }
-    }
-}
-
-/// Measures how long something took; decides nothing.
 pub struct Stopwatch(Instant);
 
 impl Stopwatch {
-    /// Starts now.
     #[must_use]
     pub fn start() -> Self {
         Self(Instant::now())
     }
 
-    /// Seconds since the start.
     pub fn seconds(&self) -> f64 {
         self.0.elapsed().as_secs_f64()
+    }
+
+    #[cfg(feature = "haptics")]
+    pub(crate) fn nanos(&self) -> u64 {
+        self.0.elapsed().as_nanos() as u64
+    }
+
+    /// Sleeps until so many nanoseconds since the start.
+    #[cfg(feature = "haptics")]
+    pub(crate) fn wait_until(&self, nanos: u64) {
+        std::thread::sleep(Duration::from_nanos(nanos).saturating_sub(self.0.elapsed()));
     }
 }

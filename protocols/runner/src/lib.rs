@@ -27,7 +27,7 @@ mod watch;
 
 use active_run::to_json;
 use board::{Board, LogState};
-pub use clock::{Metronome, Stopwatch, TimeScale, driver_clock, wall_now};
+pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
 pub use leading::{Felt, Leader, Leading};
 use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};

@@ -1,4 +1,4 @@
-//! The live fit of a run, fed sample by sample. Should it ever panic, it is off, and nothing else is.
+//! The live fit of a run, fed sample by sample. A panic in it switches it off and stops nothing else.
 
 use palpate_model::contained::contained;
 use palpate_model::estimate::LiveEstimate;
@@ -11,11 +11,9 @@ use std::any::Any;
 /// Milliseconds between two answers of the live fit.
 const LIVE_FIT_MS: u64 = 500;
 
-/// What is fed: the live fit, or a test's stand-in.
+/// The live fit, or a test's stand-in.
 pub(super) trait Estimator: Send {
-    /// Takes a sample.
     fn push(&mut self, t: Seconds, depth: Depth, force: Newtons, sigma: Newtons);
-    /// What is known by now.
     fn estimate(&self) -> Option<LiveEstimate>;
 }
 
@@ -29,7 +27,6 @@ impl Estimator for LiveFit {
     }
 }
 
-/// Begins a fit whose deepest point is this.
 pub(super) type MakeEstimator = fn(Depth) -> Box<dyn Estimator>;
 
 /// Feeds ramp and hold to the live fit and says when it has a new answer.
@@ -42,7 +39,6 @@ pub(crate) struct LiveFeed {
     first_tick: Option<u64>,
     tick_secs: f64,
     samples: u64,
-    /// Samples between two answers.
     every: u64,
     deepest: Depth,
     cycle: u32,
@@ -91,7 +87,7 @@ impl LiveFeed {
             is_due.then(|| fit.estimate()).flatten()
         });
         fed.unwrap_or_else(|panic| {
-            // What is left of it may be half changed: it is not used again.
+            // Its state may be inconsistent: it is not used again.
             self.fit = None;
             self.failure = Some(format!(
                 "the live fit failed ({}) and is off for the rest of the run; the recording goes on",
@@ -107,7 +103,6 @@ impl LiveFeed {
     }
 }
 
-/// What a panic says.
 fn words(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no reason given")

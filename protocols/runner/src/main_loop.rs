@@ -5,12 +5,12 @@
     reason = "commands to a rig are sent from here and nowhere else"
 )]
 
-use super::active_run::{ActiveRun, ToRig};
+use super::active_run::{ActiveRun, RigAction};
 use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
-use super::panic_stop::Registered;
+use super::panic_stop::RigRegistration;
 use super::run_log::FaultLog;
 use super::snapshot::{RigView, Snapshot};
-use super::start::{Bench, RunRequest, StartError, start};
+use super::start::{RigContext, RunRequest, StartError, start};
 use super::watch::HostWatch;
 use arc_swap::ArcSwap;
 use palpate_drivers::{Rig, RigEventBody};
@@ -26,10 +26,10 @@ use std::time::Duration;
 /// Grid of the watchdog: silence is judged this often in session time.
 const TICK: Nanos = Nanos::from_millis(10);
 
-/// How often a rig on wires is asked what has come: an interlock decides so late at most.
+/// Polling interval of a wired rig, which is the longest delay of an interlock.
 const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
 
-/// How often a simulated rig is looked at between runs, when nothing can move: as often as an eye follows numbers.
+/// Polling interval of a simulated rig between runs, when nothing can move: as fast as an eye follows numbers.
 const STRIDE_AT_REST: Nanos = Nanos::from_millis(50);
 
 /// A counter at rest may flicker by so much.
@@ -44,17 +44,14 @@ const PUBLISH_EVERY: Duration = Duration::from_millis(33);
 /// Requests that may wait. An operator cannot press faster than the loop turns.
 const REQUESTS_MAX: usize = 64;
 
-/// What the runner can be asked.
 pub enum Request {
     /// Start a run; the reply says whether it started.
     Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
     Operator(Operator),
-    /// Write something down in the run in progress.
     Note(String),
-    /// Connect the rig anew after its link was lost. Nothing moves, and it has to be zeroed again. Not while a run goes on.
+    /// Reconnect the rig after its link was lost. Nothing moves, and the axis must be homed again. Ignored during a run.
     Reconnect,
-    /// Stop motion and end the thread.
     Shutdown,
 }
 
@@ -84,7 +81,7 @@ impl Runner {
         let (registered, is_registered) = sync_channel(1);
         let thread = std::thread::Builder::new().name("runner".into()).spawn(move || {
             let link = main_loop.rig.halt_handle();
-            main_loop.registered = Some(Registered::new(to_stop, link));
+            main_loop.registered = Some(RigRegistration::new(to_stop, link));
             let _ = registered.send(());
             main_loop.run(first, &receiver, &shared, &wake);
         })?;
@@ -110,7 +107,6 @@ impl Runner {
         self.requests.clone()
     }
 
-    /// Whether the thread still runs.
     pub fn is_alive(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
@@ -147,7 +143,6 @@ pub(super) struct MainLoop {
     now: Nanos,
     next_tick: Nanos,
     is_sample_seen: bool,
-    /// How late the loop was at its last turn.
     behind: Duration,
     reading: Option<Reading>,
     is_homed: bool,
@@ -155,8 +150,8 @@ pub(super) struct MainLoop {
     pub(super) run: Option<ActiveRun>,
     refusal: Option<String>,
     faults: FaultLog,
-    /// What a panic stops; none outside a [`Runner`].
-    registered: Option<Registered>,
+    /// The rig that a panic stops; none outside a [`Runner`].
+    registered: Option<RigRegistration>,
 }
 
 impl MainLoop {
@@ -198,10 +193,10 @@ impl MainLoop {
             let target = self.now + self.stride();
             let wake_up = pacer.wait(target, requests);
             if let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) {
-                run.keep_lateness(pacer.lateness());
+                run.record_lateness(pacer.lateness());
             }
             self.watch(pacer.behind());
-            self.heed_pause(pacer.behind());
+            self.handle_pause(pacer.behind());
             let is_ending = match wake_up {
                 Wake::Time => {
                     self.advance(target);
@@ -238,11 +233,11 @@ impl MainLoop {
         };
         let now = run.session_time(self.now);
         let rig = &mut self.rig;
-        run.watch(now, lateness, &mut |asked| act(rig.as_mut(), asked));
+        run.watch(now, lateness, &mut |action| act(rig.as_mut(), action));
     }
 
-    /// Tells the run of a pause of the computer. The time of a simulated rig waits for it.
-    fn heed_pause(&mut self, behind: Duration) {
+    /// Reports a pause of the computer to the run. The time of a simulated rig waits for the computer.
+    fn handle_pause(&mut self, behind: Duration) {
         let late = behind.saturating_sub(std::mem::replace(&mut self.behind, behind));
         let late = Nanos::from_seconds(Seconds(late.as_secs_f64()));
         if late > TICK && !self.rig.is_virtual() {
@@ -299,7 +294,7 @@ impl MainLoop {
 
     fn on_event(&mut self, body: RigEventBody) {
         match body {
-            // What is not a number goes no further: not to a plot, a fit or a file.
+            // A signal that is not a number must not reach a plot, a fit or a file.
             RigEventBody::Reading(reading) if !reading.volts.is_finite() => {
                 let tick = reading.tick;
                 self.feed(Input::Fault(Fault::SignalInvalid { tick }));
@@ -319,7 +314,7 @@ impl MainLoop {
             RigEventBody::Ack(ack) => self.feed(Input::Ack(ack)),
             RigEventBody::Fault(fault) => {
                 if !self.is_running() {
-                    self.faults.fault(self.now, &fault);
+                    self.faults.log_fault(self.now, &fault);
                 }
                 if matches!(fault, Fault::LinkLost { .. } | Fault::ControllerReset) {
                     self.is_homed = false;
@@ -327,7 +322,7 @@ impl MainLoop {
                 if let Fault::LinkLost { detail } = &fault {
                     self.link_error = Some(detail.clone());
                 } else if matches!(fault, Fault::ControllerReset) && !self.rig.is_virtual() {
-                    // It has forgotten what was set.
+                    // A reset controller has lost its settings.
                     self.link_error = Some("the controller was reset".into());
                 }
                 self.feed(Input::Fault(fault));
@@ -335,8 +330,8 @@ impl MainLoop {
         }
     }
 
-    /// Whether nobody knows any more where an axis is that no run moves: its motor is off, so that a hand may push it, or
-    /// its counter has changed at rest.
+    /// Whether the position of an axis at rest is no longer certain: its motor is off, so that a hand may push it, or its
+    /// counter has changed.
     fn is_displaced(&self, reading: &Reading) -> bool {
         let has_jumped = self.reading.is_some_and(|last| {
             let is_moving = |one: &Reading| one.status.has(AxisStatus::MOVING);
@@ -356,19 +351,18 @@ impl MainLoop {
         run.take_raw(raw);
         let now = run.session_time(self.now);
         let rig = &mut self.rig;
-        run.feed(now, input, &mut |asked| act(rig.as_mut(), asked));
+        run.feed(now, input, &mut |action| act(rig.as_mut(), action));
         if let Some(state) = run.engine() {
             self.is_homed = state.is_homed_for_next();
         }
     }
 
-    /// Serves one request; true ends the thread.
     fn serve(&mut self, request: Request) -> bool {
         match request {
             Request::Run(request, reply) => {
                 let answer = self.start_run(&request);
                 self.refusal = answer.as_ref().err().map(ToString::to_string);
-                // Nobody may be waiting any more; the snapshot says the same.
+                // The caller may have stopped waiting; the snapshot holds the same answer.
                 let _ = reply.try_send(answer);
             }
             Request::Operator(choice) => {
@@ -411,14 +405,14 @@ impl MainLoop {
         if self.is_running() {
             return Err(StartError::Refused("a run is in progress; stop it first".into()));
         }
-        let bench = Bench {
+        let context = RigContext {
             rig: &self.description,
             is_virtual: self.rig.is_virtual(),
             is_homed: self.is_homed,
             origin: self.now,
             watch: self.host_watch(),
         };
-        self.run = Some(start(request, bench)?);
+        self.run = Some(start(request, context)?);
         // What was exchanged before belongs to no run.
         drop(self.rig.take_raw());
         self.feed(Input::Operator { choice: Operator::Start });
@@ -463,9 +457,9 @@ impl MainLoop {
     }
 }
 
-fn act(rig: &mut dyn Rig, asked: ToRig) {
-    match asked {
-        ToRig::Command(command) => rig.send(command),
-        ToRig::Hand(action) => rig.by_hand(action),
+fn act(rig: &mut dyn Rig, action: RigAction) {
+    match action {
+        RigAction::Command(command) => rig.send(command),
+        RigAction::Hand(by_hand) => rig.by_hand(by_hand),
     }
 }

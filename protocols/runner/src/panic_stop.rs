@@ -1,7 +1,7 @@
-//! What is stopped when the program panics: every rig that a runner holds.
+//! A panic stops every rig that a runner holds.
 //!
-//! The runner is asked for the immediate stop, so that the session says how it ended. A runner that does not
-//! answer, or that panics itself, is gone round: the link's own thread is told.
+//! The runner is asked for the immediate stop, so that the session says how it ended. Where a runner does not answer or panics
+//! itself, the link's own thread sends the stop.
 
 use super::main_loop::Request;
 use arc_swap::ArcSwap;
@@ -24,26 +24,25 @@ struct OpenRig {
     link: Option<HaltHandle>,
 }
 
-/// A list that is replaced and never locked: whoever panics may hold anything.
+/// A list that is replaced and never locked: a panicking thread may hold any lock.
 static OPEN: LazyLock<ArcSwap<Vec<Arc<OpenRig>>>> = LazyLock::new(ArcSwap::default);
 
 /// Keeps a rig among those that a panic stops. Made on the runner's thread.
-pub(super) struct Registered(Arc<OpenRig>);
+pub(super) struct RigRegistration(Arc<OpenRig>);
 
-impl Registered {
+impl RigRegistration {
     pub fn new(requests: SyncSender<Request>, link: Option<HaltHandle>) -> Self {
         let rig = Arc::new(OpenRig { runner: std::thread::current().id(), requests, link });
         OPEN.rcu(|open| [open.as_slice(), &[Arc::clone(&rig)]].concat());
         Self(rig)
     }
 
-    /// The same runner with another link to its rig.
     pub fn relinked(self, link: Option<HaltHandle>) -> Self {
         Self::new(self.0.requests.clone(), link)
     }
 }
 
-impl Drop for Registered {
+impl Drop for RigRegistration {
     fn drop(&mut self) {
         OPEN.rcu(|open| {
             let others = open.iter().filter(|rig| !Arc::ptr_eq(rig, &self.0));
@@ -78,7 +77,7 @@ impl OpenRig {
             return;
         };
         if !(is_asked && link.is_written(written + 1, RUNNER_PATIENCE)) {
-            // Where the link is dead as well nobody is left to ask.
+            // A dead link leaves nothing else to try.
             let _ = link.halt(LINK_PATIENCE);
         }
     }

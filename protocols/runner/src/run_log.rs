@@ -1,9 +1,9 @@
-//! What the program's log says of a run, at transitions alone: what kind of thing happened to which step, never a sample, a
-//! force or a note. Why stands in the session's own log, and reasons quote what was measured.
+//! Lines of a run in the program's log, at transitions only: the kind of event and the step, never a sample, a force or a
+//! note. Reasons quote measured values, so they are in the session's own log only.
 
 use palpate_model::Nanos;
 use palpate_model::rig::Fault;
-use palpate_protocols::engine::{EndingKind, Input, Outcome, Record, Recovery};
+use palpate_protocols::engine::{EndingKind, FailureResponse, Input, Outcome, Record};
 use palpate_protocols::plans::Plan;
 use std::mem::{Discriminant, discriminant};
 use std::path::Path;
@@ -26,8 +26,7 @@ struct FaultCount {
 }
 
 impl FaultLog {
-    /// Takes a fault of this time.
-    pub fn fault(&mut self, now: Nanos, fault: &Fault) {
+    pub fn log_fault(&mut self, now: Nanos, fault: &Fault) {
         let kind = discriminant(fault);
         match self.0.iter_mut().find(|one| one.kind == kind) {
             None => {
@@ -70,15 +69,15 @@ impl RunLog {
         }
     }
 
-    pub fn input(&mut self, now: Nanos, input: &Input) {
+    pub fn log_input(&mut self, now: Nanos, input: &Input) {
         match input {
-            Input::Fault(fault) => self.step.in_scope(|| self.faults.fault(now, fault)),
+            Input::Fault(fault) => self.step.in_scope(|| self.faults.log_fault(now, fault)),
             Input::Operator { choice } => info!(parent: &self.step, "operator: {choice}"),
             _ => {}
         }
     }
 
-    pub fn record(&mut self, record: &Record) {
+    pub fn log_record(&mut self, record: &Record) {
         match record {
             Record::PhaseStarted { step_index, .. } => {
                 self.begin_step(*step_index);
@@ -103,10 +102,10 @@ impl RunLog {
                 warn!(parent: &self.step, "monitor {} tripped", index + 1);
             }
             Record::Refused { .. } => warn!(parent: &self.step, "request refused"),
-            Record::StepFailed { then: Recovery::Retry(count), .. } => {
+            Record::StepFailed { then: FailureResponse::Retry(count), .. } => {
                 warn!(parent: &self.step, "step failed, trying again ({count})");
             }
-            Record::StepFailed { then: Recovery::Skip, .. } => {
+            Record::StepFailed { then: FailureResponse::Skip, .. } => {
                 warn!(parent: &self.step, "step failed, left out");
             }
             _ => {}
@@ -121,12 +120,11 @@ impl RunLog {
         self.step = info_span!(parent: &self.run, "step", number = index + 1, kind);
     }
 
-    /// The log of the session or the computer has something to tell.
-    pub fn trouble(&self, text: &str) {
+    pub fn log_trouble(&self, text: &str) {
         warn!(parent: &self.step, "{text}");
     }
 
-    pub fn closed(&self, outcome: &Outcome, log_error: Option<&str>) {
+    pub fn log_end(&self, outcome: &Outcome, log_error: Option<&str>) {
         info!(parent: &self.run, "session closed, {}", outcome.ending);
         if let Some(err) = log_error {
             error!(parent: &self.run, "{err}");

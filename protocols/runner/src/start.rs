@@ -1,4 +1,4 @@
-//! Starting a run: everything that can refuse, before anything moves.
+//! Starting a run: every check comes before any motion.
 
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
@@ -23,11 +23,10 @@ use thiserror::Error;
 /// What happens when a run stopped before its plan was complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AfterStop {
-    /// Nobody watches: close the session where the probe stands.
+    /// Unattended: close the session where the probe stands.
     Close,
-    /// Wait for the operator to retract or close.
     Wait,
-    /// The same, but nobody would resume a pause: the operator is only asked.
+    /// As [`Self::Wait`], but a pause that cannot end by itself ends the run: nothing can resume it.
     Ask,
 }
 
@@ -37,14 +36,12 @@ pub enum Answers {
     /// The operator, within the prompt's time.
     #[default]
     Operator,
-    /// Nobody is there and everything is as asked: a simulated rig, whose hand is simulated too.
+    /// The program, at once: a simulated rig simulates the hand too.
     Confirm,
 }
 
-/// A run somebody wants.
 #[derive(Clone, Debug)]
 pub struct RunRequest {
-    /// What to do.
     pub plan: Plan,
     /// Volts to newtons.
     pub calibration: Calibration,
@@ -52,33 +49,28 @@ pub struct RunRequest {
     pub limits: Limits,
     /// Session folder; a new one in the library if none.
     pub out: Option<PathBuf>,
-    /// Who and what.
     pub labels: Labels,
     /// Whether the operator acknowledged what the preview asks to acknowledge.
     pub is_acknowledged: bool,
     /// What beside the preview is to be acknowledged, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
-    /// What follows a stop.
     pub after_stop: AfterStop,
-    /// Who answers prompts.
     pub answers: Answers,
-    /// What leads a step that follows; without it such a step waits for a lead in vain and ends.
+    /// Source of leads for a step that follows; without it such a step times out.
     pub leader: Option<Leader>,
 }
 
-/// A run did not start.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StartError {
-    /// What was asked cannot be done; nothing was touched.
+    /// The request is not possible; nothing was changed.
     #[error("{0}")]
     Refused(String),
-    /// It should have worked and did not.
     #[error("{0}")]
     Failed(String),
 }
 
 /// What the runner knows about the rig when a run is asked for.
-pub(super) struct Bench<'a> {
+pub(super) struct RigContext<'a> {
     pub rig: &'a Arc<RigDescription>,
     pub is_virtual: bool,
     pub is_homed: bool,
@@ -88,11 +80,13 @@ pub(super) struct Bench<'a> {
     pub watch: Option<HostWatch>,
 }
 
-/// Checks a request and opens its session.
-pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun, StartError> {
+pub(super) fn start(
+    request: &RunRequest,
+    context: RigContext<'_>,
+) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
     let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
-    let preview = preview(&request.plan, bench.rig, &request.limits, &curve, bench.is_homed);
+    let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);
     preview.verdict(request.is_acknowledged).map_err(refused)?;
     if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
         return Err(refused(format!("{first}; acknowledge this to go on")));
@@ -111,33 +105,23 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
     check_free_space(&path, preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
 
-    let manifest = manifest(request, &bench, &preview, session_id.clone(), started_at)?;
-    let pace = if bench.is_virtual { Pace::Virtual } else { Pace::Real };
+    let manifest = manifest(request, &context, &preview, session_id.clone(), started_at)?;
+    let pace = if context.is_virtual { Pace::Virtual } else { Pace::Real };
     let writer = SessionWriter::start(folder, spare_folder().as_deref(), &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {
-        rig: bench.rig.as_ref().clone(),
+        rig: context.rig.as_ref().clone(),
         limits: request.plan.limits.tighten(request.limits),
         curve,
         plan: request.plan.clone(),
-        is_homed: bench.is_homed,
+        is_homed: context.is_homed,
     };
-    let run = ActiveRun::new(
-        config,
-        preview,
-        (writer, session_id),
-        path,
-        bench.origin,
-        (request.after_stop, request.answers),
-        bench.watch,
-    );
-    Ok(run.led_by(request.leader.clone()))
+    Ok(ActiveRun::new(config, preview, (writer, session_id), path, request, context))
 }
 
-/// What the session says about itself.
 fn manifest(
     request: &RunRequest,
-    bench: &Bench<'_>,
+    context: &RigContext<'_>,
     preview: &Preview,
     session_id: String,
     started_at: SystemTime,
@@ -150,7 +134,7 @@ fn manifest(
         acknowledgements.extend_from_slice(&preview.acknowledgements);
         acknowledgements.extend_from_slice(&request.to_acknowledge);
     }
-    let mut signal = bench.rig.signal();
+    let mut signal = context.rig.signal();
     if let Some(filter) = request.labels.about.get("signal.filter") {
         signal.filter = filter.as_str().unwrap_or_default().into();
     }
@@ -167,11 +151,11 @@ fn manifest(
         about: labels.about,
         signal: Some(signal),
         imported: None,
-        rig: Some(bench.rig.as_ref().clone()),
+        rig: Some(context.rig.as_ref().clone()),
         limits: Some(request.limits),
         calibration: json("calibration", serde_json::to_value(&request.calibration))?,
         plan: json("plan", serde_json::to_value(&request.plan))?,
-        settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
+        settings: serde_json::json!({ "is_homed_at_start": context.is_homed }),
         acknowledgements,
         recovered: None,
     })

@@ -95,14 +95,14 @@ fn sim() -> SimRig {
 }
 
 #[test]
-fn a_wall_clock_that_jumps_changes_no_sample_and_is_told() {
+fn wall_clock_jump_changes_no_sample_and_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let fast = TimeScale::Factor(40.0);
     let mut rows = Vec::new();
     for name in ["calm", "jumping"] {
         let start = host_times();
         let is_calm = name == "calm";
-        // An hour back after half a second: somebody set the clock.
+        // An hour back after half a second: as if the clock was set.
         let clock: Clock = Box::new(move || {
             let mut times = alike(start);
             if !is_calm && times.awake > start.awake + Duration::from_millis(500) {
@@ -166,9 +166,9 @@ fn a_computer_that_was_suspended_ends_the_run() {
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }
 
-struct Panicking(u32);
+struct PanickingEstimator(u32);
 
-impl Estimator for Panicking {
+impl Estimator for PanickingEstimator {
     fn push(&mut self, _: Seconds, _: Depth, _: Newtons, _: Newtons) {
         self.0 += 1;
         assert!(self.0 < 700, "as if a matrix had no inverse");
@@ -189,7 +189,7 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
         let active = main_loop.run.as_mut().unwrap();
         if name == "panicking" {
             let config = active.engine().unwrap().config().clone();
-            active.live = LiveFeed::with(&config, |_| Box::new(Panicking(0)));
+            active.live = LiveFeed::with(&config, |_| Box::new(PanickingEstimator(0)));
         }
         run(main_loop);
         sessions.push(Session::open(&out).unwrap());
@@ -203,7 +203,7 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
     assert_eq!(events.len(), 1, "{events:?}");
     let text = &events[0].1;
     assert!(text.contains("as if a matrix had no inverse") && text.contains("is off"), "{text}");
-    // At full pace nothing else is told: what is in the log does not depend on the computer.
+    // At full pace the log does not depend on the computer.
     assert_eq!(panicking.beside.health.messages, 1);
     assert_eq!(sound.beside.health.messages, 0);
 }
@@ -279,7 +279,7 @@ fn faults_in_turn_leave_a_line_a_minute_of_each_kind() {
                 0 => Fault::SignalInvalid { tick: ms },
                 _ => Fault::CommandRefused { detail: "busy".into() },
             };
-            faults.fault(Nanos::from_millis(ms), &fault);
+            faults.log_fault(Nanos::from_millis(ms), &fault);
         }
     });
     let lines = lines.0.lock().unwrap();

@@ -1,5 +1,5 @@
-//! How the computer keeps up with a run and what its clocks do, told in the log once a second. No decision is
-//! made of it but one: when the computer stood still, the run ends.
+//! How the computer keeps up with a run and what its clocks do, logged once a second. It leads to one decision only: a
+//! computer that stood still ends the run.
 
 use super::clock::{HostClock, HostTimes};
 use palpate_model::Nanos;
@@ -8,26 +8,24 @@ use palpate_sessions::health::{Told, Why};
 use palpate_sessions::{Health, MachineState};
 use std::time::{Duration, SystemTime};
 
-/// The state is told this often.
 const EVERY: Duration = Duration::from_secs(1);
-/// A wall clock that went further apart from the monotonic one than that was set, and a computer that answered
-/// nothing for longer stood still: far above what a busy scheduler does, far below what a person notices late.
+/// A larger step of the wall clock against the monotonic one means that it was set; a longer silence means that the computer
+/// stood still. Far above the delays of a busy scheduler, far below what an operator would notice late.
 const APART: Duration = Duration::from_millis(500);
 
 pub(super) struct HostWatch {
     clock: HostClock,
-    /// Whether nobody but this computer watches the rig, whose time goes on without it.
+    /// Whether the rig's time goes on while this computer stands still.
     is_wired: bool,
     anchor: HostTimes,
     /// The time that was spent suspended before.
     asleep: Duration,
-    told: Duration,
+    reported_at: Duration,
     lateness: Duration,
     missed: u64,
 }
 
 impl HostWatch {
-    /// Watches from now on.
     pub fn new(clock: HostClock, is_wired: bool) -> Self {
         let times = clock();
         Self {
@@ -35,19 +33,17 @@ impl HostWatch {
             is_wired,
             anchor: times,
             asleep: times.all.saturating_sub(times.awake),
-            told: times.awake,
+            reported_at: times.awake,
             lateness: Duration::ZERO,
             missed: 0,
         }
     }
 
-    /// The anchor that a session begins with.
     pub fn begin(&self) -> Health {
         anchor(Nanos::ZERO, Why::Start, self.anchor.wall, 0.0)
     }
 
-    /// One turn of the loop, that much later than it should have been: what is to be told of the clocks, and for
-    /// how long the computer stood still, if it did.
+    /// One turn of the loop, late by `lateness`: a jump of the wall clock, and for how long the computer stood still.
     pub fn turn(&mut self, now: Nanos, lateness: Duration) -> (Option<Health>, Option<Seconds>) {
         self.lateness = self.lateness.max(lateness);
         let times = (self.clock)();
@@ -58,7 +54,7 @@ impl HostWatch {
         });
         let asleep = times.all.saturating_sub(times.awake);
         let slept = asleep.saturating_sub(std::mem::replace(&mut self.asleep, asleep));
-        // The time of a simulated rig waits for a computer that is late, but not even that sleeps unseen.
+        // The time of a simulated rig waits for a late computer, but a suspension counts there too.
         let stood = match self.is_wired {
             true => slept + lateness,
             false => slept,
@@ -67,14 +63,13 @@ impl HostWatch {
         (jump, stood)
     }
 
-    /// Whether the state is to be told again.
     pub fn is_due(&self) -> bool {
-        (self.clock)().awake.saturating_sub(self.told) >= EVERY
+        (self.clock)().awake.saturating_sub(self.reported_at) >= EVERY
     }
 
-    /// The state since it was last told: the log's part of it, and the readings that are missing by now.
+    /// The state since the last report; `missed` are the readings that are missing since the start.
     pub fn state(&mut self, now: Nanos, disk: MachineState, missed: u64) -> Health {
-        self.told = (self.clock)().awake;
+        self.reported_at = (self.clock)().awake;
         let before = std::mem::replace(&mut self.missed, missed);
         Health {
             now,
@@ -86,7 +81,6 @@ impl HostWatch {
         }
     }
 
-    /// The anchor that a session ends with.
     pub fn end(&self, now: Nanos) -> Health {
         let times = (self.clock)();
         anchor(now, Why::End, times.wall, self.shift_s(&times))

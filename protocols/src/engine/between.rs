@@ -1,8 +1,8 @@
-//! Between two steps: the axis comes to rest, goes back if the step is tried again, and what follows begins.
+//! Between two steps: the axis comes to rest, returns to the start of a step that is retried, and the next step begins.
 
 use super::context::Context;
-use super::record::{EndingKind, Record, Recovery};
-use super::state::{Activity, Power, Then};
+use super::record::{EndingKind, FailureResponse, Record};
+use super::state::{Activity, FollowUp, Power};
 use super::{step, stop};
 use crate::plans::OnFailure;
 use palpate_model::Nanos;
@@ -11,11 +11,11 @@ use palpate_model::units::{MmPerS, Seconds};
 /// Longest time a deceleration takes, acknowledgement included.
 const REST_MAX: Seconds = Seconds(2.0);
 
-/// Speed of the way back to where a step began.
+/// Speed of the return to the start of a step.
 const RETURN_SPEED: MmPerS = MmPerS(3.0);
 
 /// Stops what moves; `then` follows at rest.
-pub(super) fn come_to_rest(cx: &mut Context<'_>, then: Then) {
+pub(super) fn come_to_rest(cx: &mut Context<'_>, then: FollowUp) {
     if !cx.state.is_at_rest() {
         cx.stop_move();
     }
@@ -24,36 +24,35 @@ pub(super) fn come_to_rest(cx: &mut Context<'_>, then: Then) {
         Activity::Between { then, deadline: cx.now + Nanos::from_seconds(REST_MAX) };
 }
 
-/// A sample came on the way to rest.
-pub(super) fn on_reading(cx: &mut Context<'_>, then: Then, deadline: Nanos) {
+pub(super) fn on_reading(cx: &mut Context<'_>, then: FollowUp, deadline: Nanos) {
     if cx.state.in_flight.is_some() {
-        // On the way back to where the step began.
+        // The axis returns to the start of the step.
         match (cx.at_rest(), then) {
             (Ok(false), _) => return,
-            (Ok(true), Then::Begin(index)) => return step::begin(cx, index),
+            (Ok(true), FollowUp::Begin(index)) => return step::begin(cx, index),
             (Ok(true), _) => {}
             (Err(reason), _) => return stop::begin(cx, EndingKind::Abort, reason),
         }
     }
     if !cx.state.is_at_rest() || !cx.state.unacknowledged.is_empty() {
         if cx.now > deadline {
-            let reason = "the axis did not come to rest; check the controller".into();
+            let reason = "the axis did not come to rest; check the controller";
             stop::begin(cx, EndingKind::Abort, reason);
         }
         return;
     }
     match then {
-        Then::Begin(index) => step::begin(cx, index),
-        Then::Pause(next) => cx.state.activity = Activity::Paused { next },
-        // Where the axis is already, or with the motor off, there is no way back to go.
-        Then::Return(index)
+        FollowUp::Begin(index) => step::begin(cx, index),
+        FollowUp::Pause(next) => cx.state.activity = Activity::Paused { next },
+        // At the start already, or with the motor off, there is nothing to return to.
+        FollowUp::Return(index)
             if cx.state.pulses == cx.state.step_from || cx.state.power != Power::Enabled =>
         {
             step::begin(cx, index);
         }
-        Then::Return(index) => match cx.move_to_pulses(cx.state.step_from, RETURN_SPEED) {
+        FollowUp::Return(index) => match cx.move_to_pulses(cx.state.step_from, RETURN_SPEED) {
             Ok(()) if cx.state.in_flight.is_some() => {
-                cx.state.activity = Activity::Between { then: Then::Begin(index), deadline };
+                cx.state.activity = Activity::Between { then: FollowUp::Begin(index), deadline };
             }
             Ok(()) => step::begin(cx, index),
             Err(reason) => stop::begin(cx, EndingKind::Abort, reason),
@@ -61,7 +60,7 @@ pub(super) fn on_reading(cx: &mut Context<'_>, then: Then, deadline: Nanos) {
     }
 }
 
-/// A step cannot be done: what the plan says follows.
+/// A step has failed: retry, skip or abort, as the plan says.
 pub(super) fn fail(cx: &mut Context<'_>, reason: String) {
     let step_index = cx.state.step_index;
     let planned = cx.state.config.plan.steps.get(step_index);
@@ -69,9 +68,9 @@ pub(super) fn fail(cx: &mut Context<'_>, reason: String) {
     let (then, next) = match policy {
         OnFailure::Retry(most) if cx.state.retries < most => {
             cx.state.retries += 1;
-            (Recovery::Retry(cx.state.retries), Then::Return(step_index))
+            (FailureResponse::Retry(cx.state.retries), FollowUp::Return(step_index))
         }
-        OnFailure::Skip => (Recovery::Skip, Then::Begin(step_index + 1)),
+        OnFailure::Skip => (FailureResponse::Skip, FollowUp::Begin(step_index + 1)),
         _ => return stop::begin(cx, EndingKind::Abort, reason),
     };
     cx.record(Record::StepFailed { reason, then });

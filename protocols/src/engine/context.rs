@@ -1,4 +1,4 @@
-//! What a step may see and do while it runs: ask for motion, write records.
+//! What a step may see and do while it runs: request motion, write records.
 
 use super::input::Effect;
 use super::pause;
@@ -14,21 +14,20 @@ use palpate_model::rig::{
 };
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
-/// The state, the time and the effects of one call of `step`. A step of a plan sees of the state what its methods
-/// show: no interlock, no limit and no plan can be changed through them.
+/// The state, the time and the effects of one call of `step`. A step sees the state only through
+/// these methods: they change no interlock, no limit and no plan.
 pub(crate) struct Context<'a> {
     pub(super) state: &'a mut State,
     pub now: Nanos,
     pub(super) effects: &'a mut Vec<Effect>,
 }
 
-/// A search feels with the load cell.
 pub(crate) const NOT_TARED: &str = "tare the load cell before searching with it";
 
 /// Time a move may overrun its profile before the axis counts as stuck.
 const MOVE_GRACE: Seconds = Seconds(1.0);
 
-/// Why a move does not begin that would end beyond the travel.
+/// The error of a move beyond the travel.
 pub(crate) fn outside_travel(what: &str, end: Position, travel: Position) -> String {
     format!("a {what} to {:.3} mm is outside the travel of 0 to {:.1} mm", end.0, travel.0)
 }
@@ -82,7 +81,6 @@ impl Context<'_> {
         self.state.tick + self.state.ticks(span)
     }
 
-    /// Newest answer of the live fit.
     pub fn live(&self) -> Option<&LiveEstimate> {
         self.state.live.as_ref()
     }
@@ -135,7 +133,6 @@ impl Context<'_> {
         Ok(target)
     }
 
-    /// Whether the rig has accepted every command.
     pub fn is_acknowledged(&self) -> bool {
         self.state.unacknowledged.is_empty()
     }
@@ -145,19 +142,17 @@ impl Context<'_> {
         self.state.pause == Some(Pause::Extended)
     }
 
-    /// Who answers goes on.
     pub fn end_pause(&mut self) {
         if self.is_extended() {
             pause::resume(self);
         }
     }
 
-    /// The signal's zero moved: forces before and after do not compare.
+    /// The zero of the signal has moved: forces before and after are not comparable.
     pub fn forget_force_rate(&mut self) {
         self.state.watch.forget_rate();
     }
 
-    /// Energises the motor of an axis told to stop.
     pub fn energise(&mut self) {
         self.state.power = Power::Reset;
         self.command(RigCommand::EnableMotor);
@@ -169,12 +164,11 @@ impl Context<'_> {
         self.state.power = Power::Enabled;
     }
 
-    /// A person has done something at the rig.
     pub fn by_hand(&mut self, action: Option<HandAction>) {
         self.effects.extend(action.map(Effect::ByHand));
     }
 
-    /// Sends the axis out of the tissue. A way out never leads further in.
+    /// Sends the axis out of the tissue, never deeper.
     pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> Result<(), String> {
         let target = self.position_of(Depth(-clearance_mm))?;
         let out = target.0.clamp(0.0, self.state.derived.position.0.max(0.0));
@@ -188,6 +182,11 @@ impl Context<'_> {
 
     pub fn record(&mut self, record: Record) {
         self.effects.push(Effect::Record(record));
+    }
+
+    /// What was asked for cannot be done now.
+    pub fn refuse(&mut self, reason: impl Into<String>) {
+        self.record(Record::Refused { reason: reason.into() });
     }
 
     pub fn enter_phase(&mut self, phase: Phase) {
@@ -228,7 +227,6 @@ impl Context<'_> {
         Ok(())
     }
 
-    /// Lets the axis follow a sine, deeper and back.
     pub fn oscillate(&mut self, command: Oscillation) -> Result<(), String> {
         let rig = &self.state.config.rig;
         rig.check_oscillation(&command)?;

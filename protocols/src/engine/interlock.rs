@@ -1,6 +1,6 @@
 //! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
 
-use super::millisecond::Millisecond;
+use super::block_mean::BlockMean;
 use super::state::{Power, State};
 use crate::steps::Step;
 use palpate_model::Nanos;
@@ -22,15 +22,10 @@ palpate_model::named! {
         Force = "force",
         /// Raw signal too high, whatever the calibration says.
         Volts = "raw signal",
-        /// Force changes faster than tissue can.
         ForceRate = "force rate",
-        /// Samples arrive too late for the speed.
         SampleAge = "sample age",
-        /// The motor lost its current.
         Motor = "motor",
-        /// Pulses and commanded path disagree.
         Path = "path",
-        /// The link or the controller failed.
         Link = "link",
     }
 }
@@ -45,25 +40,25 @@ pub(super) struct Trip {
 /// Milliseconds in each of the two means whose difference is the force rate.
 const RATE_MS: usize = 10;
 
-/// A signal that stays the same for so many milliseconds is that of a dead cell: with noise of a few counts each sample
-/// has a chance of at most a half.
+/// A signal that stays constant for so many milliseconds is that of a dead cell: with noise of a few counts each sample
+/// repeats the last one with a probability of at most one half.
 const STUCK_MS: u32 = 100;
 
 /// While the operator retracts after an over-force the limits that stopped the run are already
-/// exceeded; the ceiling becomes what was felt at the start of the retract plus this.
+/// exceeded; the ceiling becomes the force at the start of the retract plus this.
 const RETRACT_HEADROOM: Newtons = Newtons(0.5);
 const RETRACT_HEADROOM_VOLTS: Volts = Volts(0.05);
 
-/// A pause of the computer that is over when it is noticed is no silence of the rig, and no stop could have left in it:
-/// what counts is whether samples come now. A longer one is silence, as long as a rig may keep silent at rest.
+/// A shorter pause of the computer is not a silence of the rig: it is over when it is noticed, and no stop could have been
+/// sent in it. A longer one counts as silence: so long may a rig be silent at rest.
 const PAUSE_MAX: Nanos = Nanos::from_millis(250);
 
 /// What the interlocks remember between samples.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Watch {
+pub(super) struct InterlockWatch {
     last_at: Option<Nanos>,
     last_tick: Option<u64>,
-    millisecond: Millisecond,
+    millisecond: BlockMean<1>,
     /// The newest forces, one a millisecond, oldest first once full.
     recent: [f64; 2 * RATE_MS],
     /// The ticks of their last samples.
@@ -76,13 +71,12 @@ pub(super) struct Watch {
     stuck: u32,
 }
 
-impl Watch {
-    /// Nothing was seen of the rig yet.
+impl InterlockWatch {
     pub fn new(rig: &RigDescription) -> Self {
         Self {
             last_at: None,
             last_tick: None,
-            millisecond: Millisecond::of(rig),
+            millisecond: BlockMean::of_millisecond(rig),
             recent: [0.0; 2 * RATE_MS],
             recent_ticks: [0; 2 * RATE_MS],
             recent_count: 0,
@@ -93,12 +87,10 @@ impl Watch {
         }
     }
 
-    /// Samples are expected from now on.
     pub fn start(&mut self, now: Nanos) {
         self.last_at.get_or_insert(now);
     }
 
-    /// The computer stood still so long.
     pub fn excuse(&mut self, late: Nanos) {
         if late <= PAUSE_MAX
             && let Some(last) = &mut self.last_at
@@ -107,13 +99,13 @@ impl Watch {
         }
     }
 
-    /// The operator retracts: what is felt now may stay, but not grow.
+    /// The operator retracts: the present force may stay, but not grow.
     pub fn allow_retract(&mut self) {
         let (force, volts) = self.newest;
         self.retract_ceiling = Some((force + RETRACT_HEADROOM, volts + RETRACT_HEADROOM_VOLTS));
     }
 
-    /// The signal's zero moved (tare): forces before and after do not compare.
+    /// The zero of the signal has moved (tare): forces before and after are not comparable.
     pub fn forget_rate(&mut self) {
         self.recent_count = 0;
         self.millisecond.clear();
@@ -127,7 +119,7 @@ impl Watch {
 
     /// Change of force between the two newest means, in N/s, each time a millisecond is complete and there are enough.
     fn push_rate(&mut self, tick: u64, force: f64, rig: &RigDescription) -> Option<f64> {
-        let (_, force) = self.millisecond.push(0.0, force)?;
+        let [force] = self.millisecond.push([force])?;
         self.recent.rotate_left(1);
         self.recent[2 * RATE_MS - 1] = force;
         self.recent_ticks.rotate_left(1);
@@ -140,7 +132,7 @@ impl Watch {
         let difference = newer.iter().sum::<f64>() - older.iter().sum::<f64>();
         let (older, newer) = self.recent_ticks.split_at(RATE_MS);
         let sum = |ticks: &[u64]| ticks.iter().fold(0, |sum: u64, tick| sum.saturating_add(*tick));
-        // A clock that went back is another interlock's business.
+        // Another interlock handles a clock that went back.
         let ticks = sum(newer).saturating_sub(sum(older));
         if ticks == 0 {
             return None;
@@ -150,7 +142,7 @@ impl Watch {
     }
 }
 
-/// Judges one sample. `state.derived` already belongs to it; `path_error` is the tracker's word.
+/// Judges one sample. `state.derived` already belongs to it; `path_error` is the tracker's error.
 pub(super) fn judge(
     state: &mut State,
     now: Nanos,
@@ -159,24 +151,18 @@ pub(super) fn judge(
 ) -> Option<Trip> {
     let limits = state.config.limits;
     let age = age_trip(state, now);
-    // A sample that took long to come is as old as it is, but a filter looks back however soon it comes.
+    // The age of a sample counts, but not the delay of the cell's filter, which every sample has.
     let late = reading.age.map_or(Nanos::ZERO, |age| age.by);
     let late = late.since(Nanos((state.config.rig.cell_delay.0 * 1e9) as u64));
     state.watch.last_at = Some(Nanos(now.0.saturating_sub(late.0)));
     if !reading.volts.is_finite() {
-        return trip(
-            Interlock::Signal,
-            "the load cell's signal is not a number; check its wiring".into(),
-        );
+        let reason = "the load cell's signal is not a number; check its wiring";
+        return trip(Interlock::Signal, reason);
     }
     if state.watch.is_stuck(reading.volts) {
-        return trip(
-            Interlock::Signal,
-            format!(
-                "the signal has not changed for {} samples; check the load cell",
-                state.watch.stuck
-            ),
-        );
+        let count = state.watch.stuck;
+        let reason = format!("the signal has not changed for {count} samples; check the load cell");
+        return trip(Interlock::Signal, reason);
     }
     let derived = state.derived.force;
     let force = derived.unwrap_or_else(|| state.force_from_volts(reading.volts));
@@ -189,8 +175,8 @@ pub(super) fn judge(
         None => (limits.force_max, limits.volts_max),
     };
     if state.is_unpowered() {
-        // The motor was never energised and no command can move it: a weight on the cell harms nothing, and
-        // there is no motion to stop. Whether the signal lives and samples come counts all the same.
+        // The motor was never energised and no command can move it: a weight on the cell does no harm, and there is
+        // no motion to stop. Signal and sample age are checked all the same.
         return age;
     }
     travel_trip(state, reading, &limits)
@@ -206,19 +192,14 @@ pub(super) fn judge(
         .or_else(|| motor_trip(state, reading))
         .or_else(|| {
             let reason = path_error?;
-            // What is left of this run knows its place well enough to leave the tissue; the next one looks for home.
+            // The position is good enough to leave the tissue; the next run must home.
             state.is_path_lost = true;
             trip(Interlock::Path, reason)
         })
 }
 
-/// Judges the passing of time without a sample.
-pub(super) fn judge_silence(state: &State, now: Nanos) -> Option<Trip> {
-    age_trip(state, now)
-}
-
-fn trip(interlock: Interlock, reason: String) -> Option<Trip> {
-    Some(Trip { interlock, reason })
+fn trip(interlock: Interlock, reason: impl Into<String>) -> Option<Trip> {
+    Some(Trip { interlock, reason: reason.into() })
 }
 
 /// A closed limit switch trips unless the axis leaves it, or only stands there before it homes or
@@ -252,7 +233,7 @@ fn motor_trip(state: &mut State, reading: &Reading) -> Option<Trip> {
         return None;
     }
     state.is_homed = false;
-    trip(Interlock::Motor, "the motor lost its current; check its supply, then home".into())
+    trip(Interlock::Motor, "the motor lost its current; check its supply, then home")
 }
 
 fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
@@ -260,10 +241,8 @@ fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<
         return trip(Interlock::Force, format!("the force is {force:.2}, above {force_max:.2}"));
     }
     if force < force_min {
-        return trip(
-            Interlock::Force,
-            format!("the load cell reads {force:.2} in tension; check its wiring"),
-        );
+        let reason = format!("the load cell reads {force:.2} in tension; check its wiring");
+        return trip(Interlock::Force, reason);
     }
     None
 }
@@ -277,7 +256,7 @@ fn rate_trip(rate: Option<f64>, rate_max: f64, step: Option<&Step>) -> Option<Tr
     )
 }
 
-fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
+pub(super) fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     let last_at = state.watch.last_at?;
     let age = now.since(last_at).seconds();
     // A move just begun counts at its full speed: the newest sample cannot know it yet.
@@ -299,7 +278,7 @@ fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     )
 }
 
-impl Watch {
+impl InterlockWatch {
     /// Whether the controller clock went backward: the controller restarted.
     pub fn is_clock_restarted(&mut self, tick: u64) -> bool {
         let is_restarted = self.last_tick.is_some_and(|last| tick <= last);

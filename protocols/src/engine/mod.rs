@@ -5,10 +5,10 @@
 //! code fed from different places.
 
 mod between;
+mod block_mean;
 mod context;
 mod input;
 mod interlock;
-mod millisecond;
 mod monitor;
 mod pause;
 mod record;
@@ -18,11 +18,11 @@ mod stop;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use block_mean::BlockMean;
 pub(crate) use context::{Context, NOT_TARED, outside_travel};
 pub use input::{Effect, Input, Operator};
 pub use interlock::Interlock;
-pub(crate) use millisecond::Millisecond;
-pub use record::{Answer, EndingKind, Outcome, Record, Recovery};
+pub use record::{Answer, EndingKind, FailureResponse, Outcome, Record};
 pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, UnloadedSignal};
 pub(crate) use step::NOT_HOMED;
 pub use step::{PLAN_COMPLETE, step};

@@ -1,7 +1,7 @@
 //! The plan's own conditions, judged on every sample after the interlocks.
 
 use super::context::Context;
-use super::pause::By;
+use super::pause::PauseRequester;
 use super::record::{EndingKind, Record};
 use super::state::Activity;
 use super::{pause, stop};
@@ -9,17 +9,15 @@ use crate::plans::{Action, Source};
 use palpate_model::Nanos;
 use palpate_model::rig::Reading;
 
-/// How one monitor stands.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Condition {
+pub(super) struct MonitorState {
     is_tripped: bool,
-    /// Since when it is past again.
     past_since: Option<Nanos>,
     /// How often it has paused the step of this index.
     pauses: (usize, u32),
 }
 
-/// A condition that pauses one step more often comes back with the step, and each time the tissue is touched anew.
+/// A condition that pauses one step more often comes back with the step, and each time the tissue is touched again.
 const PAUSES_MAX: u32 = 3;
 
 /// Judges all of them. They act only while the plan runs or is paused.
@@ -68,7 +66,7 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
             let reason = format!("{message}; this has paused the step {PAUSES_MAX} times already");
             stop::begin(cx, EndingKind::Stop, reason);
         }
-        Action::Pause => pause::now(cx, By::Monitor, message),
+        Action::Pause => pause::now(cx, PauseRequester::Monitor, message),
         Action::Stop => stop::begin(cx, EndingKind::Stop, message),
         Action::Retract => {
             cx.state.leaves_after_stop = true;

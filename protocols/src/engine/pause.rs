@@ -3,56 +3,50 @@
 
 use super::context::Context;
 use super::record::Record;
-use super::state::{Activity, Pause, Then};
+use super::state::{Activity, FollowUp, Pause};
 use super::{between, step};
-use crate::steps::{Pausing, Step};
+use crate::steps::{PauseBehaviour, Step};
 use palpate_model::rig::Phase;
 
-/// Who wants a pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum By {
+pub(super) enum PauseRequester {
     Operator,
     Monitor,
 }
 
-/// Pauses as soon as it is sound.
-pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
+pub(super) fn now(cx: &mut Context<'_>, by: PauseRequester, reason: String) {
     let is_paused =
         matches!(cx.state.activity, Activity::Paused { .. }) || cx.state.pause.is_some();
-    // What a person asked for, only a person ends.
+    // A pause of the operator is ended by the operator only.
     cx.state.is_paused_by_operator =
-        by == By::Operator || is_paused && cx.state.is_paused_by_operator;
+        by == PauseRequester::Operator || is_paused && cx.state.is_paused_by_operator;
     let step_index = cx.state.step_index;
     let pausing = match &cx.state.activity {
         Activity::Step(_) => pausing(cx),
-        Activity::Between { then: Then::Begin(index) | Then::Return(index), .. } => {
+        Activity::Between { then: FollowUp::Begin(index) | FollowUp::Return(index), .. } => {
             let next = Ok(*index);
             return halt_motion(cx, next, reason);
         }
-        _ => {
-            let reason = "nothing runs that could pause".to_owned();
-            return cx.record(Record::Refused { reason });
-        }
+        _ => return cx.refuse("nothing runs that could pause"),
     };
     match pausing {
-        Some(Pausing::Wait | Pausing::Control) => {
+        Some(PauseBehaviour::Wait | PauseBehaviour::Control) => {
             cx.state.pause = Some(Pause::Extended);
             cx.record(Record::Paused { reason, no_resume: None });
         }
-        Some(Pausing::Complete) | None => await_end_of(cx, step_index),
-        Some(Pausing::Repeat | Pausing::RepeatFromStart) => {
+        Some(PauseBehaviour::Complete) | None => await_end_of(cx, step_index),
+        Some(PauseBehaviour::Repeat | PauseBehaviour::RepeatFromStart) => {
             halt_motion(cx, Ok(step_index), reason);
         }
-        Some(Pausing::Measure(why)) => halt_motion(cx, Err(why), reason),
+        Some(PauseBehaviour::Measure(cause)) => halt_motion(cx, Err(cause), reason),
     }
 }
 
-fn pausing(cx: &Context<'_>) -> Option<Pausing> {
+fn pausing(cx: &Context<'_>) -> Option<PauseBehaviour> {
     let step = cx.state.current_step();
     step.map(|step| step.kind().facts().pausing)
 }
 
-/// Pauses behind a step that has not ended yet.
 pub(super) fn after(cx: &mut Context<'_>, step_index: usize) {
     let is_ahead = (cx.state.step_index..cx.state.config.plan.steps.len()).contains(&step_index);
     let is_running = matches!(
@@ -60,8 +54,7 @@ pub(super) fn after(cx: &mut Context<'_>, step_index: usize) {
         Activity::Starting | Activity::Step(_) | Activity::Between { .. }
     );
     if !is_ahead || !is_running || cx.state.pause == Some(Pause::Extended) {
-        let reason = "that place of the plan is not ahead, or the run is paused".to_owned();
-        return cx.record(Record::Refused { reason });
+        return cx.refuse("that place of the plan is not ahead, or the run is paused");
     }
     cx.state.is_paused_by_operator = true;
     await_end_of(cx, step_index);
@@ -76,7 +69,7 @@ fn halt_motion(cx: &mut Context<'_>, next: Result<usize, &'static str>, reason: 
     cx.record(Record::Paused { reason, no_resume: next.err().map(str::to_owned) });
     cx.state.pause = None;
     cx.enter_phase(Phase::Paused);
-    between::come_to_rest(cx, Then::Pause(next));
+    between::come_to_rest(cx, FollowUp::Pause(next));
 }
 
 /// The step behind which a pause was asked for is done: the axis rests.
@@ -90,34 +83,30 @@ pub(super) fn at_checkpoint(cx: &mut Context<'_>, done_index: usize) {
     cx.state.activity = Activity::Paused { next: Ok(done_index + 1) };
 }
 
-/// The operator goes on.
 pub(super) fn resume(cx: &mut Context<'_>) {
     match (&cx.state.activity, cx.state.pause) {
         (Activity::Paused { next: Ok(next), .. }, _) => {
             let next = *next;
             cx.record(Record::Resumed);
-            if next == cx.state.step_index && pausing(cx) == Some(Pausing::RepeatFromStart) {
-                between::come_to_rest(cx, Then::Return(next));
+            if next == cx.state.step_index && pausing(cx) == Some(PauseBehaviour::RepeatFromStart) {
+                between::come_to_rest(cx, FollowUp::Return(next));
             } else {
                 step::begin(cx, next);
             }
         }
-        (Activity::Paused { next: Err(why), .. }, _) => {
-            let reason = format!("{why}; finish early or stop");
-            cx.record(Record::Refused { reason });
+        (Activity::Paused { next: Err(cause), .. }, _) => {
+            let reason = format!("{cause}; finish early or stop");
+            cx.refuse(reason);
         }
         (_, Some(_)) => {
             cx.state.pause = None;
             cx.record(Record::Resumed);
         }
-        _ => {
-            let reason = "the run is not paused".to_owned();
-            cx.record(Record::Refused { reason });
-        }
+        _ => cx.refuse("the run is not paused"),
     }
 }
 
-/// What paused the run is past: it goes on where that is sound, else the operator decides.
+/// The cause of the pause is over: the run goes on where that is possible, else the operator decides.
 pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
     let can_resume = matches!(cx.state.activity, Activity::Paused { next: Ok(_), .. })
         || cx.state.pause == Some(Pause::Extended);
@@ -126,26 +115,25 @@ pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
     }
 }
 
-/// The operator leaves out what is left to measure.
+/// The operator skips the rest of the measurement.
 pub(super) fn finish(cx: &mut Context<'_>) {
     let is_at_rest = match &cx.state.activity {
         Activity::Paused { .. } => true,
         Activity::Step(_) => {
-            let is_moving = pausing(cx) == Some(Pausing::Control) && !cx.state.is_at_rest();
+            let is_moving = pausing(cx) == Some(PauseBehaviour::Control) && !cx.state.is_at_rest();
             cx.is_extended() && !is_moving
         }
         _ => false,
     };
     if !is_at_rest {
-        let reason = "pause first, then finish early".to_owned();
-        return cx.record(Record::Refused { reason });
+        return cx.refuse("pause first, then finish early");
     }
     cx.state.pause = None;
     cx.state.is_finished_early = true;
     cx.record(Record::FinishedEarly);
     let steps = &cx.state.config.plan.steps;
     let is_retract = |index: &usize| matches!(steps[*index].step, Step::Retract(_));
-    // The retract that was paused on its way is the last one too.
+    // A paused retract counts as the last one too.
     let last = (cx.state.step_index..steps.len()).rev().find(is_retract);
     // Before contact there is nothing to leave.
     let last = last.filter(|_| cx.state.contact.is_some());

@@ -1,4 +1,4 @@
-//! What a run writes down beside samples and commands, and how it ends.
+//! Records of a run beside samples and commands, and its outcome.
 
 use super::interlock::Interlock;
 use super::state::Drift;
@@ -14,25 +14,18 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "record", rename_all = "snake_case")]
 pub enum Record {
-    /// A phase began.
     PhaseStarted {
-        /// Which.
         phase: Phase,
-        /// Index of the step in the plan.
         step_index: usize,
     },
-    /// Position zero was defined at the home switch.
     Homed {
         /// Counter value at which the switch closed, before it was redefined.
         edge_pulses: i64,
     },
-    /// The unloaded signal was averaged.
     Tared {
-        /// Mean signal.
         volts: Volts,
         /// Standard deviation of one sample.
         noise: Volts,
-        /// How many samples.
         samples: u64,
         /// How the signal drifted meanwhile; absent where the tare was too short to tell.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -42,7 +35,6 @@ pub enum Record {
     ContactTriggered {
         /// 1 for the approach, 2 for the slow pass.
         pass: u8,
-        /// Where.
         position: Position,
         /// Signal of the triggering sample, unfiltered.
         volts: Volts,
@@ -65,7 +57,7 @@ pub enum Record {
         position: Position,
         /// Standard error in mm.
         std_error_mm: f64,
-        /// How far rig and base gave way per newton, in mm/N.
+        /// Compliance of rig and base, in mm/N.
         compliance_mm_per_n: f64,
         /// From the tissue's surface to the base in mm, where the surface was found before.
         thickness_mm: Option<f64>,
@@ -74,175 +66,129 @@ pub enum Record {
     },
     /// The live fit knows enough: the hold ends before its planned duration.
     HoldEndedEarly {
-        /// The parameter waited for.
         parameter: BodyParameter,
         /// Half of its 95 % interval as a share of its value.
         relative: f64,
-        /// The share that was wanted.
+        /// The share that was the target.
         wanted: f64,
-        /// Time at depth so far.
         held: Seconds,
     },
     /// A lead stopped coming: the axis stops where it is.
     LeadLost {
-        /// For how long none had come.
+        /// Time since the last lead.
         silent: Seconds,
     },
     /// The force hardly changes any more: the hold ends before its planned duration.
     HoldSteady {
         /// Slope of the force over the window, in N/s.
         slope_n_per_s: f64,
-        /// Time at depth so far.
         held: Seconds,
     },
-    /// The probe stopped at a force.
     ForceReached {
-        /// What was wanted.
         target: Newtons,
         /// Filtered force as the axis came to rest.
         force: Newtons,
-        /// Depth there.
         depth: Depth,
     },
-    /// A person was asked for something.
     Prompted {
-        /// What.
         message: String,
         /// How long the run waits.
         timeout: Seconds,
     },
-    /// A prompt was answered, or nobody answered it.
     Answered {
-        /// By whom, or that nobody did.
         answer: Answer,
     },
     /// A pause was asked for, and will begin behind a step.
     PausePending {
-        /// Index of the step.
         step_index: usize,
     },
-    /// The run paused.
     Paused {
-        /// Who or what asked for it.
         reason: String,
         /// Why it cannot go on from here; none if it can.
         no_resume: Option<String>,
     },
-    /// The run goes on.
     Resumed,
     /// What the operator asked for cannot be done now.
     Refused {
-        /// Why.
         reason: String,
     },
-    /// What was left to measure is left out.
     FinishedEarly,
     /// A step could not be done and the plan says what follows.
     StepFailed {
-        /// Why.
         reason: String,
-        /// What follows.
-        then: Recovery,
+        then: FailureResponse,
     },
-    /// A monitor of the plan tripped.
     MonitorTripped {
-        /// Its place in the plan.
         index: usize,
-        /// The value that tripped it.
         value: f64,
-        /// Its message.
         message: String,
     },
-    /// What tripped a monitor is past.
     MonitorPast {
-        /// Its place in the plan.
         index: usize,
-        /// The value now.
         value: f64,
     },
-    /// The load cell was read under a known mass.
     Weighed {
         /// The mass in g, platform included.
         mass_g: f64,
-        /// Whether the masses go up.
         is_loading: bool,
         /// Which pass through the masses, from 1.
         repeat: u32,
-        /// Mean signal.
         volts: Volts,
         /// Standard deviation of one sample.
         noise: Volts,
-        /// Slope that was left, in V/s.
+        /// Remaining slope, in V/s.
         slope_v_per_s: f64,
         /// Samples in the mean.
         samples: u64,
         /// Time until the signal had come to rest.
         waited: Seconds,
     },
-    /// What else a step has to say.
     StepReported {
-        /// In words.
         text: String,
         /// In numbers, each with its unit in its name.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         values: BTreeMap<String, f64>,
     },
-    /// Somebody wrote something down.
     Noted {
-        /// What.
         text: String,
     },
-    /// The home switch was touched again.
     HomeChecked {
         /// Pulses by which it was found beyond position zero: pulses missed on the way.
         missed_pulses: i64,
     },
     /// An interlock tripped.
     InterlockTripped {
-        /// Which.
         interlock: Interlock,
-        /// What was seen, in words.
         reason: String,
     },
     /// The run began to end other than by finishing its plan.
     EndingStarted {
-        /// How.
         ending: EndingKind,
-        /// Why.
         reason: String,
     },
 }
 
-/// How a prompt ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
-    /// It is done.
     Confirmed,
-    /// It will not be done.
     Declined,
-    /// Nobody answered in time.
     TimedOut,
 }
 
-/// What follows a step that could not be done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Recovery {
+pub enum FailureResponse {
     /// Once more from where it began; counted from 1.
     Retry(u32),
-    /// The next step.
     Skip,
 }
 
 palpate_model::named! {
-    /// The five ways a run ends.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum EndingKind {
-        /// The plan ran to its end.
         Finish = "finish",
-        /// Stopped by the operator; data kept.
         Stop = "stop",
         /// Given up: a step failed or the operator aborted.
         Abort = "abort",
@@ -253,12 +199,9 @@ palpate_model::named! {
     }
 }
 
-/// How a run ended and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// How.
     pub ending: EndingKind,
-    /// Why, in words.
     pub reason: String,
 }
 
@@ -278,7 +221,7 @@ impl fmt::Display for Record {
                 })
             }
             Self::ContactTriggered { pass, position, force, .. } => {
-                write!(f, "pass {pass} felt {force:.3} at {position:.3}")
+                write!(f, "pass {pass} triggered with {force:.3} at {position:.3}")
             }
             Self::ContactFound { position, std_error_mm } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
@@ -300,14 +243,14 @@ impl fmt::Display for Record {
             }
             Self::HoldEndedEarly { parameter, relative, wanted, held } => write!(
                 f,
-                "hold ended after {held:.1}: {} is known to {} %, {} % was wanted",
+                "hold ended after {held:.1}: {} is known to within {} %; the target was {} %",
                 parameter.name(),
                 percent(*relative),
                 percent(*wanted)
             ),
             Self::LeadLost { silent } => write!(
                 f,
-                "nothing has led the slave for {silent:.1}; it stops, and the step ends unless a lead comes"
+                "the slave has had no lead for {silent:.1}; it stops, and the step ends unless a lead arrives"
             ),
             Self::HoldSteady { slope_n_per_s, held } => write!(
                 f,
@@ -315,7 +258,7 @@ impl fmt::Display for Record {
                 60.0 * slope_n_per_s
             ),
             Self::ForceReached { target, force, depth } => {
-                write!(f, "{force:.3} at {depth:.3}; {target:.3} was wanted")
+                write!(f, "{force:.3} reached at {depth:.3}; the target was {target:.3}")
             }
             Self::Prompted { message, timeout } => {
                 write!(f, "{message} (waits {:.0})", *timeout)
@@ -323,25 +266,25 @@ impl fmt::Display for Record {
             Self::Answered { answer } => f.write_str(match answer {
                 Answer::Confirmed => "done",
                 Answer::Declined => "declined",
-                Answer::TimedOut => "nobody answered",
+                Answer::TimedOut => "no answer in time",
             }),
             Self::PausePending { step_index } => {
-                write!(f, "will pause behind step {}", step_index + 1)
+                write!(f, "will pause after step {}", step_index + 1)
             }
             Self::Paused { reason, no_resume } => match no_resume {
-                Some(why) => write!(f, "paused: {reason}; cannot go on: {why}"),
+                Some(cause) => write!(f, "paused: {reason}; cannot go on: {cause}"),
                 None => write!(f, "paused: {reason}"),
             },
             Self::Resumed => f.write_str("resumed"),
             Self::Refused { reason } => write!(f, "refused: {reason}"),
-            Self::FinishedEarly => f.write_str("the rest of the measurement is left out"),
+            Self::FinishedEarly => f.write_str("the rest of the measurement is skipped"),
             Self::StepFailed { reason, then } => match then {
-                Recovery::Retry(count) => write!(f, "{reason}; trying again ({count})"),
-                Recovery::Skip => write!(f, "{reason}; left out"),
+                FailureResponse::Retry(count) => write!(f, "{reason}; trying again ({count})"),
+                FailureResponse::Skip => write!(f, "{reason}; skipped"),
             },
             Self::MonitorTripped { message, value, .. } => write!(f, "{message} ({value:.4})"),
             Self::MonitorPast { index, value } => {
-                write!(f, "monitor {} is past ({value:.4})", index + 1)
+                write!(f, "monitor {} is back in range ({value:.4})", index + 1)
             }
             Self::Weighed { mass_g, is_loading, repeat, volts, .. } => {
                 let way = if *is_loading { "loading" } else { "unloading" };
@@ -350,8 +293,8 @@ impl fmt::Display for Record {
             Self::StepReported { text, .. } => f.write_str(text),
             Self::Noted { text } => write!(f, "note: {text}"),
             Self::HomeChecked { missed_pulses } => match missed_pulses {
-                0 => f.write_str("home is where it was; no pulse was missed"),
-                missed => write!(f, "home is {missed} pulses from where it was"),
+                0 => f.write_str("home is unchanged; no pulse was missed"),
+                missed => write!(f, "home has moved by {missed} pulses"),
             },
             Self::InterlockTripped { interlock, reason } => {
                 write!(f, "{interlock} interlock: {reason}")

@@ -1,10 +1,10 @@
 //! The engine's state: a plain value, cloneable, comparable, printable.
 
-use super::interlock::Watch;
-use super::monitor::Condition;
+use super::interlock::InterlockWatch;
+use super::monitor::MonitorState;
 use super::record::{EndingKind, Outcome};
 use crate::plans::Plan;
-use crate::steps::{Active, Step};
+use crate::steps::{ActiveStep, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
 use palpate_model::estimate::LiveEstimate;
@@ -16,16 +16,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// What does not change during a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// The rig as it described itself.
     pub rig: RigDescription,
     /// Interlock thresholds.
     pub limits: Limits,
     /// Volts to newtons and back.
     pub curve: Curve,
-    /// What to do.
     pub plan: Plan,
     /// Whether the axis was homed earlier on this connection.
     pub is_homed: bool,
@@ -35,11 +32,9 @@ pub struct Config {
 /// leads through `Reset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Power {
-    /// No motion.
     Stopped,
     /// The motor is being energised and the rig checked.
     Reset,
-    /// Motion is allowed.
     Enabled,
 }
 
@@ -54,7 +49,6 @@ pub struct UnloadedSignal {
     pub drift: Option<Drift>,
 }
 
-/// A steady change of the unloaded signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drift {
     /// Slope of a straight line through the samples, in V/s.
@@ -63,7 +57,6 @@ pub struct Drift {
     pub std_error: f64,
 }
 
-/// Where the tissue begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Estimated contact position from home.
@@ -77,7 +70,6 @@ pub struct Contact {
 pub struct Derived {
     /// Commanded position; from home once the axis is homed.
     pub position: Position,
-    /// Commanded velocity.
     pub velocity: MmPerS,
     /// Force above tare, once tared.
     pub force: Option<Newtons>,
@@ -87,68 +79,73 @@ pub struct Derived {
     pub depth: Option<Depth>,
 }
 
-/// How the run is paused, for whoever shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PauseView {
-    /// It is not.
     #[default]
     None,
-    /// It will be, behind this step.
     Pending {
-        /// Index of the step.
         step_index: usize,
     },
-    /// It is.
     Paused {
         /// Why it cannot go on from here; none if it can.
         no_resume: Option<&'static str>,
     },
 }
 
-/// What the run as a whole is doing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Activity {
-    /// Not started.
     Waiting,
     /// Started; the plan begins with the first sample, which tells clock and position.
     Starting,
-    /// Running the plan.
-    Step(Active),
-    /// Coming to rest between two steps.
-    Between { then: Then, deadline: Nanos },
-    /// At rest until the operator goes on; with the step to go on with, if that is sound.
-    Paused { next: Result<usize, &'static str> },
+    Step(ActiveStep),
+    Between {
+        then: FollowUp,
+        deadline: Nanos,
+    },
+    /// At rest until the operator goes on; with the next step, or why there is none.
+    Paused {
+        next: Result<usize, &'static str>,
+    },
     /// Decelerating because of `ending`.
-    Braking { ending: Outcome, deadline: Nanos },
+    Braking {
+        ending: Outcome,
+        deadline: Nanos,
+    },
     /// At rest after a stop; the operator may retract or close.
-    Holding { ending: Outcome },
+    Holding {
+        ending: Outcome,
+    },
     /// Leaving the tissue after a stop, at the operator's request.
-    Retracting { ending: Outcome },
-    /// Over.
+    Retracting {
+        ending: Outcome,
+    },
     Ended(Outcome),
+}
+
+impl Activity {
+    /// Whether the plan has begun and nothing has ended it.
+    pub fn is_in_plan(&self) -> bool {
+        use Activity::{Between, Paused, Starting, Step};
+        matches!(self, Starting | Step(_) | Between { .. } | Paused { .. })
+    }
 }
 
 /// What follows once the axis rests between two steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Then {
-    /// This step begins.
+pub(super) enum FollowUp {
     Begin(usize),
     /// Back to where the step began, then it begins again.
     Return(usize),
-    /// The run pauses.
     Pause(Result<usize, &'static str>),
 }
 
-/// A pause that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pause {
-    /// Behind this step.
     After(usize),
     /// The waiting in progress goes on until the operator resumes.
     Extended,
 }
 
-/// A move under way, for its time limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MoveInFlight {
     pub deadline: Nanos,
@@ -177,7 +174,7 @@ pub struct State {
     pub(super) tare: Option<UnloadedSignal>,
     pub(super) contact: Option<Contact>,
     pub(super) derived: Derived,
-    pub(super) watch: Watch,
+    pub(super) watch: InterlockWatch,
     pub(super) unacknowledged: VecDeque<(Nanos, RigCommand)>,
     pub(super) in_flight: Option<MoveInFlight>,
     pub(super) live: Option<LiveEstimate>,
@@ -188,14 +185,13 @@ pub struct State {
     /// Where the step in progress began, and how often it was tried again.
     pub(super) step_from: i64,
     pub(super) retries: u32,
-    pub(super) monitors: Vec<Condition>,
+    pub(super) monitors: Vec<MonitorState>,
     /// Whether the probe leaves the tissue by itself once the axis rests after a stop.
     pub(super) leaves_after_stop: bool,
     pub(super) is_finished_early: bool,
 }
 
 impl State {
-    /// A run that has not started.
     #[must_use]
     pub fn new(config: Arc<Config>) -> Self {
         Self {
@@ -214,7 +210,7 @@ impl State {
             tare: None,
             contact: None,
             derived: Derived::default(),
-            watch: Watch::new(&config.rig),
+            watch: InterlockWatch::new(&config.rig),
             unacknowledged: VecDeque::new(),
             in_flight: None,
             live: None,
@@ -223,14 +219,13 @@ impl State {
             is_paused_by_operator: false,
             step_from: 0,
             retries: 0,
-            monitors: vec![Condition::default(); config.plan.monitors.len()],
+            monitors: vec![MonitorState::default(); config.plan.monitors.len()],
             leaves_after_stop: false,
             is_finished_early: false,
             config,
         }
     }
 
-    /// What the run is doing now.
     pub fn phase(&self) -> Phase {
         self.phase
     }
@@ -251,11 +246,10 @@ impl State {
         }
     }
 
-    /// Whether and how the run is paused or about to.
     pub fn pause(&self) -> PauseView {
         match (&self.activity, self.pause) {
             (Activity::Paused { next }, _)
-            | (Activity::Between { then: Then::Pause(next), .. }, _) => {
+            | (Activity::Between { then: FollowUp::Pause(next), .. }, _) => {
                 PauseView::Paused { no_resume: next.err() }
             }
             (_, Some(Pause::Extended)) => PauseView::Paused { no_resume: None },
@@ -264,15 +258,13 @@ impl State {
         }
     }
 
-    /// The step in progress.
-    pub(crate) fn active(&self) -> Option<&Active> {
+    pub(crate) fn active(&self) -> Option<&ActiveStep> {
         match &self.activity {
             Activity::Step(active) => Some(active),
             _ => None,
         }
     }
 
-    /// Index of the step in progress, and since when.
     pub fn step_progress(&self) -> (usize, Nanos) {
         (self.step_index, self.step_started)
     }
@@ -282,17 +274,14 @@ impl State {
         &self.derived
     }
 
-    /// Whether motion is possible.
     pub fn power(&self) -> Power {
         self.power
     }
 
-    /// Whether position zero is known.
     pub fn is_homed(&self) -> bool {
         self.is_homed
     }
 
-    /// Whether the next run may trust position zero.
     pub fn is_homed_for_next(&self) -> bool {
         self.is_homed && !self.is_path_lost
     }
@@ -307,46 +296,30 @@ impl State {
         self.tare
     }
 
-    /// Newest answer of the live fit, as it came in.
     pub fn live(&self) -> Option<&LiveEstimate> {
         self.live.as_ref()
     }
 
     /// Whether a plan runs that never energised the motor, such as a calibration: no command can move the axis.
     pub fn is_unpowered(&self) -> bool {
-        self.power == Power::Stopped
-            && matches!(
-                self.activity,
-                Activity::Starting
-                    | Activity::Step(_)
-                    | Activity::Between { .. }
-                    | Activity::Paused { .. }
-            )
+        self.power == Power::Stopped && self.activity.is_in_plan()
     }
 
     /// Whether the axis may be moving or about to move.
     pub fn is_motion_possible(&self) -> bool {
-        matches!(
-            self.activity,
-            Activity::Starting
-                | Activity::Step(_)
-                | Activity::Between { .. }
-                | Activity::Paused { .. }
-                | Activity::Braking { .. }
-                | Activity::Retracting { .. }
-        )
+        self.activity.is_in_plan()
+            || matches!(self.activity, Activity::Braking { .. } | Activity::Retracting { .. })
     }
 
     /// Set while the run has stopped and awaits the operator's choice to retract or close.
     pub fn holding(&self) -> Option<&Outcome> {
         match &self.activity {
-            // A monitor wanted the probe out: it leaves first.
+            // A monitor has requested a retract, which comes first.
             Activity::Holding { ending } if !self.leaves_after_stop => Some(ending),
             _ => None,
         }
     }
 
-    /// Why the operator cannot retract now, if so.
     pub fn can_retract(&self) -> Result<(), &'static str> {
         match &self.activity {
             Activity::Holding { ending } if ending.ending == EndingKind::Halt || !self.is_homed => {
@@ -371,7 +344,6 @@ impl State {
         Some(&planned.step)
     }
 
-    /// What does not change during the run.
     pub fn config(&self) -> &Config {
         &self.config
     }

@@ -6,12 +6,12 @@ use super::interlock::{self, Interlock, Trip};
 use super::record::{Answer, EndingKind, Outcome, Record};
 use super::state::{Activity, Derived, Pause, PauseView, Power, State};
 use super::{between, monitor, pause, stop};
-use crate::steps::{Active, Progress, Step, StepEvent};
+use crate::steps::{ActiveStep, Progress, Step, StepEvent};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Phase, Reading, RigCommand};
 use palpate_model::units::{Position, Seconds};
 
-/// Why a run ended that did everything its plan wanted.
+/// Reason of a run that completed its plan.
 pub const PLAN_COMPLETE: &str = "the plan is complete";
 
 /// Longest time a controller may take to acknowledge a command.
@@ -92,7 +92,7 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
     path_error
 }
 
-fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
+fn run_step(cx: &mut Context<'_>, mut active: ActiveStep, reading: &Reading) {
     match active.in_progress().on_reading(cx, reading) {
         Ok(progress) => keep_or_end(cx, active, progress),
         Err(reason) => {
@@ -106,7 +106,7 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
     }
 }
 
-/// Hands the step in progress what came beside samples; whether it took notice.
+/// Passes an event to the step in progress; whether the step handled it.
 fn pass_event(cx: &mut Context<'_>, event: &StepEvent) -> bool {
     let Some(mut active) = cx.state.activity.take_step() else {
         return false;
@@ -117,7 +117,7 @@ fn pass_event(cx: &mut Context<'_>, event: &StepEvent) -> bool {
     is_noticed
 }
 
-fn keep_or_end(cx: &mut Context<'_>, active: Active, progress: Progress) {
+fn keep_or_end(cx: &mut Context<'_>, active: ActiveStep, progress: Progress) {
     match progress {
         Progress::Continue => cx.state.activity = Activity::Step(active),
         // A wait that is paused stays what it is until the operator goes on.
@@ -142,11 +142,8 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
     let config = std::sync::Arc::clone(&cx.state.config);
     let Some(step) = config.plan.steps.get(step_index).map(|planned| &planned.step) else {
         cx.state.power = Power::Stopped;
-        let reason = if cx.state.is_finished_early {
-            "finished early by the operator"
-        } else {
-            PLAN_COMPLETE
-        };
+        let is_early = cx.state.is_finished_early;
+        let reason = if is_early { "finished early by the operator" } else { PLAN_COMPLETE };
         return stop::end(cx, Outcome { ending: EndingKind::Finish, reason: reason.into() });
     };
     if step_index != cx.state.step_index || cx.state.phase == Phase::Idle {
@@ -165,10 +162,10 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
     }
 }
 
-/// Why a step does not begin that needs to know where it is.
+/// Error of a step that needs the position.
 pub(crate) const NOT_HOMED: &str = "the axis is not homed; home it first";
 
-fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
+fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<ActiveStep, String> {
     if step.needs_homed_axis() && !cx.state.is_homed {
         return Err(NOT_HOMED.into());
     }
@@ -176,7 +173,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
 }
 
 fn on_tick(cx: &mut Context<'_>) {
-    let trip = interlock::judge_silence(cx.state, cx.now).or_else(|| acknowledgement_trip(cx));
+    let trip = interlock::age_trip(cx.state, cx.now).or_else(|| acknowledgement_trip(cx));
     match trip {
         Some(trip) => on_trip(cx, trip),
         None => stop::on_time(cx),
@@ -185,7 +182,7 @@ fn on_tick(cx: &mut Context<'_>) {
 
 fn on_ack(cx: &mut Context<'_>, ack: Ack) {
     let expected = cx.state.unacknowledged.pop_front().map(|(_, command)| command);
-    if !expected.is_some_and(|asked| asked.is_answered_by(&ack.command)) {
+    if !expected.is_some_and(|sent| sent.is_answered_by(&ack.command)) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
             None => format!("the rig acknowledged {:?}, which was not asked", ack.command),
@@ -199,14 +196,11 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
         }
         RigCommand::EnableMotor => stop::on_motor_enabled(cx),
         // A motion that waits behind the stop is not the one that was stopped.
-        RigCommand::Stop if !is_motion_waiting(cx.state) => cx.state.path.on_stop_accepted(),
+        RigCommand::Stop if !cx.state.unacknowledged.iter().any(|(_, next)| next.is_motion()) => {
+            cx.state.path.on_stop_accepted();
+        }
         _ => {}
     }
-}
-
-fn is_motion_waiting(state: &State) -> bool {
-    let mut waiting = state.unacknowledged.iter();
-    waiting.any(|(_, command)| command.is_motion())
 }
 
 fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
@@ -214,7 +208,7 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
     match fault {
         Fault::LinkLost { .. } | Fault::ControllerReset => {
             cx.state.is_homed = false;
-            // What the tracker knew of the path ended with the link.
+            // Without a link the path is unknown.
             cx.state.path = PathTracker::new(&cx.state.config.rig);
             on_trip(cx, Trip { interlock: Interlock::Link, reason });
         }
@@ -241,12 +235,12 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
     }
 }
 
-/// The run is paused and nobody is there who could decide.
+/// A pause of an unattended run ends it.
 fn leave(cx: &mut Context<'_>) {
-    let reason = match cx.state.pause() {
-        PauseView::Paused { no_resume } => no_resume.unwrap_or("what paused the run does not pass"),
-        _ => return,
+    let PauseView::Paused { no_resume } = cx.state.pause() else {
+        return;
     };
+    let reason = no_resume.unwrap_or("what paused the run does not pass");
     let reason = format!("paused, and nobody is there to decide: {reason}");
     stop::begin(cx, EndingKind::Stop, reason);
 }
@@ -280,16 +274,14 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
             cx.state.activity = Activity::Starting;
         }
         Operator::Start => {}
-        Operator::Stop => stop::begin(cx, EndingKind::Stop, "the operator stopped the run".into()),
-        Operator::Abort => {
-            stop::begin(cx, EndingKind::Abort, "the operator aborted the run".into())
-        }
-        Operator::Halt => {
-            stop::begin(cx, EndingKind::Halt, "the operator halted the motion".into())
-        }
+        Operator::Stop => stop::begin(cx, EndingKind::Stop, "the operator stopped the run"),
+        Operator::Abort => stop::begin(cx, EndingKind::Abort, "the operator aborted the run"),
+        Operator::Halt => stop::begin(cx, EndingKind::Halt, "the operator halted the motion"),
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
-        Operator::Pause => pause::now(cx, pause::By::Operator, "the operator asked for it".into()),
+        Operator::Pause => {
+            pause::now(cx, pause::PauseRequester::Operator, "the operator asked for it".into())
+        }
         Operator::Leave => leave(cx),
         Operator::PauseAfter { step_index } => pause::after(cx, step_index),
         Operator::Resume => pause::resume(cx),
@@ -300,31 +292,25 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
     }
 }
 
-/// The operator answered.
 fn answer(cx: &mut Context<'_>, answer: Answer) {
     if !pass_event(cx, &StepEvent::Answer(answer)) {
-        let reason = "there is no question to answer".to_owned();
-        cx.record(Record::Refused { reason });
+        cx.refuse("there is no question to answer");
     }
 }
 
-/// The operator wants to read a weight again.
 fn redo(cx: &mut Context<'_>) {
     match cx.state.redo_step() {
         Ok(step_index) => {
             cx.end_pause();
             begin(cx, step_index);
         }
-        Err(reason) => {
-            let reason = reason.to_owned();
-            cx.record(Record::Refused { reason });
-        }
+        Err(reason) => cx.refuse(reason),
     }
 }
 
 impl Activity {
     /// The step in progress, taken out so that it can change beside the state.
-    fn take_step(&mut self) -> Option<Active> {
+    fn take_step(&mut self) -> Option<ActiveStep> {
         match std::mem::replace(self, Self::Waiting) {
             Self::Step(active) => Some(active),
             other => {

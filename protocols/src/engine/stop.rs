@@ -12,7 +12,7 @@ use palpate_model::Nanos;
 use palpate_model::rig::{Phase, RigCommand};
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
-/// Time after which an axis told to stop counts as stopped even if no sample says so: the
+/// Time after which an axis with a stop command counts as stopped even if no sample shows it: the
 /// longest deceleration plus the longest acknowledgement.
 const BRAKE_MAX: Seconds = Seconds(2.0);
 
@@ -21,7 +21,8 @@ const RETRACT_SPEED: MmPerS = MmPerS(6.0);
 const RETRACT_CLEARANCE_MM: f64 = 10.0;
 
 /// Begins to end the run. A halt always cuts at once, whatever is under way.
-pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
+pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: impl Into<String>) {
+    let reason = reason.into();
     let is_halt = ending == EndingKind::Halt;
     let outcome = match &cx.state.activity {
         Activity::Ended(_) => return,
@@ -29,11 +30,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         Activity::Braking { ending, .. }
         | Activity::Holding { ending }
         | Activity::Retracting { ending } => ending.clone(),
-        Activity::Waiting
-        | Activity::Starting
-        | Activity::Step(_)
-        | Activity::Between { .. }
-        | Activity::Paused { .. } => {
+        _ => {
             cx.record(Record::EndingStarted { ending, reason: reason.clone() });
             Outcome { ending, reason }
         }
@@ -75,7 +72,6 @@ fn cut(cx: &mut Context<'_>) {
     cx.command(RigCommand::Halt);
 }
 
-/// Whether the axis is already being stopped.
 pub(super) fn is_braking(state: &State) -> bool {
     matches!(&state.activity, Activity::Braking { .. })
 }
@@ -101,14 +97,12 @@ pub(super) fn on_time(cx: &mut Context<'_>) {
             Ok(_) => {}
             Err(reason) => begin(cx, EndingKind::Abort, reason),
         },
-        // A plan that wanted the probe out has its wish once the axis rests.
+        // A retract that a monitor requested follows once the axis rests.
         Activity::Holding { .. } if cx.state.leaves_after_stop => {
             cx.state.leaves_after_stop = false;
             match cx.state.can_retract() {
                 Ok(()) => retract(cx),
-                Err(reason) => cx.record(Record::Refused {
-                    reason: format!("the probe stays where it is: {reason}"),
-                }),
+                Err(reason) => cx.refuse(format!("the probe stays where it is: {reason}")),
             }
         }
         _ => {}
@@ -154,7 +148,6 @@ pub(super) fn close(cx: &mut Context<'_>) {
     }
 }
 
-/// The run is over.
 pub(super) fn end(cx: &mut Context<'_>, outcome: Outcome) {
     cx.state.power = Power::Stopped;
     cx.enter_phase(Phase::Ended);

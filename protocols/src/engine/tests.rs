@@ -76,7 +76,6 @@ impl Bench {
         Self::holding_on(rig(), hold, until)
     }
 
-    /// The same on another rig.
     fn holding_on(rig: RigDescription, hold: f64, until: Option<HoldUntil>) -> Self {
         let steps = vec![
             Step::SelfTest(SelfTest { duration: Seconds(0.1) }),
@@ -419,7 +418,7 @@ fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
 }
 
 #[test]
-fn steps_are_pure() {
+fn same_state_and_input_give_the_same_result() {
     let mut bench = Bench::holding(10.0);
     let state = bench.state().clone();
     let reading = Reading {

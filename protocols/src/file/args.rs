@@ -1,49 +1,47 @@
 //! The keys of one step or monitor, read by their table: kinds, ranges, what is unknown and what is missing.
 
+use super::keys::{Key, KeyNeed, Range};
 use super::problem::{Problems, nearest, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
-use super::tree::Table;
-use super::words::{Key, KeyNeed, Range};
+use super::tree::DocumentTable;
 use palpate_model::units::{MmPerS, Seconds};
 
 /// Longest time, in s: a day is longer than any specimen lasts.
 const TIME_MAX: f64 = 86_400.0;
-/// Largest of everything else, in the unit of its kind: longer than any slider, stronger than any cell here.
+/// Largest number of the other kinds, in their unit: longer than any slider, stronger than any cell here.
 const SIZE_MAX: f64 = 1000.0;
-/// Largest mass, in g: the weight that is as strong.
+/// Largest mass, in g: as much weight as [`SIZE_MAX`] newtons.
 const MASS_MAX: f64 = 100_000.0;
-/// Largest count.
 pub(super) const COUNT_MAX: f64 = 10_000.0;
 
 /// What to do about steps below another [table]: everything belongs to the last one above it.
 pub(super) const STEPS_HINT: &str = "write [procedure] on a line above it";
 
-/// Values of keys that were checked.
 pub(crate) struct Args(Vec<(&'static str, Given)>);
 
 impl Args {
-    /// Reads the keys of a table. `what` names it in sentences, `besides` are keys that are read elsewhere.
+    /// Reads the keys of a table. `what` names it in sentences, `other_keys` are keys that are read elsewhere.
     pub(super) fn read(
-        table: &Table,
+        table: &DocumentTable,
         what: &str,
         keys: &[&'static [Key]],
-        besides: &[&'static str],
+        other_keys: &[&'static str],
         scope: &Scope,
         problems: &mut Problems,
     ) -> Self {
         let all = || keys.iter().copied().flatten();
         let mut args = Vec::new();
-        // A key that is only misspelt is told once, not as unknown and as missing too.
-        let mut meant = Vec::new();
+        // A misspelt key is reported as unknown, not as missing too.
+        let mut near_misses = Vec::new();
         for entry in &table.entries {
-            if besides.contains(&entry.key.as_str()) {
+            if other_keys.contains(&entry.key.as_str()) {
                 continue;
             }
             let Some(key) = all().find(|key| key.name == entry.key) else {
                 let known: Vec<&str> =
-                    besides.iter().copied().chain(all().map(|key| key.name)).collect();
-                meant.extend(nearest(&entry.key, known.iter().copied()));
+                    other_keys.iter().copied().chain(all().map(|key| key.name)).collect();
+                near_misses.extend(nearest(&entry.key, known.iter().copied()));
                 let hint = match entry.key.as_str() {
                     "steps" => STEPS_HINT.into(),
                     key => suggestion(key, &known),
@@ -54,9 +52,9 @@ impl Args {
             let value = scope
                 .value(&entry.node, key.kind)
                 .and_then(|given| checked(key, given))
-                .map_err(|why| format!("'{}' of {what}: {why}", key.name));
+                .map_err(|reason| format!("'{}' of {what}: {reason}", key.name));
             match problems.take(entry.line, value) {
-                // "none" is as good as no key where a key may be left out.
+                // "none" counts as a missing key where the key is optional.
                 Some(given) if given.what == What::None && key.kind != Kind::Flag => match key.need
                 {
                     KeyNeed::Required
@@ -81,8 +79,8 @@ impl Args {
         for key in all() {
             match key.need {
                 KeyNeed::Required if table.get(key.name).is_some() => {}
-                KeyNeed::Required if meant.contains(&key.name) => {}
-                KeyNeed::Required => problems.error(table.line, missing(what, key)),
+                KeyNeed::Required if near_misses.contains(&key.name) => {}
+                KeyNeed::Required => problems.error(table.line, describe_missing(what, key)),
                 KeyNeed::Usual(text) if !args.has(key.name) => {
                     args.0.push((key.name, Given::of_text(text)));
                 }
@@ -137,7 +135,6 @@ impl Args {
         self.get(key).is_some_and(|given| given.what == What::Flag(true))
     }
 
-    /// Whether the key is there and says no.
     pub fn is_no(&self, key: &str) -> bool {
         self.get(key).is_some_and(|given| matches!(given.what, What::Flag(false) | What::None))
     }
@@ -147,7 +144,7 @@ impl Args {
 fn checked(key: &Key, given: Given) -> Result<Given, String> {
     match key.kind {
         _ if given.what == What::None => Ok(given),
-        // Anything that is there, beside false, counts as yes.
+        // Every value but false counts as true.
         Kind::Flag if key.name == "only_if" => Ok(given),
         Kind::Flag => match given.what {
             What::Flag(_) => Ok(given),
@@ -157,13 +154,13 @@ fn checked(key: &Key, given: Given) -> Result<Given, String> {
             Range::OneOf(words) if !words.contains(&given.text.as_str()) => {
                 Err(format!("'{}' is not possible; {}", given.text, suggestion(&given.text, words)))
             }
-            _ if given.text.trim().is_empty() => Err("it says nothing; write a text".into()),
+            _ if given.text.trim().is_empty() => Err("it is empty; write a text".into()),
             _ => Ok(given),
         },
         kind => {
             let number = given.number(kind)?;
             check_range(kind, key.range, number)
-                .map_err(|why| format!("{} is not possible; {why}", given.text))?;
+                .map_err(|reason| format!("{} is not possible; {reason}", given.text))?;
             Ok(given)
         }
     }
@@ -192,7 +189,7 @@ pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), S
     })
 }
 
-fn missing(what: &str, key: &Key) -> String {
+fn describe_missing(what: &str, key: &Key) -> String {
     let (name, example) = (key.name, key.kind.example());
     format!("{what} needs '{name}': {}; write {name} = {example}", key.about)
 }

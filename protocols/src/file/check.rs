@@ -7,7 +7,6 @@ use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, RigDescription};
 use std::collections::BTreeMap;
 
-/// A protocol with what was found.
 #[derive(Clone, Debug)]
 pub struct Checked {
     /// The protocol with its plan and preview for the chosen values; none if it cannot be read or written out.
@@ -17,7 +16,6 @@ pub struct Checked {
 }
 
 impl Checked {
-    /// Whether nothing forbids a run.
     pub fn is_sound(&self) -> bool {
         !self.problems.iter().any(Problem::is_error)
     }

@@ -1,9 +1,9 @@
-//! The head of a protocol: who it is, what may be changed, what is watched. The steps are read by `procedure`.
+//! The head of a protocol: name, parameters, limits and monitors. `procedure` reads the steps.
 
 use super::args::STEPS_HINT;
 use super::problem::{Problems, suggestion};
-use super::scope::names_in;
-use super::tree::{self, Node, Table, Value};
+use super::scope::visit_names;
+use super::tree::{self, DocumentNode, DocumentTable, DocumentValue};
 use super::{LANGUAGE, Protocol, parameter};
 use std::collections::BTreeSet;
 
@@ -39,7 +39,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
         problems.error(entry.line, format!("a protocol has no key '{}'; {hint}", entry.key));
     }
     let mut text_of = |key: &str, example: &str| match root.get(key) {
-        Some(Node { value: Value::Text(text), .. }) if !text.trim().is_empty() => {
+        Some(DocumentNode { value: DocumentValue::Text(text), .. }) if !text.trim().is_empty() => {
             text.trim().to_owned()
         }
         Some(node) => {
@@ -59,10 +59,10 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
     let about = text_of("about", "What it is for and what it shows.");
     let source = text_of("source", "Fung 1993, section 7.5");
     check_name(&root, &name, problems);
-    let version = version(&root, problems);
-    let ask = ask(&root, problems);
-    let parameters = parameter::all(&root, problems);
-    let procedure = procedure(&root, problems);
+    let version = read_version(&root, problems);
+    let ask = read_ask(&root, problems);
+    let parameters = parameter::read_parameters(&root, problems);
+    let procedure = find_procedure(&root, problems);
     let protocol = Protocol {
         name,
         version,
@@ -80,9 +80,11 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
     Some(protocol)
 }
 
-fn check_language(root: &Table, problems: &mut Problems) -> Option<()> {
+fn check_language(root: &DocumentTable, problems: &mut Problems) -> Option<()> {
     let (line, found) = match root.get("palpate") {
-        Some(Node { line, value: Value::Number(number) }) => (*line, number.as_str()),
+        Some(DocumentNode { line, value: DocumentValue::Number(number) }) => {
+            (*line, number.as_str())
+        }
         Some(node) => (node.line, node.kind()),
         None => {
             let first = format!("palpate = {LANGUAGE}");
@@ -100,7 +102,7 @@ fn check_language(root: &Table, problems: &mut Problems) -> Option<()> {
     None
 }
 
-fn check_name(root: &Table, name: &str, problems: &mut Problems) {
+fn check_name(root: &DocumentTable, name: &str, problems: &mut Problems) {
     let is_plain =
         |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '-';
     if !name.is_empty() && !name.chars().all(is_plain) {
@@ -114,26 +116,24 @@ fn check_name(root: &Table, name: &str, problems: &mut Problems) {
     }
 }
 
-fn version(root: &Table, problems: &mut Problems) -> u32 {
+fn read_version(root: &DocumentTable, problems: &mut Problems) -> u32 {
     let message = "the protocol needs its own version, a whole number from 1; write version = 1 and raise it with every change";
-    let (line, version) = match root.get("version") {
-        Some(node) => match &node.value {
-            Value::Number(number) => (node.line, number.parse().unwrap_or(0)),
-            _ => (node.line, 0),
-        },
-        None => (1, 0),
+    let node = root.get("version");
+    let version = match node.map(|node| &node.value) {
+        Some(DocumentValue::Number(number)) => number.parse().unwrap_or(0),
+        _ => 0,
     };
     if version == 0 {
-        problems.error(line, message);
+        problems.error(node.map_or(1, |node| node.line), message);
     }
     version
 }
 
-fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
+fn read_ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
     let Some(node) = root.get("ask") else {
         return Vec::new();
     };
-    let Value::List(items) = &node.value else {
+    let DocumentValue::List(items) = &node.value else {
         problems
             .error(node.line, "'ask' must be a list, such as ask = [\"operator\", \"specimen\"]");
         return Vec::new();
@@ -142,58 +142,50 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {
-            Value::Text(key) if known.contains(&key.as_str()) => {
-                if !ask.contains(key) {
-                    ask.push(key.clone());
-                }
+            DocumentValue::Text(key) if ask.contains(key) => {}
+            DocumentValue::Text(key) if known.contains(&key.as_str()) => ask.push(key.clone()),
+            DocumentValue::Text(key) => {
+                let message = format!("'{key}' cannot be asked for; {}", suggestion(key, &known));
+                problems.error(item.line, message);
             }
-            Value::Text(key) => {
-                problems.error(
-                    item.line,
-                    format!("'{key}' cannot be asked for; {}", suggestion(key, &known)),
-                );
+            _ => {
+                let kind = item.kind();
+                let message = format!("{kind} cannot be asked for; write a text in quotes");
+                problems.error(item.line, message);
             }
-            _ => problems.error(
-                item.line,
-                format!("{} cannot be asked for; write a text in quotes", item.kind()),
-            ),
         }
     }
     ask
 }
 
-fn procedure(root: &Table, problems: &mut Problems) -> Node {
-    let nothing = Node { line: 1, value: Value::List(Vec::new()) };
-    let has_steps =
-        |node: &Node| matches!(&node.value, Value::Table(table) if table.get("steps").is_some());
+fn find_procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode {
+    let nothing = DocumentNode { line: 1, value: DocumentValue::List(Vec::new()) };
+    let has_steps = |node: &DocumentNode| matches!(&node.value, DocumentValue::Table(table) if table.get("steps").is_some());
     let is_misplaced =
         root.entries.iter().any(|entry| entry.key == "steps" || has_steps(&entry.node));
     let Some(node) = root.get("procedure") else {
-        // Steps that stand elsewhere are told there.
-        if is_misplaced {
-            return nothing;
+        // Steps in the wrong table are reported there.
+        if !is_misplaced {
+            problems.error(1, "the protocol has no steps; write [procedure] and below it steps = [ { do = \"self-test\" }, ... ]");
         }
-        problems.error(1, "the protocol does nothing; write [procedure] and below it steps = [ { do = \"self-test\" }, ... ]");
         return nothing;
     };
     let steps = match &node.value {
-        Value::Table(table) => {
+        DocumentValue::Table(table) => {
             for entry in table.entries.iter().filter(|entry| entry.key != "steps") {
-                problems.error(
-                    entry.line,
-                    format!("[procedure] has only the key 'steps', not '{}'", entry.key),
-                );
+                let message = format!("[procedure] has only the key 'steps', not '{}'", entry.key);
+                problems.error(entry.line, message);
             }
             table.get("steps")
         }
         _ => None,
     };
     match steps {
-        Some(Node { line, value: Value::List(items) }) if items.is_empty() => {
+        Some(DocumentNode { line, value: DocumentValue::List(items) }) if items.is_empty() => {
             problems.error(*line, "the protocol has no steps; write { do = \"self-test\" } and so on between the brackets");
             nothing
         }
-        Some(steps @ Node { value: Value::List(_), .. }) => steps.clone(),
+        Some(steps @ DocumentNode { value: DocumentValue::List(_), .. }) => steps.clone(),
         _ => {
             problems.error(node.line, "[procedure] has no list of steps; write steps = [ { do = \"self-test\" }, ... ] below it");
             nothing
@@ -201,13 +193,13 @@ fn procedure(root: &Table, problems: &mut Problems) -> Node {
     }
 }
 
-/// A parameter that nothing uses promises something that will not happen.
+/// An unused parameter would have no effect.
 fn check_used(protocol: &Protocol, problems: &mut Problems) {
     let mut used = BTreeSet::new();
     let parts = [Some(&protocol.procedure), protocol.limits.as_ref(), protocol.monitors.as_ref()];
     for part in parts.into_iter().flatten() {
-        part.each_text(&mut |text| {
-            names_in(text, &mut |name| {
+        part.visit_texts(&mut |text| {
+            visit_names(text, &mut |name| {
                 used.insert(name.to_owned());
             })
         });

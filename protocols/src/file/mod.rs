@@ -7,6 +7,8 @@ mod args;
 mod builtin;
 mod check;
 mod document;
+mod keys;
+mod monitors;
 mod order;
 mod parameter;
 pub mod problem;
@@ -15,17 +17,15 @@ mod quantity;
 mod reference;
 mod scope;
 pub mod tree;
-mod watch;
-mod words;
 
 pub(crate) use args::Args;
 pub use builtin::{BUILT_IN, built_in, nearest_built_in};
 pub use check::{Checked, check};
+pub(crate) use keys::Key;
 pub use parameter::Parameter;
 pub use problem::{Problem, Severity};
 pub use quantity::{Given, Kind, What};
 pub use reference::reference;
-pub(crate) use words::Key;
 
 use crate::plans::{Plan, PlanSource};
 use palpate_model::about::Labels;
@@ -33,7 +33,7 @@ use palpate_model::about::{self, KEYS};
 use problem::{Problems, suggestion};
 use scope::Scope;
 use std::collections::BTreeMap;
-use tree::{Node, Value};
+use tree::{DocumentNode, DocumentValue};
 
 /// Version of the protocol language that this program reads.
 pub const LANGUAGE: u32 = 1;
@@ -45,29 +45,22 @@ pub struct Protocol {
     pub name: String,
     /// Version of this protocol, raised with every change.
     pub version: u32,
-    /// What is done, in a few words.
     pub title: String,
-    /// What it is for, in a paragraph.
     pub about: String,
-    /// Where it comes from.
     pub source: String,
-    /// What must be told before the start: keys of [`KEYS`].
+    /// Labels that must be set before the start: keys of [`KEYS`].
     pub ask: Vec<String>,
-    /// What may be changed at the start.
     pub parameters: Vec<Parameter>,
     /// CRC-32 of the text, eight hexadecimal digits.
     pub crc32: String,
-    limits: Option<Node>,
-    monitors: Option<Node>,
-    procedure: Node,
+    limits: Option<DocumentNode>,
+    monitors: Option<DocumentNode>,
+    procedure: DocumentNode,
 }
 
-/// A protocol written out for chosen values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// The plan.
     pub plan: Plan,
-    /// The line of the file each step came from.
     pub lines: Vec<u32>,
     /// What to look at before the start; nothing that forbids it.
     pub warnings: Vec<Problem>,
@@ -121,22 +114,23 @@ impl Protocol {
             let given = values
                 .get(&parameter.name)
                 .map_or(Ok(parameter.default.clone()), |text| parameter.read(text));
-            let given = given.map_err(|why| format!("parameter '{}': {why}", parameter.name));
+            let given = given.map_err(|reason| format!("parameter '{}': {reason}", parameter.name));
             // After a wrong value the usual one stands in, so that the rest is checked too.
             let given = problems.take(0, given).unwrap_or_else(|| parameter.default.clone());
             chosen.insert(parameter.name.clone(), given.text.clone());
             scope.push(&parameter.name, given);
         }
-        let limits = watch::limits(self.limits.as_ref(), &scope, problems);
-        let monitors = watch::monitors(self.monitors.as_ref(), &scope, problems);
+        let limits = monitors::read_limits(self.limits.as_ref(), &scope, problems);
+        let monitors = monitors::read_monitors(self.monitors.as_ref(), &scope, problems);
         let before = problems.count();
         let steps = procedure::write_out(&self.procedure, &mut scope, problems);
         // A step that could not be read would be missed by those behind it.
         if problems.count() == before {
             order::check(&steps, problems);
         }
-        // Nothing at all in the file was told by its reader.
-        let is_nothing = matches!(&self.procedure.value, Value::List(items) if items.is_empty());
+        // A file without any step is reported by `document`.
+        let is_nothing =
+            matches!(&self.procedure.value, DocumentValue::List(items) if items.is_empty());
         if steps.is_empty() && !is_nothing && problems.count() == before {
             problems.error(self.procedure.line, "with these values no step is left; choose others");
         }
@@ -157,15 +151,15 @@ impl Protocol {
         self.limits.as_ref().map_or(0, |node| node.line)
     }
 
-    /// What it asks for and was not told, in the order of [`KEYS`].
+    /// Labels it asks for that are not set, in the order of [`KEYS`].
     pub fn open_questions(&self, labels: &Labels) -> Vec<&'static about::Key> {
         let is_open = |key: &&about::Key| {
-            self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
+            self.ask.iter().any(|name| name == key.name) && !labels.is_told(key.name)
         };
         KEYS.iter().filter(is_open).collect()
     }
 
-    /// Whether everything it asks for was told; else what to tell.
+    /// The error lists the labels that are missing.
     pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
         let open = self.open_questions(labels);
         let open: Vec<String> =
@@ -173,6 +167,6 @@ impl Protocol {
         if open.is_empty() {
             return Ok(());
         }
-        Err(format!("protocol {} asks before it starts for: {}", self.name, open.join(", ")))
+        Err(format!("protocol {} needs these before it starts: {}", self.name, open.join(", ")))
     }
 }

@@ -2,13 +2,12 @@
 //! surface is found before they are needed, and the probe is outside where it has to be.
 
 use super::problem::{Problem, Problems};
-use super::procedure::Placed;
-use crate::steps::Known;
+use super::procedure::PlacedStep;
+use crate::steps::Preconditions;
 use std::collections::BTreeSet;
 
-/// Looks through the steps.
-pub(super) fn check(steps: &[Placed], problems: &mut Problems) {
-    let mut known = Known::default();
+pub(super) fn check(steps: &[PlacedStep], problems: &mut Problems) {
+    let mut known = Preconditions::default();
     let mut warned = BTreeSet::new();
     for placed in steps {
         let step = placed.planned.step.kind();

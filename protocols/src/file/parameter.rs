@@ -3,7 +3,7 @@
 use super::args::STEPS_HINT;
 use super::problem::{Problems, suggestion};
 use super::quantity::{Given, Kind, What};
-use super::tree::{Entry, Table, Value};
+use super::tree::{DocumentEntry, DocumentTable, DocumentValue};
 use serde::Serialize;
 
 /// Something a technician may change at the start.
@@ -11,21 +11,17 @@ use serde::Serialize;
 pub struct Parameter {
     /// Its name, as in `--set name=value`.
     pub name: String,
-    /// What kind of value it takes.
     pub kind: Kind,
     /// Whether it takes several values, separated by commas.
     pub is_list: bool,
-    /// The usual value.
     pub default: Given,
     /// Smallest value, in the unit of its kind.
     pub min: Option<f64>,
     /// Largest value, in the unit of its kind.
     pub max: Option<f64>,
-    /// What it is.
     pub about: String,
     /// Where the default comes from; may be empty.
     pub source: String,
-    /// Its line in the file.
     pub line: u32,
 }
 
@@ -75,20 +71,17 @@ impl Parameter {
     }
 }
 
-/// Every parameter of a protocol.
-pub(super) fn all(root: &Table, problems: &mut Problems) -> Vec<Parameter> {
+pub(super) fn read_parameters(root: &DocumentTable, problems: &mut Problems) -> Vec<Parameter> {
     let Some(node) = root.get("parameters") else {
         return Vec::new();
     };
-    let Value::Table(table) = &node.value else {
-        problems.error(
-            node.line,
-            "'parameters' must be a table; write [parameters] on a line of its own",
-        );
+    let DocumentValue::Table(table) = &node.value else {
+        let message = "'parameters' must be a table; write [parameters] on a line of its own";
+        problems.error(node.line, message);
         return Vec::new();
     };
-    let read = |entry: &Entry| {
-        let Value::Table(keys) = &entry.node.value else {
+    let read = |entry: &DocumentEntry| {
+        let DocumentValue::Table(keys) = &entry.node.value else {
             let name = &entry.key;
             if name == "steps" {
                 problems
@@ -101,22 +94,20 @@ pub(super) fn all(root: &Table, problems: &mut Problems) -> Vec<Parameter> {
             );
             return None;
         };
-        parameter(&entry.key, keys, problems)
+        read_parameter(&entry.key, keys, problems)
     };
     table.entries.iter().filter_map(read).collect()
 }
 
 const PARAMETER_KEYS: [&str; 6] = ["default", "unit", "min", "max", "about", "source"];
 
-fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parameter> {
+fn read_parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> Option<Parameter> {
     let line = keys.line;
     for entry in &keys.entries {
         if !PARAMETER_KEYS.contains(&entry.key.as_str()) {
             let hint = suggestion(&entry.key, &PARAMETER_KEYS);
-            problems.error(
-                entry.line,
-                format!("parameter '{name}' has no key '{}'; {hint}", entry.key),
-            );
+            let message = format!("parameter '{name}' has no key '{}'; {hint}", entry.key);
+            problems.error(entry.line, message);
         }
     }
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
@@ -128,15 +119,13 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
         return None;
     }
     let text_of = |key: &str| match keys.get(key).map(|node| &node.value) {
-        Some(Value::Text(text)) => text.trim().to_owned(),
+        Some(DocumentValue::Text(text)) => text.trim().to_owned(),
         _ => String::new(),
     };
     let (about, source) = (text_of("about"), text_of("source"));
     if about.is_empty() {
-        problems.error(
-            line,
-            format!("parameter '{name}' does not say what it is; write about = \"...\""),
-        );
+        let message = format!("parameter '{name}' does not say what it is; write about = \"...\"");
+        problems.error(line, message);
     }
     let Some(default) = keys.get("default") else {
         problems.error(
@@ -152,7 +141,7 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
     let mut bound = |key: &str| {
         let node = keys.get(key)?;
         let number = Given::of_node(node).and_then(|given| given.number(kind));
-        problems.take(node.line, number.map_err(|why| format!("'{key}' of '{name}': {why}")))
+        problems.take(node.line, number.map_err(|reason| format!("'{key}' of '{name}': {reason}")))
     };
     let parameter = Parameter {
         name: name.to_owned(),
@@ -165,8 +154,9 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
         source,
         line,
     };
-    if let Err(why) = parameter.check(&parameter.default) {
-        problems.error(line, format!("the default of '{name}' does not pass its own check: {why}"));
+    if let Err(reason) = parameter.check(&parameter.default) {
+        problems
+            .error(line, format!("the default of '{name}' does not pass its own check: {reason}"));
     }
     Some(parameter)
 }
@@ -176,7 +166,7 @@ fn kind_of(name: &str, default: &Given, unit: &str) -> Result<Kind, String> {
     match (default.kind(), unit) {
         (Some(kind), "") => Ok(kind),
         (None, "") => Err(format!(
-            "the default of '{name}' does not tell its unit; add unit = \"mm\" or whatever it is"
+            "the default of '{name}' has no unit; add unit = \"mm\" or the unit it has"
         )),
         (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
             Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
@@ -184,7 +174,7 @@ fn kind_of(name: &str, default: &Given, unit: &str) -> Result<Kind, String> {
                 Err(format!("the default of '{name}' is wrong: {}", default.is_not(kind)))
             }
             None => Err(format!(
-                "'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
+                "'{unit}' of '{name}' is not a unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
             )),
         },
     }

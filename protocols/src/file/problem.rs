@@ -3,27 +3,22 @@
 use serde::Serialize;
 use std::fmt;
 
-/// Problems told of one file. More would hide the first.
+/// Most problems reported of one file. More would hide the first.
 pub const PROBLEMS_MAX: usize = 20;
 
-/// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// The protocol cannot run.
     Error,
-    /// It can, but perhaps not as meant.
+    /// The protocol can run, but perhaps not as intended.
     Warning,
 }
 
-/// One thing that is wrong, as a sentence.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Problem {
     /// Line of the file, from 1; 0 where it is not in the file.
     pub line: u32,
-    /// How bad.
     pub severity: Severity,
-    /// What is wrong and what to do.
     pub message: String,
 }
 
@@ -34,13 +29,11 @@ impl Problem {
         Self { line, severity: Severity::Error, message: message.into() }
     }
 
-    /// Something to look at.
     #[must_use]
     pub fn warning(line: u32, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, ..Self::error(line, message) }
     }
 
-    /// Whether it keeps the protocol from running.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
     }
@@ -72,7 +65,7 @@ impl Problems {
         self.push(Problem::error(line, message));
     }
 
-    /// The pass of a loop finds what the pass before found: it is told once.
+    /// Every pass of a loop finds the same problem: it is listed once.
     pub fn push(&mut self, problem: Problem) {
         self.count += 1;
         if self.found.contains(&problem) {
@@ -85,7 +78,6 @@ impl Problems {
         }
     }
 
-    /// The value, or its problem put down.
     pub fn take<T>(&mut self, line: u32, result: Result<T, String>) -> Option<T> {
         result.map_err(|message| self.error(line, message)).ok()
     }
@@ -99,7 +91,6 @@ impl Problems {
         self.found.iter().any(Problem::is_error)
     }
 
-    /// Whether there is no use in looking on.
     pub fn is_full(&self) -> bool {
         self.dropped > 0
     }
@@ -173,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn problems_are_told_once_and_not_without_end() {
+    fn problems_are_listed_once_and_up_to_a_limit() {
         let mut problems = Problems::default();
         for _ in 0..3 {
             problems.error(7, "twice");

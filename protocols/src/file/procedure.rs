@@ -1,13 +1,13 @@
 //! The steps of a protocol written out: loops unrolled, names replaced by values.
 
 use super::args::{Args, COUNT_MAX};
+use super::keys::{COMMON, Key};
 use super::problem::{Problems, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
-use super::tree::{Node, Table, Value};
-use super::words::{COMMON, Key};
+use super::tree::{DocumentNode, DocumentTable, DocumentValue};
 use crate::plans::{OnFailure, PlannedStep};
-use crate::steps::{Build, Facts, KINDS};
+use crate::steps::{BuildStep, KINDS, StepFacts};
 
 /// Steps and passes of loops in one plan. A day of steps of ten seconds each.
 pub(super) const STEPS_MAX: usize = 10_000;
@@ -15,7 +15,6 @@ pub(super) const STEPS_MAX: usize = 10_000;
 /// Loops in one another.
 const LOOPS_MAX: usize = 6;
 
-/// Keys of a loop, beside what it runs through.
 pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
@@ -31,23 +30,21 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "checkpoint",
         Kind::Text,
-        "name of a place behind each pass where the run may pause",
+        "name of a checkpoint after each pass, where the run may pause",
     ),
-    Key::optional("only_if", Kind::Flag, "leaves the loop out where this is `false` or `\"none\"`"),
+    Key::optional("only_if", Kind::Flag, "skips the loop where this is `false` or `\"none\"`"),
 ];
 
-/// A step with the line it came from.
-pub(super) struct Placed {
+pub(super) struct PlacedStep {
     pub planned: PlannedStep,
     pub line: u32,
 }
 
-/// Writes out the steps.
 pub(super) fn write_out(
-    procedure: &Node,
+    procedure: &DocumentNode,
     scope: &mut Scope,
     problems: &mut Problems,
-) -> Vec<Placed> {
+) -> Vec<PlacedStep> {
     let mut writer =
         Writer { scope, problems, steps: Vec::new(), passes: 0, cycles: 0, is_too_long: false };
     writer.steps(procedure, 0, 0);
@@ -57,127 +54,102 @@ pub(super) fn write_out(
 struct Writer<'a> {
     scope: &'a mut Scope,
     problems: &'a mut Problems,
-    steps: Vec<Placed>,
+    steps: Vec<PlacedStep>,
     passes: usize,
-    /// Repeats of the measurement so far.
     cycles: u32,
     is_too_long: bool,
 }
 
+/// A message with its line.
+type Mistake = (u32, String);
+
 impl Writer<'_> {
-    fn steps(&mut self, list: &Node, cycle: u32, depth: usize) {
-        let Value::List(items) = &list.value else {
-            return self.problems.error(
-                list.line,
-                "'steps' must be a list in brackets, such as steps = [ { do = \"tare\" } ]",
-            );
+    fn steps(&mut self, list: &DocumentNode, cycle: u32, depth: usize) {
+        let DocumentValue::List(items) = &list.value else {
+            let message =
+                "'steps' must be a list in brackets, such as steps = [ { do = \"tare\" } ]";
+            return self.problems.error(list.line, message);
         };
         for item in items {
             if self.is_too_long || self.problems.is_full() {
                 return;
             }
-            let Value::Table(table) = &item.value else {
-                self.problems.error(
-                    item.line,
-                    format!("{} is no step; write {{ do = \"ramp\", ... }} in braces", item.kind()),
-                );
-                continue;
-            };
-            let is_loop = ["repeat", "for_each"].map(|key| table.get(key).is_some());
-            let is_step = table.get("do").is_some();
-            match is_loop {
-                [false, false] if !is_step && table.get("steps").is_some() => {
-                    self.problems
-                        .error(item.line, "a loop needs 'repeat' or 'for_each'; write repeat = 10");
-                }
-                [false, false] => self.step(table, cycle),
-                [true, true] => self.problems.error(
-                    item.line,
-                    "a loop has 'repeat' or 'for_each', not both; put one loop into the other",
-                ),
-                _ if is_step => {
-                    self.problems.error(item.line, "one step cannot repeat itself; put it into a loop: { repeat = 10, steps = [ { do = ... } ] }");
-                }
-                _ => self.run_loop(table, cycle, depth),
+            if let Err((line, message)) = self.item(item, cycle, depth) {
+                self.problems.error(line, message);
             }
         }
     }
 
-    fn step(&mut self, table: &Table, cycle: u32) {
-        let known: Vec<&str> = kinds().map(|(kind, _)| kind.word).collect();
-        let name = match table.get("do").map(|node| &node.value) {
-            Some(Value::Text(name)) => name.as_str(),
-            _ => {
-                return self.problems.error(
-                    table.line,
-                    "a step must say what to do; write do = \"ramp\" or repeat = 10",
-                );
+    /// A step or a loop.
+    fn item(&mut self, item: &DocumentNode, cycle: u32, depth: usize) -> Result<(), Mistake> {
+        let DocumentValue::Table(table) = &item.value else {
+            let kind = item.kind();
+            let message = format!("{kind} is not a step; write {{ do = \"ramp\", ... }} in braces");
+            return Err((item.line, message));
+        };
+        let has = |key| table.get(key).is_some();
+        let message = match (has("repeat"), has("for_each")) {
+            (false, false) if has("do") || !has("steps") => {
+                return self.step(table, cycle).map_err(|message| (item.line, message));
             }
+            (false, false) => "a loop needs 'repeat' or 'for_each'; write repeat = 10",
+            (true, true) => {
+                "a loop has 'repeat' or 'for_each', not both; put one loop into the other"
+            }
+            _ if has("do") => {
+                "one step cannot repeat itself; put it into a loop: { repeat = 10, steps = [ { do = ... } ] }"
+            }
+            _ => return self.run_loop(table, cycle, depth),
+        };
+        Err((item.line, message.into()))
+    }
+
+    fn step(&mut self, table: &DocumentTable, cycle: u32) -> Result<(), String> {
+        let Some(DocumentValue::Text(name)) = table.get("do").map(|node| &node.value) else {
+            return Err("a step must say what to do; write do = \"ramp\" or repeat = 10".into());
         };
         let Some((kind, build)) = kinds().find(|(kind, _)| kind.word == name) else {
-            return self.problems.error(
-                table.line,
-                format!("there is no step '{name}'; {}", suggestion(name, &known)),
-            );
+            let known: Vec<&str> = kinds().map(|(kind, _)| kind.word).collect();
+            return Err(format!("there is no step '{name}'; {}", suggestion(name, &known)));
         };
         let before = self.problems.count();
         let what = format!("'{name}'");
         let args =
             Args::read(table, &what, &[kind.keys, &COMMON], &["do"], self.scope, self.problems);
         let on_failure = args.text("on_failure").and_then(on_failure);
-        let on_failure = self
-            .problems
-            .take(table.line, on_failure.map_err(|why| format!("'on_failure' of {what}: {why}")));
+        let on_failure =
+            on_failure.map_err(|reason| format!("'on_failure' of {what}: {reason}"))?;
         if args.is_no("only_if") || self.problems.count() > before {
-            return;
+            return Ok(());
         }
-        let built = build(&args).map_err(|why| format!("{what}: {why}"));
-        let (Some(step), Some(on_failure)) = (self.problems.take(table.line, built), on_failure)
-        else {
-            return;
-        };
-        if !self.has_room(table.line) {
-            return;
+        let step = build(&args).map_err(|reason| format!("{what}: {reason}"))?;
+        if self.has_room(table.line) {
+            let checkpoint = args.maybe_text("checkpoint").map(str::to_owned);
+            let planned = PlannedStep { step, cycle, checkpoint, on_failure };
+            self.steps.push(PlacedStep { planned, line: table.line });
         }
-        let planned = PlannedStep {
-            step,
-            cycle,
-            checkpoint: args.maybe_text("checkpoint").map(str::to_owned),
-            on_failure,
-        };
-        self.steps.push(Placed { planned, line: table.line });
+        Ok(())
     }
 
-    fn run_loop(&mut self, table: &Table, cycle: u32, depth: usize) {
+    fn run_loop(&mut self, table: &DocumentTable, cycle: u32, depth: usize) -> Result<(), Mistake> {
+        let mistake = |message: &str| Err((table.line, message.to_owned()));
         if depth == LOOPS_MAX {
-            let message = format!(
+            return mistake(&format!(
                 "loops can stand in one another {LOOPS_MAX} deep, not deeper; write some steps out"
-            );
-            return self.problems.error(table.line, message);
+            ));
         }
         let Some(steps) = table.get("steps") else {
-            return self
-                .problems
-                .error(table.line, "a loop needs steps; write steps = [ { do = \"ramp\", ... } ]");
+            return mistake("a loop needs steps; write steps = [ { do = \"ramp\", ... } ]");
         };
-        let besides = ["repeat", "for_each", "steps"];
+        let other_keys = ["repeat", "for_each", "steps"];
         // The name of a checkpoint may use the loop's own names, so it is read in each pass.
-        let without_name = Table {
-            line: table.line,
-            entries: table
-                .entries
-                .iter()
-                .filter(|entry| entry.key != "checkpoint")
-                .cloned()
-                .collect(),
-        };
+        let mut own = table.clone();
+        own.entries.retain(|entry| entry.key != "checkpoint");
         let args =
-            Args::read(&without_name, "a loop", &[&LOOP_KEYS], &besides, self.scope, self.problems);
-        let Some((name, mut values)) = self.values(table) else {
-            return;
-        };
+            Args::read(&own, "a loop", &[&LOOP_KEYS], &other_keys, self.scope, self.problems);
+        let (name, mut values) = self.values(table)?;
         if args.is_no("only_if") {
-            return;
+            return Ok(());
         }
         if args.is_true("reverse") {
             values.reverse();
@@ -186,15 +158,16 @@ impl Writer<'_> {
         let outside = self.scope.len();
         for name in [name.as_str(), number].into_iter().filter(|name| !name.is_empty()) {
             if self.scope.has(name) {
-                let message = format!("the name '{name}' is taken already; give the loop another");
-                return self.problems.error(table.line, message);
+                return mistake(&format!(
+                    "the name '{name}' is taken already; give the loop another"
+                ));
             }
         }
         let count = values.len();
         for (pass, value) in (1..).zip(values) {
             self.passes += 1;
             if self.is_too_long || self.problems.is_full() || !self.has_room(table.line) {
-                return;
+                return Ok(());
             }
             if !name.is_empty() {
                 self.scope.push(&name, value);
@@ -213,21 +186,19 @@ impl Writer<'_> {
             self.name_checkpoint(table, begun);
             self.scope.shorten(outside);
         }
-        if count > 0 && matches!(&steps.value, Value::List(items) if items.is_empty()) {
-            self.problems.error(
-                table.line,
-                "the loop has no steps; put some between its brackets or take it out",
-            );
+        if count > 0 && matches!(&steps.value, DocumentValue::List(items) if items.is_empty()) {
+            return mistake("the loop has no steps; put some between its brackets or take it out");
         }
+        Ok(())
     }
 
     /// Names the checkpoint behind a pass of a loop, whose steps begin at an index.
-    fn name_checkpoint(&mut self, table: &Table, begun: usize) {
+    fn name_checkpoint(&mut self, table: &DocumentTable, begun: usize) {
         let Some(node) = table.get("checkpoint") else {
             return;
         };
         let named = self.scope.value(node, Kind::Text);
-        let named = named.map_err(|why| format!("'checkpoint' of a loop: {why}"));
+        let named = named.map_err(|reason| format!("'checkpoint' of a loop: {reason}"));
         let named = self.problems.take(node.line, named);
         if let Some(last) = self.steps[begun..].last_mut() {
             last.planned.checkpoint = named.map(|given| given.text);
@@ -235,46 +206,38 @@ impl Writer<'_> {
     }
 
     /// What a loop runs through: the name of its values and the values; numbers have no name but `as`.
-    fn values(&mut self, table: &Table) -> Option<(String, Vec<Given>)> {
+    fn values(&self, table: &DocumentTable) -> Result<(String, Vec<Given>), Mistake> {
         if let Some(node) = table.get("repeat") {
+            let value = self.scope.value(node, Kind::Count);
+            let count = value.and_then(|given| given.number(Kind::Count));
             let count =
-                self.scope.value(node, Kind::Count).and_then(|given| given.number(Kind::Count));
-            let count = count.map_err(|why| format!("'repeat' of a loop: {why}"));
-            let count = self.problems.take(node.line, count)?;
+                count.map_err(|reason| (node.line, format!("'repeat' of a loop: {reason}")))?;
             if !(1.0..=COUNT_MAX).contains(&count) {
                 let message = format!(
                     "a loop cannot be repeated {count} times; give 1 to {COUNT_MAX}, or take it out"
                 );
-                self.problems.error(node.line, message);
-                return None;
+                return Err((node.line, message));
             }
-            return Some((String::new(), (0..count as u32).map(|_| Given::count(0)).collect()));
+            return Ok((String::new(), (0..count as u32).map(|_| Given::count(0)).collect()));
         }
-        let node = table.get("for_each")?;
-        let entry = match &node.value {
-            Value::Table(variables) if variables.entries.len() == 1 => &variables.entries[0],
-            _ => {
-                let message = "'for_each' needs one name and its values, such as for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }";
-                self.problems.error(node.line, message);
-                return None;
-            }
+        let node = table.get("for_each");
+        let entries = match node.map(|node| &node.value) {
+            Some(DocumentValue::Table(variables)) => variables.entries.as_slice(),
+            _ => &[],
         };
-        let values = self
-            .scope
-            .list(&entry.node)
-            .map_err(|why| format!("the values of '{}': {why}", entry.key));
-        let values = self.problems.take(entry.line, values)?;
-        if let Some(odd) =
-            values.iter().find(|value| matches!(value.what, What::List(_) | What::None))
-        {
-            let message = format!(
-                "the values of '{}': '{}' is no single value; write each by itself",
-                entry.key, odd.text
-            );
-            self.problems.error(entry.line, message);
-            return None;
+        let [entry] = entries else {
+            let message = "'for_each' needs one name and its values, such as for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }";
+            return Err((node.map_or(table.line, |node| node.line), message.into()));
+        };
+        let mistake =
+            |reason: String| (entry.line, format!("the values of '{}': {reason}", entry.key));
+        let values = self.scope.list(&entry.node).map_err(mistake)?;
+        let is_odd = |value: &&Given| matches!(value.what, What::List(_) | What::None);
+        if let Some(odd) = values.iter().find(is_odd) {
+            let text = &odd.text;
+            return Err(mistake(format!("'{text}' is not a single value; write each by itself")));
         }
-        Some((entry.key.clone(), values))
+        Ok((entry.key.clone(), values))
     }
 
     fn has_room(&mut self, line: u32) -> bool {
@@ -293,7 +256,7 @@ impl Writer<'_> {
 }
 
 /// The steps that a protocol can ask for, each with what makes it of its keys.
-fn kinds() -> impl Iterator<Item = (&'static Facts, Build)> {
+fn kinds() -> impl Iterator<Item = (&'static StepFacts, BuildStep)> {
     KINDS.iter().filter_map(|kind| Some((*kind, kind.build?)))
 }
 
@@ -302,7 +265,7 @@ fn on_failure(text: &str) -> Result<OnFailure, String> {
     match text.split_once(' ').unwrap_or((text, "")) {
         ("abort", "") => Ok(OnFailure::Abort),
         ("skip", "") => Ok(OnFailure::Skip),
-        // A specimen that fails nine times will fail the tenth.
+        // More than nine retries of one specimen do not help.
         ("retry", count) => match count.trim().parse() {
             Ok(count @ 1..=9) => Ok(OnFailure::Retry(count)),
             _ => Err("a step can be tried again 1 to 9 times; write \"retry 2\"".into()),

@@ -1,37 +1,28 @@
 //! Values with units, as people write them: `0.75 mm/s`, `3 min`, `0.01 N/min`.
 
 use super::problem::suggestion;
-use super::tree::{Node, Value};
+use super::tree::{DocumentNode, DocumentValue};
 use palpate_model::quantity::{base_unit, in_base_unit, split, units_like};
 use serde::Serialize;
 
-/// What kind of value a key or a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// In mm/s.
     Speed,
     /// Depth, distance or position in mm.
     Length,
-    /// In N.
     Force,
-    /// In s.
     Time,
-    /// In g.
     Mass,
-    /// In Hz.
     Frequency,
     /// Force over time in N/s.
     ForceRate,
-    /// In V.
     Voltage,
-    /// In °C.
     Temperature,
     /// A whole number without a unit.
     Count,
     /// `true` or `false`.
     Flag,
-    /// Words.
     Text,
 }
 
@@ -53,6 +44,10 @@ const KINDS: [(Kind, &str, &str, &str); 12] = [
 ];
 
 impl Kind {
+    pub(super) fn with_units() -> impl Iterator<Item = Self> {
+        KINDS.iter().filter(|(_, _, unit, _)| !unit.is_empty()).map(|(kind, ..)| *kind)
+    }
+
     /// The unit numbers of this kind are kept in; empty for a count and for words.
     #[must_use]
     pub fn unit(self) -> &'static str {
@@ -65,13 +60,11 @@ impl Kind {
         units_like(self.unit())
     }
 
-    /// Its name with an article.
     #[must_use]
     pub fn name(self) -> &'static str {
         KINDS[self as usize].1
     }
 
-    /// A value of this kind as one would write it.
     #[must_use]
     pub fn example(self) -> &'static str {
         KINDS[self as usize].3
@@ -86,28 +79,21 @@ impl Kind {
     }
 }
 
-/// A value with the words it was given in.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Given {
-    /// As it was written.
     pub text: String,
-    /// What it is.
     pub what: What,
 }
 
-/// What a value is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum What {
     /// A number in the unit of its kind; a count has none.
     Number(Kind, f64),
-    /// Yes or no.
     Flag(bool),
-    /// Words.
     Text,
     /// `"none"`: no value.
     None,
-    /// Several values of one kind.
     List(Vec<Given>),
 }
 
@@ -116,13 +102,12 @@ impl Given {
         Self { text: text.to_owned(), what }
     }
 
-    /// A count, such as the pass of a loop.
     #[must_use]
     pub fn count(count: u32) -> Self {
         Self::new(&count.to_string(), What::Number(Kind::Count, f64::from(count)))
     }
 
-    /// What its words say by themselves: a number with a unit, a whole number, true, false, none, else words.
+    /// Recognises a number with a unit, a whole number, true, false and none; everything else is a text.
     #[must_use]
     pub fn of_text(text: &str) -> Self {
         let trimmed = text.trim();
@@ -144,22 +129,20 @@ impl Given {
         Self::new(trimmed, what)
     }
 
-    /// The same for a value of a file.
-    pub(super) fn of_node(node: &Node) -> Result<Self, String> {
+    pub(super) fn of_node(node: &DocumentNode) -> Result<Self, String> {
         match &node.value {
-            Value::Text(text) | Value::Number(text) => Ok(Self::of_text(text)),
-            Value::Flag(flag) => Ok(Self::new(&flag.to_string(), What::Flag(*flag))),
-            Value::List(items) => {
+            DocumentValue::Text(text) | DocumentValue::Number(text) => Ok(Self::of_text(text)),
+            DocumentValue::Flag(flag) => Ok(Self::new(&flag.to_string(), What::Flag(*flag))),
+            DocumentValue::List(items) => {
                 let items: Result<Vec<Self>, String> = items.iter().map(Self::of_node).collect();
                 Ok(Self::of_list(items?))
             }
-            Value::Table(_) => {
-                Err("a table in braces is no value; write a text with a unit".into())
+            DocumentValue::Table(_) => {
+                Err("a table in braces is not a value; write a text with a unit".into())
             }
         }
     }
 
-    /// A list of values.
     #[must_use]
     pub fn of_list(items: Vec<Self>) -> Self {
         let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
@@ -188,7 +171,6 @@ impl Given {
         }
     }
 
-    /// Why it is not of a kind, and what to write.
     pub(super) fn is_not(&self, kind: Kind) -> String {
         let text = &self.text;
         let write = format!("write {} like {}", kind.name(), kind.example());
@@ -198,7 +180,7 @@ impl Given {
             }
             What::Number(Kind::Count, _) => format!("{text} has no unit; {write}"),
             What::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
-            What::Flag(_) | What::None => format!("{text} is no value here; {write}"),
+            What::Flag(_) | What::None => format!("{text} is not a value here; {write}"),
             What::List(_) => format!("[{text}] is a list; {write}"),
             What::Text if is_overflow(text) => {
                 format!("\"{text}\" is too large to count with; {write}")
@@ -216,7 +198,7 @@ impl Given {
                 }
                 Some((_, unit)) if !kind.units().is_empty() => {
                     let known = suggestion(unit, &kind.units());
-                    format!("'{unit}' in \"{text}\" is no unit of {}; {known}", kind.name())
+                    format!("'{unit}' in \"{text}\" is not a unit of {}; {known}", kind.name())
                 }
                 _ => format!("\"{text}\" is not {}; {write}", kind.name()),
             },
@@ -242,7 +224,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_exactly_what_they_say() {
+    fn values_with_units_are_read_exactly() {
         for (text, kind, number) in [
             ("0.75 mm/s", Kind::Speed, 0.75),
             ("45mm/min", Kind::Speed, 0.75),
@@ -260,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_value_says_what_to_write() {
+    fn wrong_values_get_a_message_with_an_example() {
         for (text, kind, words) in [
             ("0.75", Kind::Speed, "has no unit"),
             ("5", Kind::Length, "has no unit"),
@@ -276,7 +258,7 @@ mod tests {
             ("nan", Kind::Time, "is not a time"),
             ("", Kind::Time, "is not a time"),
             ("--1 s", Kind::Time, "is not a time"),
-            ("none", Kind::Time, "no value here"),
+            ("none", Kind::Time, "not a value here"),
             ("2e s", Kind::Time, "of a time"),
         ] {
             let message = Given::of_text(text).number(kind).unwrap_err();

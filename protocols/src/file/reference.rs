@@ -1,9 +1,9 @@
 //! The reference of the language, written from the table that reads it.
 
+use super::keys::{COMMON, Key, KeyNeed};
+use super::monitors::MONITOR_KEYS;
 use super::procedure::LOOP_KEYS;
 use super::quantity::Kind;
-use super::watch::MONITOR_KEYS;
-use super::words::{COMMON, Key, KeyNeed};
 use crate::steps::KINDS;
 use palpate_model::about::KEYS;
 use std::fmt::Write;
@@ -21,20 +21,10 @@ pub fn reference() -> String {
     section(&mut text, "Every step", "These keys go with any step.", &COMMON);
     let about = "`repeat = 10` or `for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }`, and `steps = [ ... ]`.";
     section(&mut text, "Loops", about, &LOOP_KEYS);
-    let about = "`above` or `below` is the threshold and `resume` the value at which it is past, in the unit of what is watched.";
+    let about = "`above` or `below` is the threshold and `resume` the value at which the monitor resets, in the unit of what is watched.";
     section(&mut text, "`[[monitor]]`", about, &MONITOR_KEYS);
     text.push_str("### Units\n\n| kind | units |\n|---|---|\n");
-    for kind in [
-        Kind::Speed,
-        Kind::Length,
-        Kind::Force,
-        Kind::Time,
-        Kind::Mass,
-        Kind::Frequency,
-        Kind::ForceRate,
-        Kind::Voltage,
-        Kind::Temperature,
-    ] {
+    for kind in Kind::with_units() {
         let units = kind.units().join(", ");
         let _ = writeln!(text, "| {} | {units} |", kind.name().trim_start_matches("a "));
     }

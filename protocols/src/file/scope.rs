@@ -2,9 +2,8 @@
 
 use super::problem::suggestion;
 use super::quantity::{Given, Kind, What};
-use super::tree::{Node, Value};
+use super::tree::{DocumentNode, DocumentValue};
 
-/// Names with their values; inner loops last.
 #[derive(Debug, Default)]
 pub(super) struct Scope(Vec<(String, Given)>);
 
@@ -13,7 +12,6 @@ impl Scope {
         self.0.push((name.to_owned(), value));
     }
 
-    /// Forgets every name but the first so many.
     pub fn shorten(&mut self, len: usize) {
         self.0.truncate(len);
     }
@@ -36,12 +34,12 @@ impl Scope {
     }
 
     /// The value of a node for a key of a kind: `$name` stands for a value, `{name}` in a text for its words.
-    pub fn value(&self, node: &Node, kind: Kind) -> Result<Given, String> {
+    pub fn value(&self, node: &DocumentNode, kind: Kind) -> Result<Given, String> {
         match &node.value {
-            Value::Text(text) => match text.strip_prefix('$') {
+            DocumentValue::Text(text) => match text.strip_prefix('$') {
                 Some(name) => {
                     let given = self.get(name.trim())?.clone();
-                    // A value that does not fit is told with the name it came by.
+                    // The message of an unfit value has the name that it came by.
                     let fits = matches!(kind, Kind::Text | Kind::Flag)
                         || given.what == What::None
                         || given.kind() == Some(kind) && !matches!(given.what, What::List(_));
@@ -64,16 +62,15 @@ impl Scope {
         }
     }
 
-    /// The values a loop runs through.
-    pub fn list(&self, node: &Node) -> Result<Vec<Given>, String> {
+    pub fn list(&self, node: &DocumentNode) -> Result<Vec<Given>, String> {
         let given = match &node.value {
-            Value::Text(text) => match text.strip_prefix('$') {
+            DocumentValue::Text(text) => match text.strip_prefix('$') {
                 Some(name) => self.get(name.trim())?.clone(),
                 None => Given::of_text(text),
             },
-            Value::List(items) => {
+            DocumentValue::List(items) => {
                 let items = items.iter().map(|item| match &item.value {
-                    Value::Text(text) if text.starts_with('$') => {
+                    DocumentValue::Text(text) if text.starts_with('$') => {
                         self.get(text[1..].trim()).cloned()
                     }
                     _ => Given::of_node(item),
@@ -121,7 +118,7 @@ impl Scope {
 }
 
 /// Calls `see` with every name that a text uses.
-pub(super) fn names_in(text: &str, see: &mut impl FnMut(&str)) {
+pub(super) fn visit_names(text: &str, see: &mut impl FnMut(&str)) {
     if let Some(name) = text.strip_prefix('$') {
         see(name.trim());
     }

@@ -1,79 +1,74 @@
-//! The text of a protocol as a tree in which every word knows its line.
+//! The text of a protocol as a tree of nodes with line numbers.
 
 use super::problem::Problem;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A value at its line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Node {
+pub struct DocumentNode {
     pub line: u32,
-    pub value: Value,
+    pub value: DocumentValue,
 }
 
-/// What can stand behind a key.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Value {
+pub enum DocumentValue {
     Text(String),
     /// A number without a unit, as it was written.
     Number(String),
     Flag(bool),
-    List(Vec<Node>),
-    Table(Table),
+    List(Vec<DocumentNode>),
+    Table(DocumentTable),
 }
 
 /// Keys and values in the order of the text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct DocumentTable {
     pub line: u32,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<DocumentEntry>,
 }
 
-/// A key with its value.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct DocumentEntry {
     pub key: String,
     pub line: u32,
-    pub node: Node,
+    pub node: DocumentNode,
 }
 
-impl Table {
-    /// The value of a key.
-    pub fn get(&self, key: &str) -> Option<&Node> {
+impl DocumentTable {
+    pub fn get(&self, key: &str) -> Option<&DocumentNode> {
         let found = self.entries.iter().find(|entry| entry.key == key);
         found.map(|entry| &entry.node)
     }
 }
 
-impl Node {
-    /// What it is, for a sentence.
+impl DocumentNode {
     pub fn kind(&self) -> &'static str {
         match self.value {
-            Value::Text(_) => "a text",
-            Value::Number(_) => "a bare number",
-            Value::Flag(_) => "true or false",
-            Value::List(_) => "a list",
-            Value::Table(_) => "a table in braces",
+            DocumentValue::Text(_) => "a text",
+            DocumentValue::Number(_) => "a bare number",
+            DocumentValue::Flag(_) => "true or false",
+            DocumentValue::List(_) => "a list",
+            DocumentValue::Table(_) => "a table in braces",
         }
     }
 
     /// Calls `see` with every text in it.
-    pub fn each_text(&self, see: &mut impl FnMut(&str)) {
+    pub fn visit_texts(&self, see: &mut impl FnMut(&str)) {
         match &self.value {
-            Value::Text(text) => see(text),
-            Value::List(items) => items.iter().for_each(|item| item.each_text(see)),
-            Value::Table(table) => {
+            DocumentValue::Text(text) => see(text),
+            DocumentValue::List(items) => items.iter().for_each(|item| item.visit_texts(see)),
+            DocumentValue::Table(table) => {
                 let nodes = table.entries.iter().map(|entry| &entry.node);
-                nodes.for_each(|node| node.each_text(see));
+                nodes.for_each(|node| node.visit_texts(see));
             }
-            Value::Number(_) | Value::Flag(_) => {}
+            DocumentValue::Number(_) | DocumentValue::Flag(_) => {}
         }
     }
 }
 
-/// Reads a text. A mistake of writing makes everything behind it doubtful, so only the first is told.
-pub fn read(text: &str) -> Result<Table, Problem> {
+/// Reads a text. After a syntax error everything behind it is doubtful, so only the first is reported.
+pub fn read(text: &str) -> Result<DocumentTable, Problem> {
     let lines = Lines::of(text);
     match DeTable::parse(text) {
         Ok(document) => Ok(lines.table(document.get_ref(), 0)),
@@ -88,7 +83,6 @@ pub fn read(text: &str) -> Result<Table, Problem> {
     }
 }
 
-/// Where lines begin.
 struct Lines(Vec<usize>);
 
 impl Lines {
@@ -104,38 +98,41 @@ impl Lines {
         u32::try_from(before).unwrap_or(u32::MAX)
     }
 
-    fn table(&self, table: &DeTable<'_>, line: u32) -> Table {
-        let mut entries: Vec<(usize, Entry)> = table
+    fn table(&self, table: &DeTable<'_>, line: u32) -> DocumentTable {
+        let mut entries: Vec<(usize, DocumentEntry)> = table
             .iter()
             .map(|(key, value)| {
                 let line = self.at(&key.span());
-                let entry =
-                    Entry { key: key.get_ref().to_string(), line, node: self.node(value, line) };
+                let entry = DocumentEntry {
+                    key: key.get_ref().to_string(),
+                    line,
+                    node: self.node(value, line),
+                };
                 (key.span().start, entry)
             })
             .collect();
         // The parser sorts by name; people read by place.
         entries.sort_by_key(|(place, _)| *place);
         let entries = entries.into_iter().map(|(_, entry)| entry).collect();
-        Table { line, entries }
+        DocumentTable { line, entries }
     }
 
     /// A value; `at_least` is the line of its key, because tables in several pieces have no place of their own.
-    fn node(&self, value: &Spanned<DeValue<'_>>, at_least: u32) -> Node {
+    fn node(&self, value: &Spanned<DeValue<'_>>, at_least: u32) -> DocumentNode {
         let line = self.at(&value.span()).max(at_least);
         let value = match value.get_ref() {
-            DeValue::String(text) => Value::Text(text.to_string()),
-            DeValue::Integer(number) => Value::Number(number.to_string()),
-            DeValue::Float(number) => Value::Number(number.to_string()),
-            DeValue::Boolean(flag) => Value::Flag(*flag),
-            DeValue::Datetime(date) => Value::Text(date.to_string()),
+            DeValue::String(text) => DocumentValue::Text(text.to_string()),
+            DeValue::Integer(number) => DocumentValue::Number(number.to_string()),
+            DeValue::Float(number) => DocumentValue::Number(number.to_string()),
+            DeValue::Boolean(flag) => DocumentValue::Flag(*flag),
+            DeValue::Datetime(date) => DocumentValue::Text(date.to_string()),
             DeValue::Array(items) => {
                 let items = items.iter().map(|item| self.node(item, at_least));
-                Value::List(items.collect())
+                DocumentValue::List(items.collect())
             }
-            DeValue::Table(table) => Value::Table(self.table(table, line)),
+            DeValue::Table(table) => DocumentValue::Table(self.table(table, line)),
         };
-        Node { line, value }
+        DocumentNode { line, value }
     }
 }
 
@@ -150,15 +147,15 @@ mod tests {
         let keys: Vec<(&str, u32)> =
             tree.entries.iter().map(|entry| (entry.key.as_str(), entry.line)).collect();
         assert_eq!(keys, [("b", 1), ("a", 2), ("t", 4), ("m", 9)]);
-        let Value::Table(t) = &tree.get("t").unwrap().value else {
+        let DocumentValue::Table(t) = &tree.get("t").unwrap().value else {
             panic!("t is a table");
         };
-        let Value::List(items) = &t.get("z").unwrap().value else {
+        let DocumentValue::List(items) = &t.get("z").unwrap().value else {
             panic!("z is a list");
         };
         assert_eq!((items[0].line, items[1].line), (6, 7));
-        assert_eq!(items[1].value, Value::Number("2.5".into()));
-        let Value::List(monitors) = &tree.get("m").unwrap().value else {
+        assert_eq!(items[1].value, DocumentValue::Number("2.5".into()));
+        let DocumentValue::List(monitors) = &tree.get("m").unwrap().value else {
             panic!("m is a list");
         };
         let lines: Vec<u32> = monitors.iter().map(|node| node.line).collect();
@@ -166,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_of_writing_names_its_line() {
+    fn syntax_error_names_its_line() {
         for (text, line) in [
             ("a = 1\nb = \"open\nc = 2\n", 2),
             ("a = 1\n\nb 2\n", 3),

@@ -10,12 +10,10 @@ use std::fmt;
 pub struct HoldRate {
     /// Largest slope either way, in N/s.
     pub below_n_per_s: f64,
-    /// Window over which the slope is fitted.
     pub over: Seconds,
 }
 
 impl HoldRate {
-    /// What is wrong with it, in words.
     pub fn check(&self) -> Result<(), String> {
         if !(self.below_n_per_s > 0.0 && self.below_n_per_s.is_finite()) {
             return Err(format!(

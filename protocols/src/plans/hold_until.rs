@@ -9,15 +9,10 @@ palpate_model::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
     pub enum BodyParameter {
-        /// Relaxation time.
         TauEps = "tau_eps",
-        /// First elastic coefficient.
         Mu1 = "mu1",
-        /// Second elastic coefficient.
         Mu2 = "mu2",
-        /// Third elastic coefficient.
         Mu3 = "mu3",
-        /// Coefficient of depth times speed.
         TauSig = "tau_sig",
     }
 }
@@ -27,7 +22,6 @@ palpate_model::named! {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoldUntil {
-    /// Which parameter.
     pub parameter: BodyParameter,
     /// Half of its interval as a share of its value.
     pub relative: f64,
@@ -42,7 +36,6 @@ impl HoldUntil {
         Self { parameter, relative, at_least: Seconds(5.0) }
     }
 
-    /// What is wrong with it, in words.
     pub fn check(&self) -> Result<(), String> {
         if !(self.relative > 0.0 && self.relative < 1.0) {
             return Err(format!(
@@ -63,7 +56,7 @@ impl HoldUntil {
     pub fn parse(text: &str) -> Result<Self, String> {
         let form = "write it like tau=1% or tau_eps=0.01";
         let Some((name, share)) = text.split_once('=') else {
-            return Err(format!("'{text}' does not say how well to know what; {form}"));
+            return Err(format!("'{text}' has no '='; {form}"));
         };
         let name = match name.trim() {
             "tau" => "tau_eps",
@@ -138,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn says_itself_in_words() {
+    fn hold_rule_prints_as_a_sentence() {
         let rule = HoldUntil::new(BodyParameter::TauEps, 0.01);
         assert_eq!(rule.to_string(), "tau_eps is known to 1 %");
         assert_eq!(percent(0.12345), "12.3");

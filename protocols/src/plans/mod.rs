@@ -25,7 +25,6 @@ pub struct Plan {
     pub name: String,
     /// Version of the plan's own definition.
     pub version: u32,
-    /// The steps, loops written out.
     pub steps: Vec<PlannedStep>,
     /// What is watched beside the interlocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -44,14 +43,11 @@ pub struct Plan {
 pub struct PlanSource {
     /// CRC-32 of the text, eight hexadecimal digits.
     pub crc32: String,
-    /// Value of every parameter, as it was written.
     pub values: BTreeMap<String, String>,
 }
 
-/// One step at its place in the plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedStep {
-    /// What to do.
     #[serde(flatten)]
     pub step: Step,
     /// Which repeat of the measurement it belongs to, from 1; 0 where nothing is repeated.
@@ -60,7 +56,6 @@ pub struct PlannedStep {
     /// Name of the checkpoint behind this step: where the run may pause without spoiling data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<String>,
-    /// What follows if the step cannot be done.
     #[serde(default, skip_serializing_if = "OnFailure::is_default")]
     pub on_failure: OnFailure,
 }
@@ -69,10 +64,9 @@ pub struct PlannedStep {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnFailure {
-    /// The run is given up; the data is kept.
     #[default]
     Abort,
-    /// Back to where the step began and once more, so many times; then as [`OnFailure::Abort`].
+    /// Return to the start of the step and repeat it, so many times; then as [`OnFailure::Abort`].
     Retry(u32),
     /// Written down, and the plan goes on with the next step.
     Skip,
@@ -96,17 +90,17 @@ impl PlanLimits {
         *self == Self::default()
     }
 
-    /// Which limits stand here for nothing, and why: they can only tighten what the rig allows.
+    /// A sentence for each limit without effect: limits can only be tighter than the rig's.
     pub fn unused(&self, rig: &Limits) -> Vec<String> {
-        let told = |name, own: &dyn Display, rigs: &dyn Display| {
+        let sentence = |name, own: &dyn Display, rigs: &dyn Display| {
             format!(
                 "{name} = {own} in [limits] changes nothing, because the rig stops at {rigs} in any case and a protocol's limits can only be tighter; give less, or leave it out"
             )
         };
         let force = self.force_max.filter(|own| *own >= rig.force_max);
         let travel = self.travel_max.filter(|own| *own >= rig.travel_max);
-        let force = force.map(|own| told("force_max", &own, &rig.force_max));
-        let travel = travel.map(|own| told("travel_max", &own, &rig.travel_max));
+        let force = force.map(|own| sentence("force_max", &own, &rig.force_max));
+        let travel = travel.map(|own| sentence("travel_max", &own, &rig.travel_max));
         force.into_iter().chain(travel).collect()
     }
 

@@ -7,23 +7,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Monitor {
-    /// What is watched.
     pub source: Source,
     /// Whether values above the threshold trip it, or values below.
     pub side: Side,
     /// The value that trips it, in the source's unit.
     pub threshold: f64,
-    /// The value at which it is past again.
     pub resume: f64,
     /// How long it must be past before a paused run goes on.
     pub settle: Seconds,
-    /// What happens.
     pub action: Action,
-    /// What the operator reads, naming what tripped.
     pub message: String,
 }
 
-/// What a monitor looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Source {
@@ -37,34 +32,25 @@ pub enum Source {
     Position,
 }
 
-/// Which side of the threshold trips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Side {
-    /// At or above.
     Above,
-    /// At or below.
     Below,
 }
 
-/// What a monitor does when it trips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Action {
-    /// Write it down.
     Note,
     /// Pause; go on by itself once it is past, where going on is sound.
     Pause,
-    /// Stop the run and hold.
     Stop,
-    /// Stop the run and leave the tissue.
     Retract,
-    /// Cut the motion.
     Halt,
 }
 
 impl Source {
-    /// Its unit.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -76,7 +62,6 @@ impl Source {
 }
 
 impl Monitor {
-    /// Whether a value trips it.
     pub fn is_tripped_by(&self, value: f64) -> bool {
         match self.side {
             Side::Above => value >= self.threshold,
@@ -84,7 +69,6 @@ impl Monitor {
         }
     }
 
-    /// Whether a value is past it again.
     pub fn is_past_at(&self, value: f64) -> bool {
         match self.side {
             Side::Above => value <= self.resume,
@@ -92,7 +76,6 @@ impl Monitor {
         }
     }
 
-    /// What is wrong with it, in words.
     pub fn check(&self) -> Result<(), String> {
         if !(self.threshold.is_finite() && self.resume.is_finite()) {
             return Err("a monitor's threshold and resume value must be numbers".into());

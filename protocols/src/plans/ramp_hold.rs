@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// contact position and well clear of the tissue that the probe draws after it.
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
-/// The way out of the tissue behind a measurement.
+/// The retract after a measurement.
 pub const LEAVE: Step = Step::Retract(Retract { speed: MmPerS(6.0), clearance_mm: 10.0 });
 
 /// Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
@@ -28,10 +28,8 @@ pub fn approach(tare: Seconds, contact: FindContact) -> Vec<Step> {
     ]
 }
 
-/// What a technician chooses for a ramp and hold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RampHold {
-    /// Indentation speed.
     pub speed: MmPerS,
     /// Depth from contact.
     pub depth: Depth,
@@ -40,7 +38,7 @@ pub struct RampHold {
     /// What may end the hold before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until: Option<HoldUntil>,
-    /// Speed of a recorded way back to the surface; without it the probe only leaves.
+    /// Speed of a recorded unloading; without it the probe only retracts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unload: Option<MmPerS>,
 }
@@ -59,7 +57,6 @@ impl Default for RampHold {
 }
 
 impl RampHold {
-    /// The plan, from self-test to retract.
     pub fn plan(&self) -> Plan {
         let mut steps = approach(TARE, FindContact::default());
         steps.extend([

@@ -24,7 +24,6 @@ impl Follow {
         Self { duration, speed: MmPerS(steps.clamp(1.0, most.max(1.0)) * quantum), depth_max }
     }
 
-    /// The plan, from self-test to retract.
     #[must_use]
     pub fn plan(self) -> Plan {
         let mut steps = approach(TARE, FindContact::default());

@@ -10,7 +10,7 @@ impl Walk<'_> {
         self.refusals.extend(self.rig.check_speed(speed).err());
     }
 
-    /// A way further in by so much ends within the travel, wherever contact is: in front of it home is.
+    /// The end of a move `further_mm` deeper is within the travel, wherever contact is.
     pub fn check_travel(&mut self, what: &str, further_mm: f64) {
         let (travel, end) = (self.limits.travel_max, self.reach.low + further_mm);
         if self.known.contact && end > travel.0 {
@@ -33,7 +33,7 @@ impl Walk<'_> {
             ));
         } else if force.0 <= FORCE_FLOOR {
             self.note(format!(
-                "a force of {force:.4} is no more than a force may be off, {FORCE_FLOOR} N, so nothing tells whether it was met; load to more"
+                "a force of {force:.4} is within the tolerance of {FORCE_FLOOR} N, so nothing shows whether it was reached; use a larger force"
             ));
         }
     }

@@ -9,8 +9,8 @@ use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 /// organ differ in level by tens of percent; the band must not be narrower than that.
 const STIFFNESS_BAND: [f64; 2] = [0.7, 1.35];
 
-/// How far a rig gives way on a base that does not, in mm/N: a slide and a load cell of the thesis's size, to an order
-/// of magnitude. Only the picture of a plan and its duration use it.
+/// Machine compliance on a stiff base, in mm/N: a slide and a load cell of the thesis's size, to an order of magnitude.
+/// Only the outline of a plan and its duration use it.
 const RIG_COMPLIANCE: f64 = 0.03;
 
 /// Points of one move: the exact step has no error of its own, so this is for the picture and for how well
@@ -23,18 +23,14 @@ const WAIT_POINTS: u32 = 12;
 /// Cycles of a sine that are followed one by one; later ones repeat the last.
 const SINE_CYCLES_MAX: u32 = 20;
 
-/// One point of the picture of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlinePoint {
-    /// Time since the start.
     pub t: Seconds,
     /// Depth from contact.
     pub depth: Depth,
-    /// Force of the thesis body.
     pub force: Newtons,
     /// Whether the plan or a base sets the force, and not the specimen.
     pub is_force_set: bool,
-    /// Phase.
     pub phase: Phase,
 }
 
@@ -49,7 +45,7 @@ impl OutlinePoint {
 }
 
 /// The expected specimen on its way through the plan.
-pub(crate) struct Expected {
+pub(crate) struct ExpectedSpecimen {
     state: KelvinState,
     /// The probe stands before a stiff base instead of tissue.
     is_base: bool,
@@ -65,7 +61,7 @@ pub(crate) struct Expected {
     pub outline: Vec<OutlinePoint>,
 }
 
-impl Expected {
+impl ExpectedSpecimen {
     pub fn new(has_outline: bool) -> Self {
         Self {
             state: KelvinState::at_rest(),
@@ -85,20 +81,17 @@ impl Expected {
         self.depth
     }
 
-    /// The probe is placed on relaxed tissue.
     pub fn place(&mut self, depth: f64) {
         self.state = KelvinState::at_rest();
         self.is_base = false;
         (self.depth, self.force) = (depth, 0.0);
     }
 
-    /// The probe is placed on a base.
     pub fn place_on_base(&mut self) {
         self.place(0.0);
         self.is_base = true;
     }
 
-    /// One straight piece of the way.
     fn advance(&mut self, phase: Phase, depth: f64, secs: f64) {
         let force = if self.is_base {
             depth / RIG_COMPLIANCE

@@ -8,11 +8,11 @@ mod walk;
 pub use expected::OutlinePoint;
 
 pub(crate) use moves::Reach;
-pub(crate) use walk::{CONTACT_EXPECTED_SHARE, SETTLE_SECS, Span, Walk};
+pub(crate) use walk::{CONTACT_EXPECTED_SHARE, DurationEstimate, SETTLE_SECS, Walk};
 
 use crate::plans::Plan;
-use crate::steps::Known;
-use expected::Expected;
+use crate::steps::Preconditions;
+use expected::ExpectedSpecimen;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::units::{Newtons, Seconds};
@@ -22,12 +22,9 @@ use serde::{Deserialize, Serialize};
 /// 23 on the ideal one, whose noise fills every digit; rounded up.
 const BYTES_PER_SAMPLE: f64 = 30.0;
 
-/// One step of the plan as it is expected to go.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepPreview {
-    /// Phase name.
     pub phase: Phase,
-    /// Expected duration.
     pub expected: Seconds,
     /// Longest duration.
     pub longest: Seconds,
@@ -41,15 +38,12 @@ pub struct StepPreview {
 /// What a plan will do, as far as it can be known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preview {
-    /// Step by step.
     pub steps: Vec<StepPreview>,
-    /// Expected duration of the whole run.
     pub expected: Seconds,
     /// Longest duration: tissue at the end of the travel, axis at the far end before homing.
     pub longest: Seconds,
     /// Lowest and highest peak force expected over specimens.
     pub force_band: [Newtons; 2],
-    /// Bytes of disk the session may take.
     pub storage_bytes: u64,
     /// Why the plan cannot run on this rig; empty if it can.
     pub refusals: Vec<String>,
@@ -109,8 +103,8 @@ fn walk(
         limits: &limits,
         refusals: Vec::new(),
         notes: Vec::new(),
-        expected: Expected::new(has_outline),
-        known: Known { home: is_homed, ..Known::default() },
+        expected: ExpectedSpecimen::new(has_outline),
+        known: Preconditions { home: is_homed, ..Preconditions::default() },
         phase: Phase::Idle,
         reach: Reach::at(0.0),
     };

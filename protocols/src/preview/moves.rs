@@ -1,6 +1,6 @@
 //! How long moves and waits take, and where a move may begin and end.
 
-use super::walk::{Span, Walk};
+use super::walk::{DurationEstimate, Walk};
 use palpate_model::rig::Profile;
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
@@ -45,23 +45,22 @@ impl Reach {
 }
 
 impl Walk<'_> {
-    /// A move to a depth.
-    pub fn go(&mut self, depth: Depth, speed: MmPerS) -> Span {
+    pub fn go(&mut self, depth: Depth, speed: MmPerS) -> DurationEstimate {
         let end = Reach::to(depth.0, self.rig.mm_per_pulse);
         self.go_within(depth.0, end, speed)
     }
 
-    /// A way out, which never leads further in.
-    pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> Span {
+    /// A retract, which never goes deeper.
+    pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> DurationEstimate {
         let to = Reach::to(-clearance_mm, self.rig.mm_per_pulse);
         let end = Reach { low: to.low.min(self.reach.low), high: to.high.min(self.reach.high) };
         let depth = (-clearance_mm).min(self.expected.depth());
         self.go_within(depth, end, speed)
     }
 
-    fn go_within(&mut self, depth_mm: f64, end: Reach, speed: MmPerS) -> Span {
+    fn go_within(&mut self, depth_mm: f64, end: Reach, speed: MmPerS) -> DurationEstimate {
         if self.is_refused() {
-            return Span(0.0, 0.0, true);
+            return DurationEstimate(0.0, 0.0, true);
         }
         let (from, is_exact) =
             (self.reach, self.reach.is_known() && end.is_known() && self.is_answer_exact());
@@ -70,20 +69,19 @@ impl Walk<'_> {
         let longest = self.secs(self.move_ticks(furthest, speed));
         self.expected.go(self.phase, depth_mm, expected);
         self.reach = end;
-        Span(expected, longest.max(expected), is_exact)
+        DurationEstimate(expected, longest.max(expected), is_exact)
     }
 
-    /// A wait of so many whole samples.
-    pub fn wait(&mut self, duration: Seconds) -> Span {
+    pub fn wait(&mut self, duration: Seconds) -> DurationEstimate {
         let secs = self.secs(self.ticks(duration.0));
         self.expected.stay(self.phase, secs);
-        Span(secs, secs, true)
+        DurationEstimate(secs, secs, true)
     }
 
     /// Something whose duration only the rig or a person knows.
-    pub fn unknown(&mut self, expected: f64, longest: f64) -> Span {
+    pub fn unknown(&mut self, expected: f64, longest: f64) -> DurationEstimate {
         self.expected.stay(self.phase, expected);
-        Span(expected, longest, false)
+        DurationEstimate(expected, longest, false)
     }
 
     pub fn move_ticks(&self, distance_mm: f64, speed: MmPerS) -> u64 {

@@ -1,24 +1,19 @@
 //! Touch the home switch again and say how many pulses were missed.
 
-use super::home::{Home, Homing, KEYS, Purpose};
-use super::{Executable, Facts, Need, Pausing, StepKind};
-use crate::engine::Context;
-use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
-use palpate_model::rig::Phase;
-use palpate_model::units::MmPerS;
-use serde::{Deserialize, Serialize};
+use super::home::{Home, HomingPurpose, HomingRun, KEYS};
+use super::prelude::*;
+use crate::preview::CONTACT_EXPECTED_SHARE;
 
 /// Touch the home switch again and say how many pulses were missed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CheckHome {
-    /// Speed of the search.
     pub speed: MmPerS,
     /// Speed of the second touch.
     pub touch_speed: MmPerS,
 }
 
-pub(super) const FACTS: Facts = Facts {
-    about: "Touch the home switch again and tell how many pulses were missed.",
+pub(super) const FACTS: StepFacts = StepFacts {
+    about: "Touch the home switch again and report how many pulses were missed.",
     keys: KEYS,
     build: Some(|args| {
         let Home { speed, touch_speed } = Home::read(args)?;
@@ -28,7 +23,7 @@ pub(super) const FACTS: Facts = Facts {
     gives: &[Need::Outside],
     may_touch: false,
     label: "home",
-    ..Facts::of("check-home", Phase::CheckHome, Pausing::Repeat)
+    ..StepFacts::of("check-home", Phase::CheckHome, PauseBehaviour::Repeat)
 };
 
 impl CheckHome {
@@ -38,7 +33,7 @@ impl CheckHome {
 }
 
 impl StepKind for CheckHome {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         let travel = walk.limits.travel_max.0;
         self.search().check_speeds(walk);
         // At home, which is somewhere in front of the tissue.
@@ -49,9 +44,9 @@ impl StepKind for CheckHome {
 }
 
 impl Executable for CheckHome {
-    type Run = Homing;
+    type Run = HomingRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Homing, String> {
-        Homing::begin(cx, self.search(), Purpose::Check)
+    fn begin(&self, cx: &mut Context<'_>) -> Result<HomingRun, String> {
+        HomingRun::begin(cx, self.search(), HomingPurpose::Check)
     }
 }

@@ -3,22 +3,15 @@
 //!
 //! A stiff surface gives no time: both touches are slow, and the rig's own compliance is all that softens them.
 
-use super::find_contact::{above_noise, not_felt};
-use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
-use crate::engine::{Contact, Context, Millisecond, NOT_TARED, Record};
-use crate::file::{Key, Kind};
-use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
-use palpate_model::rig::{
-    Phase, Reading, StiffSample, Thickness, Touched, fit_compliance, thickness,
-};
-use palpate_model::signal::MovingMean;
-use palpate_model::units::{MmPerS, Newtons, Position};
-use serde::{Deserialize, Serialize};
+use super::find_contact::{above_noise, second_touch_error};
+use super::prelude::*;
+use crate::engine::{Contact, NOT_TARED};
+use crate::preview::CONTACT_EXPECTED_SHARE;
+use palpate_model::rig::{StiffSample, Thickness, Touched, fit_compliance, thickness};
 
 /// Find the stiff base the specimen lay on, with the specimen taken away: its thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindBase {
-    /// Speed of the first touch.
     pub approach_speed: MmPerS,
     /// Filtered force above tare that ends the first touch.
     pub criterion: Newtons,
@@ -30,17 +23,12 @@ pub struct FindBase {
     pub pass_force: Newtons,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Find the base the specimen lay on, with the specimen taken away: its thickness.",
     keys: &[
         Key::usual("speed", Kind::Speed, "0.6 mm/s", "of the first touch"),
-        Key::usual(
-            "criterion",
-            Kind::Force,
-            "0.05 N",
-            "force at which the first touch has felt the base",
-        ),
-        Key::usual("retreat", Kind::Length, "0.3 mm", "way back before the second touch"),
+        Key::usual("criterion", Kind::Force, "0.05 N", "force that ends the first touch"),
+        Key::usual("retreat", Kind::Length, "0.3 mm", "retract before the second touch"),
         Key::usual("pass_speed", Kind::Speed, "0.03 mm/s", "of the second touch"),
         Key::usual("pass_force", Kind::Force, "0.4 N", "force that ends the second touch"),
     ],
@@ -57,7 +45,7 @@ pub(super) const FACTS: Facts = Facts {
     needs: &[Need::Motor, Need::Home, Need::Tare, Need::Outside],
     gives: &[Need::Contact],
     label: "base",
-    ..Facts::of("find-base", Phase::Contact, Pausing::RepeatFromStart)
+    ..StepFacts::of("find-base", Phase::Contact, PauseBehaviour::RepeatFromStart)
 };
 
 impl FindBase {
@@ -95,7 +83,7 @@ impl StepKind for FindBase {
         "; what the search for the base met hardly gives way: give find-base a lower speed, or let a simulated rig give way (compliance 30)"
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_sizes(&[self.retreat_mm, self.criterion.0, self.pass_force.0]);
         walk.check_speed(self.approach_speed);
         walk.check_speed(self.pass_speed);
@@ -133,13 +121,12 @@ enum Stage {
     ToSurface,
 }
 
-/// A search for the base in progress.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BaseSearch {
     plan: FindBase,
     criterion: Newtons,
     stage: Stage,
-    millisecond: Millisecond,
+    millisecond: BlockMean<2>,
     filter: MovingMean,
     first: Position,
     samples: Vec<StiffSample>,
@@ -166,7 +153,7 @@ impl Executable for FindBase {
             plan: *self,
             criterion,
             stage: Stage::Approach,
-            millisecond: Millisecond::of(cx.rig()),
+            millisecond: BlockMean::of_millisecond(cx.rig()),
             filter: MovingMean::new(filtered),
             first: Position(0.0),
             samples: Vec::new(),
@@ -174,11 +161,11 @@ impl Executable for FindBase {
     }
 }
 
-impl InProgress for BaseSearch {
+impl RunningStep for BaseSearch {
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
         let position = cx.derived().position;
         let force = cx.derived().force.unwrap_or(Newtons(0.0));
-        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
+        let Some([mean_position, force]) = self.millisecond.push([position.0, force.0]) else {
             return Ok(Progress::Continue);
         };
         let force = Newtons(force);
@@ -207,12 +194,12 @@ impl InProgress for BaseSearch {
             Stage::SlowPass => {
                 // Forces this small are all worth the same.
                 let sigma = Newtons(1.0);
-                self.samples.push(StiffSample { position: Position(felt_at), force, sigma });
+                self.samples.push(StiffSample { position: Position(mean_position), force, sigma });
                 if filtered >= self.plan.pass_force {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
-                    return Err(not_felt("touch", self.plan.criterion, self.criterion));
+                    return Err(second_touch_error("touch", self.plan.criterion, self.criterion));
                 }
             }
             Stage::SlowBraking if at_rest => {

@@ -3,41 +3,33 @@
 //!
 //! In doubt it stops: a lead that stops coming leaves it where it is, and after a while the step ends.
 
-use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, InProgress, Need, Pausing, Progress, StepEvent, StepKind};
-use crate::engine::{Context, Record};
-use crate::preview::{Reach, SETTLE_SECS, Span, Walk};
+use super::prelude::*;
+use crate::preview::SETTLE_SECS;
 use palpate_model::Nanos;
 use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::units::{Depth, MmPerS, Position, Seconds};
-use serde::{Deserialize, Serialize};
 
 /// Go where a lead from outside says, such as the master of a master-slave system, within bounds that no lead can
 /// move.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Follow {
-    /// How long.
     pub duration: Seconds,
-    /// Fastest move.
     pub speed: MmPerS,
-    /// Depth beyond which it does not follow.
     pub depth_max: Depth,
 }
 
 /// No protocol asks for it: what leads is a program.
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Go where a lead from outside says.",
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
     label: "follow",
     // What leads may be elsewhere by then, and the slave goes there.
-    ..Facts::of("follow", Phase::Follow, Pausing::Repeat)
+    ..StepFacts::of("follow", Phase::Follow, PauseBehaviour::Repeat)
 };
 
 impl StepKind for Follow {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth_max);
         walk.check_span(self.duration);
@@ -48,15 +40,15 @@ impl StepKind for Follow {
         walk.expected.stay(walk.phase, (duration - there).max(0.0));
         walk.reach = Reach { low: -walk.limits.travel_max.0, high: way };
         walk.note(format!(
-            "the slave goes where it is led, at {} at most and no deeper than {}",
+            "the slave follows its lead at no more than {} and no deeper than {}",
             self.speed, self.depth_max
         ));
         // The move under way is braked first.
         let braking = self.speed.0 / walk.rig.acceleration.0;
-        Span(duration, duration + braking + SETTLE_SECS, false)
+        DurationEstimate(duration, duration + braking + SETTLE_SECS, false)
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         // The move under way is braked first.
         done.duration(self.duration, self.speed.0 / done.rig.acceleration.0);
     }
@@ -70,9 +62,8 @@ const SILENT_MAX: Seconds = Seconds(0.5);
 /// hangs to come back.
 const LOST: Seconds = Seconds(5.0);
 
-/// A slave that follows.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Following {
+pub(crate) struct FollowRun {
     speed: MmPerS,
     until_tick: u64,
     /// The surface, and the furthest pulse that is neither deeper than the plan allows nor beyond the travel.
@@ -80,21 +71,20 @@ pub(crate) struct Following {
     deepest_pulses: i64,
     /// Where it is to be; none before the first lead.
     wanted: Option<Depth>,
-    /// When the last lead came, or the step began.
     led_at: Nanos,
     is_lost: bool,
     is_stopping: bool,
-    is_refusal_told: bool,
+    is_refusal_reported: bool,
 }
 
 impl Executable for Follow {
-    type Run = Following;
+    type Run = FollowRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Following, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<FollowRun, String> {
         let contact = cx.contact()?;
         let deepest = self.depth_max.position_from(contact.position);
         let deepest = deepest.0.min(cx.limits().travel_max.0);
-        Ok(Following {
+        Ok(FollowRun {
             speed: self.speed,
             until_tick: cx.tick_after(self.duration),
             surface: contact.position,
@@ -104,12 +94,12 @@ impl Executable for Follow {
             led_at: cx.now,
             is_lost: false,
             is_stopping: false,
-            is_refusal_told: false,
+            is_refusal_reported: false,
         })
     }
 }
 
-impl InProgress for Following {
+impl RunningStep for FollowRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let at_rest = cx.at_rest()?;
         let silent = cx.now.since(self.led_at).seconds();
@@ -153,12 +143,10 @@ impl InProgress for Following {
                 self.led_at = cx.now;
             }
             // It is as good as none: should no other come, the slave stops.
-            None if self.is_refusal_told => {}
+            None if self.is_refusal_reported => {}
             None => {
-                self.is_refusal_told = true;
-                cx.record(Record::Refused {
-                    reason: "what leads the slave gave no number; check what leads it".into(),
-                });
+                self.is_refusal_reported = true;
+                cx.refuse("what leads the slave gave no number; check what leads it");
             }
         }
         Some(Progress::Continue)

@@ -1,18 +1,11 @@
 //! Stay at depth while the force relaxes. A hold may end early: decided from the recorded answer of the live fit, or
 //! from the slope of the force, and nothing else.
 
-use super::{Done, Executable, Facts, InProgress, Pausing, Progress, Step, StepEvent, StepKind};
-use crate::engine::{Context, Record};
-use crate::file::{Args, Key, Kind};
+use super::prelude::*;
 use crate::plans::{HoldRate, HoldUntil};
-use crate::preview::{Span, Walk};
 use palpate_model::estimate::LiveEstimate;
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::units::Seconds;
-use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Stay at depth while the force relaxes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     /// How long, at most.
@@ -25,21 +18,21 @@ pub struct Hold {
     pub rate: Option<HoldRate>,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Stay at depth while the force relaxes.",
     keys: &[
         Key::needed("for", Kind::Time, "how long, at most").zero_allowed(),
         Key::optional(
             "until",
             Kind::Text,
-            "end it once a parameter is known so well, as `\"tau=1%\"`",
+            "ends the hold once a parameter is known this well, such as `\"tau=1%\"`",
         ),
-        Key::optional("slope", Kind::ForceRate, "end it once the force changes by less"),
+        Key::optional("slope", Kind::ForceRate, "ends the hold once the force changes by less"),
         Key::optional("over", Kind::Time, "time over which the slope is judged; goes with `slope`"),
     ],
     build: Some(read),
     may_touch: false,
-    ..Facts::of("hold", Phase::Hold, Pausing::Wait)
+    ..StepFacts::of("hold", Phase::Hold, PauseBehaviour::Wait)
 };
 
 fn read(args: &Args) -> Result<Step, String> {
@@ -48,10 +41,9 @@ fn read(args: &Args) -> Result<Step, String> {
         (Some(below_n_per_s), Some(over)) => Some(HoldRate { below_n_per_s, over: Seconds(over) }),
         (None, None) => None,
         _ => {
-            return Err(
-                "'slope' and 'over' go together: how little the force changes, and over how long"
-                    .into(),
-            );
+            let message =
+                "'slope' and 'over' go together: how little the force changes, and over how long";
+            return Err(message.into());
         }
     };
     rate.map_or(Ok(()), |rule| rule.check())?;
@@ -60,7 +52,6 @@ fn read(args: &Args) -> Result<Step, String> {
 }
 
 impl Hold {
-    /// A hold that lasts as long as it says.
     #[must_use]
     pub const fn of(duration: Seconds) -> Self {
         Self { duration, until: None, rate: None }
@@ -82,7 +73,7 @@ impl Hold {
 }
 
 impl StepKind for Hold {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.duration);
         if let Some(rule) = &self.until {
             self.check_rule(rule, walk);
@@ -91,12 +82,12 @@ impl StepKind for Hold {
             walk.refusals.extend(rule.check().err());
             walk.notes.push(format!("the hold ends as soon as {rule}"));
         }
-        let Span(expected, longest, _) = walk.wait(self.duration);
+        let DurationEstimate(expected, longest, _) = walk.wait(self.duration);
         let is_exact = self.until.is_none() && self.rate.is_none();
-        Span(expected, longest, is_exact)
+        DurationEstimate(expected, longest, is_exact)
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.duration(self.duration, 0.0);
     }
 }
@@ -104,9 +95,8 @@ impl StepKind for Hold {
 /// Points of a window over which a slope is fitted: enough for a line, few enough to fit on every point.
 const SLOPE_POINTS: usize = 20;
 
-/// A hold in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Holding {
+pub(crate) struct HoldRun {
     plan: Hold,
     begun_tick: u64,
     until_tick: u64,
@@ -117,36 +107,27 @@ pub(crate) struct Holding {
 #[derive(Clone, Debug, PartialEq)]
 struct Slope {
     rule: HoldRate,
-    samples_per_point: u64,
-    /// Sum and count of the point that is being averaged.
-    sum: f64,
-    count: u64,
+    /// Samples in one point.
+    samples: u32,
+    point: BlockMean<1>,
     points: VecDeque<f64>,
 }
 
 impl Slope {
     fn new(rule: HoldRate, window_ticks: u64) -> Self {
-        Self {
-            rule,
-            samples_per_point: (window_ticks / SLOPE_POINTS as u64).max(1),
-            sum: 0.0,
-            count: 0,
-            points: VecDeque::with_capacity(SLOPE_POINTS),
-        }
+        // A window is an hour at most.
+        let samples = (window_ticks / SLOPE_POINTS as u64).max(1) as u32;
+        let points = VecDeque::with_capacity(SLOPE_POINTS);
+        Self { rule, samples, point: BlockMean::new(samples), points }
     }
 
-    /// Takes a force; the slope in N/s whenever a point is complete and the window full.
+    /// The slope in N/s whenever a point is complete and the window full.
     fn push(&mut self, force: f64, tick: Seconds) -> Option<f64> {
-        self.sum += force;
-        self.count += 1;
-        if self.count < self.samples_per_point {
-            return None;
-        }
+        let [mean] = self.point.push([force])?;
         if self.points.len() == SLOPE_POINTS {
             self.points.pop_front();
         }
-        self.points.push_back(self.sum / self.count as f64);
-        (self.sum, self.count) = (0.0, 0);
+        self.points.push_back(mean);
         if self.points.len() < SLOPE_POINTS {
             return None;
         }
@@ -157,16 +138,16 @@ impl Slope {
             let x = i as f64 - mean;
             (top + x * force, bottom + x * x)
         });
-        Some(top / bottom / (self.samples_per_point as f64 * tick.0))
+        Some(top / bottom / (f64::from(self.samples) * tick.0))
     }
 }
 
 impl Executable for Hold {
-    type Run = Holding;
+    type Run = HoldRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Holding, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<HoldRun, String> {
         let slope = self.rate.map(|rule| Slope::new(rule, cx.ticks(rule.over)));
-        Ok(Holding {
+        Ok(HoldRun {
             plan: *self,
             begun_tick: cx.tick(),
             until_tick: cx.tick_after(self.duration),
@@ -175,7 +156,7 @@ impl Executable for Hold {
     }
 }
 
-impl InProgress for Holding {
+impl RunningStep for HoldRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let tick = cx.rig().tick();
         if let (Some(slope), Some(force)) = (&mut self.slope, cx.derived().force)
@@ -187,10 +168,7 @@ impl InProgress for Holding {
             let held = Seconds((reading.tick - self.begun_tick) as f64 * tick.0);
             cx.record(Record::HoldSteady { slope_n_per_s: now, held });
         }
-        Ok(match reading.tick >= self.until_tick {
-            true => Progress::Done,
-            false => Progress::Continue,
-        })
+        Ok(Progress::done_if(reading.tick >= self.until_tick))
     }
 
     /// Lets the hold end with the next sample if its rule is met by the newest answer of the live fit.

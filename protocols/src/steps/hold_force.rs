@@ -1,35 +1,26 @@
 //! Constant force: the probe follows the tissue in small steps while the force is kept.
 
+use super::prelude::*;
 use super::target::doubt_force;
-use super::{Done, Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
-use crate::engine::Context;
-use crate::file::{Key, Kind};
-use crate::preview::{Reach, SETTLE_SECS, Span, Walk};
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::signal::MovingMean;
-use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
-use serde::{Deserialize, Serialize};
+use crate::preview::SETTLE_SECS;
 
 /// Keep the force constant and let the depth creep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HoldForce {
     /// Force above tare.
     pub force: Newtons,
-    /// How long.
     pub duration: Seconds,
-    /// Fastest correction.
     pub speed: MmPerS,
-    /// Depth beyond which the step fails.
     pub depth_max: Depth,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Keep the force and let the depth creep.",
     keys: &[
         Key::needed("force", Kind::Force, "above tare"),
         Key::needed("for", Kind::Time, "how long").zero_allowed(),
         Key::usual("speed", Kind::Speed, "0.75 mm/s", "of the corrections"),
-        Key::needed("deepest", Kind::Length, "depth at which the step is given up"),
+        Key::needed("deepest", Kind::Length, "depth at which the step fails"),
     ],
     build: Some(|args| {
         Ok(HoldForce {
@@ -44,11 +35,11 @@ pub(super) const FACTS: Facts = Facts {
     gives: &[Need::Inside],
     is_measuring: true,
     label: "creep",
-    ..Facts::of("hold-force", Phase::Creep, Pausing::Control)
+    ..StepFacts::of("hold-force", Phase::Creep, PauseBehaviour::Control)
 };
 
 impl StepKind for HoldForce {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth_max);
         walk.check_force(self.force);
@@ -57,19 +48,19 @@ impl StepKind for HoldForce {
         walk.reach =
             Reach { low: walk.reach.low.min(0.0), high: walk.reach.high.max(self.depth_max.0) };
         walk.expected.keep(walk.phase, secs);
-        Span(secs, secs + SETTLE_SECS, false)
+        DurationEstimate(secs, secs + SETTLE_SECS, false)
     }
 
     fn force_counts_from(&self) -> Option<f64> {
         Some(0.5 * self.duration.0)
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.force(self.force, done.mean_force());
         done.duration(self.duration, 0.0);
     }
 
-    fn doubt(&self, _done: &Done<'_>) -> Option<String> {
+    fn doubt(&self, _done: &StepResult<'_>) -> Option<String> {
         doubt_force(self.force)
     }
 }
@@ -92,9 +83,8 @@ const STIFFNESS_RANGE: [f64; 2] = [1.0, 50.0];
 const LEARN: f64 = 0.3;
 const LEARN_PULSES: f64 = 4.0;
 
-/// A force hold in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Creeping {
+pub(crate) struct ForceHoldRun {
     plan: HoldForce,
     until_tick: u64,
     /// No correction before this tick: the mean must be of the new position only.
@@ -109,15 +99,15 @@ pub(crate) struct Creeping {
 }
 
 impl Executable for HoldForce {
-    type Run = Creeping;
+    type Run = ForceHoldRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Creeping, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<ForceHoldRun, String> {
         cx.contact()?;
         let rig = cx.rig();
         // In ticks, and in samples.
         let filtered = FILTER_MS * rig.samples_per_ms();
         let samples = rig.means_in(FILTER_MS as usize) * rig.samples_per_ms() as usize;
-        Ok(Creeping {
+        Ok(ForceHoldRun {
             plan: *self,
             until_tick: cx.tick_after(self.duration),
             quiet_until: cx.tick() + u64::from(filtered),
@@ -129,7 +119,7 @@ impl Executable for HoldForce {
     }
 }
 
-impl InProgress for Creeping {
+impl RunningStep for ForceHoldRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let force = cx.derived().force.unwrap_or(Newtons(0.0));
         let depth = cx.derived().depth.unwrap_or(Depth(0.0));

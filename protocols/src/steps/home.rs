@@ -1,17 +1,11 @@
 //! Homing: find the home switch fast, back off, touch it slowly, call that pulse zero.
 
-use super::{Executable, Facts, InProgress, Known, Need, Pausing, Progress, StepKind};
-use crate::engine::{Context, Record};
-use crate::file::{Args, Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::{AxisStatus, Phase, Reading, RigCommand};
-use palpate_model::units::MmPerS;
-use serde::{Deserialize, Serialize};
+use super::prelude::*;
+use palpate_model::rig::{AxisStatus, RigCommand};
 
 /// Find the home switch, unless the axis is homed already.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Home {
-    /// Speed of the search.
     pub speed: MmPerS,
     /// Speed of the second touch, which defines position zero.
     pub touch_speed: MmPerS,
@@ -27,14 +21,14 @@ pub(super) const KEYS: &[Key] = &[
     ),
 ];
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Find the home switch, unless the axis is homed already.",
     keys: KEYS,
     build: Some(|args| Ok(Home::read(args)?.into())),
     needs: &[Need::Motor],
     may_touch: false,
     label: "home",
-    ..Facts::of("home", Phase::Home, Pausing::Repeat)
+    ..StepFacts::of("home", Phase::Home, PauseBehaviour::Repeat)
 };
 
 impl Home {
@@ -43,7 +37,7 @@ impl Home {
     }
 
     /// Times of a search that begins at these shares of the travel from the switch.
-    pub(super) fn expect_from(&self, walk: &mut Walk<'_>, near_share: f64) -> Span {
+    pub(super) fn expect_from(&self, walk: &mut Walk<'_>, near_share: f64) -> DurationEstimate {
         let travel = walk.limits.travel_max.0;
         // Back off 2 mm and touch again.
         let touch =
@@ -60,30 +54,30 @@ impl Home {
 }
 
 impl StepKind for Home {
-    fn pass(&self, known: &mut Known) {
+    fn pass(&self, known: &mut Preconditions) {
         // An axis that is homed already stays where it is.
         known.is_inside &= known.home;
         known.home = true;
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         self.check_speeds(walk);
         if walk.known.home {
-            return Span(0.0, 0.0, true);
+            return DurationEstimate(0.0, 0.0, true);
         }
         self.expect_from(walk, 0.1)
     }
 }
 
 impl Executable for Home {
-    type Run = Homing;
+    type Run = HomingRun;
 
     fn is_done_already(&self, cx: &Context<'_>) -> bool {
         cx.is_homed()
     }
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Homing, String> {
-        Homing::begin(cx, *self, Purpose::Define)
+    fn begin(&self, cx: &mut Context<'_>) -> Result<HomingRun, String> {
+        HomingRun::begin(cx, *self, HomingPurpose::Define)
     }
 }
 
@@ -108,27 +102,23 @@ enum Stage {
     Defining,
 }
 
-/// What a homing is for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Purpose {
-    /// Position zero is where home is found.
+pub(crate) enum HomingPurpose {
     Define,
     /// Only look where home is: position zero stays what it is.
     Check,
 }
 
-/// A homing in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Homing {
+pub(crate) struct HomingRun {
     plan: Home,
-    /// How far the probe was moved off the switch.
     back_off_mm: f64,
     stage: Stage,
-    purpose: Purpose,
+    purpose: HomingPurpose,
 }
 
-impl Homing {
-    pub fn begin(cx: &mut Context<'_>, plan: Home, purpose: Purpose) -> Result<Self, String> {
+impl HomingRun {
+    pub fn begin(cx: &mut Context<'_>, plan: Home, purpose: HomingPurpose) -> Result<Self, String> {
         cx.set_homed(false);
         let mut homing = Self { plan, back_off_mm: BACK_OFF_MM, stage: Stage::Searching, purpose };
         if cx.status().has(AxisStatus::HOME) {
@@ -141,12 +131,12 @@ impl Homing {
             let reach = cx.pulses_of(cx.limits().travel_max.0 + 10.0);
             cx.move_to_pulses(cx.pulses() - reach, plan.speed)?;
         }
-        cx.set_homed(purpose == Purpose::Check);
+        cx.set_homed(purpose == HomingPurpose::Check);
         Ok(homing)
     }
 }
 
-impl InProgress for Homing {
+impl RunningStep for HomingRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let is_at_switch = reading.status.has(AxisStatus::HOME);
         let at_rest = cx.at_rest()?;
@@ -175,7 +165,9 @@ impl InProgress for Homing {
             Stage::Searching | Stage::Touching if at_rest => {
                 return Err("the home switch was not found; check it and its cable".into());
             }
-            Stage::TouchBraking { edge_pulses } if at_rest && self.purpose == Purpose::Check => {
+            Stage::TouchBraking { edge_pulses }
+                if at_rest && self.purpose == HomingPurpose::Check =>
+            {
                 cx.record(Record::HomeChecked { missed_pulses: edge_pulses });
                 return Ok(Progress::Done);
             }

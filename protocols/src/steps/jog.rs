@@ -1,23 +1,17 @@
 //! Move by a signed distance; allowed before homing.
 
-use super::{Executable, Facts, Known, Moving, Need, Pausing, StepKind};
-use crate::engine::{Context, outside_travel};
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::Phase;
-use palpate_model::units::{Depth, MmPerS, Position};
-use serde::{Deserialize, Serialize};
+use super::prelude::*;
+use crate::engine::outside_travel;
 
 /// Move by a signed distance; allowed before homing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jog {
     /// Signed distance in mm, positive towards the tissue.
     pub distance_mm: f64,
-    /// Speed.
     pub speed: MmPerS,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Move by a distance, positive towards the tissue. Allowed before homing.",
     keys: &[
         Key::needed("distance", Kind::Length, "signed").any(),
@@ -27,11 +21,11 @@ pub(super) const FACTS: Facts = Facts {
         Ok(Jog { distance_mm: args.number("distance")?, speed: args.speed("speed")? }.into())
     }),
     needs: &[Need::Motor],
-    ..Facts::of("jog", Phase::Jog, Pausing::RepeatFromStart)
+    ..StepFacts::of("jog", Phase::Jog, PauseBehaviour::RepeatFromStart)
 };
 
 impl StepKind for Jog {
-    fn pass(&self, known: &mut Known) {
+    fn pass(&self, known: &mut Preconditions) {
         // From the surface a jog towards the tissue goes in.
         known.is_inside |= known.contact && self.may_touch();
     }
@@ -40,7 +34,7 @@ impl StepKind for Jog {
         self.distance_mm > 0.0
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         let travel = walk.limits.travel_max.0;
         walk.check_sizes(&[self.distance_mm]);
         if self.distance_mm.abs() > travel {
@@ -63,14 +57,14 @@ impl StepKind for Jog {
         } else {
             walk.expected.stay(walk.phase, secs);
         }
-        Span(secs, secs, walk.is_answer_exact())
+        DurationEstimate(secs, secs, walk.is_answer_exact())
     }
 }
 
 impl Executable for Jog {
-    type Run = Moving;
+    type Run = MoveRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<MoveRun, String> {
         let to = cx.pulses() + cx.pulses_of(self.distance_mm);
         let end = Position(to as f64 * cx.rig().mm_per_pulse);
         let travel = cx.limits().travel_max;
@@ -78,7 +72,6 @@ impl Executable for Jog {
         if cx.is_homed() && self.may_touch() && end > travel {
             return Err(outside_travel("jog", end, travel));
         }
-        cx.move_to_pulses(to, self.speed)?;
-        Ok(Moving)
+        cx.move_to_pulses(to, self.speed).map(|()| MoveRun)
     }
 }

@@ -1,21 +1,12 @@
 //! Indentation to a force: at constant speed, early by what stopping adds, or slower and slower.
 
-use super::known::FROM_SURFACE;
+use super::prelude::*;
 use super::ramp::INTERRUPTED;
 use super::target::doubt_force;
-use super::{Done, Executable, Facts, InProgress, MeterSample, Need, Pausing, Progress, StepKind};
-use crate::engine::{Context, Record};
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::signal::MovingMean;
-use palpate_model::units::{Depth, MmPerS, Newtons, Position};
-use serde::{Deserialize, Serialize};
 
 /// Indent at constant speed until a force is reached.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadTo {
-    /// Indentation speed.
     pub speed: MmPerS,
     /// Force above tare at which the probe stops.
     pub force: Newtons,
@@ -27,16 +18,16 @@ pub struct LoadTo {
     pub brake: Option<Newtons>,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Indent at constant speed until a force is reached.",
     keys: &[
         Key::needed("to", Kind::Force, "force above tare"),
         Key::needed("speed", Kind::Speed, "of the indentation"),
-        Key::needed("deepest", Kind::Length, "depth at which the step is given up"),
+        Key::needed("deepest", Kind::Length, "depth at which the step fails"),
         Key::optional(
             "brake",
             Kind::Force,
-            "so much before the target the probe slows to a tenth, then to a hundredth",
+            "force before the target at which the speed falls to a tenth, later to a hundredth",
         ),
     ],
     build: Some(|args| {
@@ -52,7 +43,7 @@ pub(super) const FACTS: Facts = Facts {
     gives: &[Need::Inside],
     is_measuring: true,
     label: "load",
-    ..Facts::of("load", Phase::Ramp, Pausing::Measure(INTERRUPTED))
+    ..StepFacts::of("load", Phase::Ramp, PauseBehaviour::Measure(INTERRUPTED))
 };
 
 impl LoadTo {
@@ -74,7 +65,7 @@ impl StepKind for LoadTo {
         Some(self.depth_max)
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth_max);
         walk.check_force(self.force);
@@ -90,14 +81,14 @@ impl StepKind for LoadTo {
         let refusal = self.check_from(from, walk.rig.mm_per_pulse).err();
         walk.refusals.extend(refusal);
         if walk.is_refused() {
-            return Span(0.0, 0.0, false);
+            return DurationEstimate(0.0, 0.0, false);
         }
         let longest = walk.move_secs(self.depth_max.0 - from.0, self.speed);
         walk.reach.high = walk.reach.high.max(self.depth_max.0);
         let expected = walk.expected.load(walk.phase, self);
         // The braked stages are a tenth and a hundredth as fast over what is left.
         let braked = self.brake.map_or(1.0, |_| 100.0);
-        Span(expected, braked * longest, false)
+        DurationEstimate(expected, braked * longest, false)
     }
 
     fn is_cruising(&self, begun: f64, sample: &MeterSample, way: &dyn Fn(f64) -> f64) -> bool {
@@ -107,12 +98,12 @@ impl StepKind for LoadTo {
         sample.force.is_some_and(is_far) && sample.depth.is_some_and(is_under_way)
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.speed(self.speed);
         done.force(self.force, done.force_reached());
     }
 
-    fn doubt(&self, _done: &Done<'_>) -> Option<String> {
+    fn doubt(&self, _done: &StepResult<'_>) -> Option<String> {
         doubt_force(self.force)
     }
 }
@@ -131,9 +122,8 @@ const ANSWER_MS: usize = 3;
 /// Shares of the speed in the stages of a braked approach, and of the brake force at which each ends.
 const STAGES: [(f64, f64); 3] = [(1.0, 1.0), (0.1, 0.1), (0.01, 0.0)];
 
-/// An indentation to a force in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Loading {
+pub(crate) struct LoadRun {
     plan: LoadTo,
     stage: usize,
     is_stopping: bool,
@@ -146,9 +136,9 @@ pub(crate) struct Loading {
 }
 
 impl Executable for LoadTo {
-    type Run = Loading;
+    type Run = LoadRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Loading, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<LoadRun, String> {
         let rig = cx.rig();
         // Ten at most.
         let samples =
@@ -156,7 +146,7 @@ impl Executable for LoadTo {
         if let Some(depth) = cx.derived().depth {
             self.check_from(depth, rig.mm_per_pulse)?;
         }
-        let mut loading = Loading {
+        let mut loading = LoadRun {
             plan: *self,
             // Without a brake there is only the last stage, at full speed.
             stage: self.brake.map_or(STAGES.len() - 1, |_| 0),
@@ -171,7 +161,7 @@ impl Executable for LoadTo {
     }
 }
 
-impl Loading {
+impl LoadRun {
     fn speed(&self, cx: &Context<'_>) -> MmPerS {
         if self.plan.brake.is_none() {
             return self.plan.speed;
@@ -186,7 +176,6 @@ impl Loading {
         Newtons(self.plan.force.0 - brake * STAGES[self.stage].1)
     }
 
-    /// Sends the axis on at the speed of the stage.
     fn go(&mut self, cx: &mut Context<'_>) -> Result<(), String> {
         let contact = cx.contact()?;
         let deepest = self.plan.depth_max.position_from(contact.position);
@@ -196,7 +185,7 @@ impl Loading {
     }
 }
 
-impl InProgress for Loading {
+impl RunningStep for LoadRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
         let Some(force) = cx.derived().force else {
             return Err("the load cell is not tared; tare it first".into());

@@ -1,9 +1,9 @@
-//! What a run can do, one file a kind of step.
+//! The kinds of steps, one file each.
 //!
 //! A file holds everything of its step: what a plan says of it, its words in the protocol language, what must hold
 //! before it and holds behind it, how it begins and reacts to inputs, what pausing means for it, what a preview
 //! expects of it, and what a finished run is held to. [`table`] is the one list of them: engine, language, preview and
-//! fidelity reach a step through [`StepKind`], [`Executable`] and [`InProgress`] and know no step by name.
+//! fidelity reach a step through [`StepKind`], [`Executable`] and [`RunningStep`] and know no step by name.
 //!
 //! A step sees the run through [`Context`], which judges every interlock before a step gets a sample and has no way
 //! to skip one.
@@ -16,8 +16,8 @@ mod hold;
 mod hold_force;
 mod home;
 mod jog;
-mod known;
 mod load_to;
+mod preconditions;
 mod prompt;
 mod ramp;
 mod rest;
@@ -32,35 +32,47 @@ mod unload;
 mod wait_until;
 mod weigh;
 
-pub(crate) use known::{Known, Need};
+pub(crate) use preconditions::{Need, Preconditions};
 pub use table::*;
-pub(crate) use target::{Done, FORCE_FLOOR};
-pub use target::{MeterSample, StepMeter, Target};
+pub(crate) use target::{FORCE_FLOOR, StepResult};
+pub use target::{MeterSample, StepMeter, StepTarget};
 
 use crate::engine::{Answer, Context};
 use crate::file::{Args, Key};
-use crate::preview::{Span, Walk};
+use crate::preview::{DurationEstimate, Walk};
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::units::Depth;
 
-/// Makes a step of its keys in a protocol.
-pub(crate) type Build = fn(&Args) -> Result<Step, String>;
+/// What the file of a step works with.
+mod prelude {
+    pub(super) use super::preconditions::{FROM_SURFACE, Need, Preconditions};
+    pub(super) use super::{
+        Executable, MeterSample, MoveRun, PauseBehaviour, Progress, RunningStep, Step, StepEvent,
+        StepFacts, StepKind, StepResult,
+    };
+    pub(super) use crate::engine::{BlockMean, Context, Record};
+    pub(super) use crate::file::{Args, Key, Kind};
+    pub(super) use crate::preview::{DurationEstimate, Reach, Walk};
+    pub(super) use palpate_model::rig::{Phase, Reading};
+    pub(super) use palpate_model::signal::MovingMean;
+    pub(super) use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+    pub(super) use serde::{Deserialize, Serialize};
+}
 
-/// What is the same for every step of a kind.
+pub(crate) type BuildStep = fn(&Args) -> Result<Step, String>;
+
 #[derive(Clone, Copy)]
-pub(crate) struct Facts {
+pub(crate) struct StepFacts {
     /// Its word in a protocol, one sentence about it, and its keys.
     pub word: &'static str,
     pub about: &'static str,
     pub keys: &'static [Key],
     /// None where no protocol can ask for it.
-    pub build: Option<Build>,
+    pub build: Option<BuildStep>,
     /// What the reference of the language adds below the keys.
     pub note: Option<fn() -> String>,
-    /// The phase it begins with.
     pub phase: Phase,
-    /// What a pause does to it.
-    pub pausing: Pausing,
+    pub pausing: PauseBehaviour,
     pub needs: &'static [Need],
     /// What holds behind it, where it differs from before.
     pub gives: &'static [Need],
@@ -72,9 +84,9 @@ pub(crate) struct Facts {
     pub label: &'static str,
 }
 
-impl Facts {
+impl StepFacts {
     /// Of a step that needs nothing and may touch.
-    pub const fn of(word: &'static str, phase: Phase, pausing: Pausing) -> Self {
+    pub const fn of(word: &'static str, phase: Phase, pausing: PauseBehaviour) -> Self {
         Self {
             word,
             about: "",
@@ -93,20 +105,19 @@ impl Facts {
 }
 
 /// The `FACTS` of a step's file, which [`table`] gives to it.
-pub(crate) trait OfKind {
-    /// What is the same for every step of its kind.
-    fn facts(&self) -> &'static Facts;
+pub(crate) trait HasFacts {
+    fn facts(&self) -> &'static StepFacts;
 }
 
 /// What is known of a step before it runs and judged behind it.
-pub(crate) trait StepKind: OfKind {
-    /// What must hold before it, in the order of [`Need`].
+pub(crate) trait StepKind: HasFacts {
+    /// Preconditions, in the order of [`Need`].
     fn needs(&self) -> &'static [Need] {
         self.facts().needs
     }
 
     /// What holds behind it, where it differs from before.
-    fn pass(&self, known: &mut Known) {
+    fn pass(&self, known: &mut Preconditions) {
         self.facts().gives.iter().for_each(|need| known.assume(*need));
     }
 
@@ -125,13 +136,12 @@ pub(crate) trait StepKind: OfKind {
         ""
     }
 
-    /// What a writer of protocols should look at.
-    fn warning(&self, _known: &Known) -> Option<&'static str> {
+    fn warning(&self, _known: &Preconditions) -> Option<&'static str> {
         None
     }
 
-    /// How long it takes, where it ends and what refuses it.
-    fn expect(&self, walk: &mut Walk<'_>) -> Span;
+    /// Duration, end and refusals of the step in a preview.
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate;
 
     /// Whether the axis surely goes at the step's full speed at a sample; `begun` is the depth at which it began and
     /// `way` the length of an acceleration from rest.
@@ -149,41 +159,37 @@ pub(crate) trait StepKind: OfKind {
         None
     }
 
-    /// The targets it is held to, against what was done.
-    fn judge(&self, _done: &mut Done<'_>) {}
+    /// Compares the result with the targets.
+    fn judge(&self, _done: &mut StepResult<'_>) {}
 
-    /// What speaks against it although every target may be met.
-    fn doubt(&self, _done: &Done<'_>) -> Option<String> {
+    /// A doubt that remains although every target is met.
+    fn doubt(&self, _done: &StepResult<'_>) -> Option<String> {
         None
     }
 }
 
-/// What a step does.
 pub(crate) trait Executable: StepKind {
-    /// What it remembers while it runs.
-    type Run: InProgress;
+    type Run: RunningStep;
 
     /// Whether there is nothing to do, so that the next step follows at once.
     fn is_done_already(&self, _cx: &Context<'_>) -> bool {
         false
     }
 
-    /// Begins it.
     fn begin(&self, cx: &mut Context<'_>) -> Result<Self::Run, String>;
 }
 
-/// A step that runs.
-pub(crate) trait InProgress {
+pub(crate) trait RunningStep {
     /// A sample came. An error is a step that cannot be done: the plan says what follows.
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String>;
 
-    /// Something else came; none where the step takes no notice of such.
+    /// Another event; `None` where the step ignores it.
     fn on_event(&mut self, _cx: &mut Context<'_>, _event: &StepEvent) -> Option<Progress> {
         None
     }
 }
 
-impl<T: InProgress> InProgress for Box<T> {
+impl<T: RunningStep> RunningStep for Box<T> {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         (**self).on_reading(cx, reading)
     }
@@ -202,29 +208,33 @@ pub(crate) enum Progress {
     Stop(String),
 }
 
-/// What reaches a step beside samples.
+impl Progress {
+    fn done_if(is_done: bool) -> Self {
+        if is_done { Self::Done } else { Self::Continue }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum StepEvent {
     /// The live fit has a new answer, which [`Context::live`] holds.
     LiveFit,
     /// Where a step that follows is to go; none where what leads gave no number.
     Lead(Option<Depth>),
-    /// A person answered.
     Answer(Answer),
 }
 
 /// What pausing means for a step in progress.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Pausing {
+pub(crate) enum PauseBehaviour {
     /// It only waits, and waits longer.
     Wait,
-    /// So too, with corrections of the axis meanwhile.
+    /// It waits longer, and goes on correcting the axis.
     Control,
     /// It is short and does not move the probe: it is completed.
     Complete,
-    /// It moves outside the measurement, to a place from wherever, and can begin again.
+    /// It moves outside the measurement to a fixed target, and can begin again anywhere.
     Repeat,
-    /// It can begin again, from where it began: a search would feel the tissue at once, a jog would go too far.
+    /// It can begin again from its start only: a search would touch the tissue at once, a jog would go too far.
     RepeatFromStart,
     /// It is the measurement and cannot go on; with the reason.
     Measure(&'static str),
@@ -232,24 +242,19 @@ pub(crate) enum Pausing {
 
 /// A move to rest, which is all that many steps are.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Moving;
+pub(crate) struct MoveRun;
 
-impl InProgress for Moving {
+impl RunningStep for MoveRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
-        Ok(match cx.at_rest()? {
-            true => Progress::Done,
-            false => Progress::Continue,
-        })
+        cx.at_rest().map(Progress::done_if)
     }
 }
 
 impl Step {
-    /// Its word in a protocol.
     pub fn word(&self) -> &'static str {
         self.kind().facts().word
     }
 
-    /// The phase it begins with.
     pub fn phase(&self) -> Phase {
         self.kind().facts().phase
     }

@@ -1,20 +1,13 @@
 //! A question to a person, with an end.
 
-use super::{
-    Executable, Facts, InProgress, Known, Need, Pausing, Progress, Step, StepEvent, StepKind, table,
-};
-use crate::engine::{Answer, Context, Record, State};
-use crate::file::{Args, Key, Kind};
-use crate::preview::{Span, Walk};
+use super::prelude::*;
+use super::table;
+use crate::engine::{Answer, State};
 use palpate_model::Nanos;
-use palpate_model::rig::{HandAction, Phase, Reading};
-use palpate_model::units::Seconds;
-use serde::{Deserialize, Serialize};
+use palpate_model::rig::HandAction;
 
-/// Ask a person for something and wait.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prompt {
-    /// What to do, as one sentence.
     pub message: String,
     /// How long the run waits for an answer.
     pub timeout: Seconds,
@@ -30,10 +23,8 @@ pub struct Prompt {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnTimeout {
-    /// The run stops where it is.
     #[default]
     Stop,
-    /// The plan goes on.
     Continue,
 }
 
@@ -48,7 +39,7 @@ impl OnTimeout {
     }
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Ask a person for something and wait. A simulated rig does the hand's work when the answer comes.",
     keys: &[
         Key::needed("message", Kind::Text, "what to do, as one sentence"),
@@ -63,7 +54,7 @@ pub(super) const FACTS: Facts = Facts {
         Key::optional(
             "cell_mass",
             Kind::Mass,
-            "by hand: all that shall lie on the load cell, `\"0 g\"` for nothing",
+            "by hand: total mass to put on the load cell, `\"0 g\"` for none",
         )
         .zero_allowed(),
         Key::optional("mount", Kind::Count, "by hand: the number of the specimen to clip in")
@@ -72,7 +63,7 @@ pub(super) const FACTS: Facts = Facts {
     ],
     build: Some(read),
     may_touch: false,
-    ..Facts::of("prompt", Phase::Prompt, Pausing::Wait)
+    ..StepFacts::of("prompt", Phase::Prompt, PauseBehaviour::Wait)
 };
 
 fn read(args: &Args) -> Result<Step, String> {
@@ -83,10 +74,9 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, Some(specimen), false) => Some(HandAction::Mount { specimen: specimen.into() }),
         (None, None, true) => Some(HandAction::Unmount),
         _ => {
-            return Err(
-                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'"
-                    .into(),
-            );
+            let message =
+                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'";
+            return Err(message.into());
         }
     };
     Ok(Prompt {
@@ -106,7 +96,7 @@ impl StepKind for Prompt {
         }
     }
 
-    fn pass(&self, known: &mut Known) {
+    fn pass(&self, known: &mut Preconditions) {
         // Another specimen has its surface elsewhere. Without one there is only the base to find.
         if let Some(hand @ (HandAction::Mount { .. } | HandAction::Unmount)) = self.hand {
             known.contact = false;
@@ -114,34 +104,34 @@ impl StepKind for Prompt {
         }
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.timeout);
         if self.message.trim().is_empty() {
             walk.refuse("a prompt must say what it asks for".into());
         }
-        // Somebody who stands beside the rig answers within half a minute.
+        // An operator beside the rig answers within half a minute.
         walk.unknown(self.timeout.0.min(30.0), self.timeout.0)
     }
 }
 
 /// A question that waits for its answer.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Asking {
+pub(crate) struct PromptRun {
     plan: Prompt,
     deadline: Nanos,
 }
 
 impl Executable for Prompt {
-    type Run = Asking;
+    type Run = PromptRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Asking, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<PromptRun, String> {
         cx.record(Record::Prompted { message: self.message.clone(), timeout: self.timeout });
-        Ok(Asking { plan: self.clone(), deadline: cx.now + Nanos::from_seconds(self.timeout) })
+        Ok(PromptRun { plan: self.clone(), deadline: cx.now + Nanos::from_seconds(self.timeout) })
     }
 }
 
-impl InProgress for Asking {
-    /// Time passes without an answer. A pause stops this clock; it begins anew when the run goes on.
+impl RunningStep for PromptRun {
+    /// A pause stops the clock of the timeout, which starts again when the run goes on.
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
         let timeout = self.plan.timeout;
         if cx.is_extended() {
@@ -166,7 +156,7 @@ impl InProgress for Asking {
             return Some(Progress::Stop("the operator declined what the plan asked for".into()));
         }
         if matches!(self.plan.hand, Some(HandAction::Mount { .. })) {
-            // What was known of the tissue was known of another specimen.
+            // The contact position was that of another specimen.
             cx.set_contact(None);
         }
         cx.by_hand(self.plan.hand);
@@ -180,7 +170,7 @@ impl State {
     /// The prompt that waits for an answer, and until when.
     pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
         match self.active() {
-            Some(table::Active::Prompt(asking)) => Some((&asking.plan, asking.deadline)),
+            Some(table::ActiveStep::Prompt(asking)) => Some((&asking.plan, asking.deadline)),
             _ => None,
         }
     }

@@ -1,24 +1,15 @@
 //! Indent to a depth at constant speed.
 
-use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, MeterSample, Moving, Need, Pausing, StepKind};
-use crate::engine::Context;
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::Phase;
-use palpate_model::units::{Depth, MmPerS};
-use serde::{Deserialize, Serialize};
+use super::prelude::*;
 
-/// Indent to a depth at constant speed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ramp {
-    /// Indentation speed.
     pub speed: MmPerS,
     /// Depth from contact.
     pub depth: Depth,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Indent to a depth at constant speed.",
     keys: &[
         Key::needed("speed", Kind::Speed, "of the indentation"),
@@ -30,7 +21,7 @@ pub(super) const FACTS: Facts = Facts {
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
-    ..Facts::of("ramp", Phase::Ramp, Pausing::Measure(INTERRUPTED))
+    ..StepFacts::of("ramp", Phase::Ramp, PauseBehaviour::Measure(INTERRUPTED))
 };
 
 /// Why an indentation does not go on after a pause.
@@ -41,7 +32,7 @@ impl StepKind for Ramp {
         Some(self.depth)
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_speed(self.speed);
         walk.check_depth(self.depth);
         walk.go(self.depth, self.speed)
@@ -51,18 +42,17 @@ impl StepKind for Ramp {
         sample.is_between(begun, self.depth.0, way(self.speed.0))
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.speed(self.speed);
         done.depth(self.depth, self.speed);
     }
 }
 
 impl Executable for Ramp {
-    type Run = Moving;
+    type Run = MoveRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<MoveRun, String> {
         let target = cx.position_of(self.depth)?;
-        cx.move_to(target, self.speed)?;
-        Ok(Moving)
+        cx.move_to(target, self.speed).map(|()| MoveRun)
     }
 }

@@ -1,48 +1,39 @@
 //! Self-test: the stop command is acknowledged, samples arrive at their rate, the signal at rest
 //! is alive, quiet and unloaded, the motor is energised.
 
+use super::prelude::*;
 use super::stats::RunningStats;
-use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
-use crate::engine::Context;
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::{AxisStatus, Phase, Reading};
-use palpate_model::units::{Newtons, Seconds, Volts};
-use serde::{Deserialize, Serialize};
+use palpate_model::rig::AxisStatus;
 
 /// Check link, stop command, sample rate and signal at rest; energise the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SelfTest {
-    /// How long the signal is watched.
     pub duration: Seconds,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
     keys: &[Key::usual("for", Kind::Time, "0.5 s", "how long the signal is watched")],
-    build: Some(|args| {
-        let duration = args.seconds("for")?;
-        Ok(SelfTest { duration }.into())
-    }),
+    build: Some(|args| Ok(SelfTest { duration: args.seconds("for")? }.into())),
     may_touch: false,
     label: "self-test",
     gives: &[Need::Motor],
-    ..Facts::of("self-test", Phase::SelfTest, Pausing::Complete)
+    ..StepFacts::of("self-test", Phase::SelfTest, PauseBehaviour::Complete)
 };
 
 impl StepKind for SelfTest {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.duration);
-        Span(self.duration.0, self.duration.0, false)
+        DurationEstimate(self.duration.0, self.duration.0, false)
     }
 }
 
 impl Executable for SelfTest {
-    type Run = Testing;
+    type Run = SelfTestRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Testing, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<SelfTestRun, String> {
         cx.energise();
-        Ok(Testing {
+        Ok(SelfTestRun {
             until_tick: cx.tick_after(self.duration),
             first_tick: cx.tick(),
             volts: RunningStats::default(),
@@ -50,9 +41,8 @@ impl Executable for SelfTest {
     }
 }
 
-/// A self-test in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Testing {
+pub(crate) struct SelfTestRun {
     until_tick: u64,
     first_tick: u64,
     volts: RunningStats,
@@ -65,7 +55,7 @@ const UNLOADED_MAX: Newtons = Newtons(0.5);
 /// Noise above this multiple of what the rig should show is a loose wire or a wrong range.
 const NOISE_FACTOR_MAX: f64 = 5.0;
 
-impl InProgress for Testing {
+impl RunningStep for SelfTestRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         self.volts.push(reading.volts.0);
         if reading.tick < self.until_tick || !cx.is_acknowledged() {
@@ -77,7 +67,7 @@ impl InProgress for Testing {
     }
 }
 
-impl Testing {
+impl SelfTestRun {
     fn judge(&self, cx: &Context<'_>, tick: u64) -> Result<(), String> {
         let rig = cx.rig();
         let ticks = (tick - self.first_tick) as f64;

@@ -1,13 +1,8 @@
 //! A sine from where the probe stands to deeper and back, beginning and ending at rest.
 
-use super::known::FROM_SURFACE;
-use super::{Done, Executable, FORCE_FLOOR, Facts, Moving, Need, Pausing, StepKind};
-use crate::engine::Context;
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::{Oscillation, Phase, RigDescription};
-use palpate_model::units::{Depth, Seconds};
-use serde::{Deserialize, Serialize};
+use super::FORCE_FLOOR;
+use super::prelude::*;
+use palpate_model::rig::{Oscillation, RigDescription};
 
 /// A sine from where the probe stands to deeper and back, beginning and ending at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,15 +11,14 @@ pub struct Sine {
     pub amplitude_mm: f64,
     /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// Whole cycles.
     pub cycles: u32,
 }
 
-pub(super) const FACTS: Facts = Facts {
-    about: "Swing from where the probe stands to deeper and back, beginning and ending at rest.",
+pub(super) const FACTS: StepFacts = StepFacts {
+    about: "Oscillate from the present depth to deeper and back; begins and ends at rest.",
     keys: &[
-        Key::needed("amplitude", Kind::Length, "half of the way between the turning points"),
-        Key::needed("frequency", Kind::Frequency, "of the swing"),
+        Key::needed("amplitude", Kind::Length, "half of the distance between the turning points"),
+        Key::needed("frequency", Kind::Frequency, "of the oscillation"),
         Key::needed("cycles", Kind::Count, "whole cycles"),
     ],
     build: Some(|args| {
@@ -38,10 +32,10 @@ pub(super) const FACTS: Facts = Facts {
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
-    ..Facts::of(
+    ..StepFacts::of(
         "sine",
         Phase::Sine,
-        Pausing::Measure("an interrupted oscillation is another experiment"),
+        PauseBehaviour::Measure("an interrupted oscillation is another experiment"),
     )
 };
 
@@ -52,7 +46,7 @@ const MEAN_SHARE: f64 = 0.02;
 const MEAN_SAMPLES_MAX: f64 = 1000.0;
 
 impl Sine {
-    /// What a rig is told: whole pulses and whole ticks.
+    /// In whole pulses and whole ticks, as a rig takes it.
     pub fn command(&self, rig: &RigDescription) -> Oscillation {
         Oscillation {
             amplitude_pulses: (self.amplitude_mm / rig.mm_per_pulse).round() as i64,
@@ -64,14 +58,14 @@ impl Sine {
 }
 
 impl StepKind for Sine {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(Seconds(f64::from(self.cycles) / self.frequency_hz));
         walk.check_sizes(&[self.amplitude_mm]);
         if self.cycles == 0 || self.amplitude_mm <= 0.0 {
             walk.refuse("a sine needs a cycle and an amplitude above 0 mm".into());
         }
         if walk.is_refused() {
-            return Span(0.0, 0.0, true);
+            return DurationEstimate(0.0, 0.0, true);
         }
         let command = self.command(walk.rig);
         if let Err(reason) = walk.rig.check_oscillation(&command) {
@@ -82,14 +76,14 @@ impl StepKind for Sine {
         let from = Depth(walk.expected.depth());
         if walk.expected.oscillate(walk.phase, self).0 <= 0.0 {
             walk.note(format!(
-                "tissue like that of the source presses too little at {from:.1} for a swing of {} mm either way: the force would come back to zero and the probe lose the tissue; go deeper or swing less",
+                "the expected tissue exerts too little force at {from:.1} for an amplitude of {} mm: the force would fall to zero and the probe would lose contact; go deeper or reduce the amplitude",
                 self.amplitude_mm
             ));
         }
         // The rig counts whole ticks of each period.
         let ticks = u64::from(command.cycles) * u64::from(command.period_ticks);
         let secs = walk.secs(ticks + walk.answer_ticks());
-        Span(secs, secs, walk.is_answer_exact())
+        DurationEstimate(secs, secs, walk.is_answer_exact())
     }
 
     fn force_mean_samples(&self, rig: &RigDescription) -> Option<usize> {
@@ -97,25 +91,24 @@ impl StepKind for Sine {
         Some(samples.min(MEAN_SAMPLES_MAX) as usize)
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.amplitude(self.amplitude_mm);
         done.frequency(self.frequency_hz, self.cycles);
     }
 
-    fn doubt(&self, done: &Done<'_>) -> Option<String> {
+    fn doubt(&self, done: &StepResult<'_>) -> Option<String> {
         let lowest = done.lowest_force().filter(|lowest| *lowest <= FORCE_FLOOR)?;
         Some(format!(
-            "the force came back to {lowest:.3} N, where nothing tells contact from none (below {FORCE_FLOOR} N): the probe may have lost the tissue; go deeper or swing less"
+            "the force fell to {lowest:.3} N, and below {FORCE_FLOOR} N contact is uncertain: the probe may have lost the tissue; go deeper or reduce the amplitude"
         ))
     }
 }
 
 impl Executable for Sine {
-    type Run = Moving;
+    type Run = MoveRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<MoveRun, String> {
         let command = self.command(cx.rig());
-        cx.oscillate(command)?;
-        Ok(Moving)
+        cx.oscillate(command).map(|()| MoveRun)
     }
 }

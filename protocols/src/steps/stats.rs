@@ -53,14 +53,18 @@ impl RunningLine {
         self.yy += dy * (y - self.y);
     }
 
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
     /// Slope and its standard error under white noise; `None` below three points or without spread.
     pub fn slope(&self) -> Option<(f64, f64)> {
         if self.count < 3 || self.xx <= 0.0 {
             return None;
         }
         let slope = self.xy / self.xx;
-        let left = (self.yy - slope * self.xy).max(0.0);
-        Some((slope, (left / (self.count - 2) as f64 / self.xx).sqrt()))
+        let residual = (self.yy - slope * self.xy).max(0.0);
+        Some((slope, (residual / (self.count - 2) as f64 / self.xx).sqrt()))
     }
 }
 
@@ -69,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn agrees_with_the_two_pass_formula() {
+    fn running_deviation_agrees_with_the_two_pass_formula() {
         let values = [1.28, 1.281, 1.279, 1.2805, 1.2795];
         let mut stats = RunningStats::default();
         values.iter().for_each(|&value| stats.push(value));
@@ -81,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_the_one_of_the_textbook() {
+    fn running_line_agrees_with_the_textbook() {
         let mut line = RunningLine::default();
         let points = [(0.0, 1.1), (1.0, 2.9), (2.0, 5.2), (3.0, 6.8)];
         points.iter().for_each(|&(x, y)| line.push(1e6 + x, y));

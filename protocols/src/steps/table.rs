@@ -1,7 +1,7 @@
 //! The steps there are. A line here and a `mod` line in the folder's head make a file of a step known to the engine,
 //! the language, the preview and the fidelity.
 
-use super::{Executable, Facts, InProgress, OfKind, StepKind};
+use super::{Executable, HasFacts, RunningStep, StepFacts, StepKind};
 use crate::engine::Context;
 use serde::{Deserialize, Serialize};
 
@@ -9,14 +9,12 @@ macro_rules! steps {
     ($($module:ident::$name:ident)*) => {
         $(pub use super::$module::*;)*
 
-        /// One step of a plan.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "step", rename_all = "kebab-case")]
-        #[expect(missing_docs, reason = "each is explained at its own data")]
         pub enum Step { $($name($name)),* }
 
-        $(impl OfKind for $name {
-            fn facts(&self) -> &'static Facts { &super::$module::FACTS }
+        $(impl HasFacts for $name {
+            fn facts(&self) -> &'static StepFacts { &super::$module::FACTS }
         })*
 
         $(impl From<$name> for Step {
@@ -25,10 +23,9 @@ macro_rules! steps {
 
         /// A step in progress, holding only its own data.
         #[derive(Clone, Debug, PartialEq)]
-        pub(crate) enum Active { $($name(<$name as Executable>::Run)),* }
+        pub(crate) enum ActiveStep { $($name(<$name as Executable>::Run)),* }
 
-        /// What is the same for every step, of all kinds.
-        pub(crate) const KINDS: &[&Facts] = &[$(&super::$module::FACTS),*];
+        pub(crate) const KINDS: &[&StepFacts] = &[$(&super::$module::FACTS),*];
 
         impl Step {
             pub(crate) fn kind(&self) -> &dyn StepKind {
@@ -39,13 +36,13 @@ macro_rules! steps {
                 match self { $(Self::$name(step) => step.is_done_already(cx)),* }
             }
 
-            pub(crate) fn begin(&self, cx: &mut Context<'_>) -> Result<Active, String> {
-                Ok(match self { $(Self::$name(step) => Active::$name(step.begin(cx)?)),* })
+            pub(crate) fn begin(&self, cx: &mut Context<'_>) -> Result<ActiveStep, String> {
+                Ok(match self { $(Self::$name(step) => ActiveStep::$name(step.begin(cx)?)),* })
             }
         }
 
-        impl Active {
-            pub(crate) fn in_progress(&mut self) -> &mut dyn InProgress {
+        impl ActiveStep {
+            pub(crate) fn in_progress(&mut self) -> &mut dyn RunningStep {
                 match self { $(Self::$name(run) => run),* }
             }
         }

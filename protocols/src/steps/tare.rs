@@ -1,55 +1,46 @@
 //! Tare: the unloaded signal and its noise, averaged over whole mains cycles.
 
+use super::prelude::*;
 use super::self_test::check_unloaded;
 use super::stats::{RunningLine, RunningStats};
-use super::{Executable, Facts, InProgress, Need, Pausing, Progress, StepKind};
-use crate::engine::{Context, Drift, Record, UnloadedSignal};
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::units::{Seconds, Volts};
-use serde::{Deserialize, Serialize};
+use crate::engine::{Drift, UnloadedSignal};
 
-/// Average the unloaded signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tare {
     /// Whole mains cycles: a whole second is 50 or 60 of them.
     pub duration: Seconds,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Average the unloaded signal. The probe touches nothing.",
     keys: &[Key::usual(
         "for",
         Kind::Time,
         "4 s",
-        "whole mains cycles: whole seconds; from 2 s on the drift is told too",
+        "whole mains cycles: whole seconds; from 2 s on the drift is measured too",
     )],
-    build: Some(|args| {
-        let duration = args.seconds("for")?;
-        Ok(Tare { duration }.into())
-    }),
+    build: Some(|args| Ok(Tare { duration: args.seconds("for")? }.into())),
     needs: &[Need::Outside],
     gives: &[Need::Tare],
     may_touch: false,
     label: "tare",
-    ..Facts::of("tare", Phase::Tare, Pausing::Complete)
+    ..StepFacts::of("tare", Phase::Tare, PauseBehaviour::Complete)
 };
 
 impl StepKind for Tare {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.duration);
         walk.wait(self.duration)
     }
 }
 
 impl Executable for Tare {
-    type Run = Taring;
+    type Run = TareRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Taring, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<TareRun, String> {
         cx.set_unloaded(None);
         cx.forget_force_rate();
-        Ok(Taring {
+        Ok(TareRun {
             until_tick: cx.tick_after(self.duration),
             volts: RunningStats::default(),
             line: (self.duration >= DRIFT_SPAN_MIN).then(|| (cx.tick(), RunningLine::default())),
@@ -63,14 +54,14 @@ const DRIFT_SPAN_MIN: Seconds = Seconds(2.0);
 
 /// A tare in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Taring {
+pub(crate) struct TareRun {
     until_tick: u64,
     volts: RunningStats,
     /// Signal over time, where the tare is long enough to tell drift.
     line: Option<(u64, RunningLine)>,
 }
 
-impl InProgress for Taring {
+impl RunningStep for TareRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         self.volts.push(reading.volts.0);
         if let Some((start_tick, line)) = &mut self.line {

@@ -1,22 +1,22 @@
-//! What a finished step is held to: its targets, measured sample by sample from plain values.
+//! Targets of a finished step, measured sample by sample.
 
 use super::Step;
+use super::stats::RunningLine;
 use palpate_model::rig::{AxisStatus, RigDescription};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 
 /// Speeds and frequencies may be off by this share: a stepper keeps them to its crystal, so a hundredth is a fault.
 const RATE_SHARE: f64 = 0.01;
-/// A force may be off by this share of the target,
+/// Relative tolerance of a force,
 const FORCE_SHARE: f64 = 0.05;
-/// and by this much in N in any case: what the mean of ten samples of a noisy cell hides.
+/// and its least tolerance in N: the noise of a mean of ten samples of a noisy cell.
 pub(crate) const FORCE_FLOOR: f64 = 0.05;
 /// A duration may be off by so many seconds beside a sample at each end: the answer of the axis.
 const ANSWER_SECS: f64 = 0.003;
 /// Fewer milliseconds of cruise tell no speed: the pulses are too coarse.
 const CRUISE_MS_MIN: u64 = 20;
 
-/// One sample as it was recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeterSample {
     pub tick: u64,
@@ -35,55 +35,23 @@ impl MeterSample {
     }
 }
 
-/// One target, and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
+pub struct StepTarget {
     pub quantity: &'static str,
     pub unit: &'static str,
     pub target: f64,
     pub achieved: f64,
-    /// Largest difference that is no fault.
+    /// Tolerance, in the unit.
     pub allowed: f64,
 }
 
-/// Least-squares slope, sums taken from the first point so that long times lose no digits.
-#[derive(Clone, Copy, Debug, Default)]
-struct Slope {
-    first: Option<(f64, f64)>,
-    n: u64,
-    t: f64,
-    x: f64,
-    tt: f64,
-    tx: f64,
-}
-
-impl Slope {
-    fn push(&mut self, t: f64, x: f64) {
-        let (t0, x0) = *self.first.get_or_insert((t, x));
-        let (t, x) = (t - t0, x - x0);
-        self.n += 1;
-        self.t += t;
-        self.x += x;
-        self.tt += t * t;
-        self.tx += t * x;
-    }
-
-    /// The slope, once there are so many points.
-    fn slope(&self, least: u64) -> Option<f64> {
-        let n = self.n as f64;
-        let below = n * self.tt - self.t * self.t;
-        (self.n >= least && below > 0.0).then(|| (n * self.tx - self.t * self.x) / below)
-    }
-}
-
-/// Follows a step while it runs.
 #[derive(Clone, Debug)]
 pub struct StepMeter {
     step: Step,
     rig: RigDescription,
     first: Option<MeterSample>,
-    by_path: Slope,
-    by_pulses: Slope,
+    by_path: RunningLine,
+    by_pulses: RunningLine,
     depth: [f64; 2],
     moving: Option<[u64; 2]>,
     force_reached: Option<Newtons>,
@@ -101,8 +69,8 @@ impl StepMeter {
             step: step.clone(),
             rig: rig.clone(),
             first: None,
-            by_path: Slope::default(),
-            by_pulses: Slope::default(),
+            by_path: RunningLine::default(),
+            by_pulses: RunningLine::default(),
             depth: [f64::INFINITY, f64::NEG_INFINITY],
             moving: None,
             force_reached: None,
@@ -115,11 +83,11 @@ impl StepMeter {
         self.force_reached = Some(force);
     }
 
-    pub fn has_no_duration(&mut self) {
+    pub fn ignore_duration(&mut self) {
         self.has_duration = false;
     }
 
-    pub fn sample(&mut self, sample: &MeterSample) {
+    pub fn push(&mut self, sample: &MeterSample) {
         let first = *self.first.get_or_insert(*sample);
         let t = self.since(&first, sample);
         if sample.status.has(AxisStatus::MOVING) {
@@ -164,10 +132,10 @@ impl StepMeter {
 
     /// The step is done; `last` is the last sample before the next one began. Its targets, and what speaks against it
     /// although every one may be met.
-    pub fn finish(&self, last: &MeterSample) -> Option<(Vec<Target>, Option<String>)> {
+    pub fn finish(&self, last: &MeterSample) -> Option<(Vec<StepTarget>, Option<String>)> {
         let first = self.first?;
         let sample_secs = self.rig.tick().0 * self.rig.ticks_per_sample.max(1.0);
-        let mut done = Done {
+        let mut done = StepResult {
             rig: &self.rig,
             meter: self,
             sample_secs,
@@ -182,17 +150,17 @@ impl StepMeter {
 }
 
 /// What was done in a step, to hold it against its targets.
-pub(crate) struct Done<'a> {
+pub(crate) struct StepResult<'a> {
     pub rig: &'a RigDescription,
     meter: &'a StepMeter,
     /// From sample to sample, in s.
     sample_secs: f64,
     took: f64,
     end_depth: Option<f64>,
-    targets: Vec<Target>,
+    targets: Vec<StepTarget>,
 }
 
-impl Done<'_> {
+impl StepResult<'_> {
     fn add(
         &mut self,
         (quantity, unit): (&'static str, &'static str),
@@ -200,7 +168,7 @@ impl Done<'_> {
         achieved: Option<f64>,
         allowed: f64,
     ) {
-        self.targets.extend(achieved.map(|achieved| Target {
+        self.targets.extend(achieved.map(|achieved| StepTarget {
             quantity,
             unit,
             target,
@@ -212,8 +180,9 @@ impl Done<'_> {
     pub fn speed(&mut self, MmPerS(target): MmPerS) {
         let cruise = CRUISE_MS_MIN * u64::from(self.rig.samples_per_ms());
         let meter = self.meter;
-        for (name, slope) in [("speed", &meter.by_path), ("speed by pulses", &meter.by_pulses)] {
-            let achieved = slope.slope(cruise).map(f64::abs);
+        for (name, line) in [("speed", &meter.by_path), ("speed by pulses", &meter.by_pulses)] {
+            let slope = line.slope().filter(|_| line.count() >= cruise);
+            let achieved = slope.map(|(slope, _)| slope.abs());
             self.add((name, "mm/s"), target, achieved, RATE_SHARE * target);
         }
     }
@@ -252,7 +221,6 @@ impl Done<'_> {
         self.add(("frequency", "Hz"), target, achieved, RATE_SHARE * target);
     }
 
-    /// The force at which the probe stopped.
     pub fn force_reached(&self) -> Option<Newtons> {
         self.meter.force_reached
     }
@@ -273,7 +241,7 @@ impl Done<'_> {
 pub(super) fn doubt_force(force: Newtons) -> Option<String> {
     (force.0 <= FORCE_FLOOR).then(|| {
         format!(
-            "a force of {:.4} N is no more than a force may be off, {FORCE_FLOOR} N, so nothing tells whether it was met",
+            "a force of {:.4} N is within the tolerance of {FORCE_FLOOR} N, so nothing shows whether it was reached",
             force.0
         )
     })

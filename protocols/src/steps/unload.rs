@@ -1,27 +1,18 @@
-//! Come back to the surface at constant speed, as carefully recorded as the way in.
+//! Unload to the surface at constant speed, recorded as the loading is.
 
-use super::known::FROM_SURFACE;
-use super::{Done, Executable, Facts, MeterSample, Moving, Need, Pausing, StepKind};
-use crate::engine::Context;
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
-use palpate_model::rig::Phase;
-use palpate_model::units::{Depth, MmPerS};
-use serde::{Deserialize, Serialize};
+use super::prelude::*;
 
-/// Come back to the surface at constant speed, as carefully recorded as the way in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unload {
-    /// Speed of the way back.
     pub speed: MmPerS,
-    /// Distance from contact to stop at, in mm: where the force is surely gone.
+    /// Distance from contact in mm, where the force is zero with certainty.
     pub clearance_mm: f64,
 }
 
-pub(super) const FACTS: Facts = Facts {
-    about: "Come back to the surface at constant speed, recorded like the way in.",
+pub(super) const FACTS: StepFacts = StepFacts {
+    about: "Unload to the surface at constant speed, recorded like the loading.",
     keys: &[
-        Key::needed("speed", Kind::Speed, "of the way back"),
+        Key::needed("speed", Kind::Speed, "of the unloading"),
         Key::usual("clearance", Kind::Length, "0.5 mm", "distance from the surface to stop at")
             .zero_allowed(),
     ],
@@ -32,15 +23,15 @@ pub(super) const FACTS: Facts = Facts {
     gives: &[Need::Outside],
     may_touch: false,
     is_measuring: true,
-    ..Facts::of(
+    ..StepFacts::of(
         "unload",
         Phase::Unload,
-        Pausing::Measure("an interrupted unloading is another experiment"),
+        PauseBehaviour::Measure("an interrupted unloading is another experiment"),
     )
 };
 
 impl StepKind for Unload {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_sizes(&[self.clearance_mm]);
         walk.check_speed(self.speed);
         walk.leave(self.clearance_mm, self.speed)
@@ -50,17 +41,16 @@ impl StepKind for Unload {
         sample.is_between(begun, -self.clearance_mm, way(self.speed.0))
     }
 
-    fn judge(&self, done: &mut Done<'_>) {
+    fn judge(&self, done: &mut StepResult<'_>) {
         done.speed(self.speed);
         done.depth(Depth(-self.clearance_mm), self.speed);
     }
 }
 
 impl Executable for Unload {
-    type Run = Moving;
+    type Run = MoveRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
-        cx.leave(self.clearance_mm, self.speed)?;
-        Ok(Moving)
+    fn begin(&self, cx: &mut Context<'_>) -> Result<MoveRun, String> {
+        cx.leave(self.clearance_mm, self.speed).map(|()| MoveRun)
     }
 }

@@ -1,40 +1,30 @@
 //! Wait at rest for something outside the run: a digital input of the rig, or the temperature of the specimen's bath.
 
-use super::{Executable, Facts, InProgress, OnTimeout, Pausing, Progress, Step, StepKind};
-use crate::engine::{Context, Record};
-use crate::file::{Args, Key, Kind};
-use crate::preview::{Span, Walk};
+use super::OnTimeout;
+use super::prelude::*;
 use palpate_model::Nanos;
-use palpate_model::rig::{DIGITAL_INPUTS_MAX, Phase, Reading};
-use palpate_model::units::Seconds;
-use serde::{Deserialize, Serialize};
+use palpate_model::rig::DIGITAL_INPUTS_MAX;
 use std::collections::BTreeMap;
 use std::fmt;
 
 /// Wait at rest until a digital input or the bath is as wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WaitUntil {
-    /// What for.
     pub condition: WaitCondition,
     /// How long, at most.
     pub timeout: Seconds,
-    /// What follows if it does not come.
     #[serde(default)]
     pub on_timeout: OnTimeout,
 }
 
-/// What is waited for.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum WaitCondition {
-    /// A digital input has a level.
     DigitalInput {
         /// Its number, from 1.
         number: u8,
-        /// The level.
         is_high: bool,
     },
-    /// The bath is within a band.
     Bath {
         /// Lower end in °C.
         from_celsius: f64,
@@ -43,7 +33,7 @@ pub enum WaitCondition {
     },
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Wait at rest until a digital input of the rig has a level, or its bath a temperature.",
     keys: &[
         Key::optional("input", Kind::Count, "number of the digital input, from 1"),
@@ -71,7 +61,7 @@ pub(super) const FACTS: Facts = Facts {
     ],
     build: Some(read),
     may_touch: false,
-    ..Facts::of("wait-until", Phase::Rest, Pausing::Wait)
+    ..StepFacts::of("wait-until", Phase::Rest, PauseBehaviour::Wait)
 };
 
 fn read(args: &Args) -> Result<Step, String> {
@@ -112,7 +102,6 @@ impl WaitCondition {
         }
     }
 
-    /// Whether it is so; an unknown value is not.
     fn is_met(&self, cx: &Context<'_>) -> bool {
         let sensors = cx.sensors();
         match *self {
@@ -139,7 +128,7 @@ impl fmt::Display for WaitCondition {
 }
 
 impl StepKind for WaitUntil {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.timeout);
         walk.refusals.extend(self.condition.check().err());
         let sensors = walk.rig.sensors;
@@ -149,20 +138,20 @@ impl StepKind for WaitUntil {
         };
         if !is_there {
             walk.refuse(format!(
-                "rig {} cannot tell whether {}: it has no such sensor",
+                "rig {} has no sensor that shows whether {}",
                 walk.rig.name, self.condition
             ));
         }
-        // Nobody knows when it comes; a plan that continues without it takes as long as it may.
+        // The time of the event is unknown; a plan that continues without it takes as long as it may.
         walk.unknown(self.timeout.0, self.timeout.0)
     }
 }
 
 impl Executable for WaitUntil {
-    type Run = Waiting;
+    type Run = WaitRun;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Waiting, String> {
-        Ok(Waiting {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<WaitRun, String> {
+        Ok(WaitRun {
             plan: *self,
             begun: cx.now,
             deadline: cx.now + Nanos::from_seconds(self.timeout),
@@ -170,16 +159,15 @@ impl Executable for WaitUntil {
     }
 }
 
-/// A wait in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Waiting {
+pub(crate) struct WaitRun {
     plan: WaitUntil,
     begun: Nanos,
     deadline: Nanos,
 }
 
-impl InProgress for Waiting {
-    /// A pause stops the clock of the timeout; it begins anew when the run goes on.
+impl RunningStep for WaitRun {
+    /// A pause stops the clock of the timeout, which starts again when the run goes on.
     fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
         let WaitUntil { condition, timeout, on_timeout } = self.plan;
         if cx.is_extended() {
@@ -204,7 +192,7 @@ impl InProgress for Waiting {
     }
 }
 
-impl Waiting {
+impl WaitRun {
     fn report(&self, cx: &mut Context<'_>, text: String) {
         let waited = cx.now.since(self.begun).seconds();
         let mut values = BTreeMap::from([("waited_s".to_owned(), waited.0)]);

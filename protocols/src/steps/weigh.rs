@@ -1,40 +1,32 @@
 //! One reading of a calibration: the signal under a known mass, once it has come to rest.
 
-use super::{Executable, Facts, InProgress, Known, Pausing, Progress, Step, StepKind, table};
-use crate::engine::{Context, Record, State};
-use crate::file::{Key, Kind};
-use crate::preview::{Span, Walk};
+use super::prelude::*;
+use super::table;
+use crate::engine::State;
 use palpate_model::calibration::{Settle as Settled, SettleRule, Settling, SettlingNow};
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::units::{Seconds, Volts};
-use serde::{Deserialize, Serialize};
 
 /// Read the load cell under a known mass: one reading of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Weigh {
     /// Mass on the cell in g, the platform included.
     pub mass_g: f64,
-    /// Whether the masses go up or down.
     pub is_loading: bool,
     /// Which pass through the masses, from 1.
     pub repeat: u32,
-    /// When the signal counts as settled.
     pub settle: Settle,
 }
 
-/// When a signal counts as settled.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settle {
     /// Length of the window that is looked at and averaged.
     pub window: Seconds,
-    /// Longest wait.
     pub timeout: Seconds,
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Read the load cell under a known mass, once the signal has settled.",
     keys: &[
-        Key::needed("mass", Kind::Mass, "all of it, the platform included").zero_allowed(),
+        Key::needed("mass", Kind::Mass, "total mass, the platform included").zero_allowed(),
         Key::usual(
             "masses_go",
             Kind::Text,
@@ -56,17 +48,17 @@ pub(super) const FACTS: Facts = Facts {
         .into())
     }),
     may_touch: false,
-    ..Facts::of("weigh", Phase::Weigh, Pausing::Complete)
+    ..StepFacts::of("weigh", Phase::Weigh, PauseBehaviour::Complete)
 };
 
 impl StepKind for Weigh {
-    fn warning(&self, known: &Known) -> Option<&'static str> {
+    fn warning(&self, known: &Preconditions) -> Option<&'static str> {
         known.motor.then_some(
             "'weigh' with the motor on ends at the force limit of the rig; leave { do = \"self-test\" } out of a protocol that only weighs",
         )
     }
 
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.settle.window);
         walk.check_span(self.settle.timeout);
         let (window, timeout) = (self.settle.window.0, self.settle.timeout.0);
@@ -74,18 +66,17 @@ impl StepKind for Weigh {
     }
 }
 
-/// A reading in progress.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Weighing {
+pub(crate) struct WeighRun {
     plan: Weigh,
     settling: Settling,
     newest_tick: Option<u64>,
 }
 
 impl Executable for Weigh {
-    type Run = Box<Weighing>;
+    type Run = Box<WeighRun>;
 
-    fn begin(&self, cx: &mut Context<'_>) -> Result<Box<Weighing>, String> {
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Box<WeighRun>, String> {
         let rig = cx.rig();
         let rule = SettleRule {
             window: self.settle.window,
@@ -94,7 +85,7 @@ impl Executable for Weigh {
         };
         // A weight was laid on or taken off: forces before and after do not compare.
         cx.forget_force_rate();
-        Ok(Box::new(Weighing {
+        Ok(Box::new(WeighRun {
             plan: self.clone(),
             settling: Settling::new(rule),
             newest_tick: None,
@@ -102,7 +93,7 @@ impl Executable for Weigh {
     }
 }
 
-impl InProgress for Weighing {
+impl RunningStep for WeighRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         // A controller that restarted counts from zero again.
         let ticks = self.newest_tick.map_or(1, |newest| reading.tick.saturating_sub(newest));
@@ -133,7 +124,7 @@ impl State {
     /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
     pub fn settling(&self) -> Option<SettlingNow> {
         match self.active() {
-            Some(table::Active::Weigh(weighing)) => Some(weighing.settling.now()),
+            Some(table::ActiveStep::Weigh(weighing)) => Some(weighing.settling.now()),
             _ => None,
         }
     }
@@ -151,8 +142,10 @@ impl State {
         let is_weigh = |index: usize| matches!(steps[index].step, Step::Weigh(_));
         let is_prompt = |index: usize| matches!(steps[index].step, Step::Prompt(_));
         match self.active() {
-            Some(table::Active::Weigh(_)) if at >= 1 && is_prompt(at - 1) => Ok(at - 1),
-            Some(table::Active::Prompt(_)) if at >= 2 && is_weigh(at - 1) && is_prompt(at - 2) => {
+            Some(table::ActiveStep::Weigh(_)) if at >= 1 && is_prompt(at - 1) => Ok(at - 1),
+            Some(table::ActiveStep::Prompt(_))
+                if at >= 2 && is_weigh(at - 1) && is_prompt(at - 2) =>
+            {
                 Ok(at - 2)
             }
             _ => Err("no weight was read just before"),

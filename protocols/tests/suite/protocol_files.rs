@@ -1,4 +1,4 @@
-//! Protocols as files: the built-in ones, typical mistakes, and texts that nobody meant.
+//! Protocols as files: the built-in ones, typical mistakes, and random texts.
 
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
@@ -66,7 +66,7 @@ fn every_built_in_protocol_is_named_like_its_file_and_runs_on_the_simulated_rig(
 }
 
 #[test]
-fn the_ramp_and_hold_is_the_plan_it_was() {
+fn ramp_hold_protocol_gives_the_ramp_hold_plan() {
     let until = HoldUntil::new(BodyParameter::TauEps, 0.01);
     let cases = [
         (RampHold::default(), vec![]),
@@ -246,7 +246,7 @@ fn spoilt(text: &str, other: &str, random: &mut Random) -> String {
 }
 
 #[test]
-fn no_text_makes_it_panic_and_every_problem_has_its_line() {
+fn random_texts_never_panic_and_every_problem_has_its_line() {
     let (rig, limits, calibration) = bench();
     let curve = calibration.curve().unwrap();
     let mut random = Random(5);
@@ -301,7 +301,7 @@ fn a_protocol_cannot_be_made_endless() {
 }
 
 #[test]
-fn the_page_has_the_reference_of_the_program() {
+fn docs_page_ends_with_the_printed_reference() {
     let page = fs::read_to_string(workspace().join("docs/protocols.md")).unwrap();
     assert!(
         page.ends_with(&reference()),

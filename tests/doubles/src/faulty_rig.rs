@@ -17,7 +17,7 @@ const REFUSAL_DELAY: Nanos = Nanos(2_000_000);
 
 /// What happens at a set time whether or not the rig inside reports anything.
 #[derive(Clone, Debug)]
-enum Timed {
+enum TimedFault {
     Disconnect,
     Reset { is_announced: bool },
     Refusal,
@@ -33,7 +33,7 @@ pub struct FaultyRig<R> {
     script: Vec<ScriptedFault>,
     noise: Random,
     /// In order of time.
-    timed: VecDeque<(Nanos, Timed)>,
+    timed: VecDeque<(Nanos, TimedFault)>,
     /// Reports on their way to the caller, in order of time.
     reports: VecDeque<RigEvent>,
     /// Arrival of the newest report put on its way.
@@ -50,7 +50,6 @@ pub struct FaultyRig<R> {
     unanswered: VecDeque<Sender>,
 }
 
-/// Who sent a command to the rig inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sender {
     Caller,
@@ -58,7 +57,6 @@ enum Sender {
     Double,
 }
 
-/// A controller that began again.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reset {
     /// Tick of the first reading since, once it has come.
@@ -70,13 +68,13 @@ impl<R: Rig> FaultyRig<R> {
     /// `inner` with the faults of `script`; `seed` is that of added noise.
     #[must_use]
     pub fn new(inner: R, script: Vec<ScriptedFault>, seed: u64) -> Self {
-        let mut timed: Vec<(Nanos, Timed)> = script
+        let mut timed: Vec<(Nanos, TimedFault)> = script
             .iter()
             .filter_map(|fault| {
                 let what = match fault.kind {
-                    FaultKind::Disconnect => Timed::Disconnect,
-                    FaultKind::Reset => Timed::Reset { is_announced: true },
-                    FaultKind::UnannouncedReset => Timed::Reset { is_announced: false },
+                    FaultKind::Disconnect => TimedFault::Disconnect,
+                    FaultKind::Reset => TimedFault::Reset { is_announced: true },
+                    FaultKind::UnannouncedReset => TimedFault::Reset { is_announced: false },
                     _ => return None,
                 };
                 Some((fault.at, what))
@@ -99,7 +97,6 @@ impl<R: Rig> FaultyRig<R> {
         }
     }
 
-    /// The rig inside, such as for its truth.
     pub fn inner(&self) -> &R {
         &self.inner
     }
@@ -117,7 +114,7 @@ impl<R: Rig> FaultyRig<R> {
         self.reports.push_back(RigEvent::new(at, body));
     }
 
-    fn schedule(&mut self, at: Nanos, what: Timed) {
+    fn schedule(&mut self, at: Nanos, what: TimedFault) {
         let place = self.timed.partition_point(|(earlier, _)| *earlier <= at);
         self.timed.insert(place, (at, what));
     }
@@ -128,17 +125,17 @@ impl<R: Rig> FaultyRig<R> {
     }
 
     /// What happens at its time, regardless of the rig inside.
-    fn on_timed(&mut self, at: Nanos, what: Timed) {
+    fn on_timed(&mut self, at: Nanos, what: TimedFault) {
         self.now = self.now.max(at);
         let fault = match what {
-            Timed::Disconnect => {
+            TimedFault::Disconnect => {
                 self.is_linked = false;
                 // Reports still on their way are lost with the link.
                 self.reports.clear();
                 self.newest = self.handed_out;
                 Fault::LinkLost { detail: "no answer, the other end has gone".to_owned() }
             }
-            Timed::Reset { is_announced } => {
+            TimedFault::Reset { is_announced } => {
                 self.reset = Some(Reset::default());
                 self.pass_on(RigCommand::Halt, Sender::Double);
                 self.pass_on(RigCommand::DefinePosition { pulses: 0 }, Sender::Double);
@@ -147,8 +144,8 @@ impl<R: Rig> FaultyRig<R> {
                 }
                 Fault::ControllerReset
             }
-            Timed::Refusal => {
-                Fault::CommandRefused { detail: "told to refuse by the test's script".to_owned() }
+            TimedFault::Refusal => {
+                Fault::CommandRefused { detail: "refused by the test's script".to_owned() }
             }
         };
         self.put(at, RigEventBody::Fault(fault));
@@ -281,7 +278,7 @@ impl<R: Rig> Rig for FaultyRig<R> {
             !reset.is_motor_enabled && is_motion
         });
         if is_motor_off || self.is_active(|kind| kind == FaultKind::RefuseCommands) {
-            self.schedule(self.now + REFUSAL_DELAY, Timed::Refusal);
+            self.schedule(self.now + REFUSAL_DELAY, TimedFault::Refusal);
             return;
         }
         if let (Some(reset), RigCommand::EnableMotor) = (&mut self.reset, command) {

@@ -1,4 +1,4 @@
-//! Faulty stand-ins for tests: they take a rig's commands and give its reports, and fail as told.
+//! Faulty stand-ins for tests: they take a rig's commands, give its reports and fail by script.
 //!
 //! For tests only: no program depends on this crate.
 

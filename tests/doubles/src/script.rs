@@ -1,4 +1,4 @@
-//! What a faulty stand-in is told to do wrong, and when.
+//! The script of a faulty stand-in: its faults and their times.
 
 use palpate_model::{Nanos, Volts};
 
@@ -18,7 +18,6 @@ pub enum FaultKind {
     Silent,
     /// Everything arrives later by this much, in order.
     Late(Nanos),
-    /// The signal is not a number.
     NotANumber,
     /// The signal stays as it was when the fault began.
     Stuck,
@@ -39,18 +38,15 @@ pub enum FaultKind {
     /// milliseconds, then clock and pulse counter begin at zero with the motor off until it is
     /// enabled again. [`palpate_model::rig::Fault::ControllerReset`] says so at once.
     Reset,
-    /// The same restart, told by nothing but the readings.
+    /// The same restart, visible in the readings only.
     UnannouncedReset,
 }
 
-/// A fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScriptedFault {
-    /// When it begins.
     pub at: Nanos,
     /// How long it lasts; `None` for good.
     pub lasts: Option<Nanos>,
-    /// What goes wrong.
     pub kind: FaultKind,
 }
 

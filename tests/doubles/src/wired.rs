@@ -1,11 +1,11 @@
-//! A rig as if on wires: it tells the bytes it exchanges.
+//! A rig as if on wires: it reports the bytes it exchanges.
 
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
 use std::sync::Arc;
 
-/// Any rig, whose commands and reports are told as bytes too: a line of text each, commands and answers with the
+/// Any rig, with its commands and reports as bytes too: a line of text each, commands and answers with the
 /// device `controller`, readings with the device `cell`.
 #[derive(Clone, Debug)]
 pub struct WiredRig<R> {
@@ -29,13 +29,11 @@ impl<R: Rig> WiredRig<R> {
         }
     }
 
-    /// The line that stands for a command.
     #[must_use]
     pub fn command_line(command: &RigCommand) -> String {
         format!("{command:?}\r")
     }
 
-    /// The line that stands for a report.
     #[must_use]
     pub fn report_line(body: &RigEventBody) -> String {
         match body {

@@ -1,51 +1,42 @@
-//! How well a run did what its plan said: speeds, depths, forces and durations against their targets,
-//! samples that are missing or came late, and what the time went to.
+//! How well a run met its plan: speeds, depths, forces and durations against their targets, missing and late samples, and
+//! the use of time.
 //!
-//! [`FidelityMeter`] takes samples and decisions one by one, so that a run is judged in the memory of a few
-//! numbers a step, while it goes on or from its log.
+//! [`FidelityMeter`] takes samples and decisions one by one and needs a few numbers a step, during the run or from its log.
 
-mod verdict;
+mod quality;
 
-pub use verdict::first_verdict;
+pub use quality::first_verdict;
 
 use palpate_model::rig::{AxisStatus, Phase, RigDescription};
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::Plan;
-use palpate_protocols::{MeterSample, StepMeter, Target};
+use palpate_protocols::{MeterSample, StepMeter, StepTarget};
 use palpate_sessions::record::Row;
 use serde::Serialize;
 
-/// A sample that comes so much later than the one before explains, in s, is late: two scheduler slices of a
-/// desktop host.
+/// A delay beyond this, in s, makes a sample late: two scheduler slices of a desktop host.
 pub const LATE_S: f64 = 0.020;
 
-/// One target of a step, and what became of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Achieved {
-    /// Index of the step in the plan.
     pub step_index: usize,
-    /// What the step does, as its phase is called.
     pub step: &'static str,
     /// Which repeat it belongs to; 0 where nothing is repeated.
     pub cycle: u32,
-    /// What was to be kept: `speed`, `speed by pulses`, `depth`, `force`, `duration`, `amplitude` or `frequency`.
+    /// `speed`, `speed by pulses`, `depth`, `force`, `duration`, `amplitude` or `frequency`.
     pub quantity: &'static str,
-    /// Its unit.
     pub unit: &'static str,
-    /// What was wanted.
     pub target: f64,
-    /// What was done.
     pub achieved: f64,
     /// The difference in percent of the target; `None` for a target of 0.
     pub error_percent: Option<f64>,
-    /// Largest difference that is no fault, in the unit.
+    /// Tolerance, in the unit.
     pub allowed: f64,
-    /// Whether the difference is within it.
     pub is_within: bool,
 }
 
 impl Achieved {
-    fn of(step_index: usize, step: &'static str, cycle: u32, one: &Target) -> Self {
+    fn of(step_index: usize, step: &'static str, cycle: u32, one: &StepTarget) -> Self {
         let error = one.achieved - one.target;
         Self {
             step_index,
@@ -62,7 +53,6 @@ impl Achieved {
     }
 }
 
-/// What of a recorded sample a step's targets are about.
 fn sample(row: &Row) -> MeterSample {
     MeterSample {
         tick: row.tick,
@@ -78,7 +68,6 @@ fn sample(row: &Row) -> MeterSample {
 pub struct TimeUse {
     /// Self-test, homing, tare, finding contact.
     pub set_up_s: f64,
-    /// Ramps, unloading, sines, retracts, jogs.
     pub motion_s: f64,
     /// At constant depth or force, and under a weight.
     pub hold_s: f64,
@@ -111,18 +100,15 @@ impl TimeUse {
         *kind += seconds;
     }
 
-    /// All of it.
     pub fn total_s(&self) -> f64 {
         self.set_up_s + self.motion_s + self.hold_s + self.waiting_s
     }
 }
 
-/// What was found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Fidelity {
     /// Every target of every completed step, in the order done.
     pub targets: Vec<Achieved>,
-    /// Samples there are.
     pub samples: u64,
     /// Samples that are missing between them, by the controller's clock.
     pub dropped: u64,
@@ -132,26 +118,22 @@ pub struct Fidelity {
     pub late_worst_s: f64,
     /// The longest time from one sample to the next by the controller's clock, in s.
     pub longest_gap_s: f64,
-    /// What the time went to.
     pub time_use: TimeUse,
-    /// Samples taken while something was measured.
     pub measured: u64,
-    /// What else speaks against the run: steps left out, monitors, missed pulses, contact lost, targets too small to tell.
+    /// Skipped steps, tripped monitors, missed pulses, lost contact, targets within their own tolerance.
     pub remarks: Vec<String>,
 }
 
 impl Fidelity {
-    /// The targets that were missed.
     pub fn missed(&self) -> impl Iterator<Item = &Achieved> {
         self.targets.iter().filter(|one| !one.is_within)
     }
 }
 
-/// Samples that should have come between two samples so many ticks apart.
+/// Samples that are missing between two samples so many ticks apart.
 ///
-/// A rig that reports every tick misses each tick between. One that is asked for its samples gives them as the link
-/// allows: what comes within two scheduler slices of a desktop host, or half a sample late, is its way; in a longer gap
-/// all that its rate promises are missing.
+/// Of a rig that reports every tick, each tick between is missing. A polled rig delivers as its link allows: two scheduler
+/// slices of a desktop host or half a sample are usual, and a longer gap misses what the rate promises.
 fn missing_in(ticks: u64, rig: &RigDescription) -> u64 {
     let between = ticks.saturating_sub(1);
     let per_sample = rig.ticks_per_sample;
@@ -162,10 +144,9 @@ fn missing_in(ticks: u64, rig: &RigDescription) -> u64 {
     if ticks as f64 <= usual { 0 } else { (between as f64 / per_sample) as u64 }
 }
 
-/// Remarks kept: more would tell no more.
+/// More remarks would not help a reviewer.
 const REMARKS_MAX: usize = 20;
 
-/// Follows a run.
 #[derive(Clone, Debug)]
 pub struct FidelityMeter {
     plan: Plan,
@@ -177,7 +158,6 @@ pub struct FidelityMeter {
 }
 
 impl FidelityMeter {
-    /// A meter for a run of a plan on a rig.
     #[must_use]
     pub fn new(plan: &Plan, rig: &RigDescription) -> Self {
         Self {
@@ -189,7 +169,7 @@ impl FidelityMeter {
         }
     }
 
-    /// Takes a decision. Those that a sample led to come before [`FidelityMeter::row`] of that sample.
+    /// The decisions that follow from a sample come before [`FidelityMeter::row`] of that sample.
     pub fn effect(&mut self, effect: &Effect) {
         match effect {
             Effect::Record(record) => self.record(record),
@@ -211,16 +191,12 @@ impl FidelityMeter {
                     planned.map(|planned| (*step_index, StepMeter::new(&planned.step, &self.rig)));
             }
             Record::ForceReached { force, .. } => {
-                if let Some((_, current)) = &mut self.current {
-                    current.force_reached(*force);
-                }
+                self.with_meter(|meter| meter.force_reached(*force));
             }
             Record::HoldEndedEarly { .. } | Record::HoldSteady { .. } => {
-                if let Some((_, current)) = &mut self.current {
-                    current.has_no_duration();
-                }
+                self.with_meter(StepMeter::ignore_duration);
             }
-            // What is interrupted has no duration or speed to be judged by.
+            // An interrupted step has no duration or speed to compare.
             Record::Paused { .. } | Record::FinishedEarly | Record::EndingStarted { .. } => {
                 self.current = None
             }
@@ -229,9 +205,7 @@ impl FidelityMeter {
                 self.remark(record.to_string());
             }
             Record::LeadLost { .. } => {
-                if let Some((_, current)) = &mut self.current {
-                    current.has_no_duration();
-                }
+                self.with_meter(StepMeter::ignore_duration);
                 self.remark(record.to_string());
             }
             Record::MonitorTripped { .. } | Record::InterlockTripped { .. } => {
@@ -244,13 +218,18 @@ impl FidelityMeter {
         }
     }
 
+    fn with_meter(&mut self, change: impl FnOnce(&mut StepMeter)) {
+        if let Some((_, meter)) = &mut self.current {
+            change(meter);
+        }
+    }
+
     fn remark(&mut self, remark: String) {
         if self.found.remarks.len() < REMARKS_MAX {
             self.found.remarks.push(remark);
         }
     }
 
-    /// The step in progress has come to its end.
     fn complete(&mut self) {
         let (Some((step_index, meter)), Some(last)) = (self.current.take(), &self.last) else {
             return;
@@ -270,7 +249,6 @@ impl FidelityMeter {
         }
     }
 
-    /// Takes a sample.
     pub fn row(&mut self, row: &Row) {
         let tick_secs = self.rig.tick().0;
         self.found.samples += 1;
@@ -288,7 +266,7 @@ impl FidelityMeter {
         let before = self.last.map_or(0, |last| last.host.0);
         let arrived = row.host.0.saturating_sub(before) as f64 * 1e-9;
         self.found.time_use.add(row.phase, arrived);
-        // A controller that restarted counts from zero again: nothing is known to be missing.
+        // A restarted controller counts from zero again: missing samples are unknown.
         if let Some(ticks) = self.last.and_then(|last| row.tick.checked_sub(last.tick)) {
             self.found.dropped += missing_in(ticks, &self.rig);
             self.found.longest_gap_s = self.found.longest_gap_s.max(ticks as f64 * tick_secs);
@@ -298,9 +276,7 @@ impl FidelityMeter {
                 self.found.late_worst_s = self.found.late_worst_s.max(delay);
             }
         }
-        if let Some((_, current)) = &mut self.current {
-            current.sample(&sample(row));
-        }
+        self.with_meter(|meter| meter.push(&sample(row)));
         self.last = Some(*row);
     }
 
@@ -309,7 +285,6 @@ impl FidelityMeter {
         &self.found
     }
 
-    /// The fidelity, at the end.
     #[must_use]
     pub fn into_found(self) -> Fidelity {
         self.found
@@ -328,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_is_asked_for_its_samples_misses_what_its_rate_promises() {
+    fn missing_samples_are_counted_by_the_rate_of_the_rig() {
         let mut rig = recorded().manifest.rig.unwrap();
         rig.tick_nanos = 1_000_000;
         let missing = |per_sample: f64, ticks| {

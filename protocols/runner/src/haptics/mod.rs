@@ -4,8 +4,8 @@
 //! priority ([`priority`]) and its measured times ([`timing`]). A tick neither allocates nor locks nor waits;
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
-mod beat;
-mod led;
+mod guided_device;
+mod loop_thread;
 pub mod scene;
 pub mod scene_file;
 mod simulated;
@@ -14,8 +14,8 @@ mod stylus;
 pub mod taped;
 pub mod timing;
 
-pub use beat::{Beat, Ticking};
-pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
+pub use guided_device::{Lead, Led, Live, TRAIL, TrailPoint};
+pub use loop_thread::{Beat, Ticking};
 pub use palpate_drivers::priority;
 pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;

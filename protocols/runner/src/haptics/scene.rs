@@ -45,12 +45,12 @@ pub type SceneRecorder = Recorder<3, 10>;
 
 /// What is recorded of a tick: its inputs, then what they gave.
 #[must_use]
-pub fn scene_row(hand: Hand6, elapsed: u64, told: &SceneTick) -> SceneRow {
+pub fn scene_row(hand: Hand6, elapsed: u64, outcome: &SceneTick) -> SceneRow {
     let ([x, y, z], [yaw, pitch, roll]) = (hand.at, hand.turn);
-    let [fx, fy, fz] = told.force;
+    let [fx, fy, fz] = outcome.force;
     Row {
-        whole: [told.tick, elapsed, told.row_hash],
-        real: [x, y, z, yaw, pitch, roll, fx, fy, fz, told.depth],
+        whole: [outcome.tick, elapsed, outcome.row_hash],
+        real: [x, y, z, yaw, pitch, roll, fx, fy, fz, outcome.depth],
     }
 }
 
@@ -80,7 +80,6 @@ pub struct SceneFrame {
 }
 
 impl SceneFrame {
-    /// Of a scene, whole.
     fn new(scene: &Scene) -> Self {
         let nodes = scene.field().grid().columns();
         let stride = stride(nodes);
@@ -97,8 +96,8 @@ impl SceneFrame {
         frame
     }
 
-    /// The scene as it is now. What was at rest in this frame and is at rest now is left as it is.
-    fn take(&mut self, scene: &Scene) {
+    /// Copies what has moved since the last frame.
+    fn update(&mut self, scene: &Scene) {
         self.tick = scene.last();
         self.copy(scene.field(), self.displaced.union(scene.dirty()));
         self.displaced = scene.dirty();
@@ -121,8 +120,7 @@ impl SceneFrame {
     }
 }
 
-/// Every how many nodes one is shown: the fewest that leave no more than a frame has, all sides of the mesh among them if that
-/// can be.
+/// The smallest step between shown nodes that fits a frame, and that reaches all sides of the mesh if possible.
 fn stride(nodes: usize) -> usize {
     let cells = nodes - 1;
     let least = cells.div_ceil(FRAME_NODES_MAX - 1).max(1);
@@ -136,13 +134,11 @@ pub struct SceneTask {
     scene: Scene,
     device: Box<dyn HapticDevice>,
     recorder: Option<SceneRecorder>,
-    /// Ticks from frame to frame, and since the last.
     apart: u64,
     since: u64,
 }
 
 impl SceneTask {
-    /// The task.
     #[must_use]
     pub fn new(
         scene: Scene,
@@ -159,7 +155,6 @@ impl SceneTask {
         SceneFrame::new(&self.scene)
     }
 
-    /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -170,11 +165,11 @@ impl Ticking for SceneTask {
 
     fn tick(&mut self, elapsed: u64) {
         let Pose { at, turn } = self.device.sense(elapsed);
-        let told = self.scene.feel(Pose { at, turn }, elapsed);
-        self.device.give(told.force);
+        let outcome = self.scene.feel(Pose { at, turn }, elapsed);
+        self.device.give(outcome.force);
         if let Some(recorder) = &self.recorder {
             let input = self.device.hand().unwrap_or(Hand6 { at, turn });
-            recorder.push(scene_row(input, elapsed, &told));
+            recorder.push(scene_row(input, elapsed, &outcome));
         }
         self.since = if self.is_shown() { 1 } else { self.since + 1 };
     }
@@ -184,22 +179,18 @@ impl Ticking for SceneTask {
     }
 
     fn show(&self, view: &mut SceneFrame) {
-        view.take(&self.scene);
+        view.update(&self.scene);
     }
 }
 
-/// What a scene's loop left.
 #[derive(Debug)]
 pub struct SceneEnd {
-    /// The scene.
     pub scene: Scene,
-    /// How the loop kept its time.
     pub kept: Kept,
-    /// What was recorded, if it was.
     pub recorded: Option<Result<Recorded, String>>,
 }
 
-/// A scene on its way in real time. Dropping it ends it.
+/// A scene in real time. Dropping it ends the loop.
 #[derive(Debug)]
 pub struct SceneLoop {
     beat: Beat<SceneTask>,
@@ -217,7 +208,6 @@ impl SceneLoop {
         Self::start_laps(scene, (path, 1), recorder)
     }
 
-    /// The same with the path gone so many times.
     pub fn start_laps(
         scene: Scene,
         path: (Option<ScenePath>, u32),
@@ -225,13 +215,13 @@ impl SceneLoop {
     ) -> Result<Self, String> {
         let made = Stylus::new(*scene.settings(), path);
         let (device, pointing) = made.map_err(|err| err.to_string())?;
-        let hand = (Mutex::new(pointing), device.over());
+        let hand = (Mutex::new(pointing), device.end_flag());
         let mut live = Self::on(Box::new(device), scene, recorder)?;
         live.hand = Some(hand);
         Ok(live)
     }
 
-    /// Begins to tick on a device of its own, which the scene has to be made for. Its recording has [`SENSED_COLUMNS`].
+    /// Begins to tick on a device with the settings of the scene. Its recording has [`SENSED_COLUMNS`].
     pub fn on(
         device: Box<dyn HapticDevice>,
         scene: Scene,
@@ -240,7 +230,7 @@ impl SceneLoop {
         let period = scene.settings().period;
         if *device.settings() != scene.settings().device {
             return Err(
-                "the scene is made for another device than the one that is there; give it the numbers of that".into(),
+                "the scene is made for a different device than the connected one; give the scene the settings of the connected device".into(),
             );
         }
         let task = SceneTask::new(scene, device, recorder);
@@ -251,8 +241,8 @@ impl SceneLoop {
         Ok(Self { beat, hand: None })
     }
 
-    /// The hand on the simulated device goes there from the next tick on. Only those who point wait for each other, the loop for
-    /// nobody.
+    /// The hand on the simulated device goes there from the next tick on. Callers may wait for each other; the loop
+    /// never waits.
     pub fn point(&self, hand: Hand6) {
         if let Some((pointing, _)) = &self.hand {
             let mut pointing = pointing.lock().unwrap_or_else(PoisonError::into_inner);
@@ -265,12 +255,10 @@ impl SceneLoop {
         self.beat.seen()
     }
 
-    /// How the loop keeps its time.
     pub fn timing(&self) -> Kept {
         self.beat.kept()
     }
 
-    /// The priority that the system gave.
     pub fn granted(&self) -> &Granted {
         self.beat.granted()
     }

@@ -17,7 +17,6 @@ pub const THESIS: &str = "thesis";
 /// Nodes along a side that a scene may have: 1601 stand for the truth in comparisons.
 const NODES: [u64; 2] = [3, 1601];
 
-/// What a scene tolerates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
     /// Error of force in percent of the smallest change that a hand notices.
@@ -35,14 +34,11 @@ impl Default for Tolerances {
     }
 }
 
-/// A scene as its file has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
-    /// What it is called.
     pub name: String,
-    /// The session or table whose fit is the body; [`Self::body`] is, where there is none.
+    /// The session or table whose fit is the body; without it, [`Self::body`] is.
     pub source: Option<String>,
-    /// The body.
     pub body: ModifiedKelvin,
     /// Length of a side in mm.
     pub side_mm: f64,
@@ -50,7 +46,6 @@ pub struct SceneFile {
     pub slope: f64,
     /// Time constant of recovery in s; that of the body without it.
     pub recovery_s: Option<f64>,
-    /// Friction coefficient.
     pub friction: f64,
     /// Nodes along a side; planned from the tolerances without it.
     pub nodes: Option<usize>,
@@ -60,13 +55,10 @@ pub struct SceneFile {
     pub cut_mm: f64,
     /// Ticks a second.
     pub rate_hz: f64,
-    /// How the force law is stepped.
     pub scheme: Scheme,
     /// Whether guards and passivity controller are at work.
     pub is_guarded: bool,
-    /// The device.
     pub device: DeviceSettings,
-    /// What it tolerates.
     pub tolerances: Tolerances,
 }
 
@@ -99,7 +91,8 @@ impl SceneFile {
     pub fn parse(file: &str, text: &str) -> Result<Self, String> {
         let one = |mistake: Mistake| in_words(file, &[mistake]);
         if text.len() > BYTES_MAX {
-            let message = format!("more than {BYTES_MAX} bytes are no scene file");
+            let message =
+                format!("the file is too large for a scene file; keep it below {BYTES_MAX} bytes");
             return Err(one(Mistake { line: 0, message }));
         }
         let mut fields = Fields::read(text).map_err(one)?;
@@ -178,7 +171,6 @@ impl SceneFile {
         Ok(settings)
     }
 
-    /// The scene itself.
     pub fn scene(&self, planned_nodes: usize) -> Result<Scene, String> {
         let settings = self.settings(planned_nodes)?;
         Scene::new(settings).map_err(|err| format!("the scene '{}': {err}", self.name))
@@ -225,7 +217,6 @@ pub fn read_body(fields: &mut Fields, table: &str) -> Option<ModifiedKelvin> {
     Some(body)
 }
 
-/// The numbers of a device by name.
 fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15] {
     let [wide, deep, high] = &mut device.workspace_mm;
     [
@@ -250,17 +241,13 @@ fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15]
 fn read(fields: &mut Fields) -> SceneFile {
     let mut file = SceneFile::default();
     let most = 1e6;
-    if let Some(name) = fields.text("name") {
-        file.name = name;
-    }
+    file.name = fields.text("name").unwrap_or(file.name);
     let source = fields.text("tissue.source");
     let body = read_body(fields, "tissue");
     if source.is_some() && body.is_some() {
         fields.mistake("tissue.source", "give either a source or parameters, not both");
     }
-    if let Some(body) = body {
-        file.body = body;
-    }
+    file.body = body.unwrap_or(file.body);
     file.source = source.filter(|source| source != THESIS);
     // A spacing from a nanometre to a metre, so that every mesh is possible.
     set(&mut file.side_mm, fields.number("tissue.side_mm", 1.0, 1000.0));
@@ -270,8 +257,7 @@ fn read(fields: &mut Fields) -> SceneFile {
     let nodes = fields.whole("mesh.nodes", NODES[0], NODES[1]);
     match (fields.flag("mesh.auto"), nodes) {
         (Some(true), Some(_)) => {
-            fields
-                .mistake("mesh.auto", "a mesh with nodes is not planned; leave one of the two out");
+            fields.mistake("mesh.auto", "a mesh has a number of nodes or auto, not both");
         }
         (Some(true), None) => file.nodes = None,
         (_, Some(nodes)) => file.nodes = Some(nodes as usize),
@@ -281,9 +267,8 @@ fn read(fields: &mut Fields) -> SceneFile {
     set(&mut file.cut_mm, fields.number("mesh.cut_mm", 0.0, 1000.0));
     let [slowest, fastest] = Period::RATES_HZ;
     set(&mut file.rate_hz, fields.number("loop.rate_hz", slowest, fastest));
-    if let Some(scheme) = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme)) {
-        file.scheme = scheme;
-    }
+    let scheme = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme));
+    file.scheme = scheme.unwrap_or(file.scheme);
     file.is_guarded = fields.flag("loop.guards").unwrap_or(file.is_guarded);
     for (name, value) in device_numbers(&mut file.device) {
         set(value, fields.number(&format!("device.{name}"), 0.0, most));
@@ -291,25 +276,20 @@ fn read(fields: &mut Fields) -> SceneFile {
     if let Err(err) = file.device.checked() {
         fields.mistake("device", &err.to_string());
     }
-    let tolerances = &mut file.tolerances;
-    for (name, value) in [
-        ("force_percent", &mut tolerances.force_percent),
-        ("shape_mm", &mut tolerances.shape_mm),
-        ("tick_us", &mut tolerances.tick_us),
-    ] {
-        // Zero tolerates nothing, which nothing can hold.
+    let Tolerances { force_percent, shape_mm, tick_us } = &mut file.tolerances;
+    let tolerances =
+        [("force_percent", force_percent), ("shape_mm", shape_mm), ("tick_us", tick_us)];
+    for (name, value) in tolerances {
+        // A tolerance of zero could never be met.
         set(value, fields.number(&format!("tolerances.{name}"), 1e-6, most));
     }
     file
 }
 
 fn set(value: &mut f64, given: Option<f64>) {
-    if let Some(given) = given {
-        *value = given;
-    }
+    *value = given.unwrap_or(*value);
 }
 
-/// A text as TOML has it between quotes.
 fn plain(text: &str) -> String {
     let mut out = String::new();
     for letter in text.chars() {
@@ -332,7 +312,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_reads_back_to_the_same_bits() {
+    fn scene_file_reads_back_to_the_same_bits() {
         let usual = SceneFile::default();
         let odd = SceneFile {
             name: "a \"quoted\"\\ name\tand ü".to_owned(),
@@ -356,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_file_it_is_the_scene_of_the_model() {
+    fn default_scene_file_gives_the_default_scene() {
         let settings = SceneFile::default().settings(51).unwrap();
         assert_eq!(settings, SceneSettings::default());
         assert_eq!(SceneFile::parse("empty.toml", ""), Ok(SceneFile::default()));
@@ -367,8 +347,8 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_their_lines() {
-        for (text, told) in [
+    fn mistakes_are_reported_with_their_lines() {
+        for (text, expected) in [
             ("[tissue]\nside_mm = -3", "scene.toml, line 2: tissue.side_mm: "),
             ("[tissue]\n\nsid_mm = 3", "scene.toml, line 3: 'tissue.sid_mm'"),
             ("[tissue]\ntau_eps = 1.0", "line 2: tissue.tau_eps: "),
@@ -384,8 +364,8 @@ mod tests {
             ("[tolerances]\nshape_mm = \"fine\"", "line 2: tolerances.shape_mm"),
             ("side = ", "scene.toml, line 1: "),
         ] {
-            let said = SceneFile::parse("scene.toml", text).unwrap_err();
-            assert!(said.contains(told), "{said}");
+            let message = SceneFile::parse("scene.toml", text).unwrap_err();
+            assert!(message.contains(expected), "{message}");
         }
     }
 }

@@ -5,7 +5,7 @@ use palpate_haptics::MasterSlaveError;
 use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
 
-/// Ticks of a stall that the device is led through; after longer ones it stands where it was.
+/// Ticks of a stall that are simulated; after longer ones the device stands where it was.
 const LED_MAX: u64 = 1000;
 
 /// A simulation, its hand pressing again and again where its path says so.

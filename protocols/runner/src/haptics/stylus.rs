@@ -1,4 +1,4 @@
-//! The simulated haptic device with a hand on it that a path leads, and then who points.
+//! The simulated haptic device with a hand that follows a path, then a pointer.
 
 use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{
@@ -14,18 +14,16 @@ pub struct Stylus {
     device: SimulatedDevice,
     settings: SceneSettings,
     path: Option<ScenePath>,
-    /// How often the path is gone.
     laps: u32,
     pointed: Output<Hand6>,
     is_over: Arc<AtomicBool>,
-    /// Ticks since the start.
     ticks: u64,
     hand: Hand6,
     force: [f64; 3],
 }
 
 impl Stylus {
-    /// Over the middle of a scene's tissue, and where to tell its hand's place. The path is gone `laps` times.
+    /// Starts over the middle of the tissue and follows the path `laps` times; the input moves the hand afterwards.
     pub fn new(
         settings: SceneSettings,
         (path, laps): (Option<ScenePath>, u32),
@@ -46,12 +44,12 @@ impl Stylus {
         Ok((stylus, input))
     }
 
-    /// Tells whether the path has come to its end; without one it is over from the start.
-    pub(super) fn over(&self) -> Arc<AtomicBool> {
+    /// True from the end of the path on; without a path, from the start.
+    pub(super) fn end_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.is_over)
     }
 
-    fn led(&mut self) -> Hand6 {
+    fn next_pose(&mut self) -> Hand6 {
         let t = self.settings.period.time_of(self.ticks).seconds().0;
         match self.path {
             Some(path) if t <= path.seconds() * f64::from(self.laps) => {
@@ -72,7 +70,7 @@ impl HapticDevice for Stylus {
 
     fn sense(&mut self, elapsed: u64) -> Pose {
         self.ticks = self.ticks.saturating_add(elapsed);
-        self.hand = self.led();
+        self.hand = self.next_pose();
         self.device.follow(self.hand, self.force, elapsed);
         self.device.pose()
     }

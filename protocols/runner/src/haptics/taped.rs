@@ -1,5 +1,4 @@
-//! The simulated master-slave system with every tick recorded, so that it can be computed again: its hand on a path of its own, or
-//! led from outside.
+//! The simulated master-slave system with every tick recorded, so that replay can compute it again.
 
 use super::{Led, Live, Simulated, Ticking};
 use palpate_haptics::simulation::SimulationTick;
@@ -17,8 +16,8 @@ pub type TapeRecorder = Recorder<3, 5>;
 
 /// What is recorded of a tick that came `elapsed` ticks after the one before; its hand goes where the settings say.
 #[must_use]
-pub fn taped_row(elapsed: u64, told: &SimulationTick) -> TapedRow {
-    let seen = &told.snapshot;
+pub fn taped_row(elapsed: u64, tick: &SimulationTick) -> TapedRow {
+    let seen = &tick.snapshot;
     Row {
         whole: [seen.tick, elapsed, seen.sum()],
         real: [seen.depth.0, seen.model.0, seen.force.0, seen.torque, seen.bias.0],
@@ -28,9 +27,7 @@ pub fn taped_row(elapsed: u64, told: &SimulationTick) -> TapedRow {
 /// The device, and where its ticks are recorded, if they are.
 #[derive(Debug)]
 pub struct Taped {
-    /// The device.
     pub device: Simulated,
-    /// Its recording.
     pub recorder: Option<TapeRecorder>,
 }
 
@@ -56,7 +53,6 @@ pub const LED_COLUMNS: ([&str; 3], [&str; 6]) =
 /// A recorded tick of it.
 pub type LedRow = Row<3, 6>;
 
-/// Writes them.
 pub type LedRecorder = Recorder<3, 6>;
 
 /// What is recorded of its newest tick, which came `elapsed` ticks after the one before.
@@ -70,9 +66,7 @@ pub fn led_row(elapsed: u64, led: &Led) -> LedRow {
 /// The led device, and where its ticks are recorded, if they are.
 #[derive(Debug)]
 pub struct TapedLed {
-    /// The device.
     pub led: Led,
-    /// Its recording.
     pub recorder: Option<LedRecorder>,
 }
 

@@ -1,4 +1,4 @@
-//! Durations as they are counted by one thread and read by others, without a lock between them.
+//! Durations that one thread counts and others read, without a lock.
 
 use palpate_model::units::Seconds;
 use serde::Serialize;
@@ -10,20 +10,19 @@ const STEPS: u64 = 1 << STEP_BITS;
 /// Bins for every duration that 64 bits of nanoseconds hold.
 const BINS: usize = ((64 - STEP_BITS) as usize + 1) * STEPS as usize;
 
-/// A histogram of durations. One thread counts; any number read, and may miss what is counted meanwhile.
+/// One thread counts; readers may miss the newest counts.
 #[derive(Debug)]
-pub struct Durations {
+pub struct DurationHistogram {
     bins: Box<[AtomicU64]>,
     longest: AtomicU64,
 }
 
-impl Default for Durations {
+impl Default for DurationHistogram {
     fn default() -> Self {
         Self { bins: (0..BINS).map(|_| AtomicU64::new(0)).collect(), longest: AtomicU64::new(0) }
     }
 }
 
-/// The bin of a duration.
 fn bin(nanos: u64) -> usize {
     let octave = u64::from(nanos.max(1).ilog2());
     if octave < u64::from(STEP_BITS) {
@@ -44,14 +43,13 @@ fn end(bin: usize) -> u64 {
     (step << shift) | ((1 << shift) - 1)
 }
 
-impl Durations {
+impl DurationHistogram {
     /// Counts one. Neither allocates nor waits.
     pub fn count(&self, nanos: u64) {
         self.bins[bin(nanos)].fetch_add(1, Ordering::Relaxed);
         self.longest.fetch_max(nanos, Ordering::Relaxed);
     }
 
-    /// What was counted so far.
     pub fn spread(&self) -> Spread {
         let counts: Vec<u64> = self.bins.iter().map(|one| one.load(Ordering::Relaxed)).collect();
         let count: u64 = counts.iter().sum();
@@ -76,18 +74,14 @@ fn seconds(nanos: u64) -> Seconds {
     Seconds(nanos as f64 * 1e-9)
 }
 
-/// Percentiles of durations, none told shorter than it was, the longest exactly and the others within 0.8 %.
+/// Percentiles of durations: the longest exactly, the others rounded up by at most 0.8 %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// How many.
     pub count: u64,
-    /// Half are no longer.
     #[serde(rename = "p50_s")]
     pub p50: Seconds,
-    /// All but one in a hundred are no longer.
     #[serde(rename = "p99_s")]
     pub p99: Seconds,
-    /// All but one in a thousand are no longer.
     #[serde(rename = "p99_9_s")]
     pub p99_9: Seconds,
     /// None is longer.
@@ -95,22 +89,19 @@ pub struct Spread {
     pub max: Seconds,
 }
 
-/// How a loop keeps its time.
 #[derive(Debug, Default)]
-pub struct Timing {
+pub struct LoopCounters {
     /// From one tick's begin to the next one's.
-    pub period: Durations,
+    pub period: DurationHistogram,
     /// From when a tick was due to its begin.
-    pub late: Durations,
+    pub late: DurationHistogram,
     /// From a tick's begin to its end.
-    pub work: Durations,
-    /// Ticks that took longer than a period.
+    pub work: DurationHistogram,
     pub overruns: AtomicU64,
-    /// Ticks that were due while the loop was away.
     pub missed: AtomicU64,
 }
 
-/// [`Timing`] as it was at one moment.
+/// [`LoopCounters`] as it was at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Kept {
     /// From one tick's begin to the next one's.
@@ -119,15 +110,12 @@ pub struct Kept {
     pub late: Spread,
     /// From a tick's begin to its end.
     pub work: Spread,
-    /// Ticks that took longer than a period.
     pub overruns: u64,
-    /// Ticks that were due while the loop was away.
     pub missed: u64,
 }
 
-impl Timing {
-    /// What was measured so far.
-    pub fn kept(&self) -> Kept {
+impl LoopCounters {
+    pub fn snapshot(&self) -> Kept {
         Kept {
             period: self.period.spread(),
             late: self.late.spread(),
@@ -140,7 +128,7 @@ impl Timing {
 
 #[cfg(test)]
 mod tests {
-    use super::{BINS, Durations, bin, end};
+    use super::{BINS, DurationHistogram, bin, end};
 
     #[test]
     fn every_duration_has_a_bin_whose_end_is_no_more_than_a_hundredth_above() {
@@ -161,7 +149,7 @@ mod tests {
 
     #[test]
     fn percentiles_are_those_of_the_sorted_durations() {
-        let durations = Durations::default();
+        let durations = DurationHistogram::default();
         assert_eq!(durations.spread().max.0, 0.0);
         let all: Vec<u64> = (1..=100_000).map(|i| i * i % 999_983).collect();
         all.iter().for_each(|&nanos| durations.count(nanos));

@@ -1,4 +1,4 @@
-//! Under which conditions a programme is carried out: what must be the same for its repeats to be comparable.
+//! Conditions of a programme that must be the same for its repeats to be comparable.
 
 use super::document::Programme;
 use palpate_model::calibration::Calibration;
@@ -10,7 +10,6 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Rig, limits, calibration and protocols of a programme. Pace is not among them: it changes no sample.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Conditions {
-    /// Name and identity of the rig.
     pub rig: BTreeMap<String, String>,
     /// Settings of a simulated rig; those that are not the usual ones among them.
     pub settings: BTreeMap<String, String>,
@@ -23,7 +22,6 @@ pub struct Conditions {
 }
 
 impl Conditions {
-    /// The conditions of a programme on a rig.
     #[must_use]
     pub fn of(
         programme: &Programme,
@@ -60,7 +58,6 @@ impl Conditions {
         }
     }
 
-    /// What is otherwise now, each with what it was.
     pub fn changes(&self, now: &Self) -> Vec<String> {
         let mut changes = Vec::new();
         let mut compare = |was: &BTreeMap<String, String>,
@@ -70,15 +67,15 @@ impl Conditions {
             for name in names {
                 let (was, is) = (was.get(name), is.get(name));
                 if was != is {
-                    let told = |value: Option<&String>| match value {
+                    let quoted = |value: Option<&String>| match value {
                         Some(value) => format!("'{value}'"),
                         None => "the usual one".into(),
                     };
                     changes.push(format!(
                         "{} was {} and is {} now",
                         called(name),
-                        told(was),
-                        told(is)
+                        quoted(was),
+                        quoted(is)
                     ));
                 }
             }
@@ -90,11 +87,11 @@ impl Conditions {
             format!("the protocol of task '{task}' (by its CRC-32)")
         });
         if self.calibration != now.calibration {
-            let told = |one: &Self| {
+            let named = |one: &Self| {
                 let of = |key: &str| one.calibration.get(key).map_or("", String::as_str);
                 format!("'{}' (CRC-32 {})", of("name"), of("crc32"))
             };
-            changes.push(format!("the calibration was {} and is {} now", told(self), told(now)));
+            changes.push(format!("the calibration was {} and is {} now", named(self), named(now)));
         }
         changes
     }

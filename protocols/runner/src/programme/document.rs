@@ -1,6 +1,6 @@
 //! What a programme is; its text is read by `read`.
 
-use super::told::Told;
+use super::labels::LabelSettings;
 use palpate_model::about::Labels;
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
@@ -17,47 +17,37 @@ const MOUNT_TIMEOUT: Seconds = Seconds(3600.0);
 pub struct Programme {
     /// Name, such as `day-in-the-lab`.
     pub name: String,
-    /// In a few words.
     pub title: String,
-    /// What it is for.
     pub purpose: String,
-    /// What holds for every session where nothing else is told.
+    /// Labels of every session that sets no others.
     pub usual: Labels,
     /// Whether what previews ask to acknowledge is acknowledged; it is recorded in every session.
     pub is_acknowledged: bool,
     /// Settings of the simulated rig that differ from the usual ones.
     pub simulated: BTreeMap<String, String>,
-    /// The tasks.
     pub tasks: Vec<Task>,
-    pub(super) told: Told,
+    pub(super) label_settings: LabelSettings,
 }
 
-/// One protocol of a programme.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Its name; sessions are filed under it.
     pub name: String,
-    /// The protocol.
     pub protocol: Protocol,
-    /// Values of its parameters.
     pub values: BTreeMap<String, String>,
     /// Number of the specimen that is clipped in first; none keeps the one that is there.
     pub specimen: Option<u64>,
-    /// How often.
     pub repeats: u32,
     /// Rest before every repeat but the first.
     pub rest: Seconds,
     /// Whether forces of later tasks follow the calibration it measures.
     pub calibrates: bool,
     /// Which task's model its sessions are compared with.
-    pub validates: Option<Validates>,
-    /// Line of the file it begins on.
+    pub validates: Option<ModelReference>,
     pub line: u32,
 }
 
-/// A prediction to be compared.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Validates {
+pub struct ModelReference {
     /// Name of the task whose first session is fitted.
     pub task: String,
 }
@@ -78,13 +68,11 @@ impl Programme {
         text.lines().any(is_own)
     }
 
-    /// The specimen that is clipped in during a task.
     pub fn specimen_at(&self, task: usize) -> Option<u64> {
         let so_far = self.tasks.iter().take(task + 1).rev();
         so_far.filter_map(|task| task.specimen).next()
     }
 
-    /// Sessions in all.
     pub fn session_count(&self) -> u32 {
         self.tasks.iter().map(|task| task.repeats).sum()
     }
@@ -92,7 +80,7 @@ impl Programme {
 
 impl Task {
     /// The plan of one repeat, counted from 1: the protocol's, behind the rest and the specimen it needs. `remount`
-    /// is the specimen that somebody must look after before a programme goes on.
+    /// is the specimen that the operator must check before an interrupted programme goes on.
     pub fn plan(&self, repeat: u32, remount: Option<u64>) -> Option<Plan> {
         let mut plan = self.protocol.plan(&self.values).ok()?;
         let mut before = Vec::new();
@@ -101,7 +89,7 @@ impl Task {
             before.push(Rest { duration }.into());
         }
         if remount.is_some() {
-            // What broke off may have left the probe in the tissue, and nobody clips in anything under it.
+            // An interrupted run may have left the probe in the tissue, and no specimen can be clipped in under it.
             let ways_up = |step: &&Step| matches!(step, Step::SelfTest(_) | Step::Home(_));
             before.extend(plan.steps.iter().map(|one| &one.step).filter(ways_up).cloned());
         }

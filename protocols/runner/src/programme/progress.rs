@@ -6,60 +6,50 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// How a run ended that did all of its plan, as the journal has it.
+/// Ending of a complete run in the journal.
 pub const FINISHED: &str = "finish";
 
-/// How a run ended that the rig or its preview refused: it left no session.
+/// Ending of a run that the rig or its preview refused: it has no session.
 pub const REFUSED: &str = "refused";
 
 /// One line of a programme's journal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
 pub enum Entry {
-    /// The programme began.
     Programme {
-        /// Its name.
         name: String,
         /// CRC-32 of its text, eight hexadecimal digits.
         crc32: String,
         /// When, RFC 3339.
         at: String,
-        /// Under which conditions; none in a journal of a palpate that did not write them down.
+        /// None in a journal of an older palpate.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         conditions: Option<Box<Conditions>>,
     },
     /// A run began; without its end it was interrupted.
     Begun {
-        /// Which.
         place: Place,
         /// Its session folder, from the journal's.
         session: PathBuf,
         /// When, RFC 3339.
         at: String,
     },
-    /// A run ended.
     Ended {
-        /// Which.
         place: Place,
-        /// How.
         outcome: String,
-        /// Why.
         reason: String,
     },
 }
 
-/// A place in a programme.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Place {
-    /// Index of the task.
     pub task: usize,
     /// Repeat, from 1.
     pub repeat: u32,
-    /// Attempt at it, from 1: an interrupted repeat is made again, and both stay.
+    /// From 1: an interrupted repeat is run again, and both sessions stay.
     pub attempt: u32,
 }
 
-/// How far a programme is.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Progress {
     /// Runs that began, with their folder and how they ended, if they did.
@@ -69,10 +59,8 @@ pub struct Progress {
 /// A journal that does not belong to the programme.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ProgressError {
-    /// Another one.
     #[error("the folder holds the programme '{0}'; choose a new folder")]
     Other(String),
-    /// It was changed since.
     #[error(
         "the programme '{0}' was changed since it was begun here; restore it, or begin in a new folder"
     )]
@@ -82,13 +70,7 @@ pub enum ProgressError {
         "the programme '{programme}' was begun here under other conditions: {}; go on under those it was begun under, or begin in a new folder",
         .changes.join(", ")
     )]
-    Conditions {
-        /// Its name.
-        programme: String,
-        /// What changed, each with what it was.
-        changes: Vec<String>,
-    },
-    /// No sense in it.
+    Conditions { programme: String, changes: Vec<String> },
     #[error("the journal does not begin with its programme; choose a new folder")]
     Headless,
 }
@@ -141,21 +123,16 @@ impl Progress {
 
     /// The next run: the first repeat that has not finished. None once all have.
     pub fn next(&self, programme: &Programme) -> Option<Place> {
-        let places = programme
-            .tasks
-            .iter()
-            .enumerate()
-            .flat_map(|(task, one)| (1..=one.repeats).map(move |repeat| (task, repeat)));
-        places
-            .map(|(task, repeat)| {
-                let own = self.attempts(task, repeat);
-                (task, repeat, own)
-            })
-            .find(|(_, _, own)| !own.contains(&Some(FINISHED)))
-            .map(|(task, repeat, own)| Place { task, repeat, attempt: 1 + own.len() as u32 })
+        let tasks = programme.tasks.iter().enumerate();
+        let mut repeats =
+            tasks.flat_map(|(task, one)| (1..=one.repeats).map(move |repeat| (task, repeat)));
+        repeats.find_map(|(task, repeat)| {
+            let endings = self.attempts(task, repeat);
+            let is_done = endings.contains(&Some(FINISHED));
+            (!is_done).then_some(Place { task, repeat, attempt: 1 + endings.len() as u32 })
+        })
     }
 
-    /// How the attempts at one repeat ended.
     fn attempts(&self, task: usize, repeat: u32) -> Vec<Option<&str>> {
         let own =
             self.runs.iter().filter(|(place, ..)| (place.task, place.repeat) == (task, repeat));

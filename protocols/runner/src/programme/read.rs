@@ -1,14 +1,17 @@
-//! The text of a programme: every mistake in it, each at its line.
+//! Reads the text of a programme and reports every mistake with its line.
 
-use super::document::{Programme, ProgrammeError, Task, Validates};
-use super::sound::doubts;
-use super::told::Told;
+use super::consistency::find_contradictions;
+use super::document::{ModelReference, Programme, ProgrammeError, Task};
+use super::labels::LabelSettings;
 use palpate_model::about::Labels;
 use palpate_model::units::Seconds;
 use palpate_protocols::file::problem::{Problems, nearest, suggestion};
-use palpate_protocols::file::tree::{self, Entry, Node, Table, Value};
+use palpate_protocols::file::tree::{
+    self, DocumentEntry, DocumentNode, DocumentTable, DocumentValue,
+};
 use palpate_protocols::file::{Protocol, built_in};
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 /// Version of the language that is read.
 const LANGUAGE: &str = "1";
@@ -19,7 +22,7 @@ const REPEATS_MAX: u64 = 1000;
 /// Longest rest in s: a day is longer than any specimen lasts.
 const REST_MAX_S: f64 = 86_400.0;
 
-/// Keys of a programme; those that it cannot do without first.
+/// Keys of a programme, the required ones first.
 const KEYS: [&str; 10] = [
     "palpate-programme",
     "name",
@@ -33,10 +36,10 @@ const KEYS: [&str; 10] = [
     "simulated",
 ];
 
-/// Settings of a simulated rig that a programme may say.
+/// Settings of a simulated rig that a programme may give.
 const SIMULATED: [&str; 3] = ["preconditioning", "rate", "softening"];
 
-/// How many of [`KEYS`] a programme cannot do without, and how each is written.
+/// How each of the required [`KEYS`] is written.
 const NEEDED: [&str; 4] = [
     "palpate-programme = 1 on its first line",
     "name = \"my-day\"",
@@ -44,19 +47,20 @@ const NEEDED: [&str; 4] = [
     "[[task]] and below it name = \"press\" and protocol = \"ramp-hold\"",
 ];
 
-/// Keys of a task; those that it cannot do without first.
+/// Keys of a task, the required ones first.
 const TASK_KEYS: [&str; 8] =
     ["name", "protocol", "set", "specimen", "repeats", "rest_s", "calibrates", "validates"];
 
 /// The same of a task.
 const TASK_NEEDED: [&str; 2] = ["name = \"press\"", "protocol = \"ramp-hold\""];
 
-/// Why a folder's name has to be plain.
+const WHOLE: &str = "a whole number without quotes, such as 2";
+
 const PLAIN: &str = "use letters, digits and hyphens, since its folder is called so";
 
 impl Programme {
     /// Reads a programme. `other` gives the text of a protocol that is not built in, by the name the programme calls
-    /// it; every problem is told.
+    /// it. The error holds every problem.
     pub fn read(
         text: &str,
         other: &dyn Fn(&str) -> Result<String, String>,
@@ -64,10 +68,10 @@ impl Programme {
         let root = tree::read(text).map_err(|problem| ProgrammeError(vec![problem]))?;
         let mut reader = Reader::default();
         let whole = reader.programme(&root, other);
-        match reader.problems.has_errors() {
-            false => Ok(whole),
-            true => Err(ProgrammeError(reader.problems.into_list())),
+        if reader.problems.has_errors() {
+            return Err(ProgrammeError(reader.problems.into_list()));
         }
+        Ok(whole)
     }
 }
 
@@ -79,25 +83,25 @@ struct Reader {
 impl Reader {
     fn programme(
         &mut self,
-        root: &Table,
+        root: &DocumentTable,
         other: &dyn Fn(&str) -> Result<String, String>,
     ) -> Programme {
         self.check_keys(root, 1, "a programme", &KEYS, &NEEDED);
         self.check_language(root);
         let name = self.text(root, "name").unwrap_or_default();
-        if let Some(node) = root.get("name").filter(|_| !is_plain(&name)) {
-            // A name that is no text was told as such.
-            if matches!(node.value, Value::Text(_)) {
-                let message = format!("a programme cannot be called '{name}'; {PLAIN}");
-                self.problems.error(node.line, message);
-            }
+        // A name that is not a text has its own message.
+        if let Some(DocumentNode { line, value: DocumentValue::Text(_) }) = root.get("name")
+            && !is_plain(&name)
+        {
+            let message = format!("a programme cannot be called '{name}'; {PLAIN}");
+            self.problems.error(*line, message);
         }
         let mut tasks = Tasks::default();
         for table in self.tables(root) {
             self.task(table, &mut tasks, other);
         }
         let operator = self.text(root, "operator").unwrap_or_default();
-        let told = Told::read(root, &operator, &mut self.problems);
+        let label_settings = LabelSettings::read(root, &operator, &mut self.problems);
         let whole = Programme {
             name,
             title: self.text(root, "title").unwrap_or_default(),
@@ -106,23 +110,23 @@ impl Reader {
             is_acknowledged: self.flag(root, "acknowledge").unwrap_or_default(),
             simulated: self.simulated(root),
             tasks: tasks.read,
-            told,
+            label_settings,
         };
-        let unused = whole.told.specimens();
+        let unused = whole.label_settings.specimens();
         let unused = unused.filter(|(number, _)| !tasks.specimens.contains(&Some(*number)));
         // One that cannot be read may be any of them.
         let unused = unused.filter(|_| !tasks.specimens.contains(&None));
         for (number, line) in unused {
             self.problems.error(line, format!(
-                "[specimen.{number}] tells of a specimen that no task clips in; add specimen = {number} to the task that does, or take it out"
+                "[specimen.{number}] describes a specimen that no task clips in; add specimen = {number} to the task that uses it, or remove the table"
             ));
         }
         whole
     }
 
-    fn simulated(&mut self, root: &Table) -> BTreeMap<String, String> {
-        if let Some(Value::Table(table)) = root.get("simulated").map(|node| &node.value) {
-            for Entry { key, line, .. } in &table.entries {
+    fn simulated(&mut self, root: &DocumentTable) -> BTreeMap<String, String> {
+        if let Some(DocumentValue::Table(table)) = root.get("simulated").map(|node| &node.value) {
+            for DocumentEntry { key, line, .. } in &table.entries {
                 if !SIMULATED.contains(&key.as_str()) {
                     let [first, second, third] = SIMULATED;
                     let message = format!(
@@ -135,13 +139,13 @@ impl Reader {
         self.values(root, "simulated")
     }
 
-    fn check_language(&mut self, root: &Table) {
+    fn check_language(&mut self, root: &DocumentTable) {
         let Some(node) = root.get("palpate-programme") else {
             return;
         };
         let message = match &node.value {
-            Value::Number(found) if found == LANGUAGE => return,
-            Value::Number(found) => format!(
+            DocumentValue::Number(found) if found == LANGUAGE => return,
+            DocumentValue::Number(found) => format!(
                 "this is written in version {found} of the language and this palpate reads {LANGUAGE}; use a newer palpate"
             ),
             _ => wrong("palpate-programme", node, "the number 1, without quotes"),
@@ -149,47 +153,46 @@ impl Reader {
         self.problems.error(node.line, message);
     }
 
-    /// Tells keys that are unknown, and the `needed` first ones of `known` where they are missing.
+    /// Reports unknown keys and missing ones; the first of `known` are required, `needed` says how each is written.
     fn check_keys(
         &mut self,
-        table: &Table,
+        table: &DocumentTable,
         line: u32,
         what: &str,
         known: &[&str],
         needed: &[&str],
     ) {
-        // A key that is only misspelt is told once, not as unknown and as missing too.
-        let mut meant = Vec::new();
+        // A misspelt key is reported as unknown, not as missing too.
+        let mut near_misses = Vec::new();
         for entry in &table.entries {
             let key = entry.key.as_str();
             if !known.contains(&key) {
-                meant.extend(nearest(key, known.iter().copied()));
+                near_misses.extend(nearest(key, known.iter().copied()));
                 let hint = suggestion(key, known);
                 let message = format!("{what} has no key '{key}'; {hint}");
                 self.problems.error(entry.line, message);
             }
         }
         for (key, example) in known.iter().zip(needed) {
-            if table.get(key).is_none() && !meant.contains(key) {
+            if table.get(key).is_none() && !near_misses.contains(key) {
                 let message = format!("{what} needs '{key}'; write {example}");
                 self.problems.error(line, message);
             }
         }
     }
 
-    /// The tables of the tasks.
-    fn tables<'a>(&mut self, root: &'a Table) -> Vec<&'a Table> {
+    fn tables<'a>(&mut self, root: &'a DocumentTable) -> Vec<&'a DocumentTable> {
         let Some(node) = root.get("task") else {
             return Vec::new();
         };
         let items = match &node.value {
-            Value::List(items) if !items.is_empty() => items.as_slice(),
+            DocumentValue::List(items) if !items.is_empty() => items.as_slice(),
             _ => std::slice::from_ref(node),
         };
         let mut tables = Vec::new();
         for item in items {
             match &item.value {
-                Value::Table(table) if item != node => tables.push(table),
+                DocumentValue::Table(table) if item != node => tables.push(table),
                 _ => {
                     let message =
                         wrong("task", item, "tables, each under [[task]] in double brackets");
@@ -200,10 +203,10 @@ impl Reader {
         tables
     }
 
-    /// One task: into `tasks` if it is sound, and its name and specimen in any case.
+    /// Adds a task to `tasks` if it has no mistake, and its name and specimen in any case.
     fn task(
         &mut self,
-        table: &Table,
+        table: &DocumentTable,
         tasks: &mut Tasks,
         other: &dyn Fn(&str) -> Result<String, String>,
     ) {
@@ -217,16 +220,17 @@ impl Reader {
                 self.problems.error(line("name"), message);
             }
             if tasks.names.contains(name) {
-                let message = format!("there is a task '{name}' already; call it otherwise");
+                let message = format!("there is a task '{name}' already; choose another name");
                 self.problems.error(line("name"), message);
             }
         }
-        let repeats = self.whole(table, "repeats").unwrap_or(1);
+        let repeats: u64 = self.number(table, "repeats", WHOLE).unwrap_or(1);
         if !(1..=REPEATS_MAX).contains(&repeats) {
             let message = format!("{repeats} repeats are not possible; give 1 to {REPEATS_MAX}");
             self.problems.error(line("repeats"), message);
         }
-        let rest_s = self.number(table, "rest_s").unwrap_or(0.0);
+        let number = "a number without quotes, such as 2.5";
+        let rest_s = self.number(table, "rest_s", number).unwrap_or(0.0);
         if !(0.0..=REST_MAX_S).contains(&rest_s) {
             let message = format!("a rest of {rest_s} s is not possible; give 0 to {REST_MAX_S} s");
             self.problems.error(line("rest_s"), message);
@@ -238,7 +242,8 @@ impl Reader {
             );
             self.problems.error(line("validates"), message);
         }
-        let specimen = self.whole(table, "specimen");
+        let number = format!("{WHOLE}; give its name as name in [specimen.2]");
+        let specimen: Option<u64> = self.number(table, "specimen", &number);
         let values = self.values(table, "set");
         let calibrates = self.flag(table, "calibrates").unwrap_or_default();
         let called = self.text(table, "protocol");
@@ -263,10 +268,10 @@ impl Reader {
             repeats: repeats as u32, // At most a thousand.
             rest: Seconds(rest_s),
             calibrates,
-            validates: validates.map(|task| Validates { task }),
+            validates: validates.map(|task| ModelReference { task }),
             line: table.line,
         };
-        for doubt in doubts(&task, &tasks.read) {
+        for doubt in find_contradictions(&task, &tasks.read) {
             self.problems.error(task.line, doubt);
         }
         tasks.read.push(task);
@@ -293,65 +298,51 @@ impl Reader {
         }
     }
 
-    /// What `read` makes of the value of a key; one that it makes nothing of is told. Both are `None` then, as without it.
+    /// `None` where the key is missing or `read` refuses its value, which is a problem.
     fn value<T>(
         &mut self,
-        table: &Table,
+        table: &DocumentTable,
         key: &str,
         wanted: &str,
-        read: impl Fn(&Value) -> Option<T>,
+        read: impl Fn(&DocumentValue) -> Option<T>,
     ) -> Option<T> {
         let node = table.get(key)?;
         let value = read(&node.value).ok_or_else(|| wrong(key, node, wanted));
         self.problems.take(node.line, value)
     }
 
-    fn text(&mut self, table: &Table, key: &str) -> Option<String> {
+    fn text(&mut self, table: &DocumentTable, key: &str) -> Option<String> {
         self.value(table, key, "a text in quotes", |value| match value {
-            Value::Text(text) => Some(text.clone()),
+            DocumentValue::Text(text) => Some(text.clone()),
             _ => None,
         })
     }
 
-    fn flag(&mut self, table: &Table, key: &str) -> Option<bool> {
+    fn flag(&mut self, table: &DocumentTable, key: &str) -> Option<bool> {
         let wanted = "true or false, without quotes";
         self.value(table, key, wanted, |value| match value {
-            Value::Flag(flag) => Some(*flag),
+            DocumentValue::Flag(flag) => Some(*flag),
             _ => None,
         })
     }
 
-    fn whole(&mut self, table: &Table, key: &str) -> Option<u64> {
-        let wanted = match key {
-            "specimen" => {
-                "a whole number without quotes, such as 2; what it is called stands in [specimen.2] as name"
-            }
-            _ => "a whole number without quotes, such as 2",
-        };
+    fn number<T: FromStr>(&mut self, table: &DocumentTable, key: &str, wanted: &str) -> Option<T> {
         self.value(table, key, wanted, |value| match value {
-            Value::Number(number) => number.parse().ok(),
-            _ => None,
-        })
-    }
-
-    fn number(&mut self, table: &Table, key: &str) -> Option<f64> {
-        let wanted = "a number without quotes, such as 2.5";
-        self.value(table, key, wanted, |value| match value {
-            Value::Number(number) => number.parse().ok(),
+            DocumentValue::Number(number) => number.parse().ok(),
             _ => None,
         })
     }
 
     /// Values as a protocol's parameters are given: a text, or a number without a unit; a list with commas. Whether
     /// that is a value, the protocol says.
-    fn values(&mut self, table: &Table, key: &str) -> BTreeMap<String, String> {
+    fn values(&mut self, table: &DocumentTable, key: &str) -> BTreeMap<String, String> {
         let wanted = "values in braces, as in { depth = \"20 mm\" }";
         let entries = self.value(table, key, wanted, |value| match value {
-            Value::Table(table) => Some(table.entries.clone()),
+            DocumentValue::Table(table) => Some(table.entries.clone()),
             _ => None,
         });
         let mut values = BTreeMap::new();
-        for Entry { key, line, node } in entries.unwrap_or_default() {
+        for DocumentEntry { key, line, node } in entries.unwrap_or_default() {
             let text = as_text(&node).ok_or_else(|| wrong(&key, &node, "a text in quotes"));
             values.extend(self.problems.take(line, text).map(|text| (key, text)));
         }
@@ -359,37 +350,33 @@ impl Reader {
     }
 }
 
-/// What is known of the tasks so far.
 #[derive(Default)]
 struct Tasks {
-    /// Those that are sound.
     read: Vec<Task>,
-    /// Names of all.
     names: Vec<String>,
-    /// Specimens of all that clip one in; `None` for what is no number.
+    /// Specimens of all tasks that clip one in; `None` for one that is not a number.
     specimens: Vec<Option<u64>>,
 }
 
-/// That a key cannot have its value, and what to give.
-fn wrong(key: &str, node: &Node, wanted: &str) -> String {
+fn wrong(key: &str, node: &DocumentNode, wanted: &str) -> String {
     let found = match &node.value {
-        Value::Text(text) => format!("\"{text}\""),
-        Value::Number(number) => number.clone(),
-        Value::Flag(flag) => flag.to_string(),
-        Value::List(_) | Value::Table(_) => node.kind().to_owned(),
+        DocumentValue::Text(text) => format!("\"{text}\""),
+        DocumentValue::Number(number) => number.clone(),
+        DocumentValue::Flag(flag) => flag.to_string(),
+        DocumentValue::List(_) | DocumentValue::Table(_) => node.kind().to_owned(),
     };
     format!("{key} cannot be {found}; give {wanted}")
 }
 
-fn as_text(node: &Node) -> Option<String> {
+fn as_text(node: &DocumentNode) -> Option<String> {
     match &node.value {
-        Value::Text(text) | Value::Number(text) => Some(text.clone()),
-        Value::Flag(flag) => Some(flag.to_string()),
-        Value::List(items) => {
+        DocumentValue::Text(text) | DocumentValue::Number(text) => Some(text.clone()),
+        DocumentValue::Flag(flag) => Some(flag.to_string()),
+        DocumentValue::List(items) => {
             let items: Option<Vec<String>> = items.iter().map(as_text).collect();
             Some(items?.join(", "))
         }
-        Value::Table(_) => None,
+        DocumentValue::Table(_) => None,
     }
 }
 

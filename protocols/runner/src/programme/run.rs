@@ -1,6 +1,6 @@
 //! Carries a programme out on a runner: every run in its own session folder, every step of the way in the journal.
 
-use super::calibrating::{CalibratingError, calibration_of};
+use super::calibration::{CalibrationSessionError, calibration_of};
 use super::conditions::Conditions;
 use super::document::Programme;
 use super::progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
@@ -8,7 +8,7 @@ use crate::{AfterStop, Answers, Request, RunRequest, RunView, Runner, StartError
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
-use palpate_protocols::engine::{EndingKind, PLAN_COMPLETE};
+use palpate_protocols::engine::{EndingKind, Outcome, PLAN_COMPLETE};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
@@ -18,103 +18,61 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 use thiserror::Error;
 
-/// How long the runner may be silent before it is looked at whether it still lives.
+/// How long the runner may be silent before its thread is checked.
 const SILENCE: Duration = Duration::from_millis(500);
 
-/// Where a programme is carried out.
 pub struct Laboratory<'a> {
-    /// The runner, with nothing running.
     pub runner: &'a Runner,
-    /// Says that there is a new snapshot.
     pub woken: &'a Receiver<()>,
-    /// The rig.
     pub rig: &'a RigDescription,
     /// Its interlock thresholds.
     pub limits: Limits,
     /// Volts to newtons until a task measures it.
     pub calibration: Calibration,
-    /// Folder of the journal and of all sessions.
     pub folder: &'a Path,
-    /// Who answers prompts.
     pub answers: Answers,
-    /// What must be acknowledged before a plan is run, such as a daily check that failed; or why that cannot be told.
+    /// What must be acknowledged before a plan is run, such as a daily check that failed; or why that is unknown.
     pub gate: &'a dyn Fn(&Plan) -> Result<Vec<String>, String>,
 }
 
-/// What happens on the way.
 pub enum Event<'a> {
-    /// A run begins.
     Begun {
-        /// Which.
         place: &'a Place,
-        /// Sessions that have finished, and all.
         count: (u32, u32),
     },
     /// A run goes on; with the time left for the whole programme.
     Running(&'a RunView, Seconds),
-    /// A run ended as it should.
     Finished(&'a Place, &'a Path),
-    /// From now on forces follow this calibration.
     Calibrated(&'a Calibration),
 }
 
-/// A programme that is complete.
 #[derive(Clone, Debug)]
 pub struct Done {
-    /// Every run, interrupted ones too.
     pub progress: Progress,
-    /// The calibration in force at the end.
     pub calibration: Calibration,
-    /// Whether it was continued rather than begun.
     pub was_continued: bool,
 }
 
-/// A programme that is not.
 #[derive(Debug, Error)]
 pub enum RunError {
     /// Another program uses the folder, or it is no folder for a programme.
     #[error("{0}")]
     Folder(String),
-    /// The folder belongs to something else.
     #[error(transparent)]
     Progress(#[from] ProgressError),
-    /// The journal.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A plan or the rig refuses.
     #[error("task '{task}': {reason}")]
-    Refused {
-        /// Which.
-        task: String,
-        /// Why.
-        reason: String,
-    },
+    Refused { task: String, reason: String },
     /// A run ended before its plan did.
     #[error(
         "task '{task}', repeat {repeat}, ended by {ending}: {reason}; the same command goes on from there"
     )]
-    Ended {
-        /// Which.
-        task: String,
-        /// Which repeat.
-        repeat: u32,
-        /// How.
-        ending: String,
-        /// Why.
-        reason: String,
-    },
-    /// The weights make no calibration.
+    Ended { task: String, repeat: u32, ending: String, reason: String },
     #[error("task '{task}': {source}")]
-    Calibrating {
-        /// Which.
-        task: String,
-        /// Why.
-        source: CalibratingError,
-    },
-    /// A session of an earlier task.
+    Calibrating { task: String, source: CalibrationSessionError },
     #[error(transparent)]
     Session(#[from] ReadError),
-    /// The thread is gone.
     #[error("the runner ended unexpectedly; the session in progress is incomplete")]
     NoRunner,
 }
@@ -137,8 +95,14 @@ pub fn run(
         Conditions::of(programme, laboratory.rig, &laboratory.limits, &laboratory.calibration);
     let progress = Progress::of(&entries, programme, crc32, &conditions)?;
     let was_continued = !progress.runs.is_empty();
-    let mut work =
-        Work { programme, journal, progress, is_remounting: was_continued, laboratory, tell };
+    let mut work = ProgrammeRun {
+        programme,
+        journal,
+        progress,
+        is_remounting: was_continued,
+        laboratory,
+        tell,
+    };
     if entries.is_empty() {
         work.journal.push(&Entry::Programme {
             name: programme.name.clone(),
@@ -147,32 +111,32 @@ pub fn run(
             conditions: Some(Box::new(conditions)),
         })?;
     }
-    work.settle_last()?;
+    work.complete_journal()?;
     for task in 0..programme.tasks.len() {
         if let Some(folder) = work.progress.finished(task).last() {
             work.calibrate(task, &work.laboratory.folder.join(folder))?;
         }
     }
     while let Some(place) = work.progress.next(programme) {
-        work.one(place)?;
+        work.run_once(place)?;
     }
     Ok(Done { progress: work.progress, calibration: work.laboratory.calibration, was_continued })
 }
 
-struct Work<'a> {
+struct ProgrammeRun<'a> {
     programme: &'a Programme,
     journal: Journal,
     progress: Progress,
-    /// The rig was left alone: somebody must see that the specimen is still the right one.
+    /// The rig was unattended: the operator must check that the specimen is still the right one.
     is_remounting: bool,
     laboratory: Laboratory<'a>,
     tell: &'a mut dyn FnMut(Event<'_>),
 }
 
-impl Work<'_> {
-    /// Gives the last run its line in the journal where a crash came between the end of its log and that line: its
-    /// session knows how it ended. One that cannot be read, or has no end, broke off.
-    fn settle_last(&mut self) -> Result<(), RunError> {
+impl ProgrammeRun<'_> {
+    /// Adds the last run's missing line to the journal after a crash between the end of its log and that line: the session
+    /// has its ending. A session that cannot be read, or has no end, was interrupted.
+    fn complete_journal(&mut self) -> Result<(), RunError> {
         let Some((place, session, None)) = self.progress.runs.last().cloned() else {
             return Ok(());
         };
@@ -180,10 +144,9 @@ impl Work<'_> {
         let Some(end) = session.ok().and_then(|session| session.end) else {
             return Ok(());
         };
-        self.end(place, counted(&end.outcome, &end.reason), end.reason)
+        self.end(place, final_outcome(&end.outcome, &end.reason), end.reason)
     }
 
-    /// Writes down how the last run ended.
     fn end(&mut self, place: Place, outcome: String, reason: String) -> Result<(), RunError> {
         if let Some(run) = self.progress.runs.last_mut() {
             run.2 = Some(outcome.clone());
@@ -192,7 +155,7 @@ impl Work<'_> {
     }
 
     /// One run, from its entry in the journal to the next.
-    fn one(&mut self, mut place: Place) -> Result<(), RunError> {
+    fn run_once(&mut self, mut place: Place) -> Result<(), RunError> {
         let programme = self.programme;
         let task = &programme.tasks[place.task];
         // A folder that is there without its line in the journal is what a crash left of an attempt.
@@ -235,12 +198,8 @@ impl Work<'_> {
         let (ending, reason) = self.wait(&folder, later)?;
         self.end(place.clone(), ending.clone(), reason.clone())?;
         if ending != FINISHED {
-            return Err(RunError::Ended {
-                task: task.name.clone(),
-                repeat: place.repeat,
-                ending,
-                reason,
-            });
+            let (task, repeat) = (task.name.clone(), place.repeat);
+            return Err(RunError::Ended { task, repeat, ending, reason });
         }
         (self.tell)(Event::Finished(&place, &folder));
         self.calibrate(place.task, &folder)
@@ -260,17 +219,14 @@ impl Work<'_> {
         })?;
         self.progress.runs.push((place.clone(), session, None));
         let (reply, answer) = sync_channel(1);
-        let asked = Request::Run(Box::new(request), reply);
-        let sent = self.laboratory.runner.request(asked);
+        let request = Request::Run(Box::new(request), reply);
+        let sent = self.laboratory.runner.request(request);
         sent.map_err(|_| RunError::NoRunner)?;
         match answer.recv() {
             Ok(Ok(())) => Ok(None),
             Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
-                self.journal.push(&Entry::Ended {
-                    place: place.clone(),
-                    outcome: REFUSED.into(),
-                    reason: reason.clone(),
-                })?;
+                let (place, outcome) = (place.clone(), REFUSED.into());
+                self.journal.push(&Entry::Ended { place, outcome, reason: reason.clone() })?;
                 Ok(Some(reason))
             }
             Err(_) => Err(RunError::NoRunner),
@@ -284,17 +240,14 @@ impl Work<'_> {
             let snapshot = self.laboratory.runner.snapshot();
             let own = snapshot.run.as_ref().filter(|run| run.folder == folder);
             if let Some(view) = own {
-                let left = Seconds(view.time_left.0 + later.0);
-                (self.tell)(Event::Running(view, left));
-                if let Some(outcome) = &view.outcome {
-                    return match &view.log_error {
-                        // What is not on disk did not happen.
-                        Some(err) => Ok(("abort".into(), err.clone())),
-                        None => Ok((
-                            counted(outcome.ending.name(), &outcome.reason),
-                            outcome.reason.clone(),
-                        )),
-                    };
+                let remaining = Seconds(view.time_left.0 + later.0);
+                (self.tell)(Event::Running(view, remaining));
+                if let Some(Outcome { ending, reason }) = &view.outcome {
+                    // What is not on disk did not happen.
+                    let broken = view.log_error.as_ref().map(|err| ("abort".into(), err.clone()));
+                    return Ok(broken.unwrap_or_else(|| {
+                        (final_outcome(ending.name(), reason), reason.clone())
+                    }));
                 }
             }
             if !is_woken && !self.laboratory.runner.is_alive() {
@@ -317,27 +270,22 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Expected time of everything behind a place.
     fn time_after(&self, place: &Place) -> Result<Seconds, String> {
         let curve = self.laboratory.calibration.curve();
         let curve = curve.map_err(|err| err.to_string())?;
-        let mut left = 0.0;
-        for (index, task) in self.programme.tasks.iter().enumerate().skip(place.task) {
+        let (rig, limits) = (self.laboratory.rig, &self.laboratory.limits);
+        let tasks = self.programme.tasks.iter().enumerate().skip(place.task);
+        let plans = tasks.flat_map(|(index, task)| {
             let first = if index == place.task { place.repeat + 1 } else { 1 };
-            for repeat in first..=task.repeats {
-                let Some(plan) = task.plan(repeat, None) else {
-                    continue;
-                };
-                let (rig, limits) = (self.laboratory.rig, &self.laboratory.limits);
-                left += preview(&plan, rig, limits, &curve, true).expected.0;
-            }
-        }
-        Ok(Seconds(left))
+            (first..=task.repeats).filter_map(|repeat| task.plan(repeat, None))
+        });
+        let expected = plans.map(|plan| preview(&plan, rig, limits, &curve, true).expected.0);
+        Ok(Seconds(expected.sum()))
     }
 }
 
-/// How a run that ended so counts: what was left out was not done.
-fn counted(outcome: &str, reason: &str) -> String {
+/// A run that skipped measurements did not finish.
+fn final_outcome(outcome: &str, reason: &str) -> String {
     match outcome {
         FINISHED if reason != PLAN_COMPLETE => EndingKind::Stop.name().into(),
         outcome => outcome.into(),

@@ -18,10 +18,10 @@ use thiserror::Error;
 
 mod player;
 mod source;
-mod words;
+mod wording;
 
 pub use player::Player;
-use source::{RecordedInput, config_of, inputs_of, reading_of};
+use source::{RecordedInput, read_config, read_inputs, read_sample};
 
 /// Force and depth come from the same arithmetic on the same raw numbers; `exp` and friends may
 /// differ in the last digits between platforms, which depth (under 200 mm) and force (under 50 N)
@@ -31,7 +31,7 @@ pub const TOLERANCE_DERIVED: f64 = 1e-9;
 /// Residuals of the live fit; relative. Its Gram matrices keep about eight digits.
 pub const TOLERANCE_LIVE_RMSE: f64 = 1e-6;
 
-/// Parameters of the live fit, in standard errors: what nobody could see on the display. A
+/// Parameters of the live fit, in standard errors: too little to see on the display. A
 /// parameter that is not identified has no value to agree on.
 pub const TOLERANCE_LIVE_SIGMAS: f64 = 0.01;
 
@@ -44,23 +44,18 @@ pub const TOLERANCE_LIVE_OLD: (f64, f64) = (1e-3, 0.5);
 /// about four digits less than the sum itself.
 pub const TOLERANCE_LIVE_ERROR: f64 = 1e-4;
 
-/// A session cannot be replayed at all.
 #[derive(Debug, Error)]
 pub enum ReplayError {
     /// No rig recorded it, so no engine decided anything.
     #[error(
         "the session was imported from {file} and has no decisions to replay; its numbers can be checked against the original kept beside it"
     )]
-    Imported {
-        /// The file it was made from.
-        file: String,
-    },
+    Imported { file: String },
     /// The manifest's plan or calibration is not what this version knows.
     #[error(
         "the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it"
     )]
     Manifest {
-        /// Plan, calibration or settings.
         what: &'static str,
         /// The parser's words.
         detail: String,
@@ -68,7 +63,6 @@ pub enum ReplayError {
     /// A recorded input is not what this version knows.
     #[error("input {order} of the session cannot be understood ({detail})")]
     Input {
-        /// Its number.
         order: u64,
         /// The parser's words.
         detail: String,
@@ -78,61 +72,47 @@ pub enum ReplayError {
 /// The first place where recorded and recomputed differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// Session time.
     pub at_s: f64,
     /// Samples before it.
     pub after_sample: u64,
     /// What differs: `decision`, `force_N`, `depth_mm`, `phase` or `live fit`.
     pub what: String,
-    /// Number of the decision, for a decision.
     pub decision: Option<usize>,
     /// What the protocol was doing, in its words, such as `step 6 of 8, ramp, cycle 2`.
     pub step: String,
-    /// What the session says.
     pub recorded: Value,
-    /// What the engine says now.
     pub now: Value,
 }
 
 impl Difference {
-    /// What the session says, in words.
     pub fn recorded_words(&self) -> String {
-        words::of(&self.recorded)
+        wording::describe_value(&self.recorded)
     }
 
-    /// What the engine says now, in words.
     pub fn now_words(&self) -> String {
-        words::of(&self.now)
+        wording::describe_value(&self.now)
     }
 }
 
-/// A decision that is allowed to differ, for a reason somebody reviewed.
+/// A decision that is allowed to differ, for a reviewed reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Blessing {
-    /// Number of the decision.
     pub decision: usize,
-    /// What the engine decides now.
     pub now: Value,
-    /// Why that is right.
     pub reason: String,
 }
 
-/// What a replay found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ReplayReport {
-    /// Samples fed.
     pub samples: u64,
-    /// Decisions compared.
     pub decisions: usize,
     /// Whether decisions were compared: the engine version is the recorded one.
     pub is_same_engine: bool,
-    /// Decisions that differ as blessed.
     pub blessed: usize,
     /// Largest difference of a derived force, in N.
     pub force_difference_n: f64,
     /// Largest difference of a derived depth, in mm.
     pub depth_difference_mm: f64,
-    /// The first difference that matters, if any.
     pub first_difference: Option<Difference>,
 }
 
@@ -157,10 +137,9 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     }
 }
 
-/// Replays a session.
 pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport, ReplayError> {
-    let config = Arc::new(config_of(session)?);
-    let mut inputs = inputs_of(session)?;
+    let config = Arc::new(read_config(session)?);
+    let mut inputs = read_inputs(session)?;
     let mut run = Replay {
         live: LiveFeed::new(&config),
         state: Some(State::new(config)),
@@ -226,7 +205,7 @@ impl Replay<'_> {
     }
 
     fn feed_row(&mut self, index: u64, row: &Row) {
-        let Some(reading) = reading_of(row) else {
+        let Some(reading) = read_sample(row) else {
             return;
         };
         self.step(row.host, index + 1, Input::Reading(reading));
@@ -236,26 +215,18 @@ impl Replay<'_> {
         if let Some(estimate) = self.live.push(&reading, state) {
             self.expected_live.push_back(estimate);
         }
-        let force = (row.force, derived.force.map(|force| force.0));
-        let depth = (row.depth, derived.depth.map(|depth| depth.0));
-        for (what, (recorded, now)) in [("force_N", force), ("depth_mm", depth)] {
-            match (recorded, now) {
-                (Some(recorded), Some(now)) => {
-                    let difference = (recorded - now).abs();
-                    let largest = if what == "force_N" {
-                        &mut self.report.force_difference_n
-                    } else {
-                        &mut self.report.depth_difference_mm
-                    };
-                    *largest = largest.max(difference);
-                    if difference <= TOLERANCE_DERIVED {
-                        continue;
-                    }
-                }
-                (None, None) => continue,
-                _ => {}
-            }
-            self.differ(row.host, index, what, None, to_json(&recorded), to_json(&now));
+        let (report, mut differences) = (&mut self.report, Vec::new());
+        for (what, recorded, now, largest) in [
+            ("force_N", row.force, derived.force.map(|it| it.0), &mut report.force_difference_n),
+            ("depth_mm", row.depth, derived.depth.map(|it| it.0), &mut report.depth_difference_mm),
+        ] {
+            let difference = recorded.zip(now).map(|(recorded, now)| (recorded - now).abs());
+            *largest = largest.max(difference.unwrap_or(0.0));
+            let is_same = difference.map_or(recorded == now, |it| it <= TOLERANCE_DERIVED);
+            differences.extend((!is_same).then(|| (what, to_json(&recorded), to_json(&now))));
+        }
+        for (what, recorded, now) in differences {
+            self.differ(row.host, index, what, None, recorded, now);
         }
         // Labels follow decisions: they are the engine's, not arithmetic.
         if self.report.is_same_engine
@@ -320,7 +291,7 @@ impl Replay<'_> {
         recorded: Value,
         now: Value,
     ) {
-        let step = self.state.as_ref().map_or(String::new(), words::of_step);
+        let step = self.state.as_ref().map_or(String::new(), wording::describe_step);
         self.report.first_difference.get_or_insert(Difference {
             step,
             at_s: at.seconds().0,
@@ -333,7 +304,6 @@ impl Replay<'_> {
     }
 }
 
-/// Whether two live fits say the same.
 fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
     let has_verdicts = !a.verdicts.is_empty();
     let (rmse, sigmas) = if has_verdicts {

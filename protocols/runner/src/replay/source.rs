@@ -9,11 +9,10 @@ use palpate_protocols::engine::{Config, Input};
 use palpate_protocols::plans::Plan;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{EntryKind, Row};
-use serde_json::Value;
 use std::collections::VecDeque;
 
 /// The engine's configuration at the start of the session.
-pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
+pub(super) fn read_config(session: &Session) -> Result<Config, ReplayError> {
     let manifest = &session.manifest;
     let bad = |what, detail: String| ReplayError::Manifest { what, detail };
     if let Some(imported) = &manifest.imported {
@@ -27,11 +26,9 @@ pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
         .map_err(|err| bad("plan", err.to_string()))?;
     let calibration: Calibration = serde_json::from_value(manifest.calibration.clone())
         .map_err(|err| bad("calibration", err.to_string()))?;
-    let is_homed = manifest
-        .settings
-        .get("is_homed_at_start")
-        .and_then(Value::as_bool)
-        .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
+    let is_homed = manifest.settings["is_homed_at_start"].as_bool();
+    let is_homed =
+        is_homed.ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
     Ok(Config {
         rig,
         limits: plan.limits.tighten(limits),
@@ -41,19 +38,16 @@ pub(super) fn config_of(session: &Session) -> Result<Config, ReplayError> {
     })
 }
 
-/// An input that is no sample.
 #[derive(Clone, Debug)]
 pub(super) struct RecordedInput {
     /// Samples before it.
     pub after_sample: u64,
-    /// When it came.
     pub now: Nanos,
-    /// What came.
     pub input: Input,
 }
 
 /// Every input that is no sample, in order.
-pub(super) fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
+pub(super) fn read_inputs(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
     session
         .entries
         .iter()
@@ -68,7 +62,7 @@ pub(super) fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, Re
 }
 
 /// The sample as the rig sent it. Every row of a session with a rig has all of it.
-pub(super) fn reading_of(row: &Row) -> Option<Reading> {
+pub(super) fn read_sample(row: &Row) -> Option<Reading> {
     Some(Reading {
         tick: row.tick,
         counts: row.counts,

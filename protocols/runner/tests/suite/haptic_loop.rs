@@ -20,7 +20,7 @@ fn device(period: Period) -> Simulated {
 }
 
 #[test]
-fn a_tick_allocates_nothing() {
+fn haptic_tick_allocates_nothing() {
     let mut device = device(Period::MILLISECOND);
     let mut seen = *device.last();
     let counted = allocation_counter::measure(|| {
@@ -62,7 +62,7 @@ fn waits() -> u64 {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_tick_waits_for_nobody() {
+fn haptic_tick_never_waits() {
     let mut device = device(Period::MILLISECOND);
     let (mut shown, mut seen) = triple_buffer::triple_buffer(device.last());
     let reader = std::thread::Builder::new().spawn(move || {
@@ -110,13 +110,13 @@ fn poked(method: Method) -> impl FnMut(usize) {
             };
             Contact::at(&grid, node, z, side)
         });
-        let told = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
-        assert!(!told.dirty.is_empty() || tick % 4 == 0);
+        let effect = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
+        assert!(!effect.dirty.is_empty() || tick % 4 == 0);
     }
 }
 
 #[test]
-fn a_tick_of_the_surface_allocates_nothing() {
+fn surface_tick_allocates_nothing() {
     for method in Method::ALL {
         let mut tick = poked(method);
         // From the first tick on: all there is was made before.
@@ -127,7 +127,7 @@ fn a_tick_of_the_surface_allocates_nothing() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_tick_of_the_surface_waits_for_nobody() {
+fn surface_tick_never_waits() {
     for method in Method::ALL {
         let mut tick = poked(method);
         // The first ones read the program from the disk.
@@ -142,7 +142,7 @@ fn a_tick_of_the_surface_waits_for_nobody() {
 }
 
 #[test]
-fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
+fn shared_view_is_never_torn_and_never_goes_back_in_time() {
     let period = Period::of_rate(10_000.0).unwrap();
     let device = device(period);
     let first = *device.last();
@@ -166,14 +166,14 @@ fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
 }
 
 #[test]
-fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
+fn overrunning_loop_leaves_the_core_to_other_threads() {
     /// Keeps the core for twice its time, and counts what was due.
     #[derive(Default)]
-    struct Heavy {
+    struct HeavyTask {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for Heavy {
+    impl Ticking for HeavyTask {
         type View = u64;
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -188,7 +188,7 @@ fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
         }
     }
     let period = Period::of_rate(250.0).unwrap();
-    let mut beat = Beat::start(Heavy::default(), period, 0).unwrap();
+    let mut beat = Beat::start(HeavyTask::default(), period, 0).unwrap();
     until(|| (*beat.seen() >= 60).then_some(()), || "60 calls".into());
     let task = beat.end().unwrap();
     // 10 ms of work and 4 of rest are three and a half ticks of 4 ms; without the rest two and a half.
@@ -197,13 +197,13 @@ fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
 }
 
 #[test]
-fn ticks_that_were_missed_are_told_and_none_is_lost() {
+fn missed_ticks_are_counted_and_none_is_lost() {
     /// Sleeps through some ticks now and then, which a loop must never do.
-    struct Sleepy {
+    struct SleepyTask {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for Sleepy {
+    impl Ticking for SleepyTask {
         type View = (u64, u64);
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -216,7 +216,7 @@ fn ticks_that_were_missed_are_told_and_none_is_lost() {
             *view = (self.calls, self.ticks);
         }
     }
-    let task = Sleepy { calls: 0, ticks: 0 };
+    let task = SleepyTask { calls: 0, ticks: 0 };
     let mut beat = Beat::start(task, Period::MILLISECOND, (0, 0)).unwrap();
     until(|| (beat.seen().0 >= 200).then_some(()), || "200 calls".into());
     let kept = beat.kept();

@@ -91,7 +91,7 @@ fn every_frame_is_the_surface_however_seldom_one_is_taken() {
 }
 
 #[test]
-fn a_recorded_loop_is_computed_again_bit_by_bit() {
+fn recorded_loop_is_reproduced_bit_by_bit() {
     let at = tempfile::tempdir().unwrap();
     let folder = at.path().join("poke");
     let recorder = SceneRecorder::start(&folder, "", COLUMNS).unwrap();
@@ -115,10 +115,10 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
     );
     let end = live.stop().unwrap();
     assert!(end.kept.work.count > 100);
-    let told = end.recorded.unwrap().unwrap();
-    assert_eq!(told.lost, 0);
+    let recorded = end.recorded.unwrap().unwrap();
+    assert_eq!(recorded.lost, 0);
     let found = Recording::read(&folder, COLUMNS).unwrap();
-    assert_eq!(found.rows.len() as u64, told.ticks);
+    assert_eq!(found.rows.len() as u64, recorded.ticks);
     assert_eq!(found.end, End::Whole { lost: 0, left: end.scene.hash() });
     let differs = |change: fn(usize, &mut SceneRow)| {
         let mut again = LedScene::new(settings).unwrap();
@@ -127,8 +127,8 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
             let mut row = *row;
             change(index, &mut row);
             let (hand, elapsed) = scene_input(&row);
-            let told = again.tick_after(hand, elapsed);
-            let made = scene_row(hand, elapsed, &told);
+            let tick = again.tick_after(hand, elapsed);
+            let made = scene_row(hand, elapsed, &tick);
             first = first.or(made.differs(&row).map(|column| (index, column)));
         }
         (first, again.scene.hash())
@@ -159,7 +159,7 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
 }
 
 #[test]
-fn the_kept_recording_is_computed_again() {
+fn stored_recording_is_reproduced_bit_by_bit() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/scene-poke");
     let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
     let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
@@ -167,8 +167,8 @@ fn the_kept_recording_is_computed_again() {
     assert!(found.rows.len() > 700);
     for row in &found.rows {
         let (hand, elapsed) = scene_input(row);
-        let told = again.tick_after(hand, elapsed);
-        let made = scene_row(hand, elapsed, &told);
+        let tick = again.tick_after(hand, elapsed);
+        let made = scene_row(hand, elapsed, &tick);
         assert_eq!(row.differs(&made), None, "{row:?} {made:?}");
     }
     let left = again.scene.hash();
@@ -177,23 +177,23 @@ fn the_kept_recording_is_computed_again() {
 
 /// A device that is not simulated: its stylus goes where a script says, and it keeps what it was given.
 #[derive(Debug)]
-struct Scripted {
+struct ScriptedDevice {
     settings: DeviceSettings,
     script: fn(u64) -> [f64; 3],
     ticks: u64,
     given: std::sync::mpsc::SyncSender<[f64; 3]>,
 }
 
-impl Scripted {
+impl ScriptedDevice {
     fn new(script: fn(u64) -> [f64; 3]) -> (Box<Self>, std::sync::mpsc::Receiver<[f64; 3]>) {
-        let (given, told) = std::sync::mpsc::sync_channel(4096);
+        let (given, receiver) = std::sync::mpsc::sync_channel(4096);
         let settings = DeviceSettings::default();
         let device = Self { settings, script, ticks: 0, given };
-        (Box::new(device), told)
+        (Box::new(device), receiver)
     }
 }
 
-impl HapticDevice for Scripted {
+impl HapticDevice for ScriptedDevice {
     fn settings(&self) -> &DeviceSettings {
         &self.settings
     }
@@ -217,7 +217,7 @@ fn pressed(tick: u64) -> [f64; 3] {
 
 #[test]
 fn another_device_takes_the_place_of_the_simulated_one() {
-    let (device, given) = Scripted::new(pressed);
+    let (device, given) = ScriptedDevice::new(pressed);
     let settings = SceneSettings::default();
     let mut task = SceneTask::new(scene(settings), device, None);
     let mut alone = scene(settings);
@@ -225,9 +225,9 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     for tick in 1..=3000 {
         task.tick(1);
         let (at, turn) = (pressed(tick), [0.0, -0.5, 0.0]);
-        let told = alone.feel(Pose { at, turn }, 1);
+        let outcome = alone.feel(Pose { at, turn }, 1);
         let force = given.try_recv().expect("a force in every tick");
-        assert_eq!(force, told.force, "{tick}");
+        assert_eq!(force, outcome.force, "{tick}");
         assert!(force.iter().all(|part| part.is_finite()));
         most = most.max(force[2]);
     }
@@ -236,18 +236,18 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     assert_eq!(task.scene().last().force, [0.0; 3]);
     // Its numbers are those that the scene is guarded by, or there is no scene.
     let stronger = DeviceSettings { force_max_n: 8.0, ..DeviceSettings::default() };
-    let (device, _given) = Scripted::new(pressed);
+    let (device, _given) = ScriptedDevice::new(pressed);
     let refused = SceneLoop::on(device, scene(settings.with_device(stronger)), None);
-    assert!(refused.unwrap_err().contains("another device"));
+    assert!(refused.unwrap_err().contains("different device"));
 }
 
 #[test]
-fn a_recording_of_another_device_is_computed_again_from_where_it_was_sensed() {
+fn recording_of_another_device_is_reproduced_from_its_poses() {
     let at = tempfile::tempdir().unwrap();
     let folder = at.path().join("sensed");
     let recorder = SceneRecorder::start(&folder, "", SENSED_COLUMNS).unwrap();
     let settings = SceneSettings::default();
-    let (device, _given) = Scripted::new(pressed);
+    let (device, _given) = ScriptedDevice::new(pressed);
     let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
     assert!(live.is_over());
     until(|| (live.view().tick.tick >= 1200).then_some(()), || "1200 ticks".into());
@@ -256,8 +256,8 @@ fn a_recording_of_another_device_is_computed_again_from_where_it_was_sensed() {
     let mut again = scene(settings);
     for row in &found.rows {
         let (Hand6 { at, turn }, elapsed) = scene_input(row);
-        let told = again.feel(Pose { at, turn }, elapsed);
-        let made = scene_row(Hand6 { at, turn }, elapsed, &told);
+        let tick = again.feel(Pose { at, turn }, elapsed);
+        let made = scene_row(Hand6 { at, turn }, elapsed, &tick);
         assert_eq!(row.differs(&made), None);
     }
     assert!(again.last().depth > 10.0 && again.hash() == end.scene.hash());

@@ -1,11 +1,11 @@
 //! The words of what a replay and a programme refuse.
 
-use palpate_runner::programme::{CalibratingError, ProgressError, RunError};
+use palpate_runner::programme::{CalibrationSessionError, ProgressError, RunError};
 use palpate_runner::replay::ReplayError;
 use palpate_test_support::assert_messages;
 
 #[test]
-fn what_a_replay_refuses_is_worded() {
+fn replay_errors_have_their_words() {
     let detail = || "line 3".to_owned();
     assert_messages! {
         ReplayError::Imported { file: "old.csv".into() } => ["old.csv"],
@@ -15,17 +15,17 @@ fn what_a_replay_refuses_is_worded() {
 }
 
 #[test]
-fn what_a_programme_refuses_is_worded() {
+fn programme_errors_have_their_words() {
     let name = || "week".to_owned();
     let task = || "ramp".to_owned();
     let incomplete =
-        || CalibratingError::Incomplete { session: "s-1".into(), ending: "stop".into() };
+        || CalibrationSessionError::Incomplete { session: "s-1".into(), ending: "stop".into() };
     assert_messages! {
         ProgressError::Other(name()) => ["'week'"],
         ProgressError::Changed(name()) => ["'week'"],
         ProgressError::Conditions { programme: name(), changes: vec!["the rig was sim".into(), "the depth was 3 mm".into()] } => ["'week'", "sim", "3 mm"],
         ProgressError::Headless => ["new folder"],
-        CalibratingError::NoReadings("s-1".into()) => ["s-1", "load-cell-calibration"],
+        CalibrationSessionError::NoReadings("s-1".into()) => ["s-1", "load-cell-calibration"],
         incomplete() => ["s-1", "stop"],
         RunError::Refused { task: task(), reason: "the depth is too great".into() } => ["'ramp'", "the depth is too great"],
         RunError::Ended { task: task(), repeat: 2, ending: "stop".into(), reason: "by hand".into() } => ["'ramp'", "repeat 2", "stop", "by hand"],

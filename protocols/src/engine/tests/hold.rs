@@ -68,9 +68,9 @@ fn the_reason_is_recorded_once_and_says_what_was_reached() {
     let [Effect::Record(record)] = &effects[..] else {
         panic!("{effects:?}");
     };
-    let told = record.to_string();
+    let text = record.to_string();
     for fact in ["tau_eps", "0.8 %", "1 %"] {
-        assert!(told.contains(fact), "{fact}: {told}");
+        assert!(text.contains(fact), "{fact}: {text}");
     }
     assert_eq!(bench.give(answer(0.007, true)), []);
 }

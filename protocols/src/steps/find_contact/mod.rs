@@ -5,21 +5,15 @@ mod noise;
 mod search;
 mod touch_log;
 
-pub(super) use noise::{above_noise, not_felt};
+pub(super) use noise::{above_noise, second_touch_error};
 
-use super::{Executable, Facts, Need, Pausing, Step, StepKind};
-use crate::engine::Context;
-use crate::file::{Args, Key, Kind};
-use crate::preview::{CONTACT_EXPECTED_SHARE, Reach, Span, Walk};
-use palpate_model::rig::Phase;
-use palpate_model::units::{MmPerS, Newtons, Seconds};
+use super::prelude::*;
+use crate::preview::CONTACT_EXPECTED_SHARE;
 use search::ContactSearch;
-use serde::{Deserialize, Serialize};
 
 /// Find the tissue surface in two passes and rest before the measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FindContact {
-    /// Speed of the first pass.
     pub approach_speed: MmPerS,
     /// Filtered force above tare that ends the first pass.
     pub criterion: Newtons,
@@ -33,7 +27,7 @@ pub struct FindContact {
     pub recovery: Seconds,
     /// Widest accepted standard error of the contact position, in mm.
     pub std_error_mm_max: f64,
-    /// What the first pass does once it has felt the tissue; without it the first pass ends there and contact
+    /// What the first pass does after its trigger; without it the first pass ends there and contact
     /// is estimated from the second alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub press: Option<Press>,
@@ -78,12 +72,12 @@ impl Default for Press {
     }
 }
 
-pub(super) const FACTS: Facts = Facts {
+pub(super) const FACTS: StepFacts = StepFacts {
     about: "Find the surface of the tissue and stop there. Depths count from it.",
     keys: &[
         Key::optional("speed", Kind::Speed, "of the first pass"),
         Key::optional("criterion", Kind::Force, "force that ends the first pass"),
-        Key::optional("retreat", Kind::Length, "way back before the second pass"),
+        Key::optional("retreat", Kind::Length, "retract before the second pass"),
         Key::optional("pass_speed", Kind::Speed, "of the second pass"),
         Key::optional("pass_force", Kind::Force, "force that ends the second pass"),
         Key::optional("recovery", Kind::Time, "rest after each pass").zero_allowed(),
@@ -110,7 +104,7 @@ pub(super) const FACTS: Facts = Facts {
     needs: &[Need::Motor, Need::Home, Need::Tare, Need::Specimen, Need::Outside],
     gives: &[Need::Contact],
     label: "contact",
-    ..Facts::of("find-contact", Phase::Contact, Pausing::RepeatFromStart)
+    ..StepFacts::of("find-contact", Phase::Contact, PauseBehaviour::RepeatFromStart)
 };
 
 fn read(args: &Args) -> Result<Step, String> {
@@ -140,7 +134,7 @@ fn usual_search() -> String {
         format!("a press to {} and a dwell of {}", press.force, press.dwell)
     });
     format!(
-        "Without keys: a first pass at {}, felt at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
+        "Without keys: a first pass at {}, triggered at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
          recovery of {}, a standard error of {} mm at most.\n\n",
         search.approach_speed,
         search.criterion,
@@ -174,7 +168,7 @@ impl Press {
 }
 
 impl StepKind for FindContact {
-    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+    fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_sizes(&[
             self.retreat_mm,
             self.criterion.0,

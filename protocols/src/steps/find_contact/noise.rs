@@ -1,4 +1,4 @@
-//! What noise and drift allow a search to feel.
+//! Limits of noise and drift on a contact search.
 
 use crate::engine::{Context, UnloadedSignal};
 use palpate_model::units::{Newtons, Seconds, Volts};
@@ -15,20 +15,23 @@ const DRIFT_SIGMAS: f64 = 5.0;
 pub(in crate::steps) fn above_noise(
     cx: &Context<'_>,
     unloaded: &UnloadedSignal,
-    wanted: Newtons,
+    target: Newtons,
     samples: usize,
 ) -> (Newtons, Newtons) {
     let noise = cx.curve().force_sigma(Newtons(0.0), unloaded.noise);
     let filtered = noise.0 / (samples as f64).sqrt();
-    (Newtons(wanted.0.max(CRITERION_SIGMAS * filtered)), noise)
+    (Newtons(target.0.max(CRITERION_SIGMAS * filtered)), noise)
 }
 
-/// Why a second touch ended without its trigger: `wanted` is the criterion of the plan, `criterion` the one that
-/// [`above_noise`] made of it.
-pub(in crate::steps) fn not_felt(touch: &str, wanted: Newtons, criterion: Newtons) -> String {
-    let advice = if criterion > wanted {
+/// `target` is the criterion of the plan, `criterion` the one that [`above_noise`] made of it.
+pub(in crate::steps) fn second_touch_error(
+    touch: &str,
+    target: Newtons,
+    criterion: Newtons,
+) -> String {
+    let advice = if criterion > target {
         format!(
-            "noise raised the criterion from {wanted:.3} to {criterion:.3}; quieten the signal, tare and search again"
+            "noise raised the criterion from {target:.3} to {criterion:.3}; quieten the signal, tare and search again"
         )
     } else {
         "look whether the specimen or its support moved, then search again".to_owned()

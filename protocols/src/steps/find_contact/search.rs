@@ -1,19 +1,15 @@
 //! A search for the tissue's surface in progress.
 //!
 //! The trigger of a moving mean is late by construction and published testers trigger early on
-//! single peaks, so the trigger only ends a pass; the position comes from a fit: of everything felt where the
+//! single peaks, so the trigger only ends a pass; the position comes from a fit: of all forces where the
 //! plan presses, else of the onset in the second pass.
 
 use super::FindContact;
-use super::noise::{above_noise, check_drift, not_felt};
-use super::touch_log::{Counts, TouchLog};
-use crate::engine::{Contact, Context, Millisecond, NOT_TARED, Record};
-use crate::steps::{InProgress, Progress};
-use palpate_model::rig::{Phase, Reading};
-use palpate_model::signal::{
-    ContactEstimate, ContactPoint, MovingMean, TouchEstimate, fit_contact, fit_touch,
-};
-use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
+use super::noise::{above_noise, check_drift, second_touch_error};
+use super::touch_log::{ForceUse, TouchLog};
+use crate::engine::{Contact, NOT_TARED};
+use crate::steps::prelude::*;
+use palpate_model::signal::{ContactEstimate, ContactPoint, TouchEstimate, fit_contact, fit_touch};
 use std::collections::VecDeque;
 
 /// Milliseconds averaged before a force is compared with a criterion: two to three mains cycles.
@@ -52,20 +48,20 @@ const CLEARANCE_MM: f64 = 1.0;
 /// Share of the travel kept free behind the furthest approach, in mm.
 const TRAVEL_MARGIN_MM: f64 = 1.0;
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Approach,
     Press,
     ApproachBraking,
-    Dwell { until_tick: u64 },
+    Dwell,
     Retreat,
-    Recover { until_tick: u64 },
+    Recover,
     SlowPass,
     SlowBraking,
-    SlowDwell { until_tick: u64 },
-    Clear { found: Contact },
-    Rest { found: Contact, until_tick: u64 },
-    ToZero { found: Contact },
+    SlowDwell,
+    Clear(Contact),
+    Rest(Contact),
+    ToZero,
 }
 
 /// A contact search in progress.
@@ -74,34 +70,27 @@ pub(crate) struct ContactSearch {
     plan: FindContact,
     criterion: Newtons,
     stage: Stage,
-    millisecond: Millisecond,
+    /// End of a stage that lasts for a set time.
+    until_tick: u64,
+    millisecond: BlockMean<2>,
     filter: MovingMean,
     fast: MovingMean,
     /// Means in the filter, means in a row above the criterion, and in a point of the slow pass.
     filtered: usize,
     consecutive: usize,
-    point: u32,
     seen: usize,
     above: u32,
     /// The newest raw forces, one a millisecond, oldest first.
     raw: VecDeque<Newtons>,
     false_triggers: u32,
     first_trigger: Position,
-    /// Where the first touch ended, once it has been understood.
+    /// End of the first touch, once its fit has succeeded.
     first_end: Option<Position>,
     log: TouchLog,
     pass_start_tick: u64,
     points: Vec<ContactPoint>,
-    bin: Bin,
-}
-
-/// Milliseconds being averaged into one point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Bin {
-    count: u32,
-    t: f64,
-    position: f64,
-    force: f64,
+    /// Time in s, position in mm and force in N of the point in progress.
+    point: BlockMean<3>,
 }
 
 impl ContactSearch {
@@ -127,12 +116,12 @@ impl ContactSearch {
             plan,
             criterion,
             stage: Stage::Approach,
-            millisecond: Millisecond::of(cx.rig()),
+            until_tick: 0,
+            millisecond: BlockMean::of_millisecond(cx.rig()),
             filter: MovingMean::new(filtered),
             fast: MovingMean::new(fast),
             filtered,
             consecutive,
-            point: point as u32,
             seen: 0,
             above: 0,
             raw: VecDeque::with_capacity(consecutive),
@@ -142,23 +131,22 @@ impl ContactSearch {
             log: TouchLog::new(cx.tick(), cx.rig()),
             pass_start_tick: 0,
             points: Vec::new(),
-            bin: Bin::default(),
+            point: BlockMean::new(point as u32),
         })
     }
 
-    /// What the first touch makes of a millisecond.
-    fn first_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<(), String> {
-        let Felt { reading, at_rest, .. } = *now;
+    /// Handles a millisecond of the first touch.
+    fn first_touch(&mut self, cx: &mut Context<'_>, now: &SearchSample<'_>) -> Result<(), String> {
+        let SearchSample { reading, at_rest, .. } = *now;
+        let is_over = reading.tick >= self.until_tick;
         match self.stage {
             Stage::Approach => {
                 if self.is_first_triggered(now.force, now.filtered) {
                     self.first_trigger = now.position;
                     self.record_trigger(cx, reading, 1, now.filtered);
-                    if self.plan.press.is_some() {
-                        self.stage = Stage::Press;
-                    } else {
-                        cx.stop_move();
-                        self.stage = Stage::ApproachBraking;
+                    match self.plan.press {
+                        Some(_) => self.stage = Stage::Press,
+                        None => self.stop(cx, Stage::ApproachBraking),
                     }
                 } else if at_rest {
                     return Err(no_tissue(now.position));
@@ -167,8 +155,7 @@ impl ContactSearch {
             Stage::Press => {
                 let wanted = self.plan.press.map_or(FORCE_MAX, |press| press.force);
                 if now.filtered >= wanted || now.fast >= FORCE_FAST_MAX {
-                    cx.stop_move();
-                    self.stage = Stage::ApproachBraking;
+                    self.stop(cx, Stage::ApproachBraking);
                 } else if now.filtered.0 < 0.5 * self.criterion.0 {
                     self.on_false_trigger()?;
                 } else if at_rest {
@@ -176,31 +163,30 @@ impl ContactSearch {
                 }
             }
             Stage::ApproachBraking if at_rest => match self.plan.press {
-                Some(press) => {
-                    let until_tick = reading.tick + cx.ticks(press.dwell);
-                    self.stage = Stage::Dwell { until_tick };
-                }
+                Some(press) => self.stay(cx, press.dwell, Stage::Dwell),
                 None => self.retreat(cx, self.first_trigger)?,
             },
-            Stage::Dwell { until_tick } if reading.tick >= until_tick => {
+            Stage::Dwell if is_over => {
                 let first = self.fit()?;
                 self.first_end = Some(now.position);
                 self.retreat(cx, first.contact.position)?;
             }
-            Stage::Retreat if at_rest => {
-                let until_tick = reading.tick + cx.ticks(self.plan.recovery);
-                self.stage = Stage::Recover { until_tick };
-            }
+            Stage::Retreat if at_rest => self.stay(cx, self.plan.recovery, Stage::Recover),
             _ => {}
         }
         Ok(())
     }
 
-    /// What the second touch and the way to depth zero make of it.
-    fn second_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<Progress, String> {
-        let Felt { reading, at_rest, .. } = *now;
-        match self.stage.clone() {
-            Stage::Recover { until_tick } if reading.tick >= until_tick => {
+    /// Handles a millisecond of the second touch and of the move to depth zero.
+    fn second_touch(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: &SearchSample<'_>,
+    ) -> Result<Progress, String> {
+        let SearchSample { reading, at_rest, .. } = *now;
+        let is_over = reading.tick >= self.until_tick;
+        match self.stage {
+            Stage::Recover if is_over => {
                 let overrun = self.first_trigger.moved_by(PASS_OVERRUN_MM);
                 let end = self.first_end.unwrap_or(overrun);
                 cx.move_to(end, self.plan.pass_speed)?;
@@ -209,50 +195,42 @@ impl ContactSearch {
                 self.stage = Stage::SlowPass;
             }
             Stage::SlowPass => {
-                self.collect(cx, reading, now.felt_at, now.force);
+                self.collect(cx, reading, now.mean_position, now.force);
                 let target = Newtons(self.plan.pass_force.0.max(2.0 * self.criterion.0));
                 let is_felt = self.first_end.is_some() && now.filtered >= self.criterion;
                 if self.is_triggered(now.filtered, target) {
                     self.record_trigger(cx, reading, 2, now.filtered);
-                    cx.stop_move();
-                    self.stage = Stage::SlowBraking;
+                    self.stop(cx, Stage::SlowBraking);
                 } else if at_rest && is_felt {
                     self.record_trigger(cx, reading, 2, now.filtered);
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
-                    return Err(not_felt("pass", self.plan.criterion, self.criterion));
+                    return Err(second_touch_error("pass", self.plan.criterion, self.criterion));
                 }
             }
             Stage::SlowBraking if at_rest => match self.plan.press {
-                Some(press) => {
-                    let until_tick = reading.tick + cx.ticks(press.dwell);
-                    self.stage = Stage::SlowDwell { until_tick };
-                }
+                Some(press) => self.stay(cx, press.dwell, Stage::SlowDwell),
                 None => self.clear(cx)?,
             },
-            Stage::SlowDwell { until_tick } if reading.tick >= until_tick => self.clear(cx)?,
-            Stage::Clear { found } if at_rest => {
+            Stage::SlowDwell if is_over => self.clear(cx)?,
+            Stage::Clear(found) if at_rest => {
                 cx.enter_phase(Phase::Rest);
-                let until_tick = reading.tick + cx.ticks(self.plan.recovery);
-                self.stage = Stage::Rest { found, until_tick };
+                self.stay(cx, self.plan.recovery, Stage::Rest(found));
             }
-            Stage::Rest { found, until_tick } if reading.tick >= until_tick => {
+            Stage::Rest(found) if is_over => {
                 cx.set_contact(Some(found));
-                cx.record(Record::ContactFound {
-                    position: found.position,
-                    std_error_mm: found.std_error_mm,
-                });
-                let zero = Depth(0.0).position_from(found.position);
-                cx.move_to(zero, self.plan.pass_speed)?;
-                self.stage = Stage::ToZero { found };
+                let Contact { position, std_error_mm } = found;
+                cx.record(Record::ContactFound { position, std_error_mm });
+                cx.move_to(Depth(0.0).position_from(position), self.plan.pass_speed)?;
+                self.stage = Stage::ToZero;
             }
-            Stage::ToZero { .. } if at_rest => return Ok(Progress::Done),
+            Stage::ToZero if at_rest => return Ok(Progress::Done),
             _ => {}
         }
         Ok(Progress::Continue)
     }
 
-    /// Takes a millisecond into what is remembered, where the plan presses.
+    /// Stores a millisecond for the fit, where the plan presses.
     fn remember(&mut self, tick: u64, position: Position, force: Newtons) {
         self.seen += 1;
         if self.plan.press.is_none() {
@@ -263,11 +241,11 @@ impl ContactSearch {
         }
         self.raw.push_back(force);
         let counts = match self.stage {
-            Stage::Approach => Counts::Lead,
-            // The tissue may lag behind the probe, and what it does then is no part of the body.
-            Stage::Retreat => Counts::No,
-            Stage::Clear { .. } | Stage::Rest { .. } | Stage::ToZero { .. } => return,
-            _ => Counts::Yes,
+            Stage::Approach => ForceUse::Lead,
+            // The tissue may lag behind the probe, which the model does not describe.
+            Stage::Retreat => ForceUse::No,
+            Stage::Clear(_) | Stage::Rest(_) | Stage::ToZero => return,
+            _ => ForceUse::Yes,
         };
         self.log.push(tick, position, force, counts);
     }
@@ -283,13 +261,10 @@ impl ContactSearch {
         if is_searching && filtered > FORCE_MAX {
             return Err(format!("the force reached {filtered:.2} before contact was certain"));
         }
-        // Tissue leaves time to stop. What does not is a base or a holder, whatever the fit would say of it.
+        // Tissue leaves time to stop; a base or a holder does not, whatever the fit says.
         let is_stopping = matches!(
             self.stage,
-            Stage::ApproachBraking
-                | Stage::Dwell { .. }
-                | Stage::SlowBraking
-                | Stage::SlowDwell { .. }
+            Stage::ApproachBraking | Stage::Dwell | Stage::SlowBraking | Stage::SlowDwell
         );
         if is_stopping && filtered > FORCE_MAX {
             return Err(format!(
@@ -304,7 +279,7 @@ impl ContactSearch {
         Ok(())
     }
 
-    /// Where the plan presses, so many raw forces in a row tell of the tissue; else filtered ones.
+    /// Where the plan presses, consecutive raw forces trigger; else filtered ones.
     fn is_first_triggered(&mut self, force: Newtons, filtered: Newtons) -> bool {
         let judged = if self.plan.press.is_some() { force } else { filtered };
         self.is_triggered(judged, self.criterion)
@@ -323,6 +298,16 @@ impl ContactSearch {
         Ok(())
     }
 
+    fn stop(&mut self, cx: &mut Context<'_>, next: Stage) {
+        cx.stop_move();
+        self.stage = next;
+    }
+
+    fn stay(&mut self, cx: &Context<'_>, duration: Seconds, stage: Stage) {
+        self.until_tick = cx.tick_after(duration);
+        self.stage = stage;
+    }
+
     fn retreat(&mut self, cx: &mut Context<'_>, from: Position) -> Result<(), String> {
         let back = from.moved_by(-self.plan.retreat_mm);
         cx.move_to(Position(back.0.max(0.0)), self.plan.approach_speed)?;
@@ -334,7 +319,7 @@ impl ContactSearch {
         let found = self.estimate()?;
         let clear = Position((found.position.0 - CLEARANCE_MM).max(0.0));
         cx.move_to(clear, self.plan.approach_speed)?;
-        self.stage = Stage::Clear { found };
+        self.stage = Stage::Clear(found);
         Ok(())
     }
 
@@ -355,29 +340,23 @@ impl ContactSearch {
         });
     }
 
-    /// Averages what was felt in the slow pass into points for the fit. Only constant speed counts:
+    /// Averages forces of the slow pass into points for the fit. Only constant speed counts:
     /// the fit takes the pass as one straight line in time.
     fn collect(&mut self, cx: &Context<'_>, reading: &Reading, position: Position, force: Newtons) {
         if !is_cruising(cx.derived().velocity, self.plan.pass_speed) {
             return;
         }
-        let bin = &mut self.bin;
-        bin.count += 1;
-        bin.t += (reading.tick - self.pass_start_tick) as f64 * cx.rig().tick().0;
-        bin.position += position.0;
-        bin.force += force.0;
-        if bin.count == self.point {
-            let count = f64::from(self.point);
+        let t = (reading.tick - self.pass_start_tick) as f64 * cx.rig().tick().0;
+        if let Some([t, position, force]) = self.point.push([t, position.0, force.0]) {
             self.points.push(ContactPoint {
-                t: Seconds(bin.t / count),
-                position: Position(bin.position / count),
-                force: Newtons(bin.force / count),
+                t: Seconds(t),
+                position: Position(position),
+                force: Newtons(force),
             });
-            *bin = Bin::default();
         }
     }
 
-    /// What everything felt so far says of the contact position.
+    /// Estimates the contact position from all forces so far.
     fn fit(&self) -> Result<TouchEstimate, String> {
         let points = self.log.points();
         let found = fit_touch(points).map_err(|err| err.to_string())?;
@@ -387,10 +366,9 @@ impl ContactSearch {
         let ContactEstimate { position, std_error_mm, .. } = found.contact;
         let is_known = std_error_mm <= self.plan.std_error_mm_max;
         if is_known && position < begun.moved_by(3.0 * std_error_mm) {
-            return Err(
-                "the probe touched the tissue before the search began; retract and tare again"
-                    .into(),
-            );
+            let reason =
+                "the probe touched the tissue before the search began; retract and tare again";
+            return Err(reason.into());
         }
         Ok(found)
     }
@@ -422,25 +400,32 @@ impl ContactSearch {
     }
 }
 
-impl InProgress for ContactSearch {
+impl RunningStep for ContactSearch {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let position = cx.derived().position;
         let force = cx.derived().force.unwrap_or(Newtons(0.0));
-        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
+        let Some([mean_position, force]) = self.millisecond.push([position.0, force.0]) else {
             return Ok(Progress::Continue);
         };
         let filtered = Newtons(self.filter.push(force));
         let fast = Newtons(self.fast.push(force));
-        let (felt_at, force) = (Position(felt_at), Newtons(force));
-        self.remember(reading.tick, felt_at, force);
-        let now =
-            Felt { reading, position, felt_at, force, filtered, fast, at_rest: cx.at_rest()? };
+        let (mean_position, force) = (Position(mean_position), Newtons(force));
+        self.remember(reading.tick, mean_position, force);
+        let now = SearchSample {
+            reading,
+            position,
+            mean_position,
+            force,
+            filtered,
+            fast,
+            at_rest: cx.at_rest()?,
+        };
         self.check_force(filtered, fast)?;
         match self.stage {
             Stage::Approach
             | Stage::Press
             | Stage::ApproachBraking
-            | Stage::Dwell { .. }
+            | Stage::Dwell
             | Stage::Retreat => self.first_touch(cx, &now).map(|()| Progress::Continue),
             _ => self.second_touch(cx, &now),
         }
@@ -448,11 +433,11 @@ impl InProgress for ContactSearch {
 }
 
 /// A millisecond as the search feels it.
-struct Felt<'a> {
+struct SearchSample<'a> {
     reading: &'a Reading,
     position: Position,
     /// Means of the millisecond, and of what came before it.
-    felt_at: Position,
+    mean_position: Position,
     force: Newtons,
     filtered: Newtons,
     fast: Newtons,

@@ -1,5 +1,6 @@
-//! What a contact search felt, averaged into points for the fit.
+//! Forces of a contact search, averaged into points for the fit.
 
+use crate::engine::BlockMean;
 use palpate_model::rig::RigDescription;
 use palpate_model::signal::TouchPoint;
 use palpate_model::units::{Newtons, Position, Seconds};
@@ -10,33 +11,21 @@ const POINT_MS: usize = 20;
 /// Points kept of the way to the tissue, 5 s: they tell offset and drift.
 const LEAD_POINTS: usize = 250;
 
-/// Points of a search in progress.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TouchLog {
     start_tick: u64,
     tick: Seconds,
-    /// Means in one point.
-    point: u32,
-    bin: Bin,
-    points: Vec<TouchPoint>,
-}
-
-/// Milliseconds being averaged into one point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Bin {
-    count: u32,
-    t: f64,
-    position: f64,
-    force: f64,
+    /// Time in s, position in mm and force in N of the point in progress.
+    point: BlockMean<3>,
     is_uncounted: bool,
+    points: Vec<TouchPoint>,
 }
 
 /// Whether the force of a millisecond says something about the tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Counts {
+pub(super) enum ForceUse {
     /// On the way to the tissue, of which only the end is kept.
     Lead,
-    /// Like every later one.
     Yes,
     /// The path matters, the force does not.
     No,
@@ -48,31 +37,21 @@ impl TouchLog {
             start_tick,
             tick: rig.tick(),
             // Twenty at most.
-            point: rig.means_in(POINT_MS) as u32,
-            bin: Bin::default(),
+            point: BlockMean::new(rig.means_in(POINT_MS) as u32),
+            is_uncounted: false,
             points: Vec::new(),
         }
     }
 
-    pub fn push(&mut self, tick: u64, position: Position, force: Newtons, counts: Counts) {
-        let bin = &mut self.bin;
-        bin.count += 1;
-        bin.t += tick.saturating_sub(self.start_tick) as f64 * self.tick.0;
-        bin.position += position.0;
-        bin.force += force.0;
-        bin.is_uncounted |= counts == Counts::No;
-        if bin.count < self.point {
+    pub fn push(&mut self, tick: u64, position: Position, force: Newtons, counts: ForceUse) {
+        let t = tick.saturating_sub(self.start_tick) as f64 * self.tick.0;
+        self.is_uncounted |= counts == ForceUse::No;
+        let Some([t, position, force]) = self.point.push([t, position.0, force.0]) else {
             return;
-        }
-        let count = f64::from(bin.count);
-        let force = (!bin.is_uncounted).then_some(Newtons(bin.force / count));
-        self.points.push(TouchPoint {
-            t: Seconds(bin.t / count),
-            position: Position(bin.position / count),
-            force,
-        });
-        *bin = Bin::default();
-        if counts == Counts::Lead && self.points.len() >= 2 * LEAD_POINTS {
+        };
+        let force = (!std::mem::take(&mut self.is_uncounted)).then_some(Newtons(force));
+        self.points.push(TouchPoint { t: Seconds(t), position: Position(position), force });
+        if counts == ForceUse::Lead && self.points.len() >= 2 * LEAD_POINTS {
             self.points.drain(..LEAD_POINTS);
         }
     }

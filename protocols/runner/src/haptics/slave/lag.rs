@@ -1,4 +1,4 @@
-//! How far a slave is behind, and how well the force at the handle agrees with what its cell felt.
+//! How far a slave is behind, and how well the force at the handle agrees with the force of its cell.
 
 use super::{FILTER_MS, SlaveSettings};
 use crate::Felt;
@@ -14,18 +14,15 @@ use std::collections::VecDeque;
 /// The lag is taken once a millisecond: a move takes tens of them.
 const LAG_EVERY: Nanos = Nanos::from_millis(1);
 
-/// Places of the master kept to look for the slave's: five seconds, after which a slave without a lead has ended.
+/// Stored master positions: five seconds, after which a slave without a lead has ended.
 const PLACES_MAX: usize = 5000;
 
-/// Lags kept: an hour of them.
+/// An hour of lags.
 const LAGS_MAX: usize = 3_600_000;
 
-/// Middle and worst of something measured many times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// Half are below.
     pub median: f64,
-    /// The largest.
     pub worst: f64,
 }
 
@@ -49,10 +46,8 @@ pub struct Difference {
     pub rms_n: f64,
 }
 
-/// What came of a slave that followed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slaved {
-    /// Samples taken.
     pub samples: u64,
     /// Greatest depth of the slave in mm.
     pub depth_max_mm: f64,
@@ -62,15 +57,15 @@ pub struct Slaved {
     pub model_max_n: f64,
     /// Greatest force of the slave's cell.
     pub cell_max_n: f64,
-    /// The model at the depth of the slave, less the cell: the body is not the specimen.
+    /// The model at the depth of the slave minus the cell: how the body differs from the specimen.
     pub model_less_cell: Difference,
-    /// The handle less the cell: the same, and the lag of the slave.
+    /// The handle minus the cell: the same, plus the lag of the slave.
     pub handle_less_cell: Difference,
     /// How long ago the master was where the slave is, in ms; none if it hardly moved.
     pub lag_ms: Option<Spread>,
     /// How far the slave is from the master, in mm.
     pub lag_mm: Spread,
-    /// How often the slave's cell told contact or its loss.
+    /// How often the slave's cell detected contact or its loss.
     pub contact_changes: u64,
     /// Damping that the device would need at the greatest depth if its force came through the slave, at the median lag,
     /// in N s/m.
@@ -88,45 +83,42 @@ pub struct Slaved {
 pub struct MasterLoop {
     /// The priority that the system granted, in words.
     pub priority: String,
-    /// How it kept its time.
     #[serde(flatten)]
     pub kept: Kept,
 }
 
 /// A sum of squares and the largest.
 #[derive(Clone, Copy, Debug, Default)]
-struct Differences {
+struct DifferenceSums {
     worst: f64,
     squares: f64,
     count: u64,
 }
 
-impl Differences {
+impl DifferenceSums {
     fn push(&mut self, difference: f64) {
         self.worst = self.worst.max(difference.abs());
         self.squares += difference * difference;
         self.count += 1;
     }
 
-    fn told(&self) -> Difference {
+    fn summary(&self) -> Difference {
         Difference { worst_n: self.worst, rms_n: (self.squares / self.count.max(1) as f64).sqrt() }
     }
 }
 
-/// Takes a slave sample by sample.
 #[derive(Debug)]
-pub(super) struct Meter {
+pub(super) struct SlaveMeter {
     body: ModifiedKelvin,
     watch: Watch,
     depth_max: Depth,
     mm_per_pulse: f64,
-    /// The body under the slave.
     model: KelvinState,
-    /// Handle, model, cell: all averaged alike, so that all are as late.
+    /// Handle, model, cell: averaged alike, so that all have the same delay.
     filters: [MovingMean; 3],
     maxima: [f64; 3],
-    model_less_cell: Differences,
-    handle_less_cell: Differences,
+    model_less_cell: DifferenceSums,
+    handle_less_cell: DifferenceSums,
     at: Option<Nanos>,
     lag_at: Option<Nanos>,
     places: VecDeque<(Nanos, f64)>,
@@ -137,7 +129,7 @@ pub(super) struct Meter {
     contact_changes: u64,
 }
 
-impl Meter {
+impl SlaveMeter {
     pub fn new(settings: &SlaveSettings) -> Self {
         let rig = &settings.rig;
         let filter = MovingMean::new(rig.means_in(FILTER_MS) * rig.samples_per_ms() as usize);
@@ -149,8 +141,8 @@ impl Meter {
             model: KelvinState::at_rest(),
             filters: [filter.clone(), filter.clone(), filter],
             maxima: [0.0; 3],
-            model_less_cell: Differences::default(),
-            handle_less_cell: Differences::default(),
+            model_less_cell: DifferenceSums::default(),
+            handle_less_cell: DifferenceSums::default(),
             at: None,
             lag_at: None,
             places: VecDeque::new(),
@@ -162,16 +154,16 @@ impl Meter {
         }
     }
 
-    pub fn push(&mut self, felt: &Felt, master: Depth, handle: Newtons, contact_changes: u64) {
+    pub fn push(&mut self, sample: &Felt, master: Depth, handle: Newtons, contact_changes: u64) {
         self.samples += 1;
         self.contact_changes = contact_changes;
-        self.deepest = self.deepest.max(felt.depth.0);
-        let passed = felt.at.since(self.at.unwrap_or(felt.at)).seconds();
-        self.at = Some(felt.at);
-        // Above the surface nothing presses, and the memory fades.
-        let pressed = Depth(felt.depth.0.max(0.0));
+        self.deepest = self.deepest.max(sample.depth.0);
+        let passed = sample.at.since(self.at.unwrap_or(sample.at)).seconds();
+        self.at = Some(sample.at);
+        // Above the surface the tissue relaxes without load.
+        let pressed = Depth(sample.depth.0.max(0.0));
         let model = self.model.step(&self.body, pressed, passed).0.max(0.0);
-        let forces = [handle.0, model, felt.force.0];
+        let forces = [handle.0, model, sample.force.0];
         let mut means = [0.0; 3];
         for (i, force) in forces.into_iter().enumerate() {
             means[i] = self.filters[i].push(force);
@@ -185,37 +177,37 @@ impl Meter {
             self.model_less_cell.push(model - cell);
             self.handle_less_cell.push(handle - cell);
         }
-        let is_due = self.lag_at.is_none_or(|last| felt.at.since(last) >= LAG_EVERY);
+        let is_due = self.lag_at.is_none_or(|last| sample.at.since(last) >= LAG_EVERY);
         if is_due {
-            self.lag_at = Some(felt.at);
-            self.take_lag(felt, master.0.min(self.depth_max.0));
+            self.lag_at = Some(sample.at);
+            self.take_lag(sample, master.0.min(self.depth_max.0));
         }
     }
 
     /// Where the master was when it was where the slave is now: the last time it passed that place.
-    fn take_lag(&mut self, felt: &Felt, master: f64) {
+    fn take_lag(&mut self, sample: &Felt, master: f64) {
         if self.places.len() == PLACES_MAX {
             self.places.pop_front();
         }
-        self.places.push_back((felt.at, master));
+        self.places.push_back((sample.at, master));
         if self.lags_mm.len() == LAGS_MAX {
             return;
         }
-        let behind = master - felt.depth.0;
+        let behind = master - sample.depth.0;
         self.lags_mm.push(behind.abs() as f32);
         // Within a pulse it is there.
         if behind.abs() <= self.mm_per_pulse {
             return;
         }
         let mut before = self.places.iter().rev();
-        let passed = before.find(|(_, place)| (place - felt.depth.0) * behind <= 0.0);
+        let passed = before.find(|(_, place)| (place - sample.depth.0) * behind <= 0.0);
         if let Some((at, _)) = passed {
-            let lag: Seconds = felt.at.since(*at).seconds();
+            let lag: Seconds = sample.at.since(*at).seconds();
             self.lags_ms.push((1e3 * lag.0) as f32);
         }
     }
 
-    pub fn slaved(&self) -> Option<Slaved> {
+    pub fn report(&self) -> Option<Slaved> {
         let lag_mm = Spread::of(&self.lags_mm)?;
         let lag_ms = Spread::of(&self.lags_ms);
         let [handle_max_n, model_max_n, cell_max_n] = self.maxima;
@@ -233,8 +225,8 @@ impl Meter {
             handle_max_n,
             model_max_n,
             cell_max_n,
-            model_less_cell: self.model_less_cell.told(),
-            handle_less_cell: self.handle_less_cell.told(),
+            model_less_cell: self.model_less_cell.summary(),
+            handle_less_cell: self.handle_less_cell.summary(),
             lag_ms,
             lag_mm,
             contact_changes: self.contact_changes,

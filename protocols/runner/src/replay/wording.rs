@@ -1,15 +1,14 @@
-//! Differences in the words of the protocol and its records.
+//! Decisions and numbers of a replay in words.
 
 use palpate_model::rig::{HandAction, RigCommand};
 use palpate_protocols::engine::{Effect, State};
 use serde_json::Value;
 
-/// Where in the plan a run is.
-pub(super) fn of_step(state: &State) -> String {
+pub(super) fn describe_step(state: &State) -> String {
     let (index, _) = state.step_progress();
     let steps = &state.config().plan.steps;
     let Some(planned) = steps.get(index) else {
-        return format!("behind the last of {} steps", steps.len());
+        return format!("after the last of {} steps", steps.len());
     };
     let place = format!("step {} of {}, {}", index + 1, steps.len(), planned.step.word());
     match state.cycle() {
@@ -18,12 +17,12 @@ pub(super) fn of_step(state: &State) -> String {
     }
 }
 
-/// A decision or a number in words; what is none of ours as it stands.
-pub(super) fn of(value: &Value) -> String {
+/// Unknown decisions stay as they are.
+pub(super) fn describe_value(value: &Value) -> String {
     match value {
         Value::Null => "nothing".to_owned(),
         Value::Object(_) => match serde_json::from_value(value.clone()) {
-            Ok(effect) => of_effect(&effect),
+            Ok(effect) => describe_effect(&effect),
             Err(_) => value.to_string(),
         },
         Value::String(word) => word.clone(),
@@ -31,7 +30,7 @@ pub(super) fn of(value: &Value) -> String {
     }
 }
 
-fn of_effect(effect: &Effect) -> String {
+fn describe_effect(effect: &Effect) -> String {
     match effect {
         Effect::Record(record) => record.to_string(),
         Effect::Finished(outcome) => format!("{}: {}", outcome.ending, outcome.reason),
@@ -46,30 +45,32 @@ fn of_effect(effect: &Effect) -> String {
                 format!("move to pulse {} at {}", to.target_pulses, to.speed)
             }
             RigCommand::Oscillate(sine) => format!(
-                "swing by {} pulses, {} ticks a period, {} times",
+                "oscillate by {} pulses with a period of {} ticks, {} times",
                 sine.amplitude_pulses, sine.period_ticks, sine.cycles
             ),
             RigCommand::Stop => "stop".to_owned(),
             RigCommand::Halt => "halt".to_owned(),
-            RigCommand::DefinePosition { pulses } => format!("call this place pulse {pulses}"),
+            RigCommand::DefinePosition { pulses } => {
+                format!("set the position counter to {pulses} pulses")
+            }
         },
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::of;
+    use super::describe_value;
     use serde_json::json;
 
     #[test]
-    fn decisions_are_told_as_their_records_are_and_the_unknown_as_it_stands() {
+    fn known_decisions_are_described_and_unknown_ones_stay_as_they_are() {
         let contact = json!({"effect": "record", "record": "contact_found", "position": 40.0, "std_error_mm": 0.01});
-        assert!(of(&contact).contains("contact"), "{}", of(&contact));
-        assert!(!of(&contact).contains('{'));
+        assert!(describe_value(&contact).contains("contact"), "{}", describe_value(&contact));
+        assert!(!describe_value(&contact).contains('{'));
         let stop = json!({"effect": "command", "command": "stop"});
-        assert_eq!(of(&stop), "stop");
-        assert_eq!(of(&json!(null)), "nothing");
-        assert_eq!(of(&json!({"effect": "dance"})), r#"{"effect":"dance"}"#);
-        assert_eq!(of(&json!("hold")), "hold");
+        assert_eq!(describe_value(&stop), "stop");
+        assert_eq!(describe_value(&json!(null)), "nothing");
+        assert_eq!(describe_value(&json!({"effect": "dance"})), r#"{"effect":"dance"}"#);
+        assert_eq!(describe_value(&json!("hold")), "hold");
     }
 }

@@ -7,44 +7,39 @@ use palpate_protocols::weighed::Readings;
 use palpate_sessions::{EntryKind, Session};
 use thiserror::Error;
 
-/// Half-width in g within which a laboratory weight of 100 g surely lies where nobody says it better: class M3 of
+/// Half-width in g within which a laboratory weight of 100 g lies if no better value is known: class M3 of
 /// OIML R 111-1 allows 50 mg.
 const TOLERANCE_G: f64 = 0.05;
 
-/// A session is no calibration.
 #[derive(Debug, Error)]
-pub enum CalibratingError {
-    /// No reading under a known mass.
+pub enum CalibrationSessionError {
     #[error(
         "session {0} holds no reading under a known mass; run the protocol load-cell-calibration"
     )]
     NoReadings(String),
-    /// It did not run to its end.
     #[error(
         "session {session} ended by {ending} before its plan did; a calibration must be complete, so run it again"
     )]
-    Incomplete {
-        /// Which.
-        session: String,
-        /// How.
-        ending: String,
-    },
+    Incomplete { session: String, ending: String },
     /// The readings make none.
     #[error(transparent)]
     Readings(#[from] CalibrationError),
 }
 
-/// The calibration that a session measured, with the curve that foretells left-out weights best.
-pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, CalibratingError> {
+/// The calibration that a session measured, with the curve that predicts left-out weights best.
+pub fn calibration_of(
+    session: &Session,
+    name: &str,
+) -> Result<Calibration, CalibrationSessionError> {
     let manifest = &session.manifest;
     let id = manifest.session_id.clone();
     let end = session.end.as_ref();
     let ending = end.map_or("breaking off", |end| end.outcome.as_str());
     let is_complete = end.is_some_and(|end| end.reason == PLAN_COMPLETE);
     if ending != "finish" || !is_complete {
-        return Err(CalibratingError::Incomplete { session: id, ending: ending.into() });
+        return Err(CalibrationSessionError::Incomplete { session: id, ending: ending.into() });
     }
-    // Decisions of other kinds are other types; a reading that cannot be read back would be no reading.
+    // Decisions of other kinds do not deserialise as records.
     let decisions = session.entries.iter().filter(|one| one.kind == EntryKind::Decision);
     let records: Vec<Record> = decisions
         .filter_map(|one| match serde_json::from_value(one.body.clone()) {
@@ -69,7 +64,7 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
         }
     }
     if series.is_empty() {
-        return Err(CalibratingError::NoReadings(id));
+        return Err(CalibrationSessionError::NoReadings(id));
     }
     let calibration = Calibration {
         name: name.into(),

@@ -1,11 +1,11 @@
 //! Limits and monitors of a protocol.
 
 use super::args::{Args, check_range};
+use super::keys::{Key, Range};
 use super::problem::{Problem, Problems};
 use super::quantity::Kind;
 use super::scope::Scope;
-use super::tree::{Node, Table, Value};
-use super::words::{Key, Range};
+use super::tree::{DocumentNode, DocumentTable, DocumentValue};
 use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
 use palpate_model::units::{Newtons, Position, Seconds};
 
@@ -22,11 +22,14 @@ const LIMIT_KEYS: [Key; 2] = [
     ),
 ];
 
-/// The limits of a plan for given values.
-pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems) -> PlanLimits {
+pub(super) fn read_limits(
+    node: Option<&DocumentNode>,
+    scope: &Scope,
+    problems: &mut Problems,
+) -> PlanLimits {
     match node {
         None => PlanLimits::default(),
-        Some(Node { value: Value::Table(table), .. }) => {
+        Some(DocumentNode { value: DocumentValue::Table(table), .. }) => {
             let args = Args::read(table, "[limits]", &[&LIMIT_KEYS], &[], scope, problems);
             PlanLimits {
                 force_max: args.maybe("force_max").map(Newtons),
@@ -61,36 +64,40 @@ const ACTIONS: [(&str, Action); 5] = [
 pub(super) const MONITOR_KEYS: [Key; 4] = [
     Key::needed("watch", Kind::Text, "`force`, `depth`, `signal` or `position`")
         .one_of(&["force", "depth", "signal", "position"]),
-    Key::usual("settle", Kind::Time, "1 s", "how long it must be past before a paused run goes on")
-        .zero_allowed(),
+    Key::usual(
+        "settle",
+        Kind::Time,
+        "1 s",
+        "how long the value must be in range before a paused run goes on",
+    )
+    .zero_allowed(),
     Key::needed("action", Kind::Text, "`note`, `pause`, `stop`, `retract` or `halt`")
         .one_of(&["note", "pause", "stop", "retract", "halt"]),
     Key::needed("message", Kind::Text, "what the operator reads"),
 ];
 
-/// The monitors of a plan for given values.
-pub(super) fn monitors(
-    node: Option<&Node>,
+pub(super) fn read_monitors(
+    node: Option<&DocumentNode>,
     scope: &Scope,
     problems: &mut Problems,
 ) -> Vec<Monitor> {
     let Some(node) = node else {
         return Vec::new();
     };
-    let Value::List(items) = &node.value else {
+    let DocumentValue::List(items) = &node.value else {
         problems.error(node.line, "write [[monitor]] in double brackets, once for each monitor");
         return Vec::new();
     };
     let tables = items.iter().filter_map(|item| match &item.value {
-        Value::Table(table) => Some(table),
+        DocumentValue::Table(table) => Some(table),
         _ => None,
     });
-    tables.filter_map(|table| monitor(table, scope, problems)).collect()
+    tables.filter_map(|table| read_monitor(table, scope, problems)).collect()
 }
 
-fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
-    let besides = ["above", "below", "resume"];
-    let args = Args::read(table, "a monitor", &[&MONITOR_KEYS], &besides, scope, problems);
+fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
+    let other_keys = ["above", "below", "resume"];
+    let args = Args::read(table, "a monitor", &[&MONITOR_KEYS], &other_keys, scope, problems);
     let watch = args.text("watch").ok()?;
     let (_, source, kind) = *SOURCES.iter().find(|(name, ..)| *name == watch)?;
     let mut value = |key: &str| {
@@ -99,17 +106,15 @@ fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Moni
             let number = given.number(kind)?;
             check_range(kind, Range::Any, number).map(|()| number)
         });
-        problems.take(node.line, number.map_err(|why| format!("'{key}' of a monitor: {why}")))
+        problems.take(node.line, number.map_err(|reason| format!("'{key}' of a monitor: {reason}")))
     };
     let (above, below, resume) = (value("above"), value("below"), value("resume"));
     let (side, threshold) = match (table.get("above").is_some(), table.get("below").is_some()) {
         (true, false) => (Side::Above, above?),
         (false, true) => (Side::Below, below?),
         _ => {
-            problems.error(
-                table.line,
-                "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"",
-            );
+            let message = "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"";
+            problems.error(table.line, message);
             return None;
         }
     };
@@ -123,11 +128,11 @@ fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Moni
         action: ACTIONS.iter().find(|(name, _)| args.text("action") == Ok(name))?.1,
         message: args.text("message").ok()?.to_owned(),
     };
-    if let Err(why) = monitor.check() {
+    if let Err(reason) = monitor.check() {
         let line = table.get("resume").map_or(table.line, |node| node.line);
         problems.push(Problem::error(
             line,
-            format!("{why}; give a 'resume' on the other side of the threshold"),
+            format!("{reason}; give a 'resume' on the other side of the threshold"),
         ));
     }
     Some(monitor)

@@ -1,25 +1,23 @@
-//! The thread of the loop.
+//! The real-time thread of a haptic loop.
 
-use super::timing::{Kept, Timing};
-use crate::Metronome;
+use super::timing::{Kept, LoopCounters};
+use crate::Stopwatch;
 use palpate_drivers::priority::{Granted, ask};
 use palpate_haptics::Period;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use triple_buffer::{Output, triple_buffer};
 
-/// So many overruns in a row, and the loop rests for a tick after each further one: at real-time priority nobody else, who might
-/// stop it, would have the core.
+/// After so many overruns in a row the loop rests for a tick after each further one: at real-time priority it would otherwise
+/// keep the core from every thread that could stop it.
 const OVERRUNS_MAX: u32 = 10;
 
-/// What a loop does.
 pub trait Ticking: Send + 'static {
-    /// What others see of it.
     type View: Clone + Send + 'static;
 
-    /// So many ticks are due: one, unless the loop was away. Neither allocates, locks nor waits.
+    /// `elapsed` ticks are due: one, unless the loop was late. Must not allocate, lock or wait.
     fn tick(&mut self, elapsed: u64);
 
     /// Whether this tick is shown.
@@ -27,16 +25,16 @@ pub trait Ticking: Send + 'static {
         true
     }
 
-    /// Copies what is to be seen into its place, without allocating.
+    /// Must not allocate.
     fn show(&self, view: &mut Self::View);
 }
 
-/// A loop on its way. Dropping it ends it after the tick under way.
+/// A running loop. Dropping it ends the loop after the tick in progress.
 #[derive(Debug)]
 pub struct Beat<T: Ticking> {
     thread: Option<JoinHandle<T>>,
     is_ending: Arc<AtomicBool>,
-    timing: Arc<Timing>,
+    timing: Arc<LoopCounters>,
     seen: Output<T::View>,
     granted: Granted,
 }
@@ -46,18 +44,19 @@ impl<T: Ticking> Beat<T> {
     pub fn start(task: T, period: Period, first: T::View) -> std::io::Result<Self> {
         let (shown, seen) = triple_buffer(&first);
         let is_ending = Arc::new(AtomicBool::new(false));
-        let timing = Arc::new(Timing::default());
-        let (tell, told) = sync_channel(1);
+        let timing = Arc::new(LoopCounters::default());
+        let (sender, receiver) = sync_channel(1);
         let (ending, times) = (Arc::clone(&is_ending), Arc::clone(&timing));
         let thread = std::thread::Builder::new().name("haptics".into()).spawn(move || {
-            // Whoever started it waits for this.
-            let _ = tell.try_send(ask());
+            // `start` waits for this.
+            let _ = sender.try_send(ask());
             run(task, period, shown, &ending, &times)
         })?;
-        Ok(Self { thread: Some(thread), is_ending, timing, seen, granted: granted(&told) })
+        let granted = receiver.recv();
+        let granted = granted.unwrap_or_else(|_| Granted::Ordinary("the thread ended".to_owned()));
+        Ok(Self { thread: Some(thread), is_ending, timing, seen, granted })
     }
 
-    /// The priority that the system gave.
     pub fn granted(&self) -> &Granted {
         &self.granted
     }
@@ -67,9 +66,8 @@ impl<T: Ticking> Beat<T> {
         self.seen.read()
     }
 
-    /// How the loop kept its time so far.
     pub fn kept(&self) -> Kept {
-        self.timing.kept()
+        self.timing.snapshot()
     }
 
     /// Whether it still ticks; it does until it is ended, unless its work failed.
@@ -88,14 +86,10 @@ impl<T: Ticking> Drop for Beat<T> {
     fn drop(&mut self) {
         self.is_ending.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // What it did is of no interest any more.
+            // The result is not needed.
             let _ = thread.join();
         }
     }
-}
-
-fn granted(told: &Receiver<Granted>) -> Granted {
-    told.recv().unwrap_or_else(|_| Granted::Ordinary("the thread ended".to_owned()))
 }
 
 fn run<T: Ticking>(
@@ -103,9 +97,9 @@ fn run<T: Ticking>(
     period: Period,
     mut shown: triple_buffer::Input<T::View>,
     is_ending: &AtomicBool,
-    timing: &Timing,
+    timing: &LoopCounters,
 ) -> T {
-    let metronome = Metronome::start();
+    let watch = Stopwatch::start();
     // Ticks in a row that took longer than their time.
     let mut overruns = 0_u32;
     let mut rested_at = 0;
@@ -114,27 +108,24 @@ fn run<T: Ticking>(
     let mut before = None;
     while !is_ending.load(Ordering::Relaxed) {
         let due = period.time_of(done).0;
-        metronome.wait(due.max(rested_at));
-        let begun = metronome.now();
+        watch.wait_until(due.max(rested_at));
+        let begun = watch.nanos();
         let elapsed = 1 + (begun.saturating_sub(due)) / period.nanos();
         task.tick(elapsed);
         if task.is_shown() {
             task.show(shown.input_buffer_mut());
             shown.publish();
         }
-        let ended = metronome.now();
+        let ended = watch.nanos();
         done += elapsed;
         timing.late.count(begun.saturating_sub(due));
         timing.work.count(ended.saturating_sub(begun));
         if let Some(before) = before.replace(begun) {
             timing.period.count(begun.saturating_sub(before));
         }
-        if ended.saturating_sub(begun) > period.nanos() {
-            timing.overruns.fetch_add(1, Ordering::Relaxed);
-            overruns += 1;
-        } else {
-            overruns = 0;
-        }
+        let is_overrun = ended.saturating_sub(begun) > period.nanos();
+        timing.overruns.fetch_add(u64::from(is_overrun), Ordering::Relaxed);
+        overruns = if is_overrun { overruns + 1 } else { 0 };
         if overruns >= OVERRUNS_MAX {
             rested_at = ended + period.nanos();
         }

@@ -1,23 +1,17 @@
-//! What the order of steps must keep, on any rig: what each needs, and what is known at a place of a plan.
+//! Preconditions of steps, and which of them hold at a step of a plan.
 
 use crate::engine::{NOT_HOMED, NOT_TARED};
 
-/// What a step can need, in the order in which it is missed.
+/// In the order of the messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
-    /// The motor is on.
     Motor,
-    /// The axis is homed.
     Home,
     /// The load cell is tared.
     Tare,
-    /// The surface is known.
     Contact,
-    /// The probe is in the tissue.
     Inside,
-    /// A specimen is there.
     Specimen,
-    /// The probe is not in the tissue.
     Outside,
 }
 
@@ -35,7 +29,7 @@ impl Need {
         }
     }
 
-    /// What the author of a protocol is told of a step without it.
+    /// The message to the author of a protocol.
     pub fn message(self) -> &'static str {
         match self {
             Self::Motor => {
@@ -51,10 +45,10 @@ impl Need {
                 "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it"
             }
             Self::Inside => {
-                "keeps a force that is there already and hardly moves where there is none; put { do = \"load\", to = \"1 N\", ... } before it"
+                "keeps the force that the probe exerts already, and there is none yet; put { do = \"load\", to = \"1 N\", ... } before it"
             }
             Self::Specimen => {
-                "would run into the base, for the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
+                "would run into the base, because the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
             }
             Self::Outside => {
                 "must not be done while the probe is in the tissue; put { do = \"retract\" } before it"
@@ -63,9 +57,8 @@ impl Need {
     }
 }
 
-/// What is known at a place of a plan.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Known {
+pub(crate) struct Preconditions {
     pub motor: bool,
     pub home: bool,
     pub tare: bool,
@@ -75,7 +68,7 @@ pub(crate) struct Known {
     pub is_bare: bool,
 }
 
-impl Known {
+impl Preconditions {
     pub fn has(&self, need: Need) -> bool {
         match need {
             Need::Motor => self.motor,
@@ -88,7 +81,7 @@ impl Known {
         }
     }
 
-    /// Takes it to hold: a step gave it, or it was missed, which the steps behind would only repeat.
+    /// Sets a precondition: a step has met it, or its absence was reported once.
     pub fn assume(&mut self, need: Need) {
         match need {
             Need::Motor => self.motor = true,

@@ -1,45 +1,44 @@
-//! What of a programme could never work, though every part of it can be read: told before anything moves.
+//! Contradictions in a programme whose parts are all valid by themselves, found before anything moves.
 
 use super::document::Task;
 use palpate_protocols::plans::{Plan, Step};
 use std::collections::BTreeSet;
 
-/// Why a task can do nothing of what it says it does; `before` are the tasks ahead of it.
-pub(super) fn doubts(task: &Task, before: &[Task]) -> Vec<String> {
-    let mut doubts = Vec::new();
+/// Why a task cannot do what it declares; `before` are the tasks ahead of it.
+pub(super) fn find_contradictions(task: &Task, before: &[Task]) -> Vec<String> {
+    let mut find_contradictions = Vec::new();
     let plan = task.plan(1, None);
-    if task.calibrates && !plan.as_ref().is_some_and(weighs) {
-        doubts.push(format!(
-            "calibrates = true, and its protocol {} weighs nothing, so there would be no calibration; take it out, or use load-cell-calibration",
+    if task.calibrates && !plan.as_ref().is_some_and(has_weighing) {
+        find_contradictions.push(format!(
+            "calibrates = true needs readings under known masses, and protocol {} takes none; remove it, or use load-cell-calibration",
             task.protocol.name
         ));
     }
     if let Some(model) = &task.validates {
         let fitted = before.iter().find(|one| one.name == model.task);
-        if let Some(reason) = fitted.and_then(unfitted) {
-            doubts.push(format!(
-                "validates = \"{}\", and that task gives no model to compare with, because {reason}; name a task that is one ramp and hold",
+        if let Some(reason) = fitted.and_then(reason_unfitted) {
+            find_contradictions.push(format!(
+                "validates = \"{}\" needs a task with a fitted model, and that task has none, because {reason}; name a task that is one ramp and hold",
                 model.task
             ));
         }
-        if let Some(reason) = unfitted(task) {
-            doubts.push(format!(
-                "validates = \"{}\", and nothing could be compared, because {reason}; take it out, or use a protocol that is one ramp and hold",
+        if let Some(reason) = reason_unfitted(task) {
+            find_contradictions.push(format!(
+                "validates = \"{}\" has nothing to compare, because {reason}; remove it, or use a protocol that is one ramp and hold",
                 model.task
             ));
         }
     }
-    doubts
+    find_contradictions
 }
 
-/// Whether a reading under a known mass is taken.
-fn weighs(plan: &Plan) -> bool {
+fn has_weighing(plan: &Plan) -> bool {
     let is_loaded = |step: &Step| matches!(step, Step::Weigh(weigh) if weigh.mass_g > 0.0);
     plan.steps.iter().any(|planned| is_loaded(&planned.step))
 }
 
-/// Why no session of a task is fitted, if so: the page fits those with one way in, and no sine.
-fn unfitted(task: &Task) -> Option<String> {
+/// Why no session of a task is fitted, if so: the report fits sessions with one loading and no sine.
+fn reason_unfitted(task: &Task) -> Option<String> {
     let name = &task.protocol.name;
     if task.calibrates {
         return Some(format!("task '{}' calibrates", task.name));
@@ -54,7 +53,7 @@ fn unfitted(task: &Task) -> Option<String> {
     // Steps outside any loop belong to the first cycle.
     let cycles: BTreeSet<u32> = ways_in.map(|planned| planned.cycle.max(1)).collect();
     match cycles.len() {
-        0 => Some(format!("its protocol {name} presses into nothing")),
+        0 => Some(format!("its protocol {name} does not indent")),
         1 => None,
         count => Some(format!("its protocol {name} has {count} cycles")),
     }

@@ -3,7 +3,6 @@
 
 use super::quantity::Kind;
 
-/// One key of a step, loop, monitor or limit.
 #[derive(Clone, Copy)]
 pub(crate) struct Key {
     pub name: &'static str,
@@ -13,13 +12,11 @@ pub(crate) struct Key {
     pub about: &'static str,
 }
 
-/// Which numbers a key takes.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Range {
     Above0,
     From0,
     Any,
-    /// One of these words.
     OneOf(&'static [&'static str]),
 }
 
@@ -28,7 +25,6 @@ pub(crate) enum Range {
 pub(crate) enum KeyNeed {
     Required,
     Optional,
-    /// The value, as one would write it.
     Usual(&'static str),
 }
 
@@ -81,7 +77,7 @@ pub(super) const COMMON: [Key; 3] = [
     Key::optional(
         "checkpoint",
         Kind::Text,
-        "name of a place behind the step where the run may pause",
+        "name of a checkpoint after the step, where the run may pause",
     ),
     Key::usual(
         "on_failure",
@@ -89,5 +85,5 @@ pub(super) const COMMON: [Key; 3] = [
         "abort",
         "`abort`, `skip`, or `retry 2`: what follows if the step cannot be done",
     ),
-    Key::optional("only_if", Kind::Flag, "leaves the step out where this is `false` or `\"none\"`"),
+    Key::optional("only_if", Kind::Flag, "skips the step where this is `false` or `\"none\"`"),
 ];

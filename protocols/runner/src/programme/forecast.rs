@@ -7,12 +7,9 @@ use palpate_model::units::{Newtons, Seconds};
 use palpate_protocols::file::Problem;
 use palpate_protocols::preview::preview;
 
-/// One task as it is expected to go.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ForeseenTask {
-    /// Its name.
+pub struct TaskForecast {
     pub task: String,
-    /// Expected duration of all its repeats.
     pub expected: Seconds,
     /// Longest duration of all its repeats.
     pub longest: Seconds,
@@ -20,11 +17,9 @@ pub struct ForeseenTask {
     pub force_band: [Newtons; 2],
 }
 
-/// A programme as it is expected to go.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Foreseen {
-    /// Every task.
-    pub tasks: Vec<ForeseenTask>,
+    pub tasks: Vec<TaskForecast>,
     /// What to look at before the start: nothing that forbids it.
     pub notes: Vec<Problem>,
     /// What must be acknowledged and is not yet.
@@ -32,7 +27,6 @@ pub struct Foreseen {
 }
 
 impl Foreseen {
-    /// Expected duration of everything.
     pub fn expected(&self) -> Seconds {
         Seconds(self.tasks.iter().map(|task| task.expected.0).sum())
     }
@@ -49,8 +43,8 @@ pub fn foresee(
     let (mut notes, mut to_acknowledge) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
     for task in &programme.tasks {
-        let told = |reason: &String| format!("task '{}': {reason}", task.name);
-        let mut ahead = ForeseenTask {
+        let for_task = |reason: &String| format!("task '{}': {reason}", task.name);
+        let mut ahead = TaskForecast {
             task: task.name.clone(),
             expected: Seconds(0.0),
             longest: Seconds(0.0),
@@ -62,15 +56,15 @@ pub fn foresee(
                 return;
             };
             let own = preview(&plan, rig, limits, curve, false);
-            let refused = own.refusals.iter().map(told);
+            let refused = own.refusals.iter().map(for_task);
             let refused = refused.map(|reason| Problem::error(task.line, reason));
             refusals.extend(refused);
-            let warned = |reason| Problem::warning(task.line, told(reason));
+            let warned = |reason| Problem::warning(task.line, for_task(reason));
             notes.extend(plan.limits.unused(limits).iter().map(warned));
             if !programme.is_acknowledged {
                 to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
                     let message =
-                        format!("{}; write acknowledge = true into the file", told(reason));
+                        format!("{}; write acknowledge = true in the file", for_task(reason));
                     Problem::warning(task.line, message)
                 }));
             }

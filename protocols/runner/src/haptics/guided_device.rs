@@ -1,4 +1,4 @@
-//! The simulated device with a hand that is led from outside, and the trail of what was felt.
+//! The simulated device with a hand that another thread moves, and the newest points of its motion.
 
 use super::{Simulated, Ticking};
 use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
@@ -7,13 +7,13 @@ use palpate_model::units::{MmPerS, Seconds};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Points of a trail that are handed over together: whoever looks four times a second misses none.
+/// Points in one view: a reader four times a second misses none.
 pub const TRAIL: usize = 64;
 
-/// Time between two points: 250 Hz shows every buzz of a hand on a handle, which is below 100 Hz.
+/// Time between two points: 250 Hz resolves every limit cycle of a hand on a handle, which is below 100 Hz.
 const APART: Seconds = Seconds(0.004);
 
-/// Where a hand is to go; as many hold it as like, and the loop never waits for them.
+/// Target position of the hand, shared between threads; the loop never waits.
 #[derive(Clone, Debug)]
 pub struct Lead(Arc<AtomicU64>);
 
@@ -22,23 +22,21 @@ impl Lead {
         Self(Arc::new(AtomicU64::new(place_mm.to_bits())))
     }
 
-    /// The hand goes to this place in mm from the next tick on. What is no number is no place.
+    /// In mm, from the next tick on; a value that is not finite is ignored.
     pub fn to(&self, place_mm: f64) {
         if place_mm.is_finite() {
             self.0.store(place_mm.to_bits(), Ordering::Relaxed);
         }
     }
 
-    /// Where it was told to go last, in mm.
+    /// In mm.
     pub fn place(&self) -> f64 {
         f64::from_bits(self.0.load(Ordering::Relaxed))
     }
 }
 
-/// The device at one moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrailPoint {
-    /// When, in s.
     pub t: f64,
     /// Depth of the slave in mm.
     pub depth: f64,
@@ -48,28 +46,25 @@ pub struct TrailPoint {
     pub force: f64,
     /// Torque commanded in N mm.
     pub torque: f64,
-    /// All that was special since the point before.
+    /// All flags since the point before.
     pub flags: Flags,
 }
 
-/// What is seen of it: the newest tick and the way to it.
 #[derive(Clone, Debug)]
 pub struct Live {
     /// The newest tick.
     pub last: SimulationTick,
-    /// Points made so far.
     count: u64,
     /// The last of them; the one with number n at n modulo [`TRAIL`].
     trail: [TrailPoint; TRAIL],
 }
 
 impl Live {
-    /// Points made so far.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Those made after the first `known`, as far as they are still there, in order.
+    /// Points after the first `known`, as far as they are still there, in order.
     pub fn since(&self, known: u64) -> impl Iterator<Item = &TrailPoint> {
         let first = known.max(self.count.saturating_sub(TRAIL as u64));
         (first..self.count).map(|number| &self.trail[(number % TRAIL as u64) as usize])
@@ -83,9 +78,7 @@ pub struct Led {
     lead: Lead,
     place: f64,
     speed: MmPerS,
-    /// Ticks between two points.
     apart: u64,
-    /// Ticks since the last point.
     ticks: u64,
     flags: Flags,
     live: Live,
@@ -116,12 +109,10 @@ impl Led {
         self.place
     }
 
-    /// What leads its hand.
     pub fn lead(&self) -> Lead {
         self.lead.clone()
     }
 
-    /// What is seen of it.
     pub fn live(&self) -> &Live {
         &self.live
     }

@@ -1,17 +1,16 @@
-//! The first verdict on a session, given by the program when the run ends. People may change it.
+//! Data quality of a session, assessed by the program when the run ends. A reviewer may change it.
 
 use super::{Achieved, Fidelity};
 use palpate_protocols::engine::{EndingKind, Outcome};
 use palpate_sessions::edits::Verdict;
 
-/// Reasons that stand in a verdict; the report has all.
+/// More reasons are in the report only.
 const REASONS_MAX: usize = 3;
 
-/// A target that counts as met although it may be off by more than this share of itself is named. Forces of a newton
-/// and more may be off by as much.
+/// A met target with a relative tolerance above this is named. Forces of a newton and more have this tolerance.
 const WIDE: f64 = 0.05;
 
-/// What a session is worth by how it ended and how well it did what its plan said, and why.
+/// Data quality from the ending and the fidelity, with the reason.
 ///
 /// A run that did not finish is suspect, or rejected if nothing was measured.
 #[must_use]
@@ -51,12 +50,12 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
     }
 }
 
-/// The target that is held to least, where that is less than one in twenty.
+/// The target with the largest relative tolerance, if that is above [`WIDE`].
 fn widest(fidelity: &Fidelity) -> Option<String> {
     let share = |one: &Achieved| one.allowed / one.target.abs();
     let known = fidelity.targets.iter().filter(|one| one.target != 0.0);
     let widest = known.max_by(|one, next| share(one).total_cmp(&share(next)))?;
-    // A force that may be off by one in twenty is not told for a rounding.
+    // Rounding must not name a force whose tolerance is exactly one in twenty.
     (share(widest) > 1.001 * WIDE).then(|| {
         format!(
             "{} counts as met within {:.4} {unit} of {:.4} {unit}",
@@ -112,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_is_worth_what_it_did() {
+    fn data_quality_follows_ending_and_targets() {
         let fine = Fidelity { targets: vec![target(20.0)], measured: 1, ..Fidelity::default() };
         let of = |ending, fidelity: &Fidelity| first_verdict(&outcome(ending), fidelity);
         let (verdict, reason) = of(EndingKind::Finish, &fine);
@@ -132,7 +131,7 @@ mod tests {
         for fact in ["step 5", "cycle 2", "0.0500 N of 0.2000 N"] {
             assert!(reason.contains(fact), "{fact}: {reason}");
         }
-        for (change, told) in [
+        for (change, expected) in [
             (Fidelity { dropped: 7, ..fine.clone() }, "7 samples are missing"),
             (Fidelity { targets: vec![target(19.9)], ..fine.clone() }, "19.9000 mm"),
             (Fidelity { remarks: vec!["too warm".into()], ..fine.clone() }, "too warm"),
@@ -140,7 +139,7 @@ mod tests {
         ] {
             let (verdict, reason) = of(EndingKind::Finish, &change);
             assert_eq!(verdict, Verdict::Suspect);
-            assert!(reason.contains(told), "{reason}");
+            assert!(reason.contains(expected), "{reason}");
         }
         for ending in [EndingKind::Stop, EndingKind::Abort, EndingKind::Halt, EndingKind::Interlock]
         {
