@@ -42,7 +42,7 @@ impl Original {
 }
 
 impl Original {
-    /// What is kept of a damaged file is as recorded, and what is not is told to the sample.
+    /// Recovered data is as recorded, and missing data is reported to the sample.
     pub fn check_salvage(&self, path: &Path, context: &str) -> Option<usize> {
         let mut blocks = Vec::new();
         let mut visit = |block: &Block| {
@@ -242,8 +242,8 @@ fn raw_bytes_that_are_lost_are_counted() {
         let missing = bytes_of(&rows[lost.clone()]);
         assert_eq!(left.missing.raw_bytes, missing);
         assert_eq!(left.raw_bytes, bytes_of(&rows) - missing);
-        let told = left.missing.sentences().join("; ");
-        assert!(told.contains(&format!("{missing} raw bytes")), "{told}");
+        let sentences = left.missing.sentences().join("; ");
+        assert!(sentences.contains(&format!("{missing} raw bytes")), "{sentences}");
         let copy = recover(&session, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
         let kept: Vec<Row> = [&rows[..lost.start], &rows[lost.end..]].concat();
         check_raw(&read_raw(&copy.folder).unwrap(), &kept, kept.len(), "a copy");

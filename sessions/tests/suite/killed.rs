@@ -4,7 +4,7 @@
 //! SIGKILL at the one that is asked for.
 
 use crate::support::{check_raw, count_from, log_bytes, manifest, read_raw, same_bits};
-use crate::worker::{Work, command, edit, told};
+use crate::worker::{Work, command, edit, reported_numbers};
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{recover, recovered_folder, salvage};
 use palpate_sessions::{EDITS_FILE, Edit, Edits, LOG_FILE, Session, SessionFolder, segment_file};
@@ -37,7 +37,7 @@ fn kill(task: &str, folder: &Path, files: &[PathBuf], call: &str, number: u32) -
     }
     program.extend(["-e", &trace, "-e", &inject]);
     let output = command(&program, task, folder).output().expect("strace is there");
-    let last = |word| told(&output, word).last().copied().unwrap_or(0);
+    let last = |word| reported_numbers(&output, word).last().copied().unwrap_or(0);
     Left { saved: last("saved"), taken: last("taken"), was_killed: !output.status.success() }
 }
 

@@ -37,7 +37,7 @@ fn session() -> Session {
     open_bytes(&log_bytes(&rows, &entries, Some(end(Nanos(5_000_000_000))))).unwrap()
 }
 
-fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError> {
+fn put(lake: &Path, session: &Session, quality: Told) -> Result<Added, ExportError> {
     let outline = Outline {
         path: session.path.clone(),
         manifest: session.manifest.clone(),
@@ -47,7 +47,7 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
         notes: session.notes.clone(),
         beside: session.beside.clone(),
     };
-    add(lake, &outline, told, &mut |visit| {
+    add(lake, &outline, quality, &mut |visit| {
         visit(&session.rows);
         Ok(())
     })

@@ -19,7 +19,7 @@ enum Step {
     Append(u32, Vec<u8>),
 }
 
-/// Remembers in which order the disk saw what, and can be told to fail.
+/// Records the order of operations, with chosen failures.
 #[derive(Clone, Default)]
 struct Journal(Arc<Mutex<JournalState>>);
 
@@ -130,8 +130,8 @@ fn check(session: &Session, rows: &[Row], entries: &[Entry], at_least: usize, co
     assert!(entry_count >= due.count(), "{context}: entries are missing");
     assert_eq!(session.manifest, manifest());
     if session.end.is_none() {
-        let is_told = |note: &String| note.contains("no end record");
-        assert!(session.notes.iter().any(is_told), "{context}");
+        let is_no_end = |note: &String| note.contains("no end record");
+        assert!(session.notes.iter().any(is_no_end), "{context}");
     } else {
         assert_eq!((count, entry_count), (rows.len(), entries.len()));
     }
@@ -314,12 +314,15 @@ fn a_missing_segment_is_refused_and_can_be_recovered_from() {
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
     assert!(refusal.to_string().contains("001.mcap"), "{refusal}");
-    // What came before and after it can be kept; what is between is told.
+    // The parts before and after are recovered; the gap is reported.
     let (left, kept) = salvaged(folder.path());
     assert!(same_bits(&kept[..2 * BATCH], &rows[..2 * BATCH]));
     assert!(same_bits(&kept[2 * BATCH..], &rows[4 * BATCH..]));
-    let told = left.missing.sentences().join("; ");
-    assert!(told.contains("001.mcap") && told.contains("80 samples between"), "{told}");
+    let sentences = left.missing.sentences().join("; ");
+    assert!(
+        sentences.contains("001.mcap") && sentences.contains("80 samples between"),
+        "{sentences}"
+    );
     // Another segment does not pass for it, nor for the first one.
     fs::rename(folder.path().join("002.mcap"), folder.path().join("001.mcap")).unwrap();
     assert!(Session::open(folder.path()).is_err());
@@ -368,8 +371,8 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
         assert!(refusal.contains(&segment_file(number)), "{refusal}");
         let (left, kept) = salvaged(folder.path());
         assert!(same_bits(&kept, &rows));
-        let told = left.missing.sentences().join("; ");
-        assert!(told.contains(&segment_file(number)), "{told}");
+        let sentences = left.missing.sentences().join("; ");
+        assert!(sentences.contains(&segment_file(number)), "{sentences}");
         fs::write(&path, &whole).unwrap();
     }
     Session::open(folder.path()).unwrap();
@@ -379,7 +382,7 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
 fn segments_of_another_session_are_refused() {
     let (folder, rows, entries) = three_segments();
     let mut other = manifest();
-    other.operator = "somebody else".into();
+    other.operator = "Eve".into();
     let journal = Journal::default();
     let mut log = LogWriter::begin_in_segments(Box::new(journal.clone()), 2, &other).unwrap();
     for batch in rows.chunks(BATCH) {

@@ -1,11 +1,11 @@
-//! Two programs at once: nobody waits for ever, one of several wins, and nothing is left over.
+//! Two programs at once: waits are limited, one of several wins, and nothing remains.
 
 use crate::support::{count_from, end, log_bytes, manifest, rows};
-use crate::worker::{command, edit, told};
+use crate::worker::{command, edit, reported_numbers};
 use palpate_model::Nanos;
 use palpate_sessions::atomic::{leftovers, sweep};
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError};
-use palpate_sessions::folder::Busy;
+use palpate_sessions::folder::LockTimeout;
 use palpate_sessions::recover::{RecoverError, recover, recovered_folder};
 use palpate_sessions::{
     ChainError, EDITS_FILE, EditError, LOG_FILE, Session, SessionFolder, add_edit,
@@ -30,8 +30,8 @@ impl Beside {
         Self(child)
     }
 
-    /// Whether this is the process that is told as the holder, where the system tells any.
-    fn is(&self, busy: &Busy) -> bool {
+    /// Whether this process is reported as the holder, if the system shows one.
+    fn is(&self, busy: &LockTimeout) -> bool {
         busy.holder.is_none_or(|number| number == self.0.id())
     }
 }
@@ -44,14 +44,14 @@ impl Drop for Beside {
 }
 
 #[test]
-fn a_strangers_lock_on_edits_is_waited_for_a_little_and_told() {
+fn lock_on_edits_by_another_program_is_waited_for_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let id = manifest().session_id;
     add_edit(at, &id, &edit(1)).unwrap();
     let stranger = Beside::start(&format!("lock {EDITS_FILE}"), at);
     match add_edit(at, &id, &edit(2)) {
-        Err(EditError::Chain(ChainError::Busy(busy))) => {
+        Err(EditError::Chain(ChainError::LockTimeout(busy))) => {
             assert!(stranger.is(&busy), "{busy}");
             assert!(busy.path.ends_with(EDITS_FILE), "{busy}");
         }
@@ -62,7 +62,7 @@ fn a_strangers_lock_on_edits_is_waited_for_a_little_and_told() {
 }
 
 #[test]
-fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
+fn lock_on_the_catalog_by_another_program_is_waited_for_and_reported() {
     let library = tempfile::tempdir().unwrap();
     let at = library.path();
     let session = at.join("sessions/one");
@@ -73,7 +73,7 @@ fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
     for task in ["lock catalog.lock".to_owned(), format!("sqlite {CATALOG_FILE}")] {
         let stranger = Beside::start(&task, at);
         match count() {
-            Err(CatalogError::Busy(busy)) => assert!(stranger.is(&busy), "{busy}"),
+            Err(CatalogError::LockTimeout(busy)) => assert!(stranger.is(&busy), "{busy}"),
             other => panic!("{task}: {other:?}"),
         }
         drop(stranger);
@@ -82,7 +82,7 @@ fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
 }
 
 #[test]
-fn what_a_killed_process_was_writing_is_told_and_swept_and_no_other() {
+fn drafts_of_a_killed_process_are_found_and_removed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut killed = Beside::start("draft killed.csv", at);
@@ -113,7 +113,7 @@ fn of_many_recoveries_at_once_one_wins_and_nothing_is_left_over() {
             .collect();
         let outputs: Vec<_> =
             children.into_iter().map(|it| it.wait_with_output().unwrap()).collect();
-        let won: u64 = outputs.iter().flat_map(|output| told(output, "saved")).sum();
+        let won: u64 = outputs.iter().flat_map(|output| reported_numbers(output, "saved")).sum();
         assert_eq!(won, 1, "{outputs:?}");
         assert!(outputs.iter().all(|output| output.status.success()), "{outputs:?}");
         assert_eq!(Session::open(&recovered_folder(&folder)).unwrap().rows.len(), all.len());

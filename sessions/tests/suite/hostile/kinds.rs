@@ -342,7 +342,7 @@ fn catalog() -> Kind {
             assert!(written.contains(entry), "a wrong entry");
             count += 1;
         }
-        // It was set aside and begun anew.
+        // The catalog was replaced.
         match (count, catalog.remarks.is_empty()) {
             (4, true) => Outcome::Whole,
             (_, true) => Outcome::Short,

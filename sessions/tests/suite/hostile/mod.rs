@@ -10,7 +10,7 @@ mod mutate;
 mod targets;
 
 use crate::support::{Random, count_from, put, quick_folder};
-use crate::worker::{command, told};
+use crate::worker::{command, reported_numbers};
 use kinds::{Kind, Outcome};
 use std::collections::BTreeMap;
 use std::fs;
@@ -113,7 +113,7 @@ pub fn fuzz(folder: &Path, name: &str, count: usize) {
     eprintln!("done {done}\nslowest {}", slowest.as_micros());
 }
 
-/// Starts a process for a task and returns what it told; its last words if it did not end well.
+/// Starts a process for a task and returns its output, or its last lines if it failed.
 fn worked(task: &str) -> std::process::Output {
     let folder = quick_folder();
     let output = command(&[], task, folder.path())
@@ -140,7 +140,7 @@ fn keep_input(folder: &Path, task: &str) -> String {
 }
 
 fn number(output: &std::process::Output, word: &str) -> u64 {
-    told(output, word).last().copied().unwrap_or(0)
+    reported_numbers(output, word).last().copied().unwrap_or(0)
 }
 
 /// Mutations of each kind of file; the soak script asks for more.
@@ -211,7 +211,7 @@ fn the_corpus_is_small_and_every_target_has_one() {
     println!("corpus: {total} bytes");
 }
 
-/// Makes the corpus anew where `PALPATE_CORPUS` names a folder.
+/// Rebuilds the corpus in the folder `PALPATE_CORPUS`.
 #[test]
 fn what_the_corpus_is_made_of_can_be_made() {
     let chosen = std::env::var_os("PALPATE_CORPUS").map(PathBuf::from);
