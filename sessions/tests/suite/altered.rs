@@ -103,8 +103,8 @@ fn altered_log_is_reported_at_once_and_the_recording_continues() {
         };
         assert!(!missing.is_end_lost, "{command}: {missing:?}");
         assert!(patient.samples >= 3000 && patient.until_s > 5.9, "{command}: {patient:?}");
-        let lost: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
-        assert_eq!(patient.samples + lost, 6000, "{command}");
+        let missing_samples: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
+        assert_eq!(patient.samples + missing_samples, 6000, "{command}");
         assert!(Session::open(&path).is_err());
     }
 }

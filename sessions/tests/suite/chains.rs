@@ -76,7 +76,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     assert_eq!(of_specimen(), (all.to_vec(), vec![]));
     for damage in [flip, cut_last_line] {
         let analyses = session.join(ANALYSES_FILE);
-        let kept = fs::read(&analyses).unwrap();
+        let original = fs::read(&analyses).unwrap();
         damage(&analyses);
         let (events, remarks) = of_specimen();
         assert_eq!(events, all[..3]);
@@ -90,7 +90,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
         let remarks = remarks.join("\n");
         assert!(remarks.contains(ANALYSES_FILE) && remarks.contains(EDITS_FILE), "{remarks}");
         fs::write(&edits, kept_edits).unwrap();
-        fs::write(&analyses, kept).unwrap();
+        fs::write(&analyses, original).unwrap();
     }
     let check = DailyCheck {
         at: Utc.with_ymd_and_hms(2026, 3, 5, 8, 0, 0).unwrap(),
@@ -105,13 +105,13 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     let (events, remarks) = history(at, Subject::Rig, "sim");
     assert!(events.contains(&"check".into()) && remarks.is_empty(), "{events:?}");
     let file = at.join("checks/sim.jsonl");
-    let kept = fs::read(&file).unwrap();
+    let original = fs::read(&file).unwrap();
     for damage in [flip, cut_last_line, |path: &Path| fs::remove_file(path).unwrap()] {
         damage(&file);
         let (events, remarks) = history(at, Subject::Rig, "sim");
         assert_eq!(events, all);
         assert!(remarks.len() == 1 && remarks[0].contains("sim.jsonl"), "{remarks:?}");
-        fs::write(&file, &kept).unwrap();
+        fs::write(&file, &original).unwrap();
     }
 }
 

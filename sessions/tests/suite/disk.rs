@@ -95,8 +95,8 @@ impl Sink for DiskSink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         let outcome = self.disk.count();
         // A failing write leaves a part of what it was given.
-        let kept = bytes.len() / if outcome.is_ok() { 1 } else { 3 };
-        let bytes = bytes[..kept].to_vec();
+        let length = bytes.len() / if outcome.is_ok() { 1 } else { 3 };
+        let bytes = bytes[..length].to_vec();
         self.disk.note(Step::Write(self.number, bytes));
         outcome
     }

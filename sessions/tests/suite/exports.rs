@@ -66,16 +66,16 @@ fn csv_holds_every_digit_and_reads_back() {
 
     let table = read_table(&path, None).unwrap();
     let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold | Phase::Unload);
-    let kept: Vec<usize> =
+    let remaining: Vec<usize> =
         (0..session.rows.len()).filter(|&i| is_measured(session.rows[i].phase)).collect();
-    assert_eq!(table.t.len(), kept.len());
-    for (k, &i) in kept.iter().enumerate() {
+    assert_eq!(table.t.len(), remaining.len());
+    for (k, &i) in remaining.iter().enumerate() {
         assert_eq!(table.t[k], time_of(&session, i));
         assert_eq!(Some(table.force[k]), session.rows[i].force);
         assert_eq!(Some(table.depth[k]), session.rows[i].depth);
         assert_eq!(table.is_unload[k], session.rows[i].phase == Phase::Unload);
     }
-    let left_out = session.rows.len() - kept.len();
+    let left_out = session.rows.len() - remaining.len();
     assert_eq!(table.notes.len(), 1);
     assert!(table.notes[0].starts_with(&format!("{left_out} rows")));
 }

@@ -105,6 +105,6 @@ fn a_folder_that_cannot_be_written_refuses_the_start() {
     let refusal = SessionWriter::start(folder, None, &manifest(), Pace::Virtual);
     let text = refusal.err().unwrap().to_string();
     assert!(text.contains("File exists"), "{text}");
-    let kept = std::fs::read(parent.path().join("000.mcap")).unwrap();
-    assert_eq!(kept, b"precious");
+    let bytes = std::fs::read(parent.path().join("000.mcap")).unwrap();
+    assert_eq!(bytes, b"precious");
 }

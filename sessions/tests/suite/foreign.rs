@@ -58,10 +58,10 @@ fn numbers(part: &ForeignPart) -> Vec<[f64; 3]> {
     part.samples.iter().map(one).collect()
 }
 
-fn said(part: &ForeignPart, what: &str) -> String {
+fn reading(part: &ForeignPart, what: &str) -> String {
     let readings = &part.imported.readings;
     let one = readings.iter().find(|one| one.what == what);
-    let one = one.unwrap_or_else(|| panic!("nothing said of {what}: {readings:?}"));
+    let one = one.unwrap_or_else(|| panic!("no reading of {what}: {readings:?}"));
     format!("{} ({})", one.found, one.how)
 }
 
@@ -91,7 +91,7 @@ fn table_is_read_and_every_property_is_reported() {
         ("depth", "column 2 'Weg' in µm"),
         ("force", "column 3 'Kraft' in mN"),
     ] {
-        let found = said(part, what);
+        let found = reading(part, what);
         assert!(found.contains(expected) && found.ends_with("(detected)"), "{found}");
     }
 }
@@ -117,7 +117,7 @@ fn options_override_detection() {
         }
     }
     for (what, expected) in [("depth", "column 2 'z' in mm"), ("force", "column 4 'load' in gf")] {
-        let found = said(part, what);
+        let found = reading(part, what);
         assert!(found.starts_with(expected) && found.ends_with("(told)"), "{found}");
     }
     // A file without names.
@@ -237,7 +237,7 @@ fn mach1_blocks_become_parts_in_newtons() {
     assert!((last[1][2] - 29.0 * 0.009_806_65).abs() < 1e-15);
     let facts = &read.parts[0].imported.facts;
     assert!(facts.contains(&("Velocity, mm/s".into(), "0.1".into())), "{facts:?}");
-    assert_eq!(said(&read.parts[0], "layout"), "mach-1 (detected)");
+    assert_eq!(reading(&read.parts[0], "layout"), "mach-1 (detected)");
     let by_number = self::read(&mach1(), &parse_options(&[("part", "3")]));
     assert_eq!(by_number.parts.len(), 1);
     assert_eq!(numbers(&by_number.parts[0]), last);
@@ -278,11 +278,11 @@ fn rheometer_intervals_in_utf16_become_parts() {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }
-    assert!(said(part, "encoding").starts_with("UTF-16LE"));
-    assert!(said(part, "decimal sign").starts_with("comma, from '"));
+    assert!(reading(part, "encoding").starts_with("UTF-16LE"));
+    assert!(reading(part, "decimal sign").starts_with("comma, from '"));
     // The header of the second interval and its units, two lines below.
     assert_eq!(
-        (said(part, "header"), said(part, "units")),
+        (reading(part, "header"), reading(part, "units")),
         ("line 16 (detected)".into(), "line 18 (detected)".into())
     );
     let reason = parse_foreign("gel.csv", utf16(&rheometer()), &detect_all()).unwrap_err();
@@ -315,7 +315,7 @@ fn sheets_with_a_time_become_parts_in_both_formats() {
                 }
             }
         }
-        let force = said(&read.parts[1], "force");
+        let force = reading(&read.parts[1], "force");
         assert!(force.starts_with("column 3 'Force standard' in mN"), "{force}");
     }
 }
@@ -330,7 +330,7 @@ fn import_makes_a_session_and_stores_the_original() {
     assert_eq!(name, "Gel-3--first--Stress-Relaxation-1-ramp-2");
     let at = folder.path().join(name);
     let make = || {
-        let kept = Kept {
+        let target = Kept {
             folder: &at,
             original: &original,
             session_id: "20260305T141507Z-0badcafe".into(),
@@ -338,7 +338,7 @@ fn import_makes_a_session_and_stores_the_original() {
             software_version: "0.1.0",
             labels: Labels { specimen: "gel 3".into(), ..Labels::default() },
         };
-        keep(part, kept)
+        keep(part, target)
     };
     make().unwrap();
     assert_eq!(
@@ -371,7 +371,7 @@ fn times_that_no_session_holds_are_refused() {
         ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "picosecond"),
     ] {
         let part = read_one(text, &detect_all());
-        let kept = Kept {
+        let target = Kept {
             folder: &folder.path().join("no"),
             original: text.as_bytes(),
             session_id: "id".into(),
@@ -379,7 +379,7 @@ fn times_that_no_session_holds_are_refused() {
             software_version: "0.1.0",
             labels: Labels::default(),
         };
-        let refusal = keep(&part, kept).unwrap_err().to_string();
+        let refusal = keep(&part, target).unwrap_err().to_string();
         assert!(refusal.contains(expected), "{refusal}");
         assert!(!folder.path().join("no").exists());
     }

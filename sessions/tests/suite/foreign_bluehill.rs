@@ -72,13 +72,13 @@ fn specimen_is_read_with_what_the_file_says_of_it() {
     assert_eq!(fact(&read, 0, "Test : Rate 1"), Some("15.00000 mm/min"));
     assert_eq!(fact(&read, 0, "Test : Load cell"), Some("2530-100N"));
     assert_eq!(fact(&read, 0, "Notes"), None);
-    let said = |what: &str| {
+    let reading = |what: &str| {
         let readings = &read.parts[0].imported.readings;
         let one = readings.iter().find(|one| one.what == what);
         one.unwrap().found.clone()
     };
-    assert_eq!((said("header"), said("units")), ("line 6".into(), "line 7".into()));
-    assert_eq!(said("force"), "column 3 'Load' in N");
+    assert_eq!((reading("header"), reading("units")), ("line 6".into(), "line 7".into()));
+    assert_eq!(reading("force"), "column 3 'Load' in N");
     // A specimen without a label has no name.
     assert_eq!(names(&detected(&specimen("", 0))), [""]);
 }
@@ -183,14 +183,14 @@ fn a_file_cut_off_anywhere_is_refused_or_has_what_is_left() {
     let whole = detected(&text);
     let all: Vec<_> = (0..2).flat_map(|part| numbers(&whole, part)).collect();
     for length in 0..text.len() {
-        let Ok(left) = read(&text[..length], &Told::default()) else {
+        let Ok(part) = read(&text[..length], &Told::default()) else {
             continue;
         };
-        let left_parts = left.parts.len();
-        let mut left: Vec<_> = (0..left_parts).flat_map(|part| numbers(&left, part)).collect();
+        let parts = part.parts.len();
+        let mut found: Vec<_> = (0..parts).flat_map(|index| numbers(&part, index)).collect();
         // The last number may be cut off within; the rest is as it was.
-        left.pop();
-        assert_eq!(left, all[..left.len()], "{length}");
+        found.pop();
+        assert_eq!(found, all[..found.len()], "{length}");
     }
 }
 

@@ -178,9 +178,9 @@ fn disk_error_during_a_recovery_is_reported_and_leaves_the_original() {
         let log = copy.with_extension("recovering").join(LOG_FILE);
         let program = failing(&log, call, error, &number.to_string());
         let output = command(&words(&program), "recover", &folder).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(!output.status.success(), "{call} {number}: {said}");
-        assert!(said.contains("Disk {"), "{said}");
+        let output_text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{call} {number}: {output_text}");
+        assert!(output_text.contains("Disk {"), "{output_text}");
         assert!(!copy.exists());
         assert_eq!(fs::read(folder.join(LOG_FILE)).unwrap(), bytes);
         let output = command(&[], "recover", &folder).output().unwrap();
@@ -196,9 +196,9 @@ fn two_processes_never_record_in_one_folder() {
     let held = SessionFolder::create(&folder).unwrap();
     let output = command(&[], "log 100", &folder).output().unwrap();
     assert!(!output.status.success());
-    let said = String::from_utf8_lossy(&output.stderr);
+    let output_text = String::from_utf8_lossy(&output.stderr);
     let holder = format!("holder: \"{}\"", std::process::id());
-    assert!(said.contains(&holder), "{said}");
+    assert!(output_text.contains(&holder), "{output_text}");
     drop(held);
     // The other way round: the process is named by its number.
     let mut child = command(&[], "hold", &folder)
@@ -207,8 +207,8 @@ fn two_processes_never_record_in_one_folder() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    let mut said = BufReader::new(child.stderr.take().unwrap());
-    said.read_line(&mut String::new()).unwrap();
+    let mut output_text = BufReader::new(child.stderr.take().unwrap());
+    output_text.read_line(&mut String::new()).unwrap();
     let refusal = SessionFolder::create(&folder).unwrap_err();
     let FolderError::Lock(LockError::Held { holder, .. }) = refusal else {
         panic!("{refusal}");

@@ -127,9 +127,9 @@ impl Recording {
             if matches!(self.trace[at].step, Step::Sync(_)) {
                 // The folder's own may follow.
                 let after = at + 2;
-                let lost = self.check_cut(after, Fate::Dropped, 0);
+                let lost_samples = self.check_cut(after, Fate::Dropped, 0);
                 let taken = self.trace[after].taken;
-                let step = Step::Reported(taken - lost);
+                let step = Step::Reported(taken - lost_samples);
                 self.trace.insert(after, Traced { step, taken });
             }
         }
@@ -167,8 +167,8 @@ impl Recording {
 
     fn check_left(&self, folder: &Path, context: &str) -> usize {
         let mut unbroken = 0;
-        let mut kept = 0;
-        let left = salvage(folder, &mut |block| {
+        let mut remaining = 0;
+        let salvage = salvage(folder, &mut |block| {
             let first = block.first_sample() as usize;
             let found: Vec<Row> = block.rows().collect();
             let there = &self.rows[first..first + found.len()];
@@ -176,15 +176,15 @@ impl Recording {
             if first == unbroken {
                 unbroken += found.len();
             }
-            kept += found.len();
+            remaining += found.len();
         });
         // Nothing but the beginning that never reached the disk makes a session useless.
-        let Ok(Salvage { entries, missing, .. }) = left else {
+        let Ok(Salvage { entries, missing, .. }) = salvage else {
             return 0;
         };
         let is_own = |entry: &Entry| self.entries.contains(entry);
         assert!(entries.iter().all(is_own), "{context}: wrong entries");
-        let is_short = kept < self.rows.len() || entries.len() < self.entries.len();
+        let is_short = remaining < self.rows.len() || entries.len() < self.entries.len();
         assert!(!is_short || !missing.sentences().is_empty(), "{context}");
         unbroken
     }
@@ -196,10 +196,10 @@ impl Recording {
         let session = folder.path().join("one");
         std::fs::create_dir(&session).expect("a folder to write in");
         cut(&self.trace, at, fate, &mut Random(seed), &session);
-        let kept = self.check_right(&session, &context);
+        let remaining = self.check_right(&session, &context);
         let taken = self.trace[at].taken;
         if let Some(reported) = self.reported_by(at) {
-            assert!(kept >= reported, "{context}: {kept} of {reported}");
+            assert!(remaining >= reported, "{context}: {remaining} of {reported}");
             let is_recovered = recover(&session, "1", chrono::DateTime::UNIX_EPOCH);
             if let Ok(recovery) = is_recovered {
                 let copy = Session::open(&recovery.folder).expect("a copy is whole");
@@ -207,11 +207,11 @@ impl Recording {
                 let same = unbroken.take_while(|(a, b)| same_bits(&[**a], &[**b]));
                 let same = same.count();
                 let raw = read_raw(&recovery.folder).expect("a copy is whole");
-                check_raw_begins(&raw, &self.rows[..kept], &context);
-                assert!(same >= kept, "{context}: {same} of {kept} in the copy");
+                check_raw_begins(&raw, &self.rows[..remaining], &context);
+                assert!(same >= remaining, "{context}: {same} of {remaining} in the copy");
             }
         }
-        taken.saturating_sub(kept)
+        taken.saturating_sub(remaining)
     }
 }
 

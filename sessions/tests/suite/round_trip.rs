@@ -167,7 +167,7 @@ fn what_could_not_be_read_back_is_not_written() {
 fn raw_bytes_and_health_come_back_at_either_pace() {
     let health = |now: Nanos, lateness_s: f64| Health {
         now,
-        recorded: Told::State(MachineState {
+        told: Told::State(MachineState {
             lateness_s,
             queue_share: 0.25,
             sync_s: Some(0.004),

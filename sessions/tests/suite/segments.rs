@@ -47,8 +47,8 @@ impl Sink for JournalSink {
         let mut state = self.0.0.lock().unwrap();
         let outcome = state.count();
         // A failing write leaves a part of what it was given.
-        let kept = bytes.len() / if outcome.is_ok() { 1 } else { 2 };
-        state.steps.push(Step::Append(self.1, bytes[..kept].into()));
+        let remaining = bytes.len() / if outcome.is_ok() { 1 } else { 2 };
+        state.steps.push(Step::Append(self.1, bytes[..remaining].into()));
         outcome
     }
 
@@ -152,8 +152,8 @@ fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
 
 fn salvaged(folder: &Path) -> (Salvage, Vec<Row>) {
     let mut rows = Vec::new();
-    let left = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
-    (left, rows)
+    let salvage = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
+    (salvage, rows)
 }
 
 fn cut(path: &Path, length: usize) {
@@ -185,8 +185,8 @@ fn a_session_in_segments_comes_back_bit_for_bit() {
         assert_eq!(session.notes, Vec::<String>::new());
         let ending = session.end.clone().unwrap();
         assert_eq!((ending.samples, ending.entries), (3000, 99));
-        let left = salvage(folder.path(), &mut |_| {}).unwrap();
-        assert_eq!((left.samples, left.missing.sentences()), (3000, Vec::new()));
+        let salvage = salvage(folder.path(), &mut |_| {}).unwrap();
+        assert_eq!((salvage.samples, salvage.missing.sentences()), (3000, Vec::new()));
         // Thirty batches, four to a segment; each a valid file with a bounded index. With the wall
         // clock entries end batches early.
         let present = |number: &u32| folder.path().join(segment_file(*number)).exists();
@@ -315,10 +315,10 @@ fn a_missing_segment_is_refused_and_can_be_recovered_from() {
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
     assert!(refusal.to_string().contains("001.mcap"), "{refusal}");
     // The parts before and after are recovered; the gap is reported.
-    let (left, kept) = salvaged(folder.path());
-    assert!(same_bits(&kept[..2 * BATCH], &rows[..2 * BATCH]));
-    assert!(same_bits(&kept[2 * BATCH..], &rows[4 * BATCH..]));
-    let sentences = left.missing.sentences().join("; ");
+    let (salvage, remaining) = salvaged(folder.path());
+    assert!(same_bits(&remaining[..2 * BATCH], &rows[..2 * BATCH]));
+    assert!(same_bits(&remaining[2 * BATCH..], &rows[4 * BATCH..]));
+    let sentences = salvage.missing.sentences().join("; ");
     assert!(
         sentences.contains("001.mcap") && sentences.contains("80 samples between"),
         "{sentences}"
@@ -347,11 +347,11 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     cut(&middle, data);
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
-    let (left, kept) = salvaged(folder.path());
-    let gap = &left.missing.gaps[0];
+    let (salvage, remaining) = salvaged(folder.path());
+    let gap = &salvage.missing.gaps[0];
     let (before, after) = (gap.after_sample as usize, (gap.after_sample + gap.samples) as usize);
-    assert!(same_bits(&kept[..before], &rows[..before]));
-    assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
+    assert!(same_bits(&remaining[..before], &rows[..before]));
+    assert!(same_bits(&remaining[before..], &rows[after..]) && after <= 4 * BATCH);
 }
 
 /// That the next segment goes on without a gap does not make up for it: only one begun because of it would.
@@ -369,9 +369,9 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
         let refusal = Session::open(folder.path()).unwrap_err().to_string();
         assert!(refusal.contains("the index"), "{refusal}");
         assert!(refusal.contains(&segment_file(number)), "{refusal}");
-        let (left, kept) = salvaged(folder.path());
-        assert!(same_bits(&kept, &rows));
-        let sentences = left.missing.sentences().join("; ");
+        let (salvage, remaining) = salvaged(folder.path());
+        assert!(same_bits(&remaining, &rows));
+        let sentences = salvage.missing.sentences().join("; ");
         assert!(sentences.contains(&segment_file(number)), "{sentences}");
         fs::write(&path, &whole).unwrap();
     }

@@ -251,11 +251,11 @@ impl Sink for MemorySink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut memory = self.0.lock().unwrap();
         let outcome = memory.count();
-        let kept = match outcome {
+        let remaining = match outcome {
             Ok(()) => bytes.len(),
             Err(_) => (bytes.len() as f64 * memory.torn) as usize,
         };
-        memory.bytes.extend_from_slice(&bytes[..kept]);
+        memory.bytes.extend_from_slice(&bytes[..remaining]);
         outcome
     }
 

@@ -16,16 +16,16 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 /// A process that has begun its task and does it until it is let go.
-struct Beside(Child);
+struct OtherProgram(Child);
 
-impl Beside {
+impl OtherProgram {
     fn start(task: &str, folder: &Path) -> Self {
         let mut command = command(&[], task, folder);
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = piped.spawn().expect("a test is a program");
-        let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
+        let mut errors = BufReader::new(child.stderr.take().expect("it is piped"));
         let mut line = String::new();
-        said.read_line(&mut line).expect("it says so");
+        errors.read_line(&mut line).expect("it says so");
         assert_eq!(line, "saved 0\n");
         Self(child)
     }
@@ -36,7 +36,7 @@ impl Beside {
     }
 }
 
-impl Drop for Beside {
+impl Drop for OtherProgram {
     fn drop(&mut self) {
         drop(self.0.stdin.take());
         let _ = self.0.wait();
@@ -49,7 +49,7 @@ fn lock_on_edits_by_another_program_is_waited_for_and_reported() {
     let at = folder.path();
     let id = manifest().session_id;
     add_edit(at, &id, &edit(1)).unwrap();
-    let stranger = Beside::start(&format!("lock {EDITS_FILE}"), at);
+    let stranger = OtherProgram::start(&format!("lock {EDITS_FILE}"), at);
     match add_edit(at, &id, &edit(2)) {
         Err(EditError::Chain(ChainError::LockTimeout(busy))) => {
             assert!(stranger.is(&busy), "{busy}");
@@ -71,7 +71,7 @@ fn lock_on_the_catalog_by_another_program_is_waited_for_and_reported() {
     let count = || Catalog::with(at, |catalog| Ok(catalog.update(&mut |_, _| {})?.sessions));
     assert_eq!(count().unwrap(), 1);
     for task in ["lock catalog.lock".to_owned(), format!("sqlite {CATALOG_FILE}")] {
-        let stranger = Beside::start(&task, at);
+        let stranger = OtherProgram::start(&task, at);
         match count() {
             Err(CatalogError::LockTimeout(busy)) => assert!(stranger.is(&busy), "{busy}"),
             other => panic!("{task}: {other:?}"),
@@ -85,14 +85,17 @@ fn lock_on_the_catalog_by_another_program_is_waited_for_and_reported() {
 fn drafts_of_a_killed_process_are_found_and_removed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut killed = Beside::start("draft killed.csv", at);
-    let _going_on = Beside::start("draft written.csv", at);
+    let mut killed = OtherProgram::start("draft killed.csv", at);
+    let _going_on = OtherProgram::start("draft written.csv", at);
     assert!(leftovers(at, 1).is_empty());
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
-    let left = leftovers(at, 1);
-    assert!(left.len() == 1 && left[0].to_string_lossy().contains("killed.csv"), "{left:?}");
-    assert_eq!(sweep(at, 1), left);
+    let abandoned = leftovers(at, 1);
+    assert!(
+        abandoned.len() == 1 && abandoned[0].to_string_lossy().contains("killed.csv"),
+        "{abandoned:?}"
+    );
+    assert_eq!(sweep(at, 1), abandoned);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1);
 }
 

@@ -121,20 +121,20 @@ fn worked(task: &str) -> std::process::Output {
         .output()
         .expect("a test is a program");
     if !output.status.success() {
-        let kept = keep_input(folder.path(), task);
+        let stored = keep_input(folder.path(), task);
         let text = String::from_utf8_lossy(&output.stderr);
         let lines: Vec<&str> = text.lines().collect();
         let last = lines[lines.len().saturating_sub(12)..].join("\n");
-        panic!("{task} ended with {}{kept}:\n{last}", output.status);
+        panic!("{task} ended with {}{stored}:\n{last}", output.status);
     }
     output
 }
 
 /// Keeps what was read last, to become a file of the corpus.
 fn keep_input(folder: &Path, task: &str) -> String {
-    let kept = std::env::temp_dir().join(format!("palpate-{}", task.replace(' ', "-")));
-    match fs::copy(folder.join("input"), &kept) {
-        Ok(_) => format!(", input kept as {}", kept.display()),
+    let stored = std::env::temp_dir().join(format!("palpate-{}", task.replace(' ', "-")));
+    match fs::copy(folder.join("input"), &stored) {
+        Ok(_) => format!(", input stored as {}", stored.display()),
         Err(_) => String::new(),
     }
 }

@@ -111,20 +111,20 @@ fn companions_with_the_same_meaning_are_copied_and_others_reported() {
         assert_eq!(missing.entries > 0, !has_contacts, "{place}: {missing:?}");
 
         let id = &recovery.session_id;
-        let kept = Edits::read(&recovery.folder, id).unwrap().all;
+        let remaining = Edits::read(&recovery.folder, id).unwrap().all;
         // Without an end the number of decisions is unknown.
         let is_sure = has_contacts && !missing.is_end_lost;
         let is_kept = |edit: &Edit| is_sure || !matches!(edit.change, Change::Contact { .. });
         let expected: Vec<Edit> = edits().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}: {missing:?}");
-        let kept = Analyses::read(&recovery.folder, id).unwrap().all;
+        assert_eq!(remaining, expected, "{place}: {missing:?}");
+        let remaining = Analyses::read(&recovery.folder, id).unwrap().all;
         let is_kept = |one: &Analysis| match one.what {
             Analysed::Mask { .. } | Analysed::Withdrawal => has_first,
             Analysed::Recalibration { .. } => is_sure,
             Analysed::Fit { .. } => false,
         };
         let expected: Vec<Analysis> = analyses().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}: {missing:?}");
+        assert_eq!(remaining, expected, "{place}: {missing:?}");
         // The notes of the copy report the rest too.
         let note = &copy.notes[0];
         assert_eq!(recovery.salvage.missing, missing);
@@ -157,8 +157,8 @@ fn a_copy_of_an_interrupted_session_keeps_its_edits_but_those_of_contacts_it_lac
     let recovery = recover(&folder, "1.2.3", at()).unwrap();
     let copy = Session::open(&recovery.folder).unwrap();
     assert_eq!(copy.entries.len(), 1, "the cut is elsewhere");
-    let kept = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
-    assert_eq!(kept.all, edits()[..3]);
+    let remaining = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
+    assert_eq!(remaining.all, edits()[..3]);
     assert!(copy.notes[0].contains("contact 2 by Ada"), "{:?}", copy.notes);
 }
 
