@@ -219,7 +219,7 @@ fn gaps(rows: &Rows<'_>, samples: &[ForeignSample], numbers: &[usize]) -> Option
     let count = steps.iter().filter(|step| is_gap(step)).count();
     let first = steps.iter().position(is_gap)?;
     Some(format!(
-        "{count} gaps: {} {} is followed by {:.6} s without rows, which are {median:.6} s apart; nothing is filled in",
+        "{count} gaps: no row follows {} {} for {:.6} s, though rows are {median:.6} s apart; nothing is filled in",
         rows.word(),
         numbers[first],
         steps[first]
