@@ -34,11 +34,11 @@ pub struct Doubt {
 }
 
 /// Called with the number of finished sessions and of all sessions.
-pub type Progress<'a> = &'a mut dyn FnMut(usize, usize);
+pub type CatalogProgress<'a> = &'a mut dyn FnMut(usize, usize);
 
 impl Catalog {
     /// Reads new and changed sessions and removes deleted ones. Several processes may do so at a time.
-    pub fn update(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
+    pub fn update(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
         self.update_while(&mut |done, of| {
             progress(done, of);
             ControlFlow::Continue(())
@@ -96,7 +96,7 @@ impl Catalog {
     }
 
     /// Reads everything again. The recorded heads of edits, analyses, checks and journals stay.
-    pub fn rebuild(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
+    pub fn rebuild(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
         self.write(|db| {
             db.execute_batch(
                 "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;
@@ -107,7 +107,7 @@ impl Catalog {
     }
 
     /// Compares every session with its entry, without changing the catalog.
-    pub fn check(&self, progress: Progress<'_>) -> Result<Vec<Doubt>, CatalogError> {
+    pub fn check(&self, progress: CatalogProgress<'_>) -> Result<Vec<Doubt>, CatalogError> {
         let (sessions, _) = walk(&self.library);
         let heads = self.heads()?;
         let mut known: BTreeMap<String, Entry> =
