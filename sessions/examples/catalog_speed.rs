@@ -1,6 +1,6 @@
-//! How long the catalog of many sessions takes to be made, brought up to date and searched.
+//! Time to build, update and search a catalog of many sessions.
 //!
-//! Every session is the beginning of a recorded one, written again with another manifest.
+//! Every session is the beginning of a recorded one with another manifest.
 //!
 //! `cargo run -p palpate-sessions --example catalog_speed -- [SESSIONS] [FOLDER]`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
@@ -20,10 +20,10 @@ use std::time::Instant;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Samples of each session: the catalog reads the first and the last chunk of any length.
+/// Samples of each session; the catalog reads only the first and the last chunk.
 const SAMPLES: usize = 2000;
 
-/// A log in memory: what is measured is reading, not the disk's synchronisation.
+/// A log in memory, because the measurement is about reading, not about synchronisation.
 #[derive(Clone, Default)]
 struct Memory(Arc<Mutex<Vec<u8>>>);
 
@@ -42,9 +42,9 @@ impl Sink for Memory {
 #[expect(clippy::disallowed_methods, reason = "this program measures time")]
 fn timed<T>(what: &str, body: impl FnOnce() -> T) -> T {
     let start = Instant::now();
-    let done = body();
+    let result = body();
     println!("{what}: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
-    done
+    result
 }
 
 fn manifest_of(original: &Manifest, number: usize) -> Outcome<Manifest> {
@@ -76,11 +76,8 @@ fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
     log.finish(EndRecord {
         outcome: "finish".into(),
         reason: "the plan is complete".into(),
-        samples: 0,
-        entries: 0,
-        raw_bytes: 0,
         ended_at: original.rows[SAMPLES - 1].host,
-        time_use: Vec::new(),
+        ..EndRecord::default()
     })?;
     let folder = library.join("sessions").join(&manifest.session_id);
     fs::create_dir_all(&folder)?;

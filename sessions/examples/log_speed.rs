@@ -1,10 +1,9 @@
-//! How fast a session log is written and read back, and how large it is.
+//! Speed of writing and reading a session log, and its size.
 //!
 //! `cargo run --release -p palpate-sessions --example log_speed -- [SAMPLES] [FOLDER]`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
-use palpate_model::about::About;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
@@ -13,7 +12,7 @@ use palpate_sessions::{
 };
 use std::time::Instant;
 
-/// A session of the simulated rig's kind at 20 kHz: noise in every digit of the signal.
+/// A sample as of the simulated rig at 20 kHz, with noise in every digit of the signal.
 fn row(index: u64, random: &mut u64) -> Row {
     *random =
         random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -23,25 +22,23 @@ fn row(index: u64, random: &mut u64) -> Row {
     Row {
         tick: index,
         host: Nanos(index * 50_000),
-        age: None,
-        counts: None,
         volts: Some(volts),
         pulses: Some((index / 500 % 500) as i64),
-        status: 0,
         force: Some(volts * 3.7 - 1.85),
         depth: Some(depth),
         phase: Phase::Hold,
         cycle: 1,
+        ..Row::default()
     }
 }
 
 #[expect(clippy::disallowed_methods, reason = "this program measures time")]
 fn timed<T>(what: &str, samples: u64, body: impl FnOnce() -> T) -> T {
     let start = Instant::now();
-    let done = body();
+    let result = body();
     let seconds = start.elapsed().as_secs_f64();
     println!("{what}: {seconds:.3} s, {:.2} million samples/s", samples as f64 / seconds / 1e6);
-    done
+    result
 }
 
 fn manifest() -> Manifest {
@@ -56,9 +53,6 @@ fn manifest() -> Manifest {
         operator: "none".into(),
         specimen: "none".into(),
         indenter: "none".into(),
-        about: About::default(),
-        signal: None,
-        imported: None,
         rig: Some(RigDescription {
             name: "speed".into(),
             identity: "no rig".into(),
@@ -78,11 +72,7 @@ fn manifest() -> Manifest {
             sensors: Default::default(),
         }),
         limits: Some(Limits::for_travel(travel)),
-        calibration: serde_json::Value::Null,
-        plan: serde_json::Value::Null,
-        settings: serde_json::Value::Null,
-        acknowledgements: Vec::new(),
-        recovered: None,
+        ..Manifest::default()
     }
 }
 
@@ -102,11 +92,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let end = EndRecord {
             outcome: "finished".into(),
             reason: "done".into(),
-            samples: 0,
-            entries: 0,
-            raw_bytes: 0,
             ended_at: Nanos(samples * 50_000),
-            time_use: Vec::new(),
+            ..EndRecord::default()
         };
         Ok(writer.close(end)?)
     })?;

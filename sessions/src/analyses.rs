@@ -1,10 +1,10 @@
-//! What was made of a session afterwards: fits, stretches left out, forces read with another calibration.
+//! Analyses of a finished session: fits, masked stretches, recalibrated forces.
 //!
-//! Every one is a named record in `analyses.jsonl` beside the log, with who made it, when, with which
-//! version, of what (SHA-256 of every file that went in), how, and what came out. Nothing is ever written
-//! over and no name is used twice. To undo one is to add a record that withdraws it.
+//! Each analysis is a named record in `analyses.jsonl` beside the log: author, time, program version, inputs (SHA-256 of
+//! every file), settings and results. A record is never overwritten and a name is never used twice; a further record
+//! withdraws an analysis.
 
-use crate::chain::{self, ChainError, Head};
+use crate::chain::{self, ChainError, ChainHead};
 use crate::edits::EDITS_FILE;
 use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
@@ -22,47 +22,38 @@ pub const ANALYSES_FILE: &str = "analyses.jsonl";
 /// Longest name of an analysis in letters: it has to fit on a line.
 const NAME_MAX: usize = 80;
 
-/// Something that went into an analysis.
+/// One input of an analysis.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
     /// A file of the session, or `calibration` or `analysis NAME`.
     pub what: String,
-    /// Of the file's bytes, or of the compact JSON with its keys in alphabetical order.
+    /// Hash of the file's bytes, or of a document's compact JSON with its keys in alphabetical order.
     pub sha256: String,
 }
 
-/// What an analysis is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "analysis", rename_all = "lowercase")]
 pub enum Analysed {
-    /// A fit of a model.
     Fit {
-        /// The analysis that the session was read with, if any.
+        /// Name of the analysis whose forces were fitted, if any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         based_on: Option<String>,
-        /// What was asked for.
         settings: Value,
-        /// What was found, as `palpate fit --json` prints it.
+        /// The report, as `palpate fit --json` prints it.
         results: Value,
     },
-    /// Forces made from the raw signal with another calibration.
-    Recalibration {
-        /// The calibration's document.
-        calibration: Value,
-        /// How the forces change.
-        results: Value,
-    },
-    /// Stretches of a session whose forces do not count.
+    /// Forces computed from the raw signal with another calibration.
+    Recalibration { calibration: Value, results: Value },
+    /// Stretches of a session whose forces are ignored.
     Mask {
-        /// Session time from and to, in s.
+        /// Start and end of each stretch, session time in s.
         left_out_s: Vec<[f64; 2]>,
     },
-    /// The analysis of this name does not count any more.
+    /// The analysis of this name no longer counts.
     Withdrawal,
 }
 
 impl Analysed {
-    /// The word for it.
     pub const fn word(&self) -> &'static str {
         match self {
             Self::Fit { .. } => "fit",
@@ -73,103 +64,67 @@ impl Analysed {
     }
 }
 
-/// One record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Analysis {
-    /// What it is called; of a withdrawal, what is withdrawn.
+    /// Name of the analysis; in a withdrawal, of the withdrawn one.
     pub name: String,
-    /// When it was made.
     pub at: DateTime<Utc>,
-    /// By whom.
     pub by: String,
-    /// Why; may be empty but for a withdrawal.
+    /// May be empty, except in a withdrawal.
     pub reason: String,
-    /// Version of the program that made it.
     pub software_version: String,
     /// Version of the decision rules in that program.
     pub engine_version: u32,
-    /// What went in.
     pub inputs: Vec<Input>,
-    /// What it is.
     #[serde(flatten)]
     pub what: Analysed,
 }
 
-/// Analyses could not be read or made.
 #[derive(Debug, Error)]
 pub enum AnalysisError {
-    /// The file is not as it was written, or the disk refuses.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The session is still being recorded.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// What it is an analysis of cannot be read.
     #[error(transparent)]
     Session(#[from] ReadError),
-    /// A file that went in cannot be read.
     #[error("{} cannot be read ({source}); check its permissions", path.display())]
-    Input {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A name that cannot be.
+    Input { path: PathBuf, source: std::io::Error },
     #[error("'{name}' cannot be the name of an analysis; give 1 to {NAME_MAX} letters on one line")]
-    Name {
-        /// What was given.
-        name: String,
-    },
-    /// Taken, if only by one that was withdrawn.
+    Name { name: String },
     #[error(
-        "the session has an analysis '{name}' already, and a name is never used twice; choose another"
+        "the session already has an analysis '{name}', and a name is never used twice; choose another"
     )]
-    Taken {
-        /// The name.
-        name: String,
-    },
-    /// There is none, or not any more.
+    Taken { name: String },
     #[error("the session has no analysis '{name}'{known}")]
-    None {
-        /// The name.
-        name: String,
-        /// Why not, or what there is.
-        known: String,
-    },
-    /// Nobody would know why.
-    #[error("to withdraw an analysis needs a reason; say why in a few words")]
+    None { name: String, known: String },
+    #[error("a withdrawal needs a reason; give one in a few words")]
     NoReason,
-    /// A part of a recording, or a file, has no place for them.
     #[error("{} is not a session folder; name the folder", path.display())]
-    NotAFolder {
-        /// What was named.
-        path: PathBuf,
-    },
+    NotAFolder { path: PathBuf },
 }
 
-/// Every record of a session, in the order made.
+/// All records of a session, in the order of writing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Analyses {
-    /// The records, withdrawals among them.
+    /// Includes withdrawals and withdrawn analyses.
     pub all: Vec<Analysis>,
-    /// SHA-256 of the file; empty where there is none.
+    /// SHA-256 of the file; empty if there is none.
     pub sha256: String,
-    /// How far it goes.
-    pub head: Head,
+    pub head: ChainHead,
 }
 
 impl Analyses {
-    /// Reads those of a session, given its folder or a log file in it.
+    /// `session` is the session's folder or a log file in it.
     pub fn read(session: &Path, session_id: &str) -> Result<Self, AnalysisError> {
-        Self::read_since(session, session_id, Head::default())
+        Self::read_since(session, session_id, ChainHead::default())
     }
 
-    /// As [`read`](Self::read), and refuses a file that does not hold what it held once.
+    /// Like [`read`](Self::read), and refuses a file that no longer holds the lines up to `since`.
     pub(crate) fn read_since(
         session: &Path,
         session_id: &str,
-        since: Head,
+        since: ChainHead,
     ) -> Result<Self, AnalysisError> {
         let Some(path) = file_beside(session, ANALYSES_FILE) else {
             return Ok(Self::default());
@@ -185,19 +140,18 @@ impl Analyses {
         Ok(Self { all, sha256, head })
     }
 
-    /// The file as an input; none where there is no analysis.
+    /// The file itself as an input; `None` without any record.
     pub fn input(&self) -> Option<Input> {
         (!self.all.is_empty())
             .then(|| Input { what: ANALYSES_FILE.to_owned(), sha256: self.sha256.clone() })
     }
 
-    /// The withdrawal of an analysis, if there is one.
     pub fn withdrawal(&self, name: &str) -> Option<&Analysis> {
         let is_it = |one: &&Analysis| one.name == name && one.what == Analysed::Withdrawal;
         self.all.iter().find(is_it)
     }
 
-    /// Those that count, in the order made.
+    /// Analyses that are not withdrawn, in the order of writing.
     pub fn counting(&self) -> impl Iterator<Item = &Analysis> {
         let is_open = |one: &&Analysis| {
             one.what != Analysed::Withdrawal && self.withdrawal(&one.name).is_none()
@@ -205,7 +159,7 @@ impl Analyses {
         self.all.iter().filter(is_open)
     }
 
-    /// One that counts, by its name.
+    /// The analysis of this name that is not withdrawn.
     pub fn get(&self, name: &str) -> Result<&Analysis, AnalysisError> {
         self.counting().find(|one| one.name == name).ok_or_else(|| AnalysisError::None {
             name: name.to_owned(),
@@ -218,7 +172,7 @@ impl Analyses {
     }
 }
 
-/// The files of a session that any analysis goes by: its log and its edits, with their hashes.
+/// Hashes of the files that every analysis reads: the log and the edits.
 pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
     let mut files = find_files(session)?;
     let edits = match session.is_dir() {
@@ -236,13 +190,12 @@ pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
     files.into_iter().map(input).collect()
 }
 
-/// A document as an input.
 #[must_use]
 pub fn document_input(what: &str, document: &Value) -> Input {
     Input { what: what.to_owned(), sha256: sha256(document.to_string().as_bytes()) }
 }
 
-/// Which of the files that went into an analysis are others now. Only those of [`inputs_of`] are compared.
+/// Names of the input files that differ from `now`, which comes from [`inputs_of`]; documents are not compared.
 #[must_use]
 pub fn changed_inputs(analysis: &Analysis, now: &[Input]) -> Vec<String> {
     let of = |inputs: &[Input], what: &str| {
@@ -258,7 +211,7 @@ pub fn changed_inputs(analysis: &Analysis, now: &[Input]) -> Vec<String> {
     names.into_iter().filter(is_other).map(str::to_owned).collect()
 }
 
-/// Adds a record to a session folder whose recording has ended.
+/// Appends a record. The recording must have ended.
 pub fn add_analysis(
     folder: &Path,
     session_id: &str,
@@ -272,7 +225,7 @@ pub fn add_analysis(
     if !folder.is_dir() {
         return Err(AnalysisError::NotAFolder { path: folder.into() });
     }
-    let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
+    let _lock = HolderLock::acquire_waiting(&folder.join(LOCK_FILE))?;
     let there = Analyses::read(folder, session_id)?;
     if analysis.what == Analysed::Withdrawal {
         there.get(name)?;
@@ -334,7 +287,7 @@ mod tests {
             let refused = add(&analysis(name, "", mask(0.0)));
             assert!(matches!(refused, Err(AnalysisError::Name { .. })), "{name:?}");
         }
-        // What was written is never changed unnoticed.
+        // A changed record is noticed.
         let path = at.join(ANALYSES_FILE);
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replacen("3.0", "3.5", 1)).unwrap();
@@ -342,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_that_are_others_now_are_named() {
+    fn changed_inputs_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         std::fs::write(at.join("000.mcap"), "log").unwrap();

@@ -1,7 +1,7 @@
-//! Files that are whole under their names or not there: the one way in which a file is made or replaced at once.
+//! Atomic file writes: a file appears complete under its name, or not at all.
 //!
-//! A [`Draft`] is written under a hidden name in the folder where it is to be, and is locked while it is. What a
-//! killed process leaves of one is therefore told from one that is being written: nobody holds it.
+//! A [`Draft`] is written under a hidden name in the target folder and stays locked meanwhile. The lock distinguishes
+//! a draft in use from one that a killed process left behind.
 
 use std::fs::{File, Permissions, TryLockError};
 use std::io::{self, BufWriter, Write};
@@ -10,21 +10,21 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use walkdir::WalkDir;
 
-/// What the hidden names end in.
+/// Ending of the hidden names.
 const ENDING: &str = ".palpate.tmp";
-/// Letters of a file's own name that its draft's has: a file system takes 255 bytes, and a letter has four at most.
+/// Letters of the file's name in the draft's name: file systems allow 255 bytes, and a letter has up to four.
 const NAME_LETTERS_MAX: usize = 50;
 
-/// What becomes of a file that has the name already.
+/// What to do with a file that already has the name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// The new one takes its place.
+    /// The new file replaces it.
     Replace,
-    /// It stays, and the new one is refused with [`io::ErrorKind::AlreadyExists`].
+    /// It stays; the new file is refused with [`io::ErrorKind::AlreadyExists`].
     Keep,
 }
 
-/// A file that is being written. Dropped without [`persist`](Self::persist), it goes.
+/// A file being written. Dropping it without [`persist`](Self::persist) deletes it.
 #[derive(Debug)]
 pub struct Draft {
     file: NamedTempFile,
@@ -32,7 +32,7 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Begins the file that is to be at `path`.
+    /// Begins the file that [`persist`](Self::persist) moves to `path`.
     pub fn new(path: &Path) -> io::Result<Self> {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
         let name: String = name.to_string_lossy().chars().take(NAME_LETTERS_MAX).collect();
@@ -41,14 +41,14 @@ impl Draft {
             let file = Builder::new()
                 .prefix(&prefix)
                 .suffix(ENDING)
-                // As any new file: what the user's mask leaves.
+                // Like any new file, subject to the user's umask.
                 .permissions(Permissions::from_mode(0o666))
                 .tempfile_in(folder_of(path))
                 .map_err(without_hidden_name)?;
-            // Between its making and its lock, a sweep may have taken it for one that nobody writes.
+            // Between creation and lock, a sweep may have deleted it as abandoned.
             match file.as_file().try_lock() {
                 Err(TryLockError::WouldBlock) => continue,
-                // Where nothing can be locked, nothing is swept.
+                // On a file system without locks nothing is swept.
                 Err(TryLockError::Error(_)) => {}
                 Ok(()) if !is_at(file.as_file(), file.path()) => continue,
                 Ok(()) => {}
@@ -58,17 +58,15 @@ impl Draft {
         }
     }
 
-    /// Takes what is written.
     pub fn writer(&self) -> BufWriter<&File> {
         BufWriter::new(self.file.as_file())
     }
 
-    /// Where it is while it is written.
     pub fn hidden_path(&self) -> &Path {
         self.file.path()
     }
 
-    /// Gives the file its name. When this returns, it survives a power cut with all that was written.
+    /// Gives the file its name. Once this returns, name and content survive a power cut.
     pub fn persist(self, existing: Existing) -> io::Result<()> {
         self.file.as_file().sync_all()?;
         let named = match existing {
@@ -76,7 +74,7 @@ impl Draft {
             Existing::Keep => self.file.persist_noclobber(&self.path),
         };
         named.map_err(|err| err.error)?;
-        // A folder that cannot be opened may still be written to; then its disk decides when it keeps the name.
+        // A folder without read permission can be written but not synchronised.
         match File::open(folder_of(&self.path)) {
             Ok(folder) => folder.sync_all(),
             Err(_) => Ok(()),
@@ -84,12 +82,11 @@ impl Draft {
     }
 }
 
-/// Puts a file of these bytes at `path`, whatever is there.
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, bytes, Existing::Replace)
 }
 
-/// Makes a new file of these bytes.
+/// Fails if `path` exists.
 pub fn create(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, bytes, Existing::Keep)
 }
@@ -100,17 +97,17 @@ fn write(path: &Path, bytes: &[u8], existing: Existing) -> io::Result<()> {
     draft.persist(existing)
 }
 
-/// The drafts below a folder, so many folders deep, that nobody writes any more.
+/// Abandoned drafts in a folder and its subfolders down to `depth`.
 #[must_use]
 pub fn leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
     let found = unowned(folder, depth);
     found.into_iter().map(|(path, _lock)| path).collect()
 }
 
-/// Takes them away, and tells which. What cannot be taken away stays.
+/// Deletes abandoned drafts as far as permissions allow; returns the deleted paths.
 pub fn sweep(folder: &Path, depth: usize) -> Vec<PathBuf> {
     let mut found = unowned(folder, depth);
-    // The lock is held until the name is gone, so that a process that has just begun this draft notices.
+    // Held locks make a process that has just created this draft notice the deletion.
     found.retain(|(path, _lock)| std::fs::remove_file(path).is_ok());
     found.into_iter().map(|(path, _lock)| path).collect()
 }
@@ -138,14 +135,14 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Whether the open file is the one that has this name.
+/// Whether `path` still names the open file.
 fn is_at(file: &File, path: &Path) -> bool {
     let id = |facts: std::fs::Metadata| (facts.dev(), facts.ino());
     let there = std::fs::metadata(path).map(id).ok();
     there.is_some() && there == file.metadata().map(id).ok()
 }
 
-/// What the system said, without the hidden name, of which nobody knows.
+/// The system's error without the hidden name, which means nothing to a user.
 fn without_hidden_name(err: io::Error) -> io::Error {
     match err.kind() {
         io::ErrorKind::Other => err,
@@ -167,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_the_old_or_the_new_one_and_nothing_is_left_beside_it() {
+    fn a_write_leaves_the_old_or_the_new_file_and_no_draft() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().join("table.csv");
         create(&at, b"one").unwrap();
@@ -180,7 +177,7 @@ mod tests {
         replace(&at, b"three").unwrap();
         assert_eq!(fs::read(&at).unwrap(), b"three");
         assert_eq!(names(folder.path()), ["table.csv"]);
-        // It may be read by others as any file of this user.
+        // Permissions are those of any file of this user.
         let plain = folder.path().join("plain");
         fs::write(&plain, "").unwrap();
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
@@ -190,12 +187,12 @@ mod tests {
     }
 
     #[test]
-    fn only_drafts_that_nobody_writes_are_swept() {
+    fn only_abandoned_drafts_are_swept() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let written = Draft::new(&at.join("now.csv")).unwrap();
         let (_, abandoned) = Draft::new(&at.join("old.csv")).unwrap().file.keep().unwrap();
-        fs::write(at.join(".another.tmp"), "somebody else's").unwrap();
+        fs::write(at.join(".another.tmp"), "another program's").unwrap();
         fs::create_dir(at.join("deep")).unwrap();
         let deep = Draft::new(&at.join("deep/old.csv")).unwrap().file.keep();
         let (_, deep) = deep.unwrap();

@@ -1,8 +1,8 @@
-//! Samples on disk, in pairs of Protocol Buffers messages: a [`DaqBlock`] with what the rig reported and a
-//! [`DerivedBlock`] with what was made of it. Every array of a pair has one element per sample, except that `counts`
-//! is empty on a rig without a converter, and `volts` and `pulses_delta` are where an imported file has no such thing.
+//! Samples on disk, in pairs of Protocol Buffers messages: a [`DaqBlock`] of raw values and a [`DerivedBlock`] of values
+//! computed from them. Every array has one element per sample; `counts`, `volts`, `pulses_delta` and the ages are empty
+//! where the rig or the imported file has no such value.
 
-use crate::packed::{Field, extend_doubles, extend_numbers, next_field, zigzag};
+use crate::packed::{Field, extend_doubles, extend_numbers, read_fields, zigzag};
 use crate::record::Row;
 use palpate_model::Nanos;
 use palpate_model::rig::{Age, Phase};
@@ -54,17 +54,18 @@ pub(crate) struct DerivedBlock {
     pub cycle: Vec<u32>,
 }
 
-/// Which of its optional values a row has: age, counts, volts and pulses.
-fn held(row: &Row) -> [bool; 4] {
+/// Presence of age, counts, volts and pulses.
+fn present_values(row: &Row) -> [bool; 4] {
     [row.age.is_some(), row.counts.is_some(), row.volts.is_some(), row.pulses.is_some()]
 }
 
-/// Cuts rows where a block must end: at its size limit, and where optional values appear or vanish.
+/// Splits rows where a block must end: at its size limit, and where optional values appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
-    rows.chunk_by(|a, b| held(a) == held(b)).flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
+    rows.chunk_by(|a, b| present_values(a) == present_values(b))
+        .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
 }
 
-/// The pair of blocks of some rows that all have the same of their optional values.
+/// The rows must all have the same optional values, as [`block_slices`] gives them.
 pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, DerivedBlock) {
     let mut daq = DaqBlock { first_sample, ..DaqBlock::default() };
     let mut derived = DerivedBlock { first_sample, ..DerivedBlock::default() };
@@ -97,36 +98,29 @@ fn age(daq: &DaqBlock, index: usize) -> Option<Age> {
     Some(Age { by: Nanos(*daq.age_ns.get(index)?), within: Nanos(*daq.age_within_ns.get(index)?) })
 }
 
-/// Bytes of the largest block: every value of a sample in its longest form.
+/// Size of the largest block: 68 bytes hold every value of a sample in its longest form.
 const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 68;
 
-/// A verified block of samples, column by column. Its memory is used again for the next one.
+/// A verified block of samples, column by column. Its memory is reused for the next block.
 #[derive(Debug, Default)]
 pub struct Block {
-    // Once checked, the differences are summed up.
+    // After `check`, the deltas are summed to absolute values.
     daq: DaqBlock,
     derived: DerivedBlock,
 }
 
 impl Block {
-    /// Number of the first sample in the session.
+    /// Session-wide number of the first sample.
     pub fn first_sample(&self) -> u64 {
         self.daq.first_sample
     }
 
-    /// How many samples there are.
     pub fn len(&self) -> usize {
         self.daq.tick_delta.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.daq.tick_delta.is_empty()
-    }
-
-    /// Load-cell signal in V; empty where an imported file has none.
-    pub fn volts(&self) -> &[f64] {
-        &self.daq.volts
     }
 
     /// Force above tare in N; 0 where [`Row::force`] is `None`.
@@ -134,17 +128,12 @@ impl Block {
         &self.derived.force_newtons
     }
 
-    /// Depth below contact in mm; 0 where [`Row::depth`] is `None`.
-    pub fn depth(&self) -> &[f64] {
-        &self.derived.depth_mm
-    }
-
     /// Session time of the last sample.
     pub fn last_time(&self) -> Option<Nanos> {
         self.daq.host_delta_ns.last().map(|ns| Nanos(*ns as u64))
     }
 
-    /// One sample. Panics if there is none of that number.
+    /// Panics if `index` is out of range.
     pub fn row(&self, index: usize) -> Row {
         let (daq, derived) = (&self.daq, &self.derived);
         let validity = derived.validity[index];
@@ -164,16 +153,14 @@ impl Block {
         }
     }
 
-    /// All samples, in order.
     pub fn rows(&self) -> impl Iterator<Item = Row> {
         (0..self.len()).map(|index| self.row(index))
     }
 
-    /// Reads the raw half.
     pub(crate) fn take_raw(&mut self, data: &[u8]) -> Result<(), String> {
         let daq = &mut self.daq;
         prost::Message::clear(daq);
-        read_fields(data, "samples", |number, field| match (number, field) {
+        read_block(data, "samples", |number, field| match (number, field) {
             (1, Field::Number(value)) => {
                 daq.first_sample = value;
                 Ok(())
@@ -192,11 +179,11 @@ impl Block {
         })
     }
 
-    /// Reads the other half and checks both, or says what is wrong with the pair.
+    /// Reads the derived half and checks the pair.
     pub(crate) fn take_derived(&mut self, data: &[u8]) -> Result<(), String> {
         let derived = &mut self.derived;
         prost::Message::clear(derived);
-        read_fields(data, "derived samples", |number, field| match (number, field) {
+        read_block(data, "derived samples", |number, field| match (number, field) {
             (1, Field::Number(value)) => {
                 derived.first_sample = value;
                 Ok(())
@@ -256,7 +243,7 @@ impl Block {
             ("depth", &derived.depth_mm),
         ];
         for (name, column) in columns {
-            // Without a way out in the middle the loop is done several values at a time.
+            // Without an early exit the compiler vectorises the loop.
             if !column.iter().fold(true, |all, x| all & x.is_finite()) {
                 return Err(format!("the {name} of a sample is not a number"));
             }
@@ -272,22 +259,16 @@ impl Block {
     }
 }
 
-/// Goes through the fields of one half of a block. A field that is not known is passed over.
-fn read_fields<'a>(
-    mut data: &'a [u8],
+fn read_block<'a>(
+    data: &'a [u8],
     what: &str,
-    mut take: impl FnMut(u32, Field<'a>) -> Result<(), String>,
+    take: impl FnMut(u32, Field<'a>) -> Result<(), String>,
 ) -> Result<(), String> {
     if data.len() > BLOCK_BYTES_MAX {
         let count = data.len();
-        return Err(format!("a block of {what} has {count} bytes, more than any has"));
+        return Err(format!("a block of {what} has {count} bytes, more than {BLOCK_BYTES_MAX}"));
     }
-    while !data.is_empty() {
-        next_field(&mut data)
-            .and_then(|(number, field)| take(number, field))
-            .map_err(|err| format!("a block of {what} is unreadable: {err}"))?;
-    }
-    Ok(())
+    read_fields(data, what, take)
 }
 
 #[cfg(test)]

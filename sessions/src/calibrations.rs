@@ -4,17 +4,14 @@ use crate::shelf::{self, Document, LibraryError};
 use palpate_model::calibration::Calibration;
 use std::path::Path;
 
-/// A calibration in the library.
 pub type Kept = shelf::Kept<Calibration>;
 
-/// The calibrations of a library.
 pub type Shelf = shelf::Shelf<Calibration>;
 
 impl Document for Calibration {
     const KIND: &'static str = "calibration";
     const FOLDER: &'static str = "calibrations";
-    const LISTED: &'static str = "its folder calibrations";
-    const RENEW: &'static str = "import it anew";
+    const RENEW: &'static str = "import it again";
 
     fn name(&self) -> &str {
         &self.name
@@ -36,14 +33,14 @@ impl Document for Calibration {
         Self { supersedes: Some(id), ..self }
     }
 
-    /// Its signal must rise and make a curve.
+    /// The signal must rise with the mass, and a curve must fit.
     fn check(&self) -> Result<(), String> {
         let curve = self.check_rise().and_then(|()| self.curve());
         curve.map(|_| ()).map_err(|err| err.to_string())
     }
 }
 
-/// Reads a calibration from a file of the library, or a bare document.
+/// Reads a file of the library, or a bare document without checksum.
 pub fn read_calibration(path: &Path) -> Result<Calibration, LibraryError> {
     shelf::read(path)
 }
@@ -66,14 +63,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_stored_is_read_and_never_written_over() {
+    fn stored_calibration_reads_back_and_is_never_overwritten() {
         let home = tempfile::tempdir().unwrap();
         let first = taken("Cell 4711 (new)", "2026-03-05");
-        let kept = save(home.path(), &first).unwrap();
-        assert!(kept.id.starts_with("20260305-cell-4711-new-"), "{}", kept.id);
-        assert_eq!(read_calibration(&kept.path).unwrap(), first);
-        let again = save(home.path(), &first).unwrap_err();
-        assert!(again.to_string().contains(&kept.id), "{again}");
+        let stored = save(home.path(), &first).unwrap();
+        assert!(stored.id.starts_with("20260305-cell-4711-new-"), "{}", stored.id);
+        assert_eq!(read_calibration(&stored.path).unwrap(), first);
+        let duplicate = save(home.path(), &first).unwrap_err();
+        assert!(duplicate.to_string().contains(&stored.id), "{duplicate}");
         let names: Vec<_> = fs::read_dir(home.path().join("calibrations")).unwrap().collect();
         assert_eq!(names.len(), 1, "no temporary file is left");
         let mut broken = first.clone();
@@ -82,22 +79,22 @@ mod tests {
         broken = first.clone();
         broken.curve = palpate_model::calibration::CurveKind::Polynomial { degree: 1 };
         broken.steps[1].volts = Volts(1.2);
-        for refusal in [save(home.path(), &broken), supersede(home.path(), &kept.id, &broken)] {
+        for refusal in [save(home.path(), &broken), supersede(home.path(), &stored.id, &broken)] {
             let refusal = refusal.unwrap_err().to_string();
             assert!(refusal.contains("140 g"), "{refusal}");
         }
         broken = Calibration { taken_at: Some("yesterday".into()), ..first };
         let refusal = save(home.path(), &broken).unwrap_err();
-        assert!(refusal.to_string().contains("no RFC 3339 time"), "{refusal}");
+        assert!(refusal.to_string().contains("not an RFC 3339 time"), "{refusal}");
     }
 
     #[test]
     fn a_changed_file_is_refused() {
         let home = tempfile::tempdir().unwrap();
-        let kept = save(home.path(), &taken("c", "2026-03-05")).unwrap();
-        let text = fs::read_to_string(&kept.path).unwrap();
-        fs::write(&kept.path, text.replace("1.73", "1.74")).unwrap();
-        let refusal = read_calibration(&kept.path).unwrap_err();
+        let stored = save(home.path(), &taken("c", "2026-03-05")).unwrap();
+        let text = fs::read_to_string(&stored.path).unwrap();
+        fs::write(&stored.path, text.replace("1.73", "1.74")).unwrap();
+        let refusal = read_calibration(&stored.path).unwrap_err();
         assert!(refusal.to_string().contains("was changed after"), "{refusal}");
         let shelf = Shelf::open(home.path());
         assert!(shelf.kept.is_empty() && shelf.unreadable.len() == 1);
@@ -110,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_that_nothing_supersedes_is_in_force() {
+    fn latest_calibration_that_is_not_superseded_is_in_force() {
         let home = tempfile::tempdir().unwrap();
         let old = save(home.path(), &taken("a", "2026-03-05")).unwrap();
         let later = save(home.path(), &taken("b", "2026-06-05")).unwrap();

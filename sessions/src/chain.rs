@@ -1,19 +1,17 @@
-//! Files that only grow, one JSON object a line. Every line carries a checksum over itself and the line
-//! before, so that a line that was changed, moved or taken out of the middle is noticed. One taken off the end
-//! is noticed by the [`Head`], which stands in a file beside it, and by the catalog (`catalog/heads.rs` says what is noticed
-//! and what is not).
+//! Append-only JSON-lines files. Every line has a checksum over itself and the line before, which reveals a line that was
+//! changed, moved or removed. The [`ChainHead`] in a file beside it, and the catalog (`catalog/heads.rs`), reveal lines that
+//! were cut off the end.
 //!
 //! A line is `{"body": ..., "checksum": CRC-32}`. The checksum is over the checksum of the line before (of
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON
 //! of the body with its keys in alphabetical order.
 //!
-//! The file of the head is named like that of the lines with `.head` behind. It is written after the line is on the
-//! disk, so a crash leaves it a line behind, never ahead. A file of lines without one comes from a palpate that wrote none:
-//! then nothing can be confirmed.
+//! The head's file has the name of the lines' file with `.head` appended. It is written after the line is on the disk, so a
+//! crash leaves it a line behind, never ahead. Old versions of palpate wrote no head; their files are read without it.
 
 use crate::atomic;
 use crate::folder::{create_folder, sync_folder_of};
-use crate::lock::{Busy, NotLocked, lock_soon};
+use crate::lock::{LockFailure, LockTimeout, lock_waiting};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -22,65 +20,41 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A file of lines could not be read or added to.
 #[derive(Debug, Error)]
 pub enum ChainError {
-    /// The disk refused.
     #[error("{} cannot be {what} ({source}); check its permissions and the disk", path.display())]
     Io {
         /// `read` or `added to`.
         what: &'static str,
-        /// The file.
         path: PathBuf,
-        /// What the system said.
         source: io::Error,
     },
-    /// Other content than was written.
-    #[error("line {line} of {} is not as it was written; restore the file from a backup, or move it away to go back to what was recorded", path.display())]
+    #[error("line {line} of {} was changed; restore the file from a backup, or move it away to return to the recording without it", path.display())]
     Changed {
-        /// The file.
         path: PathBuf,
         /// Which line, from 1.
         line: usize,
     },
-    /// Fewer lines than were written, or others.
-    #[error("{} is not all that was written: {}; restore the file from a backup, or move it, its head and the catalog of the library away to go back to what was recorded", path.display(), missing(*found, *written))]
-    Shortened {
-        /// The file.
-        path: PathBuf,
-        /// Lines in it.
-        found: u64,
-        /// Lines that were written.
-        written: u64,
-    },
-    /// The file that tells how many lines there are cannot be understood.
-    #[error("{} is not as it was written ({reason}); restore it from a backup, or move it away: nobody can tell then whether lines are missing at the end", path.display())]
-    BadHead {
-        /// The file of the head.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A later version wrote a line.
-    #[error("line {line} of {} is {what} that this palpate does not know ({detail}); update palpate", path.display())]
+    #[error("{} is incomplete: {}; restore the file from a backup, or move it, its head and the library's catalog away to return to the recording without it", path.display(), missing(*found, *written))]
+    Shortened { path: PathBuf, found: u64, written: u64 },
+    #[error("{} is damaged ({reason}); restore it from a backup, or move it away: then lines missing at the end cannot be noticed", path.display())]
+    BadHead { path: PathBuf, reason: String },
+    #[error("line {line} of {} is {what} of a kind unknown to this version ({detail}); update palpate", path.display())]
     Unknown {
         /// What every line is, with its article.
         what: &'static str,
-        /// The file.
         path: PathBuf,
         /// Which line, from 1.
         line: usize,
-        /// The parser's words.
         detail: String,
     },
-    /// Another program has locked the file and does not let go.
     #[error(transparent)]
-    Busy(#[from] Busy),
+    LockTimeout(#[from] LockTimeout),
 }
 
 fn missing(found: u64, written: u64) -> String {
     match written.checked_sub(found) {
-        None | Some(0) => "its lines are others than its head tells".to_owned(),
+        None | Some(0) => "its lines do not match its head".to_owned(),
         Some(1) => format!("its last line is missing, {found} of {written} are there"),
         Some(count) => {
             format!("its last {count} lines are missing, {found} of {written} are there")
@@ -94,48 +68,44 @@ struct Line {
     checksum: u32,
 }
 
-/// How far a file of lines goes: who knows it notices that lines were taken off the end.
+/// Number of lines and the last checksum. Whoever remembers it notices that lines were cut off the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Head {
-    /// Lines there are.
+pub struct ChainHead {
     pub lines: u64,
-    /// Checksum of the last of them; 0 where there is none.
+    /// Checksum of the last line; 0 without lines.
     pub checksum: u32,
 }
 
 /// Version of the file of a head.
 const HEAD_VERSION: u32 = 1;
-/// A longer file is something else.
+/// Larger than any head.
 const HEAD_BYTES_MAX: u64 = 4096;
 
 #[derive(Serialize, Deserialize)]
-struct HeadFile {
+struct ChainHeadFile {
     head_version: u32,
     #[serde(flatten)]
-    head: Head,
+    head: ChainHead,
 }
 
-impl Head {
-    /// The file of the head of a file of lines.
+impl ChainHead {
     pub(crate) fn file_of(lines: &Path) -> PathBuf {
-        named(lines, ".head")
+        with_ending(lines, ".head")
     }
 
-    /// The head that was written; of no lines where there is no file of it.
+    /// Reads the head; without a file, that of no lines.
     fn read(lines: &Path) -> Result<Self, ChainError> {
         let path = Self::file_of(lines);
         let mut text = String::new();
         let read =
             File::open(&path).and_then(|file| file.take(HEAD_BYTES_MAX).read_to_string(&mut text));
         match read {
-            Ok(_) => {}
             Err(err) if err.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
-            Err(source) => {
-                return Err(ChainError::Io { what: "read", path, source });
-            }
-        }
+            outcome => outcome.map_err(|source| read_error(&path, source))?,
+        };
         let bad = |reason: String| ChainError::BadHead { path: path.clone(), reason };
-        let file: HeadFile = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
+        let file: ChainHeadFile =
+            serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
         match file.head_version {
             HEAD_VERSION => Ok(file.head),
             version => Err(bad(format!("it is of version {version}; update palpate"))),
@@ -143,22 +113,21 @@ impl Head {
     }
 
     fn write(self, lines: &Path) -> io::Result<()> {
-        let file = HeadFile { head_version: HEAD_VERSION, head: self };
+        let file = ChainHeadFile { head_version: HEAD_VERSION, head: self };
         let mut text = serde_json::to_vec(&file)?;
         text.push(b'\n');
         atomic::replace(&Self::file_of(lines), &text)
     }
 }
 
-/// What stands in a file of lines.
 #[derive(Debug)]
 pub(crate) struct Chain {
     pub bodies: Vec<Value>,
-    /// Checksum before the first line, and of each.
+    /// The seed, then the checksum of each line.
     checksums: Vec<u32>,
-    /// Bytes up to the end of the last whole line.
+    /// Bytes up to the end of the last complete line.
     whole: usize,
-    /// Whether something follows that was never finished, as a crash leaves it.
+    /// Whether an incomplete line follows, as a crash leaves it.
     pub is_torn: bool,
 }
 
@@ -167,19 +136,18 @@ impl Chain {
         self.checksums.last().copied().unwrap_or_default()
     }
 
-    /// How far it goes.
-    pub fn head(&self) -> Head {
+    pub fn head(&self) -> ChainHead {
         match self.bodies.len() {
-            0 => Head::default(),
-            lines => Head { lines: lines as u64, checksum: self.last() },
+            0 => ChainHead::default(),
+            lines => ChainHead { lines: lines as u64, checksum: self.last() },
         }
     }
 
-    /// Refuses a chain of which lines are gone that were there.
-    fn check(&self, path: &Path, head: Head) -> Result<(), ChainError> {
-        let place = usize::try_from(head.lines).unwrap_or(usize::MAX);
-        match self.checksums.get(place) {
-            Some(checksum) if place == 0 || *checksum == head.checksum => Ok(()),
+    /// Refuses a chain that lacks lines of `head`.
+    fn check(&self, path: &Path, head: ChainHead) -> Result<(), ChainError> {
+        let index = usize::try_from(head.lines).unwrap_or(usize::MAX);
+        match self.checksums.get(index) {
+            Some(checksum) if index == 0 || *checksum == head.checksum => Ok(()),
             _ => Err(ChainError::Shortened {
                 path: path.into(),
                 found: self.bodies.len() as u64,
@@ -188,7 +156,7 @@ impl Chain {
         }
     }
 
-    /// The lines of the file `path` as what they are; `what` is one of them with its article.
+    /// Parses the lines; errors name `path` and `what`, a record with its article.
     pub fn records<T: DeserializeOwned>(
         &self,
         path: &Path,
@@ -213,27 +181,41 @@ fn checksum(before: u32, body: &Value) -> u32 {
     hasher.finalize()
 }
 
-/// Reads the lines that belong to `name`; a file that is not there has none.
-pub(crate) fn read(path: &Path, name: &str) -> Result<Chain, ChainError> {
-    read_since(path, name, Head::default())
+fn read_error(path: &Path, source: io::Error) -> ChainError {
+    ChainError::Io { what: "read", path: path.into(), source }
 }
 
-/// As [`read`], and refuses a file that does not hold what it held once.
-pub(crate) fn read_since(path: &Path, name: &str, since: Head) -> Result<Chain, ChainError> {
-    // Read before the lines: a line that is added meanwhile is in the lines, not in the head.
-    let head = Head::read(path)?;
-    let chain = match std::fs::read(path) {
-        Ok(bytes) => parse(path, name, &bytes),
-        Err(err) if err.kind() == io::ErrorKind::NotFound => parse(path, name, &[]),
-        Err(source) => Err(ChainError::Io { what: "read", path: path.into(), source }),
-    }?;
+/// The bytes of a file; none if it does not exist.
+pub(crate) fn bytes_or_none(path: &Path) -> io::Result<Vec<u8>> {
+    match std::fs::read(path) {
+        Err(err) if err.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        outcome => outcome,
+    }
+}
+
+/// Bytes up to the end of the last complete line.
+pub(crate) fn complete_length(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1)
+}
+
+/// Reads the lines whose checksums begin with `name`; a missing file has none.
+pub(crate) fn read(path: &Path, name: &str) -> Result<Chain, ChainError> {
+    read_since(path, name, ChainHead::default())
+}
+
+/// Like [`read`], and refuses a file that no longer holds the lines up to `since`.
+pub(crate) fn read_since(path: &Path, name: &str, since: ChainHead) -> Result<Chain, ChainError> {
+    // Read before the lines, because another process may append a line in between.
+    let head = ChainHead::read(path)?;
+    let bytes = bytes_or_none(path).map_err(|source| read_error(path, source))?;
+    let chain = parse(path, name, &bytes)?;
     chain.check(path, head)?;
     chain.check(path, since)?;
     Ok(chain)
 }
 
 fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
-    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let whole = complete_length(bytes);
     let mut chain = Chain {
         bodies: Vec::new(),
         checksums: vec![crc32fast::hash(name.as_bytes())],
@@ -252,8 +234,8 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
     Ok(chain)
 }
 
-/// Adds a line and sees it to the disk. What a crash left unfinished at the end is first moved to a file beside it,
-/// which is named like it with `.torn` behind.
+/// Appends a line and synchronises it with the disk. An incomplete last line first moves to a file of the same name with
+/// `.torn` appended.
 pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(), ChainError> {
     let failed = |source| ChainError::Io { what: "added to", path: path.into(), source };
     let body = serde_json::to_value(body).map_err(|err| failed(err.into()))?;
@@ -262,22 +244,22 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
     }
     let mut options = OpenOptions::new();
     let mut file = options.read(true).append(true).create(true).open(path).map_err(failed)?;
-    // Two programs that add at the same time: the second continues the line of the first.
-    lock_soon(&file, path).map_err(|err| match err {
-        NotLocked::Busy(busy) => busy.into(),
-        NotLocked::Io(source) => failed(source),
+    // The lock is for two programs that append at the same time.
+    lock_waiting(&file, path).map_err(|err| match err {
+        LockFailure::LockTimeout(busy) => busy.into(),
+        LockFailure::Io(source) => failed(source),
     })?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(failed)?;
     let chain = parse(path, name, &bytes)?;
-    chain.check(path, Head::read(path)?)?;
+    chain.check(path, ChainHead::read(path)?)?;
     if chain.is_torn {
-        keep_torn(path, &bytes[chain.whole..]).map_err(failed)?;
+        store_torn(path, &bytes[chain.whole..]).map_err(failed)?;
         file.set_len(chain.whole as u64).map_err(failed)?;
     }
     let line = Line { checksum: checksum(chain.last(), &body), body };
     write_line(&mut file, &line).map_err(failed)?;
-    let head = Head { lines: chain.bodies.len() as u64 + 1, checksum: line.checksum };
+    let head = ChainHead { lines: chain.bodies.len() as u64 + 1, checksum: line.checksum };
     head.write(path).map_err(failed)?;
     if chain.bodies.is_empty() {
         sync_folder_of(path).map_err(failed)?;
@@ -285,17 +267,16 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
     Ok(())
 }
 
-/// Adds what was never finished to the file beside, a line for each time.
-fn keep_torn(path: &Path, torn: &[u8]) -> io::Result<()> {
+/// Appends an incomplete line to the `.torn` file.
+fn store_torn(path: &Path, torn: &[u8]) -> io::Result<()> {
     let mut options = OpenOptions::new();
-    let mut file = options.append(true).create(true).open(named(path, ".torn"))?;
+    let mut file = options.append(true).create(true).open(with_ending(path, ".torn"))?;
     file.write_all(torn)?;
     file.write_all(b"\n")?;
     file.sync_all()
 }
 
-/// A path with something behind its name.
-fn named(path: &Path, ending: &str) -> PathBuf {
+pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     name.into()
@@ -309,5 +290,4 @@ fn write_line(file: &mut File, line: &Line) -> io::Result<()> {
 }
 
 #[cfg(test)]
-#[path = "chain_tests.rs"]
 mod tests;

@@ -1,45 +1,33 @@
 //! The daily checks of every rig: one line each in `checks/RIG.jsonl` of the library, never changed.
 
-use crate::chain::{self, ChainError, Head};
+use crate::chain::{self, ChainError, ChainHead};
 use chrono::{DateTime, Local, Utc};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Folder of the checks in a library.
 pub(crate) const CHECKS_FOLDER: &str = "checks";
 
-/// One thing that was checked.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckPart {
     /// `run`, `zero`, `weight` or `home`.
     pub what: String,
-    /// Whether it is as it should be.
     pub is_passed: bool,
-    /// What was found, for the operator.
     pub sentence: String,
 }
 
-/// A daily check of a rig.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DailyCheck {
-    /// When it was made.
     pub at: DateTime<Utc>,
-    /// The rig's name.
     pub rig: String,
-    /// Who made it.
     pub by: String,
-    /// The session that shows it.
     pub session_id: String,
-    /// Name of the calibration that was checked.
     pub calibration: String,
-    /// Whether every part passed.
     pub is_passed: bool,
-    /// What was checked.
     pub parts: Vec<CheckPart>,
 }
 
 impl DailyCheck {
-    /// What failed, in one sentence; empty if nothing did.
+    /// The failed parts in one sentence; empty if all passed.
     pub fn failures(&self) -> String {
         let failed = self.parts.iter().filter(|part| !part.is_passed);
         let sentences: Vec<&str> = failed.map(|part| part.sentence.as_str()).collect();
@@ -47,7 +35,8 @@ impl DailyCheck {
     }
 }
 
-/// The file of a rig below the library: its name, with what a file name cannot hold replaced and told apart by a checksum.
+/// Path of a rig's file below the library. Characters unfit for a file name become dashes, and a checksum keeps such names
+/// apart.
 fn file_of(rig: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
     let mut name: String = rig.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
@@ -57,28 +46,28 @@ fn file_of(rig: &str) -> String {
     format!("{CHECKS_FOLDER}/{name}.jsonl")
 }
 
-/// Every check of a rig, oldest first; a rig that was never checked has none.
+/// All checks of a rig, oldest first.
 pub fn read_checks(library: &Path, rig: &str) -> Result<Vec<DailyCheck>, ChainError> {
-    read_checks_since(library, rig, |_| Head::default())
+    read_checks_since(library, rig, |_| ChainHead::default())
 }
 
-/// As [`read_checks`], and refuses a file that does not hold what it held once, by its path below the library.
+/// Like [`read_checks`], and refuses a file that no longer holds the lines of its recorded head; `since` finds the head by
+/// the file's path below the library.
 pub(crate) fn read_checks_since(
     library: &Path,
     rig: &str,
-    since: impl Fn(&str) -> Head,
+    since: impl Fn(&str) -> ChainHead,
 ) -> Result<Vec<DailyCheck>, ChainError> {
     let file = file_of(rig);
     let path = library.join(&file);
     chain::read_since(&path, rig, since(&file))?.records(&path, "a check")
 }
 
-/// Keeps a check.
 pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), ChainError> {
     chain::append(&library.join(file_of(&check.rig)), &check.rig, check)
 }
 
-/// The last check of the day of `now`, by this computer's calendar.
+/// The last check on the day of `now`, in this computer's time zone.
 #[must_use]
 pub fn last_of_day(checks: &[DailyCheck], now: DateTime<Utc>) -> Option<&DailyCheck> {
     let day = |at: DateTime<Utc>| at.with_timezone(&Local).date_naive();
@@ -107,10 +96,10 @@ mod tests {
     }
 
     #[test]
-    fn the_last_of_the_day_counts_and_rigs_are_kept_apart() {
+    fn last_check_of_the_day_is_found_and_rigs_have_own_files() {
         let library = tempfile::tempdir().unwrap();
         let at = library.path();
-        // Noon of the computer's own day, so that no time zone turns it into another one.
+        // Local noon, so that no time zone changes the day.
         let noon = Local.with_ymd_and_hms(2026, 3, 5, 12, 0, 0).unwrap().to_utc();
         let hour = Duration::hours(1);
         for one in [
@@ -130,8 +119,7 @@ mod tests {
         assert!(last_of_day(&own, noon + hour * 24).is_none());
         assert!(last_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon).unwrap().is_passed);
         assert_eq!(read_checks(at, "never").unwrap(), []);
-        // A name never leads out of the folder.
-        // Each with its head.
+        // A name never leads out of the folder; every file has a head beside it.
         assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 6);
         let file = at.join(file_of("sim:bench 2"));
         let text = std::fs::read_to_string(&file).unwrap();

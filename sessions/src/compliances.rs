@@ -1,21 +1,18 @@
-//! How far rigs give way, as a library keeps it in `compliances/`.
+//! The machine compliances of a library, in `compliances/`.
 
 use crate::shelf::{self, Document};
 use palpate_model::rig::RigCompliance;
 
-/// A compliance in the library.
 pub type Kept = shelf::Kept<RigCompliance>;
 
-/// The compliances of a library.
 pub type Shelf = shelf::Shelf<RigCompliance>;
 
 impl Document for RigCompliance {
     const KIND: &'static str = "compliance";
     const FOLDER: &'static str = "compliances";
-    const LISTED: &'static str = "its folder compliances";
-    const RENEW: &'static str = "measure and save it anew";
+    const RENEW: &'static str = "measure and save it again";
 
-    /// A rig has one at a time, so it goes by the rig's name.
+    /// A rig has one compliance in force, so the rig's name identifies it.
     fn name(&self) -> &str {
         &self.rig
     }
@@ -58,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compliance_is_kept_superseded_and_no_calibration() {
+    fn compliance_is_stored_superseded_and_not_read_as_calibration() {
         let home = tempfile::tempdir().unwrap();
         let first = save(home.path(), &taken("2026-03-05", 0.06)).unwrap();
         assert!(first.id.starts_with("20260305-bench-"), "{}", first.id);

@@ -1,19 +1,16 @@
-//! The contacts that a session found, as edits number them.
+//! The contact points of a session, in the order in which edits number them.
 
 use crate::record::{Entry, EntryKind};
 use palpate_model::units::Position;
 use serde_json::Value;
 
-/// A contact that a session found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundContact {
-    /// Samples before it; those that follow count their depth from it.
+    /// Samples before the contact; depths of later samples count from it.
     pub after_sample: u64,
-    /// Position from home.
     pub position: Position,
 }
 
-/// Every contact among a session's entries, in order.
 #[must_use]
 pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
     let found = entries.iter().filter_map(|entry| {
@@ -25,13 +22,13 @@ pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
     found.collect()
 }
 
-/// The position in a decision that found contact.
+/// The position in a decision that records a contact.
 #[must_use]
 pub fn contact_position(entry: &Entry) -> Option<&Value> {
     is_record(entry, "contact_found").then(|| entry.body.get("position"))?
 }
 
-/// Whether an entry is a decision that keeps a record of this name.
+/// Whether an entry is a decision with a record of this name.
 #[must_use]
 pub fn is_record(entry: &Entry, name: &str) -> bool {
     let body = &entry.body;

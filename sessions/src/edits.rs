@@ -1,9 +1,9 @@
-//! What people, or the program at the end of a run, say of a session afterwards. Nothing is ever written
-//! over: the log stays as it is, and every edit stays in `edits.jsonl` beside it. Of several verdicts, or
-//! several corrections of one contact, the last counts.
+//! Edits of a finished session, by people or by the program at the end of a run: data quality, corrected contacts, tags,
+//! notes and reviews. The log stays unchanged; every edit stays in `edits.jsonl` beside it. The last verdict, and the last
+//! correction of each contact, counts.
 
 use crate::analyses::Input;
-use crate::chain::{self, ChainError, Head};
+use crate::chain::{self, ChainError, ChainHead};
 use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
 use chrono::{DateTime, Utc};
@@ -14,19 +14,16 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
 
-/// Name of the file of edits in a session folder.
 pub const EDITS_FILE: &str = "edits.jsonl";
 
 palpate_model::named! {
-    /// What a session is worth.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Verdict {
-        /// Nothing speaks against it.
         Valid = "valid",
-        /// Something does; it is used, and every reader is told.
+        /// Used, with a remark to every reader.
         Suspect = "suspect",
-        /// It is not used unless asked for, and stays in the counts.
+        /// Used only on request; still counted as a session.
         Rejected = "rejected",
     }
 }
@@ -36,143 +33,107 @@ impl FromStr for Verdict {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|one| one.name() == text);
-        found.ok_or_else(|| format!("'{text}' is no verdict; give valid, suspect or rejected"))
+        found.ok_or_else(|| format!("'{text}' is not a verdict; give valid, suspect or rejected"))
     }
 }
 
 palpate_model::named! {
-    /// What a person who looked at a session decided.
+    /// A reviewer's decision about a session.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Decision {
-        /// It stands, with its analyses.
+        /// With its analyses.
         Accepted = "accepted",
-        /// It does not.
         Rejected = "rejected",
-        /// It is to be done again.
         Repeat = "to be repeated",
     }
 }
 
-/// The review that counts, and what has changed since.
+/// The last review and what has changed since.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Review {
-    /// What was decided.
     pub decision: Decision,
-    /// By whom.
     pub by: String,
-    /// When.
     pub at: DateTime<Utc>,
-    /// Why.
     pub reason: String,
-    /// What is not any more as it was seen; empty while the review stands.
+    /// Names of files that differ from those reviewed; empty while the review is up to date.
     pub changed: Vec<String>,
 }
 
 /// Longest tag in letters.
 const TAG_MAX: usize = 40;
 
-/// What is said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "lowercase")]
 pub enum Change {
-    /// What the session is worth.
     Verdict {
-        /// That.
         verdict: Verdict,
     },
-    /// Where contact really was.
     Contact {
-        /// Which of the contacts the session found, from 1.
+        /// Number of the contact in the session, from 1.
         number: u32,
-        /// Position from home.
         position_mm: Position,
-        /// Position that was found, from home.
+        /// Position in the recording.
         was_mm: Position,
     },
-    /// Words by which it is found.
     Tags {
-        /// Those it gets.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         add: Vec<String>,
-        /// Those it loses.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         remove: Vec<String>,
     },
-    /// A remark; what it says is the edit's reason.
+    /// The note's text is the edit's reason.
     Note,
-    /// That somebody looked at it and decided.
     Review {
-        /// What.
         decision: Decision,
-        /// The files that were seen, with their hashes.
+        /// Hashes of the reviewed files.
         seen: Vec<Input>,
     },
 }
 
-/// One edit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Edit {
-    /// When it was made.
     pub at: DateTime<Utc>,
-    /// By whom.
     pub by: String,
-    /// Why.
     pub reason: String,
-    /// What.
     #[serde(flatten)]
     pub change: Change,
 }
 
-/// Edits could not be read or made.
 #[derive(Debug, Error)]
 pub enum EditError {
-    /// The file is not as it was written, or the disk refuses.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The session is still being recorded.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// Nobody would know why.
-    #[error("an edit needs a reason, and a note its words; say it in a few words")]
+    #[error("an edit needs a reason and a note needs a text; give a few words")]
     NoReason,
-    /// Not a word that can be searched.
     #[error("'{tag}' cannot be a tag; give one word of at most {TAG_MAX} letters, as in +pilot")]
-    Tag {
-        /// What was given.
-        tag: String,
-    },
-    /// A part of a recording, or a file, has no place for edits.
+    Tag { tag: String },
     #[error("{} is not a session folder; name the folder", path.display())]
-    NotAFolder {
-        /// What was named.
-        path: PathBuf,
-    },
+    NotAFolder { path: PathBuf },
 }
 
-/// Every edit of a session, in the order made.
+/// All edits of a session, in the order of writing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edits {
-    /// The edits.
     pub all: Vec<Edit>,
-    /// Whether the last one was begun and never finished, as a crash leaves it.
+    /// Whether the last line is incomplete, as a crash leaves it.
     pub is_torn: bool,
-    /// How far their file goes.
-    pub head: Head,
+    pub head: ChainHead,
 }
 
 impl Edits {
-    /// Reads the edits of a session, given its folder or a log file in it. A log file under another name
-    /// than a session's has none.
+    /// `session` is the session's folder or a log file in it. A log file under another name has no edits.
     pub fn read(session: &Path, session_id: &str) -> Result<Self, EditError> {
-        Self::read_since(session, session_id, Head::default())
+        Self::read_since(session, session_id, ChainHead::default())
     }
 
-    /// As [`read`](Self::read), and refuses a file that does not hold what it held once.
+    /// Like [`read`](Self::read), and refuses a file that no longer holds the lines up to `since`.
     pub(crate) fn read_since(
         session: &Path,
         session_id: &str,
-        since: Head,
+        since: ChainHead,
     ) -> Result<Self, EditError> {
         let Some(path) = file_beside(session, EDITS_FILE) else {
             return Ok(Self::default());
@@ -185,7 +146,7 @@ impl Edits {
         })
     }
 
-    /// The verdict that counts, with the edit that says why.
+    /// The last verdict and its edit.
     pub fn verdict(&self) -> Option<(Verdict, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
             Change::Verdict { verdict } => Some((verdict, edit)),
@@ -193,7 +154,7 @@ impl Edits {
         })
     }
 
-    /// The correction that counts of a contact, numbered from 1.
+    /// The last correction of a contact, numbered from 1.
     pub fn contact(&self, number: u32) -> Option<(Position, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
             Change::Contact { number: own, position_mm, .. } if own == number => {
@@ -203,7 +164,6 @@ impl Edits {
         })
     }
 
-    /// The tags it has.
     pub fn tags(&self) -> BTreeSet<&str> {
         let mut tags = BTreeSet::new();
         for edit in &self.all {
@@ -217,17 +177,15 @@ impl Edits {
         tags
     }
 
-    /// The remarks, in the order made.
     pub fn notes(&self) -> impl Iterator<Item = &Edit> {
         let is_note = |edit: &&Edit| matches!(edit.change, Change::Note);
         self.all.iter().filter(is_note)
     }
 
-    /// The last review. `now` are the files that were seen as they are now: the analyses and, unless only
-    /// those are to be compared, every file of the log.
+    /// The last review. `now` has the present hashes of the analyses and, to compare the log too, of all its files.
     pub fn review(&self, now: &[Input]) -> Option<Review> {
-        let place = |edit: &Edit| matches!(edit.change, Change::Review { .. });
-        let at = self.all.iter().rposition(place)?;
+        let is_review = |edit: &Edit| matches!(edit.change, Change::Review { .. });
+        let at = self.all.iter().rposition(is_review)?;
         let (edit, later) = (&self.all[at], &self.all[at + 1..]);
         let Change::Review { decision, seen } = &edit.change else {
             return None;
@@ -236,7 +194,7 @@ impl Edits {
             let seen = seen.iter().find(|seen| seen.what == one.what);
             seen.map(|seen| &seen.sha256) != Some(&one.sha256)
         };
-        // Where no log is compared, none is missing.
+        // If `now` has no log files, the log is not compared.
         let is_log = |one: &Input| segment_number(&one.what).is_some();
         let has_logs = now.iter().any(is_log);
         let is_gone = |one: &&Input| {
@@ -245,9 +203,9 @@ impl Edits {
         let gone = seen.iter().filter(is_gone);
         let changed = now.iter().filter(is_other).chain(gone);
         let mut changed: Vec<String> = changed.map(|one| one.what.clone()).collect();
-        // Words by which it is found and remarks change nothing of what was seen.
-        let is_aside = |edit: &Edit| matches!(edit.change, Change::Tags { .. } | Change::Note);
-        if !later.iter().all(is_aside) {
+        // Tags and notes do not affect the reviewed data.
+        let is_irrelevant = |edit: &Edit| matches!(edit.change, Change::Tags { .. } | Change::Note);
+        if !later.iter().all(is_irrelevant) {
             changed.push(EDITS_FILE.to_owned());
         }
         Some(Review {
@@ -260,7 +218,6 @@ impl Edits {
     }
 }
 
-/// Whether a word can be a tag.
 fn check_tag(tag: &str) -> Result<(), EditError> {
     let is_word = !tag.is_empty() && !tag.chars().any(|it| it.is_whitespace() || it.is_control());
     if is_word && tag.chars().count() <= TAG_MAX {
@@ -269,10 +226,10 @@ fn check_tag(tag: &str) -> Result<(), EditError> {
     Err(EditError::Tag { tag: tag.to_owned() })
 }
 
-/// Adds an edit to a session folder whose recording has ended.
+/// Appends an edit. The recording must have ended.
 pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
     match &edit.change {
-        // A tag says by itself why it is there.
+        // A tag explains itself.
         Change::Tags { add, remove } => {
             add.iter().chain(remove).try_for_each(|tag| check_tag(tag))?
         }
@@ -282,7 +239,7 @@ pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), Edit
     if !folder.is_dir() {
         return Err(EditError::NotAFolder { path: folder.into() });
     }
-    let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
+    let _lock = HolderLock::acquire_waiting(&folder.join(LOCK_FILE))?;
     Ok(chain::append(&folder.join(EDITS_FILE), session_id, edit)?)
 }
 
@@ -305,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_counts_and_all_are_kept() {
+    fn last_verdict_and_correction_count_and_all_edits_stay() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let contact = |number, mm| Change::Contact {
@@ -325,8 +282,8 @@ mod tests {
         }
         let read = Edits::read(at, "id").unwrap();
         assert_eq!(read.all, edits);
-        let (worth, why) = read.verdict().unwrap();
-        assert_eq!((worth, why.reason.as_str()), (Verdict::Rejected, "hair on the probe"));
+        let (quality, edit) = read.verdict().unwrap();
+        assert_eq!((quality, edit.reason.as_str()), (Verdict::Rejected, "hair on the probe"));
         assert_eq!(read.contact(1).unwrap().0, Position(0.1 + 0.2));
         assert!(read.contact(2).is_none());
         let notes: Vec<&str> = read.notes().map(|one| one.reason.as_str()).collect();
@@ -337,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_come_and_go_and_are_words() {
+    fn tags_are_single_words_and_can_be_removed() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect();
@@ -354,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_review_stands_until_something_it_saw_changes() {
+    fn review_is_outdated_when_a_reviewed_file_changes() {
         let input = |what: &str, sha256: &str| Input { what: what.into(), sha256: sha256.into() };
         let seen = vec![input("000.mcap", "a"), input("analyses.jsonl", "b")];
         let decision = Decision::Accepted;
@@ -380,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edit_needs_a_reason_a_folder_and_an_ended_recording() {
+    fn edit_needs_a_reason_a_folder_and_an_ended_recording() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let none = add_edit(at, "id", &edit(" ", verdict(Verdict::Valid))).unwrap_err();
@@ -391,7 +348,7 @@ mod tests {
         let busy = add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap_err();
         let id = std::process::id().to_string();
         assert!(busy.to_string().contains(&id), "{busy}");
-        // Whoever only adds an edit at the same time is waited for.
+        // A short lock of another edit is waited for.
         std::thread::scope(|scope| {
             scope.spawn(|| add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap());
             std::thread::sleep(std::time::Duration::from_millis(100));

@@ -1,62 +1,36 @@
-//! Where sessions live: the library, the folder of one session, and room on its disk.
+//! The library, session folders, and free space on the disk.
 
-pub use crate::lock::{Busy, HolderLock, LockError};
+pub use crate::lock::{HolderLock, LockError, LockTimeout};
 use chrono::{DateTime, Utc};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Name of the log in a session folder, or of its first segment.
+/// The log in a session folder, or its first segment.
 pub const LOG_FILE: &str = "000.mcap";
-/// Name of the file in a session folder that names the folder of segments its disk could not take.
+/// File in a session folder that names the spare folder, with segments that the session's disk could not take.
 pub const SPARE_FILE: &str = "spare";
-/// Folder of the runs of programmes in a library.
 pub(crate) const PROGRAMMES_FOLDER: &str = "programmes";
-/// Name of the lock in a session folder.
 pub const LOCK_FILE: &str = "lock";
 
-/// A session folder could not be had.
 #[derive(Debug, Error)]
 pub enum FolderError {
-    /// Something is in the folder already.
     #[error("{} is not empty; choose a new folder", path.display())]
-    NotEmpty {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The path is taken by something that is no folder.
+    NotEmpty { path: PathBuf },
     #[error("{} is a file, not a folder; choose a new folder", path.display())]
-    NotAFolder {
-        /// The path.
-        path: PathBuf,
-    },
-    /// The folder cannot be made or read.
-    #[error("cannot make the session folder {} ({source}); choose a folder that may be written", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// Another process uses the folder, or its lock cannot be made.
+    NotAFolder { path: PathBuf },
+    #[error("cannot make the session folder {} ({source}); choose a writable folder", path.display())]
+    Io { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// The disk has no room for the session.
     #[error(
-        "the disk of {} has {} free but the session needs {} twice over; free some space or choose another disk",
+        "the disk of {} has {} free, and the session needs twice {}; free some space or choose another disk",
         path.display(), megabytes(*free_bytes), megabytes(*needed_bytes)
     )]
-    NoSpace {
-        /// The folder.
-        path: PathBuf,
-        /// Bytes free to this user.
-        free_bytes: u64,
-        /// Bytes the session is expected to take.
-        needed_bytes: u64,
-    },
+    NoSpace { path: PathBuf, free_bytes: u64, needed_bytes: u64 },
     /// Neither `PALPATE_HOME` nor a home folder is set.
-    #[error("no place for sessions is known; set PALPATE_HOME to a folder")]
+    #[error("the folder for sessions is unknown; set PALPATE_HOME to a folder")]
     NoLibrary,
 }
 
@@ -64,7 +38,7 @@ fn megabytes(bytes: u64) -> String {
     format!("{:.1} MB", bytes as f64 * 1e-6)
 }
 
-/// An empty, locked folder that is about to hold a session.
+/// An empty, locked folder for a new session.
 #[derive(Debug)]
 pub struct SessionFolder {
     path: PathBuf,
@@ -72,7 +46,7 @@ pub struct SessionFolder {
 }
 
 impl SessionFolder {
-    /// Makes the folder and its parents and locks it. Refuses a folder that holds anything.
+    /// Makes and locks the folder and makes its parents. Refuses a folder that is not empty.
     pub fn create(path: &Path) -> Result<Self, FolderError> {
         let failed = |source| FolderError::Io { path: path.into(), source };
         if path.exists() && !path.is_dir() {
@@ -84,27 +58,25 @@ impl SessionFolder {
         if !had_lock && holds_more_than_lock(path).map_err(failed)? {
             return Err(FolderError::NotEmpty { path: path.into() });
         }
-        // A held lock is reported before a non-empty folder: its holder is the better reason.
+        // A held lock is reported before a non-empty folder, because the holder is the better explanation.
         let lock = HolderLock::acquire(&lock_path)?;
-        // Looked at again under the lock: between the two, another process may have recorded.
+        // Checked again under the lock, because another process may have recorded in between.
         if holds_more_than_lock(path).map_err(failed)? {
             return Err(FolderError::NotEmpty { path: path.into() });
         }
         Ok(Self { path: path.into(), _lock: lock })
     }
 
-    /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The log in the folder, or its first segment.
     pub fn log_path(&self) -> PathBuf {
         self.path.join(LOG_FILE)
     }
 }
 
-/// Makes a folder and its parents. When this returns, those that are new survive a power cut.
+/// Makes a folder and its parents. Once this returns, the new ones survive a power cut.
 pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     let path = std::path::absolute(path)?;
     let is_new = |folder: &&Path| !folder.exists();
@@ -113,8 +85,7 @@ pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     new.iter().try_for_each(|folder| sync_folder_of(folder))
 }
 
-/// Makes the name of a file or a folder survive a power cut: it is only found if the folder it is in was
-/// synchronised (fsync(2)).
+/// Makes the name of a file or folder survive a power cut, which requires synchronising its folder (fsync(2)).
 pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
     let path = std::path::absolute(path)?;
     path.parent().map_or(Ok(()), |folder| fs::File::open(folder)?.sync_all())
@@ -129,13 +100,13 @@ fn holds_more_than_lock(path: &Path) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Name of a segment of the log; number 0 is [`LOG_FILE`].
+/// Name of a segment; number 0 is [`LOG_FILE`].
 #[must_use]
 pub fn segment_file(number: u32) -> String {
     format!("{number:03}.mcap")
 }
 
-/// Whether a folder is a session's: it has a segment of a log, the first or, where that was lost, a later one.
+/// Whether a folder holds a segment of a log; the first may be missing.
 #[must_use]
 pub fn is_session_folder(folder: &Path) -> bool {
     let is_segment = |name: std::ffi::OsString| name.to_str().and_then(segment_number).is_some();
@@ -144,14 +115,13 @@ pub fn is_session_folder(folder: &Path) -> bool {
     })
 }
 
-/// The number in a segment's name, if it is one.
 pub(crate) fn segment_number(name: &str) -> Option<u32> {
     let number = name.strip_suffix(".mcap")?.parse().ok()?;
     (segment_file(number) == name).then_some(number)
 }
 
-/// A file beside the log of a session, given its folder or a log file in it. A log file under another name than a
-/// session's has none.
+/// A file beside a session's log, given the session's folder or a segment in it. A log file under another name stands
+/// alone and has none.
 pub(crate) fn file_beside(session: &Path, name: &str) -> Option<PathBuf> {
     if session.is_dir() {
         return Some(session.join(name));
@@ -160,7 +130,7 @@ pub(crate) fn file_beside(session: &Path, name: &str) -> Option<PathBuf> {
     Some(session.with_file_name(name))
 }
 
-/// The folder of all sessions: `PALPATE_HOME`, or `palpate` in the user's home.
+/// `PALPATE_HOME`, or `palpate` in the user's home folder.
 pub fn library_folder() -> Result<PathBuf, FolderError> {
     library_from(std::env::var_os("PALPATE_HOME"), std::env::home_dir())
 }
@@ -176,29 +146,27 @@ fn library_from(
     }
 }
 
-/// Where recordings go on when the disk of their session fails: `PALPATE_SPARE`, if it is set.
+/// `PALPATE_SPARE`, where a recording continues if its disk fails; `None` if unset.
 #[must_use]
 pub fn spare_folder() -> Option<PathBuf> {
     let chosen = std::env::var_os("PALPATE_SPARE")?;
     (!chosen.is_empty()).then(|| chosen.into())
 }
 
-/// The folder a new session gets in a library.
 #[must_use]
 pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
     library.join("sessions").join(session_id)
 }
 
-/// The folder a new run of a programme gets in a library.
 #[must_use]
 pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc>) -> PathBuf {
     let begun = crate::manifest::new_session_id(started_at);
     library.join(PROGRAMMES_FOLDER).join(format!("{name}-{begun}"))
 }
 
-/// Refuses a disk with less than twice the room a session needs.
+/// Refuses a disk with less than twice the space that a session needs.
 ///
-/// `path` may not exist yet; its nearest existing parent is asked (`statvfs`, POSIX.1-2001).
+/// If `path` does not exist yet, its nearest existing parent is checked (`statvfs`, POSIX.1-2001).
 pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderError> {
     let existing = path
         .ancestors()
@@ -218,7 +186,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_library_is_chosen_or_in_the_home_folder() {
+    fn library_is_palpate_home_or_in_the_home_folder() {
         let home = Some(PathBuf::from("/home/ada"));
         let chosen = library_from(Some("/data/lab".into()), home.clone()).unwrap();
         assert_eq!(chosen, Path::new("/data/lab"));
@@ -228,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn only_names_the_writer_makes_are_segments() {
+    fn only_names_by_the_writer_are_segments() {
         assert_eq!(segment_file(0), LOG_FILE);
         for number in [0, 7, 42, 999, 1000] {
             assert_eq!(segment_number(&segment_file(number)), Some(number));
@@ -239,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_refused_with_both_numbers() {
+    fn full_disk_is_refused_with_both_numbers() {
         let folder = tempfile::tempdir().unwrap();
         let deep = folder.path().join("not/yet/there");
         check_free_space(&deep, 1).unwrap();
@@ -253,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_folder_names_its_holder() {
+    fn locked_folder_names_its_holder() {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("a/b/session");
         let held = SessionFolder::create(&path).unwrap();
@@ -263,13 +231,13 @@ mod tests {
             matches!(&refusal, FolderError::Lock(LockError::Held { holder, .. }) if *holder == id),
             "{refusal:?}"
         );
-        // A session that never wrote anything leaves a folder that can be used again.
+        // A session without a log leaves a reusable folder.
         drop(held);
         SessionFolder::create(&path).unwrap();
     }
 
     #[test]
-    fn a_folder_with_anything_in_it_is_refused_and_left_alone() {
+    fn non_empty_folder_is_refused_and_unchanged() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("thesis.doc"), "irreplaceable").unwrap();
         let refusal = SessionFolder::create(folder.path()).unwrap_err();
@@ -281,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_in_the_way_is_named() {
+    fn file_at_the_path_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("session");
         fs::write(&file, "").unwrap();

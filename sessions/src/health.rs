@@ -1,5 +1,4 @@
-//! How the computer kept up with a run, and how its clocks went: measurements of the machine, no part of what
-//! a replay compares.
+//! Measurements of the recording computer: delays, queue, disk, clocks. A replay does not compare them.
 
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
@@ -8,101 +7,82 @@ use serde::{Deserialize, Serialize};
 /// One message of the channel `/health`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Health {
-    /// Session time.
     #[serde(rename = "now_ns")]
     pub now: Nanos,
-    /// What is told.
     #[serde(flatten)]
     pub told: Told,
 }
 
-/// What a message tells.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Told {
-    /// How the computer keeps up: each the worst since the last message of this kind.
+    /// Each value is the worst since the last message of this kind.
     State(MachineState),
-    /// What the wall clock showed.
+    /// Wall clock at a session time.
     Anchor {
-        /// Why it was looked at.
+        #[serde(rename = "why")]
         why: Why,
-        /// The wall clock, UTC.
         wall: DateTime<Utc>,
-        /// By how much the wall clock went ahead of the monotonic one since the last anchor, in s.
+        /// Advance of the wall clock over the monotonic clock since the last anchor, in s.
         shift_s: f64,
     },
-    /// Something happened that no decision was made of.
-    Event {
-        /// What, in words.
-        text: String,
-    },
-    /// What a later version of the program tells.
+    /// An occurrence without influence on decisions.
+    Event { text: String },
+    /// A kind of a later version.
     #[serde(other)]
     Unknown,
 }
 
-/// Why a wall clock was looked at.
+/// Occasion of an anchor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Why {
-    /// The run began.
     Start,
-    /// Its clocks went apart by more than half a second.
+    /// The clocks diverged by more than 0.5 s.
     Jump,
-    /// The run ended.
     End,
 }
 
-/// How a computer keeps up with a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MachineState {
-    /// How late the runner woke up, in s.
+    /// Delay of the runner's wake-up, in s.
     pub lateness_s: f64,
-    /// Share of the memory for unwritten samples that is in use, 0 to 1.
+    /// Fill level of the memory for unwritten samples, 0 to 1.
     pub queue_share: f64,
-    /// How long a synchronisation with the disk took, in s; `None` if there was none.
+    /// Duration of a synchronisation with the disk, in s; `None` if there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync_s: Option<f64>,
-    /// Free room on the disk; `None` if it is not known.
+    /// Free space on the disk; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_bytes: Option<u64>,
-    /// Readings that the controller's clock says are missing.
+    /// Readings missing by the controller's clock.
     pub missed_readings: u64,
 }
 
 impl MachineState {
-    /// Takes the worse of each.
     fn worsen(&mut self, other: &Self) {
         self.lateness_s = self.lateness_s.max(other.lateness_s);
         self.queue_share = self.queue_share.max(other.queue_share);
-        self.sync_s = match (self.sync_s, other.sync_s) {
-            (Some(a), Some(b)) => Some(a.max(b)),
-            (a, b) => a.or(b),
-        };
-        self.free_bytes = match (self.free_bytes, other.free_bytes) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        };
+        self.sync_s = [self.sync_s, other.sync_s].into_iter().flatten().reduce(f64::max);
+        self.free_bytes = [self.free_bytes, other.free_bytes].into_iter().flatten().min();
         self.missed_readings += other.missed_readings;
     }
 }
 
-/// The worst that a session's `/health` tells.
+/// Worst values of a session's channel `/health`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct HealthSummary {
-    /// Messages there are.
     pub messages: u64,
-    /// The worst of each, readings missed in all; `None` where nothing was measured.
+    /// Worst of each value, and the sum of missed readings; `None` without measurements.
     pub worst: Option<MachineState>,
-    /// How often the wall clock went apart from the monotonic one.
+    /// Number of divergences of the wall clock from the monotonic clock.
     pub clock_jumps: u64,
-    /// The greatest such jump in s, with its sign.
+    /// Largest divergence in s, with its sign.
     pub clock_jump_s: f64,
-    /// Events, the first ones, with session time in s.
+    /// The first events, with session time in s.
     pub events: Vec<(f64, String)>,
 }
 
-/// Events that a summary tells in full.
 const EVENTS_MAX: usize = 100;
 
 impl HealthSummary {
@@ -131,12 +111,12 @@ impl HealthSummary {
 mod tests {
     use super::*;
 
-    fn at(now: u64, told: Told) -> Health {
-        Health { now: Nanos(now), told }
+    fn at(now: u64, content: Told) -> Health {
+        Health { now: Nanos(now), told: content }
     }
 
     #[test]
-    fn messages_come_back_and_later_kinds_are_passed_over() {
+    fn messages_read_back_and_later_kinds_are_ignored() {
         let state = MachineState {
             lateness_s: 0.1 + 0.2,
             queue_share: 1e-9,
@@ -150,8 +130,8 @@ mod tests {
             shift_s: -3600.5,
         };
         let event = Told::Event { text: "so".into() };
-        for told in [Told::State(state), anchor, event] {
-            let one = at(7, told);
+        for content in [Told::State(state), anchor, event] {
+            let one = at(7, content);
             let text = serde_json::to_string(&one).unwrap();
             assert_eq!(serde_json::from_str::<Health>(&text).unwrap(), one, "{text}");
         }
@@ -161,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_summary_keeps_the_worst_of_each() {
+    fn summary_has_the_worst_of_each_value() {
         let mut summary = HealthSummary::default();
         for (lateness_s, free_bytes, missed_readings) in
             [(0.1, Some(5), 1), (0.3, Some(3), 0), (0.2, None, 2)]

@@ -1,9 +1,9 @@
-//! A journal: one line of JSON an entry, each on disk before the next thing happens, so that a series that broke off
-//! can be continued at the right place.
+//! A programme's journal: one JSON line per entry, each on the disk before the programme continues, so that an interrupted
+//! programme resumes at the right place.
 
-use crate::chain::{self, ChainError, Head};
+use crate::chain::{self, ChainError, ChainHead, bytes_or_none, complete_length};
 use crate::folder::create_folder;
-use chrono::{DateTime, SecondsFormat, Utc};
+use crate::manifest::format_utc;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -13,60 +13,37 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use thiserror::Error;
 
-/// Name of the journal in the folder of a series.
 pub const JOURNAL_FILE: &str = "journal.jsonl";
 
-/// A journal could not be read or written.
 #[derive(Debug, Error)]
 pub enum JournalError {
-    /// The disk does not do it.
-    #[error("the journal cannot be {what} ({source}): {}", path.display())]
-    Io {
-        /// Read or written.
-        what: &'static str,
-        /// Its file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A line in the middle is no entry.
+    #[error("the journal {} cannot be {what} ({source}); check its permissions and the disk", path.display())]
+    Io { what: &'static str, path: PathBuf, source: io::Error },
     #[error(
-        "line {line} of the journal cannot be understood ({reason}); restore it from a backup or begin in a new folder: {}",
+        "line {line} of the journal {} is damaged ({reason}); restore it from a backup or begin in a new folder",
         path.display()
     )]
     Line {
         /// Counted from 1.
         line: usize,
-        /// The parser's words.
         reason: String,
-        /// Its file.
         path: PathBuf,
     },
-    /// Entries are missing at its end that were written.
     #[error(
-        "the journal holds {found} of the {written} entries that were written, or others; restore it from a backup, or take {} away to go on from those that are there: {}",
-        Head::file_of(path).display(), path.display()
+        "the journal {} is incomplete: it has {found} entries, and {written} were written; restore it from a backup, or move {} away to continue after the last entry",
+        path.display(), ChainHead::file_of(path).display()
     )]
-    Shortened {
-        /// Entries in it.
-        found: u64,
-        /// Entries that were written.
-        written: u64,
-        /// Its file.
-        path: PathBuf,
-    },
-    /// Another program has locked it, or its head cannot be understood.
+    Shortened { found: u64, written: u64, path: PathBuf },
     #[error(transparent)]
     Chain(ChainError),
 }
 
-/// A time as a journal writes it: RFC 3339 in UTC, to the millisecond.
+/// RFC 3339 in UTC, to the millisecond, as journals have it.
 #[must_use]
 pub fn stamp(at: SystemTime) -> String {
-    DateTime::<Utc>::from(at).to_rfc3339_opts(SecondsFormat::Millis, true)
+    format_utc(at.into())
 }
 
-/// An open journal.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
@@ -74,11 +51,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of a folder, new or begun, and reads what it holds. A last line without its end is
-    /// what a crash left of an entry that never counted.
+    /// Opens or begins the journal of a folder and reads its entries. An incomplete last line, as a crash leaves it, does not
+    /// count.
     ///
-    /// Every line carries a checksum, as described in [`crate::edits`]. A journal begun by a palpate that wrote
-    /// none is read as it is, and goes on without.
+    /// The file is a chain of lines with checksums (`chain.rs`). A journal of an old version has no checksums and continues
+    /// without.
     pub fn open<T: DeserializeOwned>(folder: &Path) -> Result<(Self, Vec<T>), JournalError> {
         let path = folder.join(JOURNAL_FILE);
         let failed = |what| {
@@ -86,24 +63,16 @@ impl Journal {
             move |source| JournalError::Io { what, path, source }
         };
         create_folder(folder).map_err(failed("written"))?;
-        let bytes = match fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(err) if err.kind() == io::ErrorKind::NotFound => Vec::new(),
-            Err(err) => return Err(failed("read")(err)),
-        };
+        let bytes = bytes_or_none(&path).map_err(failed("read"))?;
         let first = bytes.split(|byte| *byte == b'\n').next();
         let first = first.and_then(|line| serde_json::from_slice::<Value>(line).ok());
         let is_plain = first.is_some_and(|line| line.get("checksum").is_none());
         let bodies = match is_plain {
             true => plain_lines(&path, &bytes)?,
-            false => chain::read(&path, JOURNAL_FILE).map_err(told)?.bodies,
+            false => chain::read(&path, JOURNAL_FILE).map_err(journal_error)?.bodies,
         };
         let entries = bodies.into_iter().enumerate().map(|(index, body)| {
-            T::deserialize(body).map_err(|err| JournalError::Line {
-                line: index + 1,
-                reason: err.to_string(),
-                path: path.clone(),
-            })
+            T::deserialize(body).map_err(|err| line_error(&path, index, &err))
         });
         let entries = entries.collect::<Result<Vec<T>, _>>()?;
         Ok((Self { path, is_plain }, entries))
@@ -114,31 +83,25 @@ impl Journal {
         let failed = |source| JournalError::Io { what: "written", path: self.path.clone(), source };
         match self.is_plain {
             true => push_plain(&self.path, entry).map_err(failed),
-            false => chain::append(&self.path, JOURNAL_FILE, entry).map_err(told),
+            false => chain::append(&self.path, JOURNAL_FILE, entry).map_err(journal_error),
         }
     }
 }
 
-/// Where the last whole line ends.
-fn whole(bytes: &[u8]) -> usize {
-    let end = bytes.iter().rposition(|byte| *byte == b'\n');
-    end.map_or(0, |end| end + 1)
+fn line_error(path: &Path, index: usize, err: &serde_json::Error) -> JournalError {
+    JournalError::Line { line: index + 1, reason: err.to_string(), path: path.into() }
 }
 
 fn plain_lines(path: &Path, bytes: &[u8]) -> Result<Vec<Value>, JournalError> {
-    let lines = bytes[..whole(bytes)].split_inclusive(|byte| *byte == b'\n');
+    let lines = bytes[..complete_length(bytes)].split_inclusive(|byte| *byte == b'\n');
     let lines = lines.enumerate().map(|(index, line)| {
-        serde_json::from_slice(line).map_err(|err| JournalError::Line {
-            line: index + 1,
-            reason: err.to_string(),
-            path: path.into(),
-        })
+        serde_json::from_slice(line).map_err(|err| line_error(path, index, &err))
     });
     lines.collect()
 }
 
 fn push_plain(path: &Path, entry: &impl Serialize) -> io::Result<()> {
-    let length = whole(&fs::read(path)?);
+    let length = complete_length(&fs::read(path)?);
     let mut file = OpenOptions::new().append(true).open(path)?;
     file.set_len(length as u64)?;
     // Keys in alphabetical order, as in a chain.
@@ -147,10 +110,10 @@ fn push_plain(path: &Path, entry: &impl Serialize) -> io::Result<()> {
     file.sync_data()
 }
 
-fn told(err: ChainError) -> JournalError {
+fn journal_error(err: ChainError) -> JournalError {
     match err {
         ChainError::Changed { path, line } => {
-            JournalError::Line { line, reason: "it is not as it was written".into(), path }
+            JournalError::Line { line, reason: "it was changed".into(), path }
         }
         ChainError::Io { what, path, source } => {
             JournalError::Io { what: if what == "read" { what } else { "written" }, path, source }
@@ -167,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_torn_last_line_never_counted() {
+    fn incomplete_last_line_does_not_count() {
         let folder = tempfile::tempdir().unwrap();
         let (mut journal, old) = Journal::open::<u32>(folder.path()).unwrap();
         assert!(old.is_empty());
@@ -194,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_that_was_taken_off_the_end_is_noticed() {
+    fn entry_cut_off_the_end_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let (mut journal, _) = Journal::open::<u32>(folder.path()).unwrap();
         for entry in [1, 22, 333] {
@@ -225,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_no_entry_is_named() {
+    fn malformed_line_is_named() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join(JOURNAL_FILE), "1\nx\n3\n").unwrap();
         let refusal = Journal::open::<u32>(folder.path()).unwrap_err();

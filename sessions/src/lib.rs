@@ -1,14 +1,13 @@
 //! Session logs on disk: write, read, recover, find.
 //!
-//! A session is a folder with one log in the MCAP container (<https://mcap.dev/spec>), a long one
-//! in segments. What was
-//! flushed survives a crash, and a damaged log is refused, never read wrong.
+//! A session is a folder with one log in the MCAP container (<https://mcap.dev/spec>), a long one in segments. Flushed data
+//! survives a crash, and a damaged log is refused, never misread.
 //!
-//! This crate never commands a rig, decides nothing about a run and draws nothing. Time is the
-//! caller's; only the writer thread looks at a clock, to pace its disk synchronisation.
+//! This crate never commands a rig, decides nothing about a run and draws nothing. The caller provides the time; only the
+//! writer thread reads a clock, to pace its disk synchronisation.
 //!
-//! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
-//! itself, then [`log::SessionWriter`] and [`log::Session`].
+//! Start reading at [`record`] and [`manifest`] for the content of a session, then [`log::SessionWriter`] and
+//! [`log::Session`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod analyses;
@@ -23,7 +22,7 @@ pub mod contacts;
 pub mod edits;
 pub mod folder;
 pub mod health;
-pub mod imported;
+pub mod import_origin;
 pub mod journal;
 mod lock;
 pub mod log;
@@ -38,24 +37,24 @@ pub mod shelf;
 pub mod text;
 pub mod ticks;
 
-pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
+pub use analyses::{ANALYSES_FILE, Analyses};
 pub use block::Block;
-pub use calibrations::{Kept, Shelf, read_calibration};
-pub use catalog::{Catalog, CatalogError};
-pub use chain::{ChainError, Head};
-pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
+pub use calibrations::{Shelf, read_calibration};
+pub use catalog::Catalog;
+pub use chain::{ChainError, ChainHead};
+pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
     spare_folder,
 };
 pub use health::{Health, HealthSummary, MachineState};
-pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
+pub use import_origin::{Imported, ORIGINAL_FOLDER};
 pub use log::{
-    Alteration, BATCHES_PER_SEGMENT, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice,
-    Outline, Pace, Part, Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
+    Alteration, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace, Part,
+    Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
-pub use raw::{RawBlock, RawPiece};
+pub use raw::RawBlock;
 pub use record::{EndRecord, Entry, EntryKind, Row};
-pub use shelf::{Document, LibraryError, age_days, save, supersede, taken_at};
+pub use shelf::{age_days, save, supersede};

@@ -1,5 +1,4 @@
-//! One holder at a time, across processes: a lock file that names who holds it, and locks that are waited for, but not
-//! for ever.
+//! Locks across processes: lock files that name their holder, and waits with a limit.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -8,83 +7,70 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use thiserror::Error;
 
-/// A lock could not be taken.
 #[derive(Debug, Error)]
 pub enum LockError {
-    /// Another process, or another part of this one, holds it.
     #[error("{} is in use by process {holder}; wait for it to end, or close it", path.display())]
     Held {
-        /// The lock file.
         path: PathBuf,
         /// Process number of the holder, `unknown` if it has not written it yet.
         holder: String,
     },
-    /// The lock file cannot be made or written.
     #[error("cannot lock {} ({source}); choose a folder that may be written", path.display())]
-    Io {
-        /// The lock file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
 }
 
-/// Longest wait for a lock that palpate itself holds for a moment only.
+/// Longest wait for a lock that palpate holds only briefly.
 const PATIENCE: Duration = Duration::from_secs(3);
 const BETWEEN_TRIES: Duration = Duration::from_millis(25);
 
-/// Does what may find a lock taken until it does not, or for [`PATIENCE`].
-fn soon<T>(mut tried: impl FnMut() -> Option<T>) -> Option<T> {
+/// Repeats an attempt until it returns a value, at most for [`PATIENCE`].
+fn retry<T>(mut attempt: impl FnMut() -> Option<T>) -> Option<T> {
     let tries = PATIENCE.as_millis() / BETWEEN_TRIES.as_millis();
     for _ in 0..tries {
-        if let Some(done) = tried() {
+        if let Some(done) = attempt() {
             return Some(done);
         }
         std::thread::sleep(BETWEEN_TRIES);
     }
-    tried()
+    attempt()
 }
 
-/// Another program holds a lock for longer than palpate ever does.
+/// Another program held a lock for longer than palpate ever does.
 #[derive(Debug, PartialEq, Eq, Error)]
-#[error("{} is locked by {} and was not free within {} s; wait for that program to end, or close it", path.display(), named(*holder), PATIENCE.as_secs())]
-pub struct Busy {
-    /// The file.
+#[error("{} is locked by {} for more than {} s; wait for that program to end, or close it", path.display(), holder_name(*holder), PATIENCE.as_secs())]
+pub struct LockTimeout {
     pub path: PathBuf,
-    /// Process number of who holds it, where the system tells.
+    /// Process number of the holder, if the system shows it.
     pub holder: Option<u32>,
 }
 
-impl Busy {
+impl LockTimeout {
     pub(crate) fn of(path: &Path) -> Self {
         Self { path: path.into(), holder: holder_of(path) }
     }
 }
 
-pub(crate) fn named(holder: Option<u32>) -> String {
+pub(crate) fn holder_name(holder: Option<u32>) -> String {
     holder.map_or("another program".into(), |number| format!("process {number}"))
 }
 
-/// Why a file was not locked.
 #[derive(Debug)]
-pub(crate) enum NotLocked {
-    /// Somebody else holds it.
-    Busy(Busy),
-    /// What the system said.
+pub(crate) enum LockFailure {
+    LockTimeout(LockTimeout),
     Io(io::Error),
 }
 
-/// Locks an open file, and waits a little for whoever has locked it.
-pub(crate) fn lock_soon(file: &File, path: &Path) -> Result<(), NotLocked> {
-    let locked = soon(|| match file.try_lock() {
+/// Locks an open file; waits up to [`PATIENCE`] for another holder.
+pub(crate) fn lock_waiting(file: &File, path: &Path) -> Result<(), LockFailure> {
+    let locked = retry(|| match file.try_lock() {
         Err(TryLockError::WouldBlock) => None,
-        Err(TryLockError::Error(source)) => Some(Err(NotLocked::Io(source))),
+        Err(TryLockError::Error(source)) => Some(Err(LockFailure::Io(source))),
         Ok(()) => Some(Ok(())),
     });
-    locked.unwrap_or_else(|| Err(NotLocked::Busy(Busy::of(path))))
+    locked.unwrap_or_else(|| Err(LockFailure::LockTimeout(LockTimeout::of(path))))
 }
 
-/// Who holds a lock on a file, whichever of the two kinds there are (proc(5), `/proc/locks`).
+/// Process number of a lock's holder, for flock and POSIX locks (proc(5), `/proc/locks`).
 pub(crate) fn holder_of(path: &Path) -> Option<u32> {
     let facts = std::fs::metadata(path).ok()?;
     let (major, minor) = (rustix::fs::major(facts.dev()), rustix::fs::minor(facts.dev()));
@@ -93,7 +79,7 @@ pub(crate) fn holder_of(path: &Path) -> Option<u32> {
     let of_line = |line: &str| {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
-            // `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`; one that waits has an arrow before its kind.
+            // `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`; a waiting process has an arrow before its kind.
             [_, kind, _, _, process, place, ..] if *kind != "->" && *place == file => {
                 process.parse().ok()
             }
@@ -112,15 +98,13 @@ pub struct HolderLock {
 
 impl Drop for HolderLock {
     fn drop(&mut self) {
-        // Closing alone is not enough: a program that this process starts at this moment has the
-        // file too until it is loaded, and with it the lock.
+        // Closing is not enough: a child process that is just starting shares the file, and with it the lock.
         let _ = self.file.unlock();
     }
 }
 
 impl HolderLock {
-    /// Takes the lock at `path`, making the file and its folder if needed, and writes our process
-    /// number in it.
+    /// Takes the lock at `path` and writes the own process number into the file; creates file and folder if needed.
     pub fn acquire(path: &Path) -> Result<Self, LockError> {
         let failed = |source| LockError::Io { path: path.into(), source };
         if let Some(parent) = path.parent() {
@@ -130,7 +114,7 @@ impl HolderLock {
             .read(true)
             .write(true)
             .create(true)
-            // Another holder's number must not be erased before the lock is ours.
+            // The number of another holder must stay until the lock is taken.
             .truncate(false)
             .open(path)
             .map_err(failed)?;
@@ -149,23 +133,21 @@ impl HolderLock {
         Ok(Self { file, path: path.into() })
     }
 
-    /// As [`acquire`](Self::acquire), for work that is done in a moment: whoever else does such work is waited for,
-    /// a few seconds at most.
-    pub fn acquire_soon(path: &Path) -> Result<Self, LockError> {
-        let taken = soon(|| match Self::acquire(path) {
+    /// Like [`acquire`](Self::acquire), for short work: waits up to [`PATIENCE`] for another holder.
+    pub fn acquire_waiting(path: &Path) -> Result<Self, LockError> {
+        let taken = retry(|| match Self::acquire(path) {
             Err(LockError::Held { .. }) => None,
             done => Some(done),
         });
         taken.unwrap_or_else(|| Self::acquire(path))
     }
 
-    /// The lock file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 }
 
-/// The process number in a lock file; digits only, whatever else the file may hold.
+/// The process number in a lock file.
 fn read_holder(file: &File) -> String {
     let mut bytes = Vec::new();
     // A process number has at most 10 digits.
@@ -179,9 +161,9 @@ fn read_holder(file: &File) -> String {
 mod tests {
     use super::*;
 
-    /// A file that a child of this process got with its start is the same open file.
+    /// A child process inherits the open file.
     #[test]
-    fn a_lock_ends_with_its_holder_whoever_else_has_the_file() {
+    fn dropped_lock_is_free_although_a_child_has_the_file_open() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lock");
         let held = HolderLock::acquire(&path).unwrap();

@@ -1,7 +1,7 @@
-//! The first message of every session: who measured what, on which rig, with which versions.
+//! The first message of every session: operator, specimen, rig, settings and versions.
 
-use crate::imported::Imported;
-use crate::recover::Recovered;
+use crate::import_origin::Imported;
+use crate::recover::RecoveryOrigin;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::about::About;
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
@@ -9,72 +9,67 @@ use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Version of the on-disk form. A reader refuses a higher one.
+/// Version of the on-disk format. A reader refuses a higher one.
 ///
-/// 2: imported sessions, which have no rig and no limits, and samples without volts and pulses.
+/// 2: imported sessions, which have no rig and no limits, and whose samples may lack volts and pulses.
 pub const RECORD_VERSION: u32 = 2;
 
-/// Ticks in a second of an imported session: fine enough to keep every digit that a file's times have, and
-/// 63 bits of them are 106 days.
+/// Ticks per second of an imported session: fine enough for every digit of a file's times, and 63 bits span 106 days.
 pub const IMPORTED_TICKS_PER_S: f64 = 1e12;
 
-/// What a session needs to be understood and replayed, beside its samples and entries.
+/// Everything needed to interpret and replay a session's samples and entries.
 ///
-/// `calibration`, `plan` and `settings` are opaque here: their types belong to the crates that
-/// act on them, which read them back from this JSON.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// `calibration`, `plan` and `settings` are opaque here: their types belong to the crates that use them.
+/// The default is an empty import: without rig, plan and decisions.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
-    /// Version of the on-disk form, [`RECORD_VERSION`] when written by this program.
+    /// [`RECORD_VERSION`] of the program that recorded.
     pub record_version: u32,
-    /// Sortable name of the session, such as `20260305T141507Z-9f31c2aa`.
+    /// Sortable by time, such as `20260305T141507Z-9f31c2aa`.
     pub session_id: String,
-    /// Version of the program that recorded.
     pub software_version: String,
-    /// Version of the decision rules that recorded; a replay needs the same.
+    /// Version of the decision rules; a replay needs the same.
     pub engine_version: u32,
-    /// Wall clock at session time zero, UTC, RFC 3339 on disk; of the import, for an imported session.
+    /// Wall clock at session time zero, or at the import; UTC, RFC 3339 on disk.
     pub started_at: DateTime<Utc>,
-    /// Who measured.
     pub operator: String,
-    /// What was indented.
     pub specimen: String,
-    /// The probe's shape and size, in words.
+    /// Shape and size of the probe, in words.
     pub indenter: String,
-    /// What else was told of specimen, probe and series; see [`palpate_model::about::KEYS`].
+    /// Further facts about specimen, probe and series; see [`palpate_model::about::KEYS`].
     #[serde(default, skip_serializing_if = "About::is_empty")]
     pub about: About,
-    /// How the signal was taken; `None` in sessions recorded before this was written down.
+    /// `None` in sessions of old versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signal: Option<SignalFacts>,
-    /// Which file the session was imported from, and how; `None` for one that was recorded.
+    /// `None` in a recorded session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Imported>,
-    /// The rig as it described itself; `None` in an imported session.
+    /// The rig's description of itself; `None` in an imported session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<RigDescription>,
     /// The interlock limits in force; `None` in an imported session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<Limits>,
-    /// The load-cell calibration in force; null in an imported session, as are plan and settings.
+    /// Null in an imported session, like plan and settings.
     pub calibration: serde_json::Value,
-    /// The protocol and its parameters.
     pub plan: serde_json::Value,
-    /// Whatever else a replay needs, such as pace and seeds.
+    /// Further inputs of a replay, such as pace and seeds.
     pub settings: serde_json::Value,
     /// Warnings the operator read and accepted before the start.
     pub acknowledgements: Vec<String>,
-    /// Set if this is what could be kept of another session.
+    /// Set if the session was recovered from another one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub recovered: Option<Recovered>,
+    pub recovered: Option<RecoveryOrigin>,
 }
 
 impl Manifest {
-    /// Length of one tick of the samples.
+    /// Duration of a tick.
     pub fn tick(&self) -> Seconds {
         self.rig.as_ref().map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
     }
 
-    /// The length of so many ticks. Of an imported session it is the float that the file's decimal number is.
+    /// Duration of `ticks`. In an imported session it is exactly the float of the file's decimal number.
     pub fn time_of(&self, ticks: i64) -> Seconds {
         Seconds(match &self.rig {
             Some(rig) => ticks as f64 * rig.tick().0,
@@ -82,16 +77,20 @@ impl Manifest {
         })
     }
 
-    /// The start as an RFC 3339 text in UTC, to the millisecond.
+    /// RFC 3339 in UTC, to the millisecond.
     pub fn started_at_text(&self) -> String {
-        self.started_at.to_rfc3339_opts(SecondsFormat::Millis, true)
+        format_utc(self.started_at)
     }
 }
 
-/// A new session name: the UTC start to the second, then eight hexadecimal digits.
+pub(crate) fn format_utc(at: DateTime<Utc>) -> String {
+    at.to_rfc3339_opts(SecondsFormat::Millis, true)
+}
+
+/// A new session name: the start in UTC to the second, then eight hexadecimal digits.
 ///
-/// The digits mix the process, the sub-second time and a counter, so that two sessions started
-/// in the same second, by one process or by two, get different names.
+/// The digits hash process number, sub-second time and a counter, so that sessions of the same second, of one process or of
+/// two, have different names.
 #[must_use]
 pub fn new_session_id(started_at: DateTime<Utc>) -> String {
     static COUNTER: AtomicU32 = AtomicU32::new(0);
@@ -110,7 +109,7 @@ mod tests {
     use chrono::TimeZone;
 
     #[test]
-    fn session_ids_sort_by_time_and_do_not_repeat() {
+    fn session_ids_sort_by_time_and_are_unique() {
         let first = Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap();
         let second = Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 8).unwrap();
         let ids = [new_session_id(first), new_session_id(first), new_session_id(second)];

@@ -1,38 +1,35 @@
-//! Raw bytes of devices on disk: packed blocks, one device each, several pieces together.
+//! Raw bytes exchanged with devices, on disk in blocks of one device each.
 
-use crate::packed::{Field, extend_numbers, next_field, zigzag};
+use crate::packed::{Field, extend_numbers, read_fields, zigzag};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 
-/// Most bytes of one block, so that a block stays far below the largest message.
+/// Largest number of bytes in a block, far below the largest message.
 const BLOCK_BYTES_MAX: usize = 1 << 20;
-/// Most pieces of one block.
 const BLOCK_PIECES_MAX: usize = 1 << 16;
 /// A packed number takes ten bytes at most.
 const NUMBER_BYTES_MAX: usize = 10;
 
-/// A block as it is written.
 #[derive(Clone, PartialEq, prost::Message)]
 pub(crate) struct RawMessage {
-    /// Raw bytes of the session before this block, over all devices.
+    /// Raw bytes of all devices before this block.
     #[prost(uint64, tag = "1")]
     pub first_byte: u64,
     #[prost(string, tag = "2")]
     pub device: String,
-    /// Session time of each piece; differences to the piece before, the first to zero, modulo 2^64.
+    /// Session time of each piece as the difference to the piece before, the first to zero, modulo 2^64.
     #[prost(sint64, repeated, tag = "3")]
     pub at_delta_ns: Vec<i64>,
     #[prost(bool, repeated, tag = "4")]
     pub is_sent: Vec<bool>,
     #[prost(uint32, repeated, tag = "5")]
     pub length: Vec<u32>,
-    /// The bytes of all pieces, one after the other.
     #[prost(bytes = "vec", tag = "6")]
     pub data: Vec<u8>,
 }
 
-/// The blocks of some pieces: the devices in the order in which they first appear, and of each its pieces in
-/// their order. Where a piece is longer than a block may be, it is cut. Empty pieces are nothing.
+/// Encodes pieces: the devices in the order of their first piece, each with its pieces in order. A piece longer than a block
+/// is split; empty pieces are dropped.
 pub(crate) fn raw_blocks(mut first_byte: u64, pieces: &[RawBytes]) -> Vec<RawMessage> {
     let mut devices: Vec<&str> = Vec::new();
     for piece in pieces {
@@ -73,8 +70,8 @@ pub(crate) fn raw_blocks(mut first_byte: u64, pieces: &[RawBytes]) -> Vec<RawMes
     blocks
 }
 
-/// A verified block of raw bytes, of one device.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A verified block of raw bytes of one device.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RawBlock<'a> {
     first_byte: u64,
     device: &'a str,
@@ -84,39 +81,34 @@ pub struct RawBlock<'a> {
     data: &'a [u8],
 }
 
-/// One piece of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawPiece<'a> {
     /// Session time at which the computer read or wrote it.
     pub at: Nanos,
     /// Whether the computer sent it; received otherwise.
     pub is_sent: bool,
-    /// What was exchanged.
     pub bytes: &'a [u8],
 }
 
 impl<'a> RawBlock<'a> {
-    /// Raw bytes of the session before this block, over all devices.
-    pub fn first_byte(&self) -> u64 {
+    /// Raw bytes of all devices before this block.
+    pub(crate) fn first_byte(&self) -> u64 {
         self.first_byte
     }
 
-    /// Name of the device.
     pub fn device(&self) -> &'a str {
         self.device
     }
 
-    /// How many bytes there are.
     pub fn len(&self) -> usize {
         self.data.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.data.is_empty()
     }
 
-    /// The pieces, in the order in which they were exchanged.
+    /// The pieces in the order of the exchange.
     pub fn pieces(&self) -> impl Iterator<Item = RawPiece<'a>> {
         let mut rest = self.data;
         let places = self.at_ns.iter().zip(&self.is_sent).zip(&self.length);
@@ -128,22 +120,9 @@ impl<'a> RawBlock<'a> {
         })
     }
 
-    /// Reads a block and checks it, or says what is wrong with it.
     pub(crate) fn read(data: &'a [u8]) -> Result<Self, String> {
-        let mut block = Self {
-            first_byte: 0,
-            device: "",
-            at_ns: Vec::new(),
-            is_sent: Vec::new(),
-            length: Vec::new(),
-            data: &[],
-        };
-        let mut rest = data;
-        while !rest.is_empty() {
-            next_field(&mut rest)
-                .and_then(|(number, field)| block.take(number, field))
-                .map_err(|err| format!("a block of raw bytes is unreadable: {err}"))?;
-        }
+        let mut block = Self::default();
+        read_fields(data, "raw bytes", |number, field| block.take(number, field))?;
         block.check()?;
         Ok(block)
     }
@@ -154,10 +133,10 @@ impl<'a> RawBlock<'a> {
             (1, Field::Number(value)) => self.first_byte = value,
             (2, Field::Bytes(bytes)) => {
                 self.device = std::str::from_utf8(bytes)
-                    .map_err(|_| "the device's name is no text".to_owned())?;
+                    .map_err(|_| "the device's name is not UTF-8".to_owned())?;
             }
             (3..=5, Field::Bytes(bytes)) if is_long(bytes) => {
-                return Err("it has more pieces than any block".into());
+                return Err(format!("it has more pieces than {BLOCK_PIECES_MAX}"));
             }
             (3, Field::Bytes(bytes)) => extend_numbers(&mut self.at_ns, bytes, zigzag)?,
             (4, Field::Bytes(bytes)) => extend_numbers(&mut self.is_sent, bytes, |it| it != 0)?,
@@ -186,7 +165,6 @@ impl<'a> RawBlock<'a> {
         Ok(())
     }
 
-    /// The pieces as they were taken.
     pub(crate) fn to_pieces(&self) -> Vec<RawBytes> {
         let device = std::sync::Arc::<str>::from(self.device);
         self.pieces()

@@ -1,23 +1,22 @@
-//! Text appended to a file that begins anew when it is full, with a few full ones kept beside it.
+//! The program's own log: a text file that rotates when it is full.
 //!
-//! Nothing is held between two calls, so that several programs can append to one file.
+//! No file stays open between calls, so several programs can append to the same log.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Bytes after which a file is full: some weeks of runs.
+/// Size of a full file in bytes: some weeks of runs.
 const BYTES_MAX: u64 = 1 << 20;
-/// Files at most, the one in use included.
+/// Largest number of files, including the current one.
 const FILES_MAX: usize = 5;
 
-/// The folder of the program's own log in a library.
 #[must_use]
 pub fn log_folder(library: &Path) -> PathBuf {
     library.join("log")
 }
 
-/// Where the file is that so many were begun after.
+/// The current file has age 0.
 fn file(folder: &Path, age: usize) -> PathBuf {
     match age {
         0 => folder.join("palpate.log"),
@@ -25,14 +24,14 @@ fn file(folder: &Path, age: usize) -> PathBuf {
     }
 }
 
-/// The files of a log that are there, newest first.
+/// The existing files of a log, newest first.
 #[must_use]
 pub fn log_files(folder: &Path) -> Vec<PathBuf> {
     let files = (0..FILES_MAX).map(|age| file(folder, age));
     files.filter(|path| path.is_file()).collect()
 }
 
-/// Appends text to a log, in one write. A new file begins with `head`.
+/// Appends text in one write. A new file begins with `head`.
 pub fn append(folder: &Path, head: &str, text: &[u8]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let newest = file(folder, 0);
@@ -52,13 +51,13 @@ fn is_full(log: &File) -> io::Result<bool> {
     Ok(log.metadata()?.len() >= BYTES_MAX)
 }
 
-/// Gives every file the next age, the oldest none. Whether there is a new file to open: another program may be at it.
+/// Renames every file to the next age; the oldest is overwritten. Returns false if another program is rotating.
 fn rotate(folder: &Path, full: &File) -> io::Result<bool> {
-    // Held until `full` is closed; a file system without locks rotates all the same.
+    // Locked until `full` is closed; a file system without locks rotates too.
     if matches!(full.try_lock(), Err(fs::TryLockError::WouldBlock)) {
         return Ok(false);
     }
-    // Somebody may have done it before the lock was ours.
+    // Another program may have rotated before this one got the lock.
     if fs::metadata(file(folder, 0))?.len() < BYTES_MAX {
         return Ok(true);
     }
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_log_is_bounded_in_size_and_number_and_loses_the_oldest_first() {
+    fn log_is_bounded_and_drops_the_oldest_file_first() {
         let home = tempfile::tempdir().unwrap();
         let folder = log_folder(home.path());
         assert!(log_files(&folder).is_empty());
@@ -88,20 +87,20 @@ mod tests {
         let files = log_files(&folder);
         assert_eq!(files.len(), FILES_MAX);
         assert_eq!(fs::read_dir(&folder).unwrap().count(), FILES_MAX);
-        let mut kept = Vec::new();
+        let mut numbers = Vec::new();
         for path in files.iter().rev() {
             let text = fs::read_to_string(path).unwrap();
             assert!(text.len() as u64 <= BYTES_MAX + (1 << 17), "{}", text.len());
             let lines = text.strip_prefix("head\n").unwrap().lines();
-            kept.extend(lines.map(|line| line[..8].trim().parse::<usize>().unwrap()));
+            numbers.extend(lines.map(|line| line[..8].trim().parse::<usize>().unwrap()));
         }
-        // Without a gap, up to the newest.
-        assert_eq!(kept, (count - kept.len()..count).collect::<Vec<_>>());
-        assert!(kept.len() < count);
+        // No gap up to the newest.
+        assert_eq!(numbers, (count - numbers.len()..count).collect::<Vec<_>>());
+        assert!(numbers.len() < count);
     }
 
     #[test]
-    fn a_file_that_another_program_is_rotating_is_appended_to() {
+    fn file_that_another_program_rotates_is_appended_to() {
         let home = tempfile::tempdir().unwrap();
         let full = vec![b'x'; BYTES_MAX as usize];
         append(home.path(), "", &full).unwrap();
@@ -116,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_made_is_an_error() {
+    fn unusable_folder_is_an_error() {
         let home = tempfile::tempdir().unwrap();
         let taken = home.path().join("log");
         fs::write(&taken, "").unwrap();

@@ -23,13 +23,12 @@ palpate_model::named! {
         Decision = "/decision",
         Fit = "/fit",
         End = "/end",
-        /// The samples thinned out, one message each, for programs that draw messages.
+        /// Thinned samples, one message each, for programs that plot messages.
         View = "/daq/view",
-        /// Says that what may be lost of the segments before is written again in this one.
+        /// Marks a segment that rewrites what the segments before may have lost.
         Rewrite = "/rewrite",
-        /// Bytes as exchanged with devices.
+        /// Bytes exchanged with devices.
         Raw = "/raw",
-        /// How the computer kept up, and its clocks.
         Health = "/health",
     }
 }
@@ -47,178 +46,139 @@ impl Channel {
         }
     }
 
-    /// The encoding of messages, and so of the schema: `protobuf` or `json`.
-    pub fn message_encoding(self) -> &'static str {
+    /// The message's name without the package, and its schema.
+    fn definition(self) -> (&'static str, Schema) {
+        const NOW: &[(&str, &str)] = &[("now_ns", "ns since session start")];
+        const END: &[(&str, &str)] = &[("ended_at", "ns since session start"), ("time_use", "s")];
+        const HEALTH: &[(&str, &str)] = &[
+            ("now_ns", "ns since session start"),
+            ("lateness_s", "s"),
+            ("sync_s", "s"),
+            ("free_bytes", "bytes"),
+            ("shift_s", "s"),
+        ];
         match self {
-            Self::Daq | Self::Derived | Self::View | Self::Raw => "protobuf",
-            _ => "json",
+            Self::Manifest => ("Manifest", Schema::Json(MANIFEST_SCHEMA, &[])),
+            Self::Daq => ("DaqBlock", Schema::Protobuf(DAQ_FIELDS)),
+            Self::Derived => ("DerivedBlock", Schema::Protobuf(DERIVED_FIELDS)),
+            Self::Input | Self::Decision | Self::Fit => ("Entry", Schema::Json(ENTRY_SCHEMA, NOW)),
+            Self::End => ("EndRecord", Schema::Json(END_SCHEMA, END)),
+            Self::View => ("View", Schema::Protobuf(VIEW_FIELDS)),
+            Self::Rewrite => ("Rewrite", Schema::Json(REWRITE_SCHEMA, &[])),
+            Self::Raw => ("RawBlock", Schema::Protobuf(RAW_FIELDS)),
+            Self::Health => ("Health", Schema::Json(HEALTH_SCHEMA, HEALTH)),
         }
     }
 
-    pub fn schema_encoding(self) -> &'static str {
-        match self {
-            Self::Daq | Self::Derived | Self::View | Self::Raw => "protobuf",
-            _ => "jsonschema",
+    /// The encodings of messages and of the schema.
+    pub fn encodings(self) -> (&'static str, &'static str) {
+        match self.definition().1 {
+            Schema::Protobuf(_) => ("protobuf", "protobuf"),
+            Schema::Json(..) => ("json", "jsonschema"),
         }
     }
 
-    pub fn schema_name(self) -> &'static str {
-        match self {
-            Self::Manifest => "palpate.Manifest",
-            Self::Daq => "palpate.DaqBlock",
-            Self::Derived => "palpate.DerivedBlock",
-            Self::Input | Self::Decision | Self::Fit => "palpate.Entry",
-            Self::End => "palpate.EndRecord",
-            Self::View => "palpate.View",
-            Self::Rewrite => "palpate.Rewrite",
-            Self::Raw => "palpate.RawBlock",
-            Self::Health => "palpate.Health",
-        }
+    pub fn schema_name(self) -> String {
+        format!("palpate.{}", self.definition().0)
     }
 
     pub fn schema(self) -> Vec<u8> {
-        match self {
-            Self::Daq => descriptor_set("DaqBlock", DAQ_FIELDS),
-            Self::Derived => descriptor_set("DerivedBlock", DERIVED_FIELDS),
-            Self::Manifest => MANIFEST_SCHEMA.into(),
-            Self::Input | Self::Decision | Self::Fit => ENTRY_SCHEMA.into(),
-            Self::End => END_SCHEMA.into(),
-            Self::View => descriptor_set("View", VIEW_FIELDS),
-            Self::Rewrite => REWRITE_SCHEMA.into(),
-            Self::Raw => descriptor_set("RawBlock", RAW_FIELDS),
-            Self::Health => HEALTH_SCHEMA.into(),
+        match self.definition() {
+            (name, Schema::Protobuf(fields)) => descriptor_set(name, fields, |_| false),
+            (_, Schema::Json(schema, _)) => schema.into(),
         }
     }
 
     /// Units of the channel's fields.
     pub fn metadata(self) -> BTreeMap<String, String> {
-        let units: &[(&str, &str)] = match self {
-            Self::Daq => &[
-                ("tick_delta", "controller clock counts"),
-                ("host_delta_ns", "ns"),
-                ("counts", "1"),
-                ("volts", "V"),
-                ("pulses_delta", "pulses"),
-                ("status", "bits"),
-                ("age_ns", "ns"),
-                ("age_within_ns", "ns"),
-            ],
-            Self::Derived => &[
-                ("force_newtons", "N"),
-                ("depth_mm", "mm"),
-                ("validity", "bits: 1 force, 2 depth"),
-                ("phase", "code"),
-                ("cycle", "1"),
-            ],
-            Self::Input | Self::Decision | Self::Fit => &[("now_ns", "ns since session start")],
-            Self::End => &[("ended_at", "ns since session start"), ("time_use", "s")],
-            Self::View => &[
-                ("t_s", "s since session start"),
-                ("signal_V", "V"),
-                ("force_N", "N"),
-                ("depth_mm", "mm"),
-            ],
-            Self::Raw => &[
-                ("first_byte", "bytes"),
-                ("at_delta_ns", "ns since session start"),
-                ("length", "bytes"),
-            ],
-            Self::Health => &[
-                ("now_ns", "ns since session start"),
-                ("lateness_s", "s"),
-                ("sync_s", "s"),
-                ("free_bytes", "bytes"),
-                ("shift_s", "s"),
-            ],
-            Self::Manifest | Self::Rewrite => &[],
-        };
-        units.iter().map(|(field, unit)| (format!("unit.{field}"), (*unit).to_owned())).collect()
+        match self.definition().1 {
+            Schema::Protobuf(fields) => unit_metadata(fields.iter().map(|one| (one.0, one.4))),
+            Schema::Json(_, units) => unit_metadata(units.iter().copied()),
+        }
     }
+}
+
+/// Fields of a message, or a JSON Schema with the units of its fields.
+enum Schema {
+    Protobuf(&'static [Field]),
+    Json(&'static str, &'static [(&'static str, &'static str)]),
+}
+
+fn unit_metadata(
+    units: impl Iterator<Item = (&'static str, &'static str)>,
+) -> BTreeMap<String, String> {
+    let known = units.filter(|(_, unit)| !unit.is_empty());
+    known.map(|(field, unit)| (format!("unit.{field}"), unit.to_owned())).collect()
 }
 
 /// Topic of an export of one message per sample.
 pub const SAMPLE_TOPIC: &str = "/sample";
 
-/// Descriptor of its messages, where what is unknown is told apart from 0.
+/// Descriptor of a sample's message, in which unknown values are absent.
 pub fn sample_schema() -> Vec<u8> {
     let always = ["t_s", "phase", "cycle", "sample"];
-    descriptor_set_with("Sample", SAMPLE_FIELDS, |name| !always.contains(&name))
+    descriptor_set("Sample", SAMPLE_FIELDS, |name| !always.contains(&name))
 }
 
-/// Units of its fields.
 pub fn sample_metadata() -> BTreeMap<String, String> {
-    let units = [
-        ("t_s", "s since the first sample"),
-        ("depth_mm", "mm"),
-        ("force_N", "N"),
-        ("signal_V", "V"),
-        ("counts", "1"),
-        ("pulses", "1"),
-        ("cycle", "1"),
-        ("sample", "1"),
-    ];
-    let pairs = units.map(|(field, unit)| (format!("unit.{field}"), unit.to_owned()));
-    pairs.into()
+    unit_metadata(SAMPLE_FIELDS.iter().map(|one| (one.0, one.4)))
 }
 
-type Field = (&'static str, i32, Label, Type);
+/// Name, number, label, type and unit.
+type Field = (&'static str, i32, Label, Type, &'static str);
 
 const DAQ_FIELDS: &[Field] = &[
-    ("first_sample", 1, Label::Optional, Type::Uint64),
-    ("tick_delta", 2, Label::Repeated, Type::Sint64),
-    ("host_delta_ns", 3, Label::Repeated, Type::Sint64),
-    ("counts", 4, Label::Repeated, Type::Sint32),
-    ("volts", 5, Label::Repeated, Type::Double),
-    ("pulses_delta", 6, Label::Repeated, Type::Sint64),
-    ("status", 7, Label::Repeated, Type::Uint32),
-    ("age_ns", 8, Label::Repeated, Type::Uint64),
-    ("age_within_ns", 9, Label::Repeated, Type::Uint64),
+    ("first_sample", 1, Label::Optional, Type::Uint64, ""),
+    ("tick_delta", 2, Label::Repeated, Type::Sint64, "controller clock counts"),
+    ("host_delta_ns", 3, Label::Repeated, Type::Sint64, "ns"),
+    ("counts", 4, Label::Repeated, Type::Sint32, "1"),
+    ("volts", 5, Label::Repeated, Type::Double, "V"),
+    ("pulses_delta", 6, Label::Repeated, Type::Sint64, "pulses"),
+    ("status", 7, Label::Repeated, Type::Uint32, "bits"),
+    ("age_ns", 8, Label::Repeated, Type::Uint64, "ns"),
+    ("age_within_ns", 9, Label::Repeated, Type::Uint64, "ns"),
 ];
 
 const DERIVED_FIELDS: &[Field] = &[
-    ("first_sample", 1, Label::Optional, Type::Uint64),
-    ("force_newtons", 2, Label::Repeated, Type::Double),
-    ("depth_mm", 3, Label::Repeated, Type::Double),
-    ("validity", 4, Label::Repeated, Type::Uint32),
-    ("phase", 5, Label::Repeated, Type::Uint32),
-    ("cycle", 6, Label::Repeated, Type::Uint32),
+    ("first_sample", 1, Label::Optional, Type::Uint64, ""),
+    ("force_newtons", 2, Label::Repeated, Type::Double, "N"),
+    ("depth_mm", 3, Label::Repeated, Type::Double, "mm"),
+    ("validity", 4, Label::Repeated, Type::Uint32, "bits: 1 force, 2 depth"),
+    ("phase", 5, Label::Repeated, Type::Uint32, "code"),
+    ("cycle", 6, Label::Repeated, Type::Uint32, "1"),
 ];
 
 const VIEW_FIELDS: &[Field] = &[
-    ("t_s", 1, Label::Optional, Type::Double),
-    ("signal_V", 2, Label::Optional, Type::Double),
-    ("force_N", 3, Label::Optional, Type::Double),
-    ("depth_mm", 4, Label::Optional, Type::Double),
-    ("cycle", 5, Label::Optional, Type::Uint32),
+    ("t_s", 1, Label::Optional, Type::Double, "s since session start"),
+    ("signal_V", 2, Label::Optional, Type::Double, "V"),
+    ("force_N", 3, Label::Optional, Type::Double, "N"),
+    ("depth_mm", 4, Label::Optional, Type::Double, "mm"),
+    ("cycle", 5, Label::Optional, Type::Uint32, ""),
 ];
 
 const RAW_FIELDS: &[Field] = &[
-    ("first_byte", 1, Label::Optional, Type::Uint64),
-    ("device", 2, Label::Optional, Type::String),
-    ("at_delta_ns", 3, Label::Repeated, Type::Sint64),
-    ("is_sent", 4, Label::Repeated, Type::Bool),
-    ("length", 5, Label::Repeated, Type::Uint32),
-    ("data", 6, Label::Optional, Type::Bytes),
+    ("first_byte", 1, Label::Optional, Type::Uint64, "bytes"),
+    ("device", 2, Label::Optional, Type::String, ""),
+    ("at_delta_ns", 3, Label::Repeated, Type::Sint64, "ns since session start"),
+    ("is_sent", 4, Label::Repeated, Type::Bool, ""),
+    ("length", 5, Label::Repeated, Type::Uint32, "bytes"),
+    ("data", 6, Label::Optional, Type::Bytes, ""),
 ];
 
 const SAMPLE_FIELDS: &[Field] = &[
-    ("t_s", 1, Label::Optional, Type::Double),
-    ("depth_mm", 2, Label::Optional, Type::Double),
-    ("force_N", 3, Label::Optional, Type::Double),
-    ("signal_V", 4, Label::Optional, Type::Double),
-    ("counts", 5, Label::Optional, Type::Sint32),
-    ("pulses", 6, Label::Optional, Type::Sint64),
-    ("phase", 7, Label::Optional, Type::String),
-    ("cycle", 8, Label::Optional, Type::Uint32),
-    ("sample", 9, Label::Optional, Type::Uint64),
+    ("t_s", 1, Label::Optional, Type::Double, "s since the first sample"),
+    ("depth_mm", 2, Label::Optional, Type::Double, "mm"),
+    ("force_N", 3, Label::Optional, Type::Double, "N"),
+    ("signal_V", 4, Label::Optional, Type::Double, "V"),
+    ("counts", 5, Label::Optional, Type::Sint32, "1"),
+    ("pulses", 6, Label::Optional, Type::Sint64, "1"),
+    ("phase", 7, Label::Optional, Type::String, ""),
+    ("cycle", 8, Label::Optional, Type::Uint32, "1"),
+    ("sample", 9, Label::Optional, Type::Uint64, "1"),
 ];
 
-fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
-    descriptor_set_with(message, fields, |_| false)
-}
-
-/// A field that may be absent is in a `oneof` of its own, as the language's `optional` is described.
-fn descriptor_set_with(
+/// A field that may be absent is in its own `oneof`, as proto3 encodes `optional`.
+fn descriptor_set(
     message: &str,
     fields: &[Field],
     may_be_absent: impl Fn(&str) -> bool,
@@ -226,7 +186,7 @@ fn descriptor_set_with(
     let absent: Vec<&str> =
         fields.iter().map(|(name, ..)| *name).filter(|name| may_be_absent(name)).collect();
     let oneof_of = |name: &str| absent.iter().position(|one| *one == name);
-    let field = |&(name, number, label, kind): &Field| FieldDescriptorProto {
+    let field = |&(name, number, label, kind, _): &Field| FieldDescriptorProto {
         name: Some(name.into()),
         oneof_index: oneof_of(name).map(|index| index as i32),
         proto3_optional: oneof_of(name).map(|_| true),
@@ -288,11 +248,11 @@ mod tests {
         fields
     }
 
-    /// What a descriptor promises on the wire: packed arrays and plain varints.
-    fn promised(fields: &[Field]) -> Vec<(u32, WireType)> {
+    /// Wire format by the descriptor: packed arrays and plain varints.
+    fn described(fields: &[Field]) -> Vec<(u32, WireType)> {
         fields
             .iter()
-            .map(|&(_, number, label, kind)| match (label, kind) {
+            .map(|&(_, number, label, kind, _)| match (label, kind) {
                 (Label::Repeated, _) | (_, Type::String | Type::Bytes) => {
                     (number as u32, WireType::LengthDelimited)
                 }
@@ -302,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn descriptors_describe_what_is_written() {
+    fn descriptors_match_the_encoded_messages() {
         let daq = DaqBlock {
             first_sample: 1,
             tick_delta: vec![1],
@@ -314,7 +274,7 @@ mod tests {
             age_ns: vec![1],
             age_within_ns: vec![1],
         };
-        assert_eq!(wire_fields(&daq.encode_to_vec()), promised(DAQ_FIELDS));
+        assert_eq!(wire_fields(&daq.encode_to_vec()), described(DAQ_FIELDS));
         let derived = DerivedBlock {
             first_sample: 1,
             force_newtons: vec![1.0],
@@ -323,7 +283,7 @@ mod tests {
             phase: vec![1],
             cycle: vec![1],
         };
-        assert_eq!(wire_fields(&derived.encode_to_vec()), promised(DERIVED_FIELDS));
+        assert_eq!(wire_fields(&derived.encode_to_vec()), described(DERIVED_FIELDS));
         let raw = RawMessage {
             first_byte: 1,
             device: "a".into(),
@@ -332,21 +292,21 @@ mod tests {
             length: vec![1],
             data: vec![1],
         };
-        assert_eq!(wire_fields(&raw.encode_to_vec()), promised(RAW_FIELDS));
-        // The names of the fields, as the derive macro sees them, are the names described.
+        assert_eq!(wire_fields(&raw.encode_to_vec()), described(RAW_FIELDS));
+        // Rust fields have the described names.
         let shown = format!("{daq:?} {derived:?} {raw:?}");
-        let described = DAQ_FIELDS.iter().chain(DERIVED_FIELDS).chain(RAW_FIELDS);
-        for (name, ..) in described {
+        let fields = DAQ_FIELDS.iter().chain(DERIVED_FIELDS).chain(RAW_FIELDS);
+        for (name, ..) in fields {
             assert!(shown.contains(&format!("{name}:")), "{name}");
         }
     }
 
     #[test]
-    fn schemas_are_what_they_claim_to_be() {
+    fn schemas_parse_as_their_declared_kind() {
         for channel in Channel::ALL {
             assert_eq!(Channel::from_topic(channel.name()), Some(channel));
             let schema = channel.schema();
-            if channel.schema_encoding() == "protobuf" {
+            if channel.encodings().1 == "protobuf" {
                 let set = FileDescriptorSet::decode(schema.as_slice()).unwrap();
                 let name = format!("palpate.{}", set.file[0].message_type[0].name());
                 assert_eq!(name, channel.schema_name());

@@ -1,8 +1,8 @@
-//! The documents of a library: one file each in the folder of their kind, never changed and never removed,
+//! The documents of a library: one file each in the folder of their kind. A document is never changed and never removed,
 //! only superseded by a later one.
 //!
 //! A file is `{"checksum": CRC-32 of the compact JSON of the document with its keys in alphabetical order,
-//! KIND: the document}` and is called by its id, `20260305-bench-cell-9f31c2aa`: day, name, checksum.
+//! KIND: the document}`. Its name is the document's id, `20260305-bench-cell-9f31c2aa`: day, name, checksum.
 
 use crate::atomic;
 use crate::text::json_files;
@@ -15,148 +15,76 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// What a library keeps.
 pub trait Document: Clone + Serialize + DeserializeOwned {
-    /// What one is called, in sentences and in its file.
+    /// The word in messages, and the key in the file.
     const KIND: &'static str;
-    /// Their folder in the library.
     const FOLDER: &'static str;
-    /// What shows all that are kept.
-    const LISTED: &'static str;
-    /// What makes a new one.
+    /// How to make a new one, as in `import it again`.
     const RENEW: &'static str;
 
-    /// What people call it.
     fn name(&self) -> &str;
-    /// The rig it is of.
     fn rig(&self) -> &str;
-    /// When it was taken, RFC 3339; `None` where that is not known.
+    /// RFC 3339; `None` where the time is not known.
     fn taken_at(&self) -> Option<&str>;
-    /// Id of the one whose place it takes.
+    /// Id of the document that this one supersedes.
     fn supersedes(&self) -> Option<&str>;
-    /// The same in the place of another one.
     #[must_use]
     fn superseding(self, id: String) -> Self;
-    /// Why it cannot be used, in words.
+    /// The error says why the document cannot be used.
     fn check(&self) -> Result<(), String>;
 }
 
-/// A document could not be kept or had.
 #[derive(Debug, Error)]
 pub enum LibraryError {
-    /// The disk refused.
     #[error("the {kind} cannot be {what} ({source}), {}", path.display())]
     Io {
-        /// What the document is.
         kind: &'static str,
         /// `stored` or `read`.
         what: &'static str,
-        /// The file.
         path: PathBuf,
-        /// What the system said.
         source: io::Error,
     },
-    /// Something else than a document of this kind.
-    #[error("this file holds no {kind} ({reason}); name another, {}", path.display())]
-    NotOne {
-        /// What was wanted.
-        kind: &'static str,
-        /// The file.
-        path: PathBuf,
-        /// What is missing or wrong.
-        reason: String,
-    },
-    /// Other content than was written.
-    #[error("this {kind} was changed after it was stored; a {kind} is never edited, {renew} to supersede it, {}", path.display())]
-    Changed {
-        /// What the document is.
-        kind: &'static str,
-        /// What makes a new one.
-        renew: &'static str,
-        /// The file.
-        path: PathBuf,
-    },
-    /// The document cannot be used.
-    #[error("{reason}, in {what}")]
-    Unsound {
-        /// Its file or name.
-        what: String,
-        /// Why.
-        reason: String,
-    },
-    /// The same document is stored already.
-    #[error("the library has this very {kind} already, as {id}")]
-    AlreadyThere {
-        /// What the document is.
-        kind: &'static str,
-        /// Its id.
-        id: String,
-    },
-    /// A date that is none.
+    #[error("{} holds no {kind} ({reason}); name another file", path.display())]
+    NotOne { kind: &'static str, path: PathBuf, reason: String },
+    #[error("{} was changed after it was stored; a {kind} is never edited, so {renew} to supersede it", path.display())]
+    Changed { kind: &'static str, renew: &'static str, path: PathBuf },
+    #[error("{what}: {reason}")]
+    Unsound { what: String, reason: String },
+    #[error("the library already holds this {kind} as {id}")]
+    AlreadyThere { kind: &'static str, id: String },
     #[error(
-        "the {kind} is dated \"{date}\", which is no RFC 3339 time; write it like 2026-03-05T14:15:00Z"
+        "the {kind} is dated \"{date}\", which is not an RFC 3339 time; write it like 2026-03-05T14:15:00Z"
     )]
-    Date {
-        /// What the document is.
-        kind: &'static str,
-        /// The text.
-        date: String,
-    },
-    /// Nothing of that name.
-    #[error("the library has no {kind} \"{name}\"{known}; {listed} shows them, or give a file")]
-    Unknown {
-        /// What was wanted.
-        kind: &'static str,
-        /// The name.
-        name: String,
-        /// What there is, in words.
-        known: String,
-        /// What shows all.
-        listed: &'static str,
-    },
-    /// Several of that name, none superseding the others.
-    #[error("\"{name}\" may be {}; give the id of one", ids.join(" or "))]
-    Ambiguous {
-        /// The name.
-        name: String,
-        /// Their ids.
-        ids: Vec<String>,
-    },
-    /// The old one has a successor already.
-    #[error("{id} is superseded by {by} already; supersede that one")]
-    Superseded {
-        /// The old one.
-        id: String,
-        /// Its successor.
-        by: String,
-    },
+    Date { kind: &'static str, date: String },
+    #[error(
+        "the library has no {kind} \"{name}\"{known}; look in its folder {folder}, or give a file"
+    )]
+    Unknown { kind: &'static str, name: String, known: String, folder: &'static str },
+    #[error("\"{name}\" names several: {}; give the id of one", ids.join(", "))]
+    Ambiguous { name: String, ids: Vec<String> },
+    #[error("{id} is already superseded by {by}; supersede that one")]
+    Superseded { id: String, by: String },
 }
 
-/// A document in the library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept<D> {
-    /// Its id, the stem of its file.
+    /// The file's name without its ending.
     pub id: String,
-    /// Its file.
     pub path: PathBuf,
-    /// The document.
     pub document: D,
 }
 
 impl<D: Document> Kept<D> {
-    /// CRC-32 of the document as its file has it, eight hexadecimal digits.
+    /// CRC-32 as in the file, eight hexadecimal digits.
     pub fn checksum(&self) -> Option<String> {
         let value = serde_json::to_value(&self.document).ok()?;
         Some(format!("{:08x}", checksum(&value).ok()?))
     }
 }
 
-/// What a library holds.
 #[derive(Debug)]
 pub struct Shelf<D> {
-    /// Every readable one, by id.
     pub kept: Vec<Kept<D>>,
-    /// Why others cannot be read.
     pub unreadable: Vec<LibraryError>,
 }
 
@@ -167,7 +95,7 @@ impl<D> Default for Shelf<D> {
 }
 
 impl<D: Document> Shelf<D> {
-    /// Reads a library; a folder that is not there is empty.
+    /// A missing folder counts as empty.
     #[must_use]
     pub fn open(library: &Path) -> Self {
         let mut shelf = Self::default();
@@ -184,20 +112,20 @@ impl<D: Document> Shelf<D> {
         shelf
     }
 
-    /// The id of the one that took the place of this one.
+    /// Id of the document that supersedes this one.
     pub fn successor(&self, id: &str) -> Option<&str> {
         let by = |one: &&Kept<D>| one.document.supersedes() == Some(id);
         self.kept.iter().find(by).map(|one| one.id.as_str())
     }
 
-    /// The one in force for a rig: of those taken on it that nothing supersedes, the latest by its date.
+    /// The latest document of a rig that is not superseded.
     pub fn in_force(&self, rig: &str) -> Option<&Kept<D>> {
         let own = self.kept.iter().filter(|one| one.document.rig() == rig);
         let open = own.filter(|one| self.successor(&one.id).is_none());
         open.max_by_key(|one| (taken_at(&one.document).ok().flatten(), &one.id))
     }
 
-    /// One by its id, or by a name that only one has which nothing supersedes.
+    /// Finds a document by its id, or by a name that only one document in force has.
     pub fn find(&self, name: &str) -> Result<&Kept<D>, LibraryError> {
         if let Some(exact) = self.kept.iter().find(|one| one.id == name) {
             return Ok(exact);
@@ -209,7 +137,7 @@ impl<D: Document> Shelf<D> {
             [] => Err(LibraryError::Unknown {
                 kind: D::KIND,
                 name: name.to_owned(),
-                listed: D::LISTED,
+                folder: D::FOLDER,
                 known: match self.kept.len() {
                     0 => ", it holds none".to_owned(),
                     count => format!(" among its {count}"),
@@ -227,7 +155,6 @@ fn checksum(document: &Value) -> serde_json::Result<u32> {
     Ok(crc32fast::hash(&serde_json::to_vec(document)?))
 }
 
-/// When a document was taken.
 pub fn taken_at<D: Document>(document: &D) -> Result<Option<DateTime<FixedOffset>>, LibraryError> {
     let parse = |text: &str| {
         DateTime::parse_from_rfc3339(text)
@@ -236,15 +163,14 @@ pub fn taken_at<D: Document>(document: &D) -> Result<Option<DateTime<FixedOffset
     document.taken_at().map(parse).transpose()
 }
 
-/// Whole days from when a document was taken until `now`; `None` where it does not say when.
+/// Whole days between a document's date and `now`; `None` without a date.
 #[must_use]
 pub fn age_days<D: Document>(document: &D, now: DateTime<Utc>) -> Option<i64> {
     let taken = taken_at(document).ok()??;
     Some((now - taken.to_utc()).num_days())
 }
 
-/// Stores a new document and tells its id. Nothing is ever written over; the file is whole whenever it
-/// is there.
+/// Stores a new document atomically; an existing file is never overwritten.
 pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, LibraryError> {
     check(document, document.name())?;
     let day =
@@ -275,7 +201,7 @@ pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, Librar
     }
 }
 
-/// Stores a document that takes the place of another one, which stays as it is.
+/// Stores a document that supersedes `old`; the old file stays as it is.
 pub fn supersede<D: Document>(library: &Path, old: &str, new: &D) -> Result<Kept<D>, LibraryError> {
     let shelf = Shelf::<D>::open(library);
     let old = shelf.find(old)?;
@@ -285,7 +211,7 @@ pub fn supersede<D: Document>(library: &Path, old: &str, new: &D) -> Result<Kept
     save(library, &new.clone().superseding(old.id.clone()))
 }
 
-/// Reads a file of the library and checks that it is what was written, or a bare document.
+/// Reads and verifies a file of the library, or a bare document without checksum.
 pub fn read<D: Document>(path: &Path) -> Result<D, LibraryError> {
     let not_one = |err: serde_json::Error| LibraryError::NotOne {
         kind: D::KIND,
@@ -322,14 +248,14 @@ fn check<D: Document>(document: &D, what: &str) -> Result<(), LibraryError> {
     document.check().map_err(|reason| LibraryError::Unsound { what: what.to_owned(), reason })
 }
 
-/// A name as part of a file's: small letters, digits and single dashes.
+/// A name for a file: lower-case letters, digits and single dashes.
 fn slug(name: &str) -> String {
     let words = name
         .split(|letter: char| !letter.is_ascii_alphanumeric())
         .filter(|word| !word.is_empty())
         .map(str::to_ascii_lowercase);
     let slug = words.collect::<Vec<_>>().join("-");
-    // File names have an end; 40 letters tell one document from another.
+    // 40 letters distinguish documents and stay far below the file system's limit.
     let short: String = slug.chars().take(40).collect();
     if short.is_empty() { "unnamed".into() } else { short }
 }

@@ -1,4 +1,4 @@
-//! Small text files beside a session.
+//! Text files, and checksums of files and texts.
 
 use crate::atomic;
 use sha2::{Digest, Sha256};
@@ -6,18 +6,18 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// The text of a file, or one sentence that names it.
+/// The error is a sentence that names the file.
 pub fn read(path: &Path) -> Result<String, String> {
     fs::read_to_string(path).map_err(|err| format!("cannot read {} ({err})", path.display()))
 }
 
-/// Writes a text over what may be there; the file is the old or the new one, never half of it.
+/// Writes or replaces a file atomically.
 pub fn write(path: &Path, text: &str) -> Result<(), String> {
     atomic::replace(path, text.as_bytes())
         .map_err(|err| format!("cannot write {} ({err})", path.display()))
 }
 
-/// The JSON files of a folder that are not hidden, by name; none where there is no such folder.
+/// The JSON files of a folder, hidden ones excepted, sorted by name; a missing folder has none.
 #[must_use]
 pub fn json_files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
@@ -36,15 +36,31 @@ pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// SHA-256 of a file, as [`sha256`]; it is read in pieces.
+/// SHA-256 of a file, which is read in pieces.
 pub fn sha256_of_file(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
     let mut hasher = Sha256::new();
-    let mut piece = [0; 1 << 16];
+    read_pieces(File::open(path)?, |piece| hasher.update(piece))?;
+    Ok(hex(&hasher.finalize()))
+}
+
+/// CRC-32 of a file, which is read in pieces.
+pub fn crc32_of_file(path: &Path) -> io::Result<u32> {
+    crc32_of(File::open(path)?)
+}
+
+/// CRC-32 of the rest of a stream.
+pub fn crc32_of(from: impl Read) -> io::Result<u32> {
+    let mut hasher = crc32fast::Hasher::new();
+    read_pieces(from, |piece| hasher.update(piece))?;
+    Ok(hasher.finalize())
+}
+
+fn read_pieces(mut from: impl Read, mut take: impl FnMut(&[u8])) -> io::Result<()> {
+    let mut piece = vec![0; 1 << 18];
     loop {
-        match file.read(&mut piece)? {
-            0 => return Ok(hex(&hasher.finalize())),
-            count => hasher.update(&piece[..count]),
+        match from.read(&mut piece)? {
+            0 => return Ok(()),
+            count => take(&piece[..count]),
         }
     }
 }
@@ -59,7 +75,7 @@ pub fn checksum(text: &str) -> String {
     format!("{:08x}", crc32fast::hash(text.as_bytes()))
 }
 
-/// The text of a file, `None` if there is no such file.
+/// `None` if there is no such file.
 pub fn read_if_present(path: &Path) -> io::Result<Option<String>> {
     match fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
@@ -73,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sha_256_is_that_of_the_standard() {
+    fn sha_256_matches_the_standard_example() {
         // The example of one block in FIPS 180-4's examples.
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);

@@ -1,11 +1,12 @@
-//! Recordings of a loop, tick by tick: what it was told and what it answered, so that it can be computed again.
+//! Recordings of a loop, tick by tick with inputs and outputs, so that a replay can recompute it.
 //!
-//! A recording is a folder with two texts. `settings.toml` holds what the loop was made of, as its owner writes it. `ticks.csv`
-//! has a line with the names of the columns, a line for each tick with whole numbers first, every other number in
-//! the shortest decimal form that reads back to the same bits, and at its end `end,` with the count of ticks, those lost, a hash of
-//! what the loop left and a hash of all lines. Without that line the recording was cut off, and is good to its last whole line.
+//! A recording is a folder with two text files. `settings.toml` holds the loop's settings, in the format of its owner.
+//! `ticks.csv` has a line with the column names and a line per tick: integers first, then floats in the shortest decimal form
+//! that reads back to the same bits. The last line is `end,` with the number of ticks, the number of lost ticks, a hash of the
+//! loop's final state, and a hash of all lines. Without that line the recording was cut off and is valid to its last complete
+//! line.
 //!
-//! [`Recorder::push`] neither waits nor allocates: ticks go through a ring, and a thread writes them.
+//! [`Recorder::push`] neither waits nor allocates: a bounded channel takes the ticks to a thread that writes them.
 
 use crate::atomic;
 use std::fs::File;
@@ -17,28 +18,23 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// What the loop was made of.
 pub const SETTINGS: &str = "settings.toml";
-/// Its ticks.
 pub const TICKS: &str = "ticks.csv";
 
-/// Ticks for which the ring has room: eight seconds at 1 kHz, far longer than a disk is away.
-const ROOM: usize = 8192;
+/// Capacity of the channel in ticks: 8 s at 1 kHz, far longer than a disk stalls.
+const CAPACITY: usize = 8192;
 
-/// How long the writing thread sleeps when there is nothing to write.
+/// Sleep of the writing thread when there is nothing to write.
 const NAP: Duration = Duration::from_millis(5);
 
-/// A tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row<const W: usize, const R: usize> {
-    /// Whole numbers.
     pub whole: [u64; W],
-    /// Other numbers.
     pub real: [f64; R],
 }
 
 impl<const W: usize, const R: usize> Row<W, R> {
-    /// The column where this differs from another in any bit; whole numbers come first.
+    /// Index of the first column that differs in any bit; integers come first.
     pub fn differs(&self, other: &Self) -> Option<usize> {
         let whole = self.whole.iter().zip(&other.whole).map(|(a, b)| a != b);
         let real = self.real.iter().zip(&other.real);
@@ -54,7 +50,7 @@ impl<const W: usize, const R: usize> Row<W, R> {
             let _ = write!(line, "{comma}{value}");
         }
         for value in &self.real {
-            // Debug has an exponent where plain digits would be long.
+            // Debug uses an exponent for very large and small numbers.
             let _ = write!(line, ",{value:?}");
         }
         line.push('\n');
@@ -73,43 +69,41 @@ impl<const W: usize, const R: usize> Row<W, R> {
     }
 }
 
-/// What was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recorded {
-    /// Ticks written.
     pub ticks: u64,
-    /// Ticks for which there was no room: after the first of them nothing can be computed again.
+    /// Ticks dropped because the channel was full; a replay ends at the first of them.
     pub lost: u64,
 }
 
-/// Writes ticks while a loop goes on.
+/// Writes ticks while a loop runs.
 #[derive(Debug)]
 pub struct Recorder<const W: usize, const R: usize> {
     ring: SyncSender<Row<W, R>>,
-    lost: Arc<AtomicU64>,
-    thread: JoinHandle<io::Result<Lines>>,
+    dropped: Arc<AtomicU64>,
+    thread: JoinHandle<io::Result<TickFile>>,
     file: PathBuf,
 }
 
-/// A file of lines and the hash of what is in it.
+/// The file of ticks and the hash of its content.
 #[derive(Debug)]
-struct Lines {
+struct TickFile {
     to: BufWriter<File>,
     hash: u64,
     ticks: u64,
 }
 
-impl Lines {
+impl TickFile {
     fn put(&mut self, line: &str) -> io::Result<()> {
-        self.hash = hashed(self.hash, line.as_bytes());
+        self.hash = extend_hash(self.hash, line.as_bytes());
         self.to.write_all(line.as_bytes())
     }
 }
 
-/// FNV-1a: the basis, and one with more bytes.
+/// Offset basis of FNV-1a.
 const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 
-fn hashed(hash: u64, bytes: &[u8]) -> u64 {
+fn extend_hash(hash: u64, bytes: &[u8]) -> u64 {
     let mix = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
     bytes.iter().fold(hash, mix)
 }
@@ -122,64 +116,64 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
         (whole, real): ([&str; W], [&str; R]),
     ) -> Result<Self, String> {
         let file = folder.join(TICKS);
-        let told = |err: io::Error| {
+        let failed = |err: io::Error| {
             format!(
                 "cannot record in {} ({err}); give a new folder that may be written",
                 folder.display()
             )
         };
-        std::fs::create_dir(folder).map_err(told)?;
-        atomic::create(&folder.join(SETTINGS), settings.as_bytes()).map_err(told)?;
-        let mut lines = Lines {
-            to: BufWriter::new(File::create_new(&file).map_err(told)?),
+        std::fs::create_dir(folder).map_err(failed)?;
+        atomic::create(&folder.join(SETTINGS), settings.as_bytes()).map_err(failed)?;
+        let mut lines = TickFile {
+            to: BufWriter::new(File::create_new(&file).map_err(failed)?),
             hash: BASIS,
             ticks: 0,
         };
         let names: Vec<&str> = whole.into_iter().chain(real).collect();
-        lines.put(&(names.join(",") + "\n")).map_err(told)?;
-        let (ring, rows) = sync_channel(ROOM);
+        lines.put(&(names.join(",") + "\n")).map_err(failed)?;
+        let (ring, rows) = sync_channel(CAPACITY);
         let thread = std::thread::Builder::new()
             .name("tick-writer".into())
             .spawn(move || write(lines, &rows))
-            .map_err(told)?;
-        Ok(Self { ring, lost: Arc::new(AtomicU64::new(0)), thread, file })
+            .map_err(failed)?;
+        Ok(Self { ring, dropped: Arc::new(AtomicU64::new(0)), thread, file })
     }
 
-    /// Hands over a tick; where there is no room it is lost, and counted.
+    /// Sends a tick; if the channel is full, drops and counts it.
     pub fn push(&self, row: Row<W, R>) {
         if self.ring.try_send(row).is_err() {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+            self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Writes what is still to be written, and the end with a hash of what the loop left.
-    pub fn finish(self, left: u64) -> Result<Recorded, String> {
-        let Self { ring, lost, thread, file } = self;
+    /// Writes the remaining ticks and the end, with a hash of the loop's final state.
+    pub fn finish(self, state_hash: u64) -> Result<Recorded, String> {
+        let Self { ring, dropped, thread, file } = self;
         drop(ring);
-        let lost = lost.load(Ordering::Relaxed);
+        let lost = dropped.load(Ordering::Relaxed);
         let written =
             thread.join().unwrap_or_else(|_| Err(io::Error::other("the writing thread failed")));
         let ended = written.and_then(|mut lines| {
-            let end = format!("end,{},{lost},{left:016x},", lines.ticks);
-            let hash = hashed(lines.hash, end.as_bytes());
+            let end = format!("end,{},{lost},{state_hash:016x},", lines.ticks);
+            let hash = extend_hash(lines.hash, end.as_bytes());
             lines.put(&format!("{end}{hash:016x}\n"))?;
             lines.to.flush()?;
             Ok(Recorded { ticks: lines.ticks, lost })
         });
         ended.map_err(|err| {
             format!(
-                "cannot write {} ({err}); look for room on the disk and record again",
+                "cannot write {} ({err}); free space on the disk and record again",
                 file.display()
             )
         })
     }
 }
 
-/// Writes until nobody sends any more. It looks now and then instead of waiting, so that nobody has to wake it.
+/// Writes until the sender is dropped. It polls, so that the sender never spends time on waking it.
 fn write<const W: usize, const R: usize>(
-    mut lines: Lines,
+    mut lines: TickFile,
     rows: &Receiver<Row<W, R>>,
-) -> io::Result<Lines> {
+) -> io::Result<TickFile> {
     let mut line = String::new();
     loop {
         match rows.try_recv() {
@@ -189,7 +183,7 @@ fn write<const W: usize, const R: usize>(
                 lines.ticks += 1;
             }
             Err(TryRecvError::Empty) => {
-                // After a crash everything but the last moment is there.
+                // A crash loses only the last moment.
                 lines.to.flush()?;
                 std::thread::sleep(NAP);
             }
@@ -198,34 +192,26 @@ fn write<const W: usize, const R: usize>(
     }
 }
 
-/// How a recording ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// As it should.
     Whole {
-        /// Ticks that were lost.
         lost: u64,
-        /// Hash of what the loop left.
+        /// Hash of the loop's final state.
         left: u64,
     },
-    /// Without its last line.
     CutOff,
 }
 
-/// A recording as it was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording<const W: usize, const R: usize> {
-    /// What the loop was made of.
     pub settings: String,
-    /// Its ticks.
     pub rows: Vec<Row<W, R>>,
-    /// How it ends.
     pub end: End,
 }
 
-/// What the loop of a recording was made of, of which its owner knows what kind it is.
+/// The settings of a recording, whose owner knows their format.
 pub fn read_settings(folder: &Path) -> Result<String, String> {
-    text(&folder.join(SETTINGS))
+    read_text(&folder.join(SETTINGS))
 }
 
 /// Whether the ticks of a recording have these columns.
@@ -233,17 +219,16 @@ pub fn has_columns(folder: &Path, whole: &[&str], real: &[&str]) -> Result<bool,
     let file = folder.join(TICKS);
     let mut head = String::new();
     let read = File::open(&file).and_then(|ticks| BufReader::new(ticks).read_line(&mut head));
-    read.map_err(|err| unread(&file, &err))?;
+    read.map_err(|err| unreadable(&file, &err))?;
     Ok(head.trim_end() == [whole, real].concat().join(","))
 }
 
-fn text(file: &Path) -> Result<String, String> {
-    std::fs::read_to_string(file).map_err(|err| unread(file, &err))
+fn read_text(file: &Path) -> Result<String, String> {
+    std::fs::read_to_string(file).map_err(|err| unreadable(file, &err))
 }
 
-fn unread(file: &Path, err: &std::io::Error) -> String {
-    let called = file.display();
-    format!("cannot read {called} ({err}); give the folder of a recording")
+fn unreadable(file: &Path, err: &io::Error) -> String {
+    format!("cannot read {} ({err}); give the folder of a recording", file.display())
 }
 
 impl<const W: usize, const R: usize> Recording<W, R> {
@@ -251,10 +236,10 @@ impl<const W: usize, const R: usize> Recording<W, R> {
     pub fn read(folder: &Path, (whole, real): ([&str; W], [&str; R])) -> Result<Self, String> {
         let settings = read_settings(folder)?;
         let file = folder.join(TICKS);
-        let all = text(&file)?;
+        let all = read_text(&file)?;
         let damaged = |line: usize, what: &str| {
             format!(
-                "{}, line {line}: {what}; the recording is damaged, take a copy that is not",
+                "{}, line {line}: {what}; the recording is damaged, use an undamaged copy",
                 file.display()
             )
         };
@@ -262,39 +247,39 @@ impl<const W: usize, const R: usize> Recording<W, R> {
         let mut lines = all.split_inclusive('\n').enumerate();
         let head = lines.next().map_or("", |(_, line)| line);
         if head.trim_end() != names.join(",") {
-            return Err(damaged(1, "these are not the columns of such a recording"));
+            return Err(damaged(1, "the columns do not fit this kind of recording"));
         }
-        let mut hash = hashed(BASIS, head.as_bytes());
+        let mut hash = extend_hash(BASIS, head.as_bytes());
         let mut rows = Vec::new();
         while let Some((index, line)) = lines.next() {
             let number = index + 1;
             let Some(content) = line.strip_suffix('\n') else {
-                // Its writer was stopped here.
+                // The recording was cut off here.
                 break;
             };
             if content.starts_with("end,") {
-                let end = ended(content, hash, rows.len());
-                let end = end.ok_or_else(|| damaged(number, "the lines are not those written"))?;
+                let end = parse_end(content, hash, rows.len());
+                let end = end.ok_or_else(|| damaged(number, "the lines were changed"))?;
                 if lines.next().is_some() {
-                    return Err(damaged(number + 1, "something follows the end"));
+                    return Err(damaged(number + 1, "a line follows the end"));
                 }
                 return Ok(Self { settings, rows, end });
             }
-            hash = hashed(hash, line.as_bytes());
-            rows.push(Row::of(content).ok_or_else(|| damaged(number, "this is no tick"))?);
+            hash = extend_hash(hash, line.as_bytes());
+            rows.push(Row::of(content).ok_or_else(|| damaged(number, "it is not a tick"))?);
         }
         Ok(Self { settings, rows, end: End::CutOff })
     }
 }
 
-/// The last line, if its count and hash are those of what was read.
-fn ended(content: &str, hash: u64, count: usize) -> Option<End> {
-    let (said, written) = content.rsplit_once(',')?;
-    let mut parts = said.strip_prefix("end,")?.split(',');
+/// Parses the last line; `None` if its count or hash is wrong.
+fn parse_end(content: &str, hash: u64, count: usize) -> Option<End> {
+    let (counts, written) = content.rsplit_once(',')?;
+    let mut parts = counts.strip_prefix("end,")?.split(',');
     let ticks: usize = parts.next()?.parse().ok()?;
     let lost = parts.next()?.parse().ok()?;
     let left = u64::from_str_radix(parts.next()?, 16).ok()?;
-    let hash = hashed(hash, format!("{said},").as_bytes());
+    let hash = extend_hash(hash, format!("{counts},").as_bytes());
     let is_right = ticks == count && u64::from_str_radix(written, 16).ok()? == hash;
     is_right.then_some(End::Whole { lost, left })
 }
@@ -318,12 +303,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_has_the_bits_that_were_written() {
+    fn recording_reads_back_bit_for_bit() {
         let at = tempfile::tempdir().unwrap();
         let folder = at.path().join("one");
         let values = [0.1, 1e-310, f64::MAX, -0.0, f64::INFINITY, 1.0 / 3.0];
-        let told = recorded(&folder, &values);
-        assert_eq!(told, Recorded { ticks: 6, lost: 0 });
+        let counts = recorded(&folder, &values);
+        assert_eq!(counts, Recorded { ticks: 6, lost: 0 });
         let found = Recording::read(&folder, COLUMNS).unwrap();
         assert_eq!(found.settings, "a = 1\n");
         assert_eq!(found.end, End::Whole { lost: 0, left: 77 });
@@ -331,12 +316,12 @@ mod tests {
             assert_eq!(found.differs(&row(tick as u64, x)), None);
         }
         assert_eq!(row(0, 0.0).differs(&row(0, -0.0)), Some(1));
-        // Not over another.
+        // An existing recording is never overwritten.
         assert!(Recorder::start(&folder, "", COLUMNS).is_err());
     }
 
     #[test]
-    fn a_recording_cut_off_anywhere_is_read_to_its_last_whole_line_and_a_change_is_found() {
+    fn truncated_recording_is_read_to_its_last_line_and_a_change_is_found() {
         let at = tempfile::tempdir().unwrap();
         let folder = at.path().join("one");
         recorded(&folder, &[0.1, 0.2, 0.3]);
@@ -352,24 +337,27 @@ mod tests {
         }
         for (from, to) in [("0.2", "0.4"), ("end,3", "end,2"), ("end,3,0,", "end,3,1,")] {
             std::fs::write(&file, whole.replacen(from, to, 1)).unwrap();
-            let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
-            assert!(said.contains("line 5") && said.contains("damaged"), "{said}");
+            let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+            assert!(reason.contains("line 5") && reason.contains("damaged"), "{reason}");
         }
         std::fs::write(&file, format!("{whole}3,0.4,-2.5")).unwrap();
-        let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
-        assert!(said.contains("line 6: something follows"), "{said}");
+        let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+        assert!(reason.contains("line 6: a line follows"), "{reason}");
         std::fs::write(&file, whole.replacen("0.2", "x", 1)).unwrap();
-        let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
-        assert!(said.contains("line 3"), "{said}");
+        let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+        assert!(reason.contains("line 3"), "{reason}");
     }
 
     #[test]
-    fn ticks_without_room_are_counted_and_a_push_never_waits() {
-        let (ring, rows) = sync_channel(ROOM);
+    fn dropped_ticks_are_counted_and_push_never_waits() {
+        let (ring, rows) = sync_channel(CAPACITY);
         let at = tempfile::tempdir().unwrap();
         let file = at.path().join(TICKS);
-        let lines =
-            Lines { to: BufWriter::new(File::create_new(&file).unwrap()), hash: BASIS, ticks: 0 };
+        let lines = TickFile {
+            to: BufWriter::new(File::create_new(&file).unwrap()),
+            hash: BASIS,
+            ticks: 0,
+        };
         let (go, gone) = sync_channel::<()>(1);
         let thread = std::thread::Builder::new()
             .spawn(move || {
@@ -377,13 +365,13 @@ mod tests {
                 write::<1, 2>(lines, &rows)
             })
             .unwrap();
-        let recorder = Recorder { ring, lost: Arc::default(), thread, file };
-        for tick in 0..ROOM as u64 + 10 {
+        let recorder = Recorder { ring, dropped: Arc::default(), thread, file };
+        for tick in 0..CAPACITY as u64 + 10 {
             recorder.push(row(tick, 1.0));
         }
         go.send(()).unwrap();
-        let told = recorder.finish(0).unwrap();
-        let ticks = ROOM as u64;
-        assert_eq!(told, Recorded { ticks, lost: 10 });
+        let counts = recorder.finish(0).unwrap();
+        let ticks = CAPACITY as u64;
+        assert_eq!(counts, Recorded { ticks, lost: 10 });
     }
 }

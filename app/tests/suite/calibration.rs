@@ -130,7 +130,7 @@ fn mistakes_get_one_sentence() {
         (&["import", "cell.csv", "--name", "p", "--curve", "segments=11"], "11 weights"),
         (&["import", "cell.csv", "--name", "p", "--curve", "spline"], "give best, monotone"),
         (&["import", "cell.csv", "--name", "p", "--tolerance=-1"], "tolerance"),
-        (&["import", "cell.csv", "--name", "p", "--taken-at", "monday"], "no RFC 3339 time"),
+        (&["import", "cell.csv", "--name", "p", "--taken-at", "monday"], "not an RFC 3339 time"),
         (&["supersede", "none", "cell.csv", "--name", "p"], "no calibration \"none\""),
     ] {
         let output = palpate(at, &[&["calibration"][..], args].concat());

@@ -57,7 +57,7 @@ fn every_kind_of_file_gets_the_right_word() {
     assert!(note.contains(&format!("{lost} samples between")), "{note}");
     succeeded(&palpate(at, &["fit", "damaged.recovered"]));
     let again = palpate(at, &["recover", "damaged"]);
-    assert_says(&again, "was recovered before");
+    assert_says(&again, "was already recovered");
     let visit = stdout(&palpate(at, &["doctor", "damaged.recovered"]));
     assert!(visit.contains("healthy"), "{visit}");
 }

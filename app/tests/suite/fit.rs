@@ -153,7 +153,7 @@ fn tables_without_header_or_unit_are_read_when_told_how() {
     assert!(stderr(&time).contains("seconds"));
     assert_eq!(json(&named)["parameters"], json(&time)["parameters"]);
     let wrong = palpate(at, &["fit", "bare.csv", "--columns", "t_s,x_mm"]);
-    assert_refused(&wrong, 2, "is a force");
+    assert_refused(&wrong, 2, "is the force");
 }
 
 #[test]

@@ -1,13 +1,13 @@
-//! Conditions on named values, as people write them: `depth>=2mm`, `ramp.speed=3`, `about.series.id=pilot`.
+//! Conditions on named values, as typed: `depth>=2mm`, `ramp.speed=3`, `about.series.id=pilot`.
 
-use super::entry::{Entry, Named, Source};
+use super::entry::{Entry, NamedValue, Source};
 use palpate_model::quantity::{base_unit, in_base_unit, split};
 use rusqlite::types::Value as Sql;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// How a value is compared. What is no number is only equal or not.
+/// How a value is compared. A text can only be equal or unequal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Relation {
     Equal,
@@ -18,7 +18,7 @@ enum Relation {
     AtLeast,
 }
 
-/// The longer signs come first.
+/// Longer signs come first, because they begin like the shorter ones.
 const SIGNS: [(&str, Relation); 6] = [
     ("<=", Relation::AtMost),
     (">=", Relation::AtLeast),
@@ -56,54 +56,30 @@ impl Relation {
 pub struct Condition {
     source: Option<Source>,
     relation: Relation,
-    /// What is compared with, and under which names.
-    ways: Vec<Way>,
+    /// Several where the text is ambiguous; one suffices.
+    alternatives: Vec<Comparison>,
 }
 
-/// One way to read a condition: `depth_mm>2` may be a value called so, or one called `depth` in mm.
+/// One reading of a condition: `depth_mm>2` may mean a value of that name, or a value `depth` in mm.
 #[derive(Clone, Debug, PartialEq)]
-struct Way {
+struct Comparison {
     name: String,
-    /// Base unit that a value must have if it states one; `None` where any will do.
+    /// Base unit that a value must have if it states one; `None` allows any.
     unit: Option<&'static str>,
-    with: With,
+    /// A real number or a text.
+    value: Sql,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-enum With {
-    Number(f64),
-    Text(String),
-}
-
-/// Something is no condition.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ConditionError {
-    /// No sign of comparison in it, or no name or value beside it.
     #[error(
-        "'{text}' is no condition; write a name, one of = != < <= > >= and a value, as in depth>=2mm"
+        "'{text}' is not a condition; write a name, one of = != < <= > >= and a value, as in depth>=2mm"
     )]
-    Form {
-        /// What was given.
-        text: String,
-    },
-    /// Words are not larger or smaller.
-    #[error("'{value}' in '{text}' is no number, so it can only be = or !=")]
-    Words {
-        /// What was given.
-        text: String,
-        /// The value in it.
-        value: String,
-    },
-    /// A unit of something else.
-    #[error("'{text}' gives two units, {name} and {value}; give one")]
-    Units {
-        /// What was given.
-        text: String,
-        /// The unit at the end of the name.
-        name: String,
-        /// The unit of the value.
-        value: String,
-    },
+    Form { text: String },
+    #[error("'{value}' in '{text}' is not a number; compare it with = or !=")]
+    Words { text: String, value: String },
+    #[error("'{text}' has two units, {name} and {value}; give one")]
+    Units { text: String, name: String, value: String },
 }
 
 impl FromStr for Condition {
@@ -128,82 +104,73 @@ impl FromStr for Condition {
             return Err(form());
         }
         let is_order = !matches!(relation, Relation::Equal | Relation::Unequal);
-        let ways = ways(text, name, value)?;
-        let is_words = |way: &Way| matches!(way.with, With::Text(_));
-        if is_order && ways.iter().all(is_words) {
+        let alternatives = alternatives(text, name, value)?;
+        let is_text = |one: &Comparison| matches!(one.value, Sql::Text(_));
+        if is_order && alternatives.iter().all(is_text) {
             return Err(ConditionError::Words { text: text.to_owned(), value: value.to_owned() });
         }
-        Ok(Self { source, relation, ways })
+        Ok(Self { source, relation, alternatives })
     }
 }
 
-fn ways(text: &str, name: &str, value: &str) -> Result<Vec<Way>, ConditionError> {
-    let way = |name: &str, unit, with| Way { name: name.to_owned(), unit, with };
+fn alternatives(text: &str, name: &str, value: &str) -> Result<Vec<Comparison>, ConditionError> {
+    let comparison = |name: &str, unit, value| Comparison { name: name.to_owned(), unit, value };
     let ending = name.rsplit_once('_').filter(|(stem, _)| !stem.is_empty());
     let ending = ending.and_then(|(stem, unit)| Some((stem, unit, base_unit(unit)?)));
     let of_value = split(value).filter(|(_, unit)| unit.is_empty() || base_unit(unit).is_some());
     let Some((number, unit)) = of_value else {
-        return Ok(vec![way(name, None, With::Text(value.to_owned()))]);
+        return Ok(vec![comparison(name, None, Sql::Text(value.to_owned()))]);
     };
-    let converted = |unit| With::Number(in_base_unit(number, unit).unwrap_or(number));
+    let converted = |unit| Sql::Real(in_base_unit(number, unit).unwrap_or(number));
     match ending {
-        None if unit.is_empty() => Ok(vec![way(name, None, With::Number(number))]),
-        None => Ok(vec![way(name, base_unit(unit), converted(unit))]),
+        None if unit.is_empty() => Ok(vec![comparison(name, None, Sql::Real(number))]),
+        None => Ok(vec![comparison(name, base_unit(unit), converted(unit))]),
         Some((_, own, _)) if !unit.is_empty() && unit != own => Err(ConditionError::Units {
             text: text.to_owned(),
             name: own.to_owned(),
             value: unit.to_owned(),
         }),
-        Some((stem, own, base)) => {
-            Ok(vec![way(name, None, With::Number(number)), way(stem, Some(base), converted(own))])
-        }
+        Some((stem, own, base)) => Ok(vec![
+            comparison(name, None, Sql::Real(number)),
+            comparison(stem, Some(base), converted(own)),
+        ]),
     }
 }
 
 impl Condition {
-    /// Whether a session meets it. The catalog finds the same sessions with [`Condition::sql`].
+    /// Evaluates the condition in memory; [`Condition::sql`] is the same for the database.
     pub fn is_met(&self, entry: &Entry) -> bool {
-        let is_way = |one: &Named, way: &Way| {
-            let is_unit = way.unit.is_none_or(|unit| one.unit.is_empty() || one.unit == unit);
-            let holds = match (&way.with, one.number) {
-                (With::Number(right), Some(left)) => self.relation.holds(left, *right),
-                (With::Text(right), _) => {
-                    (one.text == *right) == (self.relation == Relation::Equal)
-                }
-                (With::Number(_), None) => false,
+        let is_met_by = |one: &NamedValue, comparison: &Comparison| {
+            let is_unit =
+                comparison.unit.is_none_or(|unit| one.unit.is_empty() || one.unit == unit);
+            let holds = match (&comparison.value, one.number) {
+                (Sql::Real(right), Some(left)) => self.relation.holds(left, *right),
+                (Sql::Text(right), _) => (one.text == *right) == (self.relation == Relation::Equal),
+                _ => false,
             };
-            one.name == way.name && is_unit && holds
+            one.name == comparison.name && is_unit && holds
         };
         entry.named.iter().any(|one| {
             self.source.is_none_or(|source| one.source == source)
-                && self.ways.iter().any(|way| is_way(one, way))
+                && self.alternatives.iter().any(|comparison| is_met_by(one, comparison))
         })
     }
 
-    /// The same as a condition on the table of sessions, and its values in order.
+    /// The condition as SQL on the table of sessions; appends its values.
     pub(super) fn sql(&self, values: &mut Vec<Sql>) -> String {
-        let mut ways = Vec::new();
-        for way in &self.ways {
-            values.push(way.name.clone().into());
+        let mut alternatives = Vec::new();
+        for comparison in &self.alternatives {
+            values.push(comparison.name.clone().into());
             let mut text = "name = ?".to_owned();
-            if let Some(unit) = way.unit {
+            if let Some(unit) = comparison.unit {
                 values.push(unit.to_owned().into());
                 text += " AND unit IN ('', ?)";
             }
-            let sign = self.relation.sign();
-            text += &match &way.with {
-                With::Number(number) => {
-                    values.push((*number).into());
-                    format!(" AND number {sign} ?")
-                }
-                With::Text(words) => {
-                    values.push(words.clone().into());
-                    format!(" AND text {sign} ?")
-                }
-            };
-            ways.push(format!("({text})"));
+            let column = if matches!(comparison.value, Sql::Text(_)) { "text" } else { "number" };
+            values.push(comparison.value.clone());
+            alternatives.push(format!("({text} AND {column} {} ?)", self.relation.sign()));
         }
-        let mut sql = format!("({})", ways.join(" OR "));
+        let mut sql = format!("({})", alternatives.join(" OR "));
         if let Some(source) = self.source {
             values.push(source.name().to_owned().into());
             sql += " AND source = ?";
@@ -211,11 +178,10 @@ impl Condition {
         format!("id IN (SELECT session FROM named WHERE {sql})")
     }
 
-    /// Whether values of these names are known at all, whatever they are and in whatever unit, as a condition on the table
-    /// of named values.
+    /// SQL on the table of named values that selects the names of this condition, whatever their values and units.
     pub(super) fn sql_of_names(&self, values: &mut Vec<Sql>) -> String {
-        values.extend(self.ways.iter().map(|way| Sql::from(way.name.clone())));
-        let mut sql = vec!["?"; self.ways.len()].join(", ");
+        values.extend(self.alternatives.iter().map(|one| Sql::from(one.name.clone())));
+        let mut sql = vec!["?"; self.alternatives.len()].join(", ");
         sql = format!("name IN ({sql})");
         if let Some(source) = self.source {
             values.push(source.name().to_owned().into());
@@ -224,26 +190,26 @@ impl Condition {
         sql
     }
 
-    /// What is compared, as it was named.
+    /// The compared value's name, as typed.
     pub(super) fn name(&self) -> &str {
-        &self.ways[0].name
+        &self.alternatives[0].name
     }
 
-    /// The units that a value may be in; empty where any will do.
+    /// The units that a value may have; empty if any.
     pub(super) fn units(&self) -> Vec<&'static str> {
-        if self.ways.iter().any(|way| way.unit.is_none()) {
-            return Vec::new();
-        }
-        self.ways.iter().filter_map(|way| way.unit).collect()
+        let units: Option<Vec<_>> = self.alternatives.iter().map(|one| one.unit).collect();
+        units.unwrap_or_default()
     }
 }
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let way = &self.ways[0];
-        match &way.with {
-            With::Number(number) => write!(f, "{} {} {number}", way.name, self.relation.sign()),
-            With::Text(words) => write!(f, "{} {} {words}", way.name, self.relation.sign()),
+        let Comparison { name, value, .. } = &self.alternatives[0];
+        write!(f, "{name} {} ", self.relation.sign())?;
+        match value {
+            Sql::Real(number) => write!(f, "{number}"),
+            Sql::Text(words) => f.write_str(words),
+            _ => Ok(()),
         }
     }
 }
@@ -253,7 +219,7 @@ mod tests {
     use super::*;
 
     fn entry(named: &[(&str, Option<f64>, &str, &str)]) -> Entry {
-        let named = named.iter().map(|(name, number, unit, text)| Named {
+        let named = named.iter().map(|(name, number, unit, text)| NamedValue {
             source: Source::Plan,
             name: (*name).to_owned(),
             number: *number,
@@ -295,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_condition_is_told() {
+    fn malformed_conditions_are_refused() {
         for text in ["", "depth", "=3", "depth=", "depth~3", "!depth", "plan.=3"] {
             assert!(
                 matches!(text.parse::<Condition>(), Err(ConditionError::Form { .. })),

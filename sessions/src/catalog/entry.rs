@@ -1,9 +1,9 @@
-//! What the catalog knows of one session. All of it comes from the session's folder.
+//! The catalog's entry of a session, made from the session's folder.
 
 use super::heads::KnownHeads;
-use super::walk::Place;
+use super::walk::LibrarySession;
 use crate::analyses::{Analysed, Analyses};
-use crate::chain::Head;
+use crate::chain::ChainHead;
 use crate::edits::{Edits, Review, Verdict};
 use crate::log::Summary;
 use crate::manifest::Manifest;
@@ -13,91 +13,72 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// One session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Its folder below the library, with `/` between.
+    /// Path of the folder below the library, separated by `/`.
     pub folder: String,
-    /// Its name; empty where it cannot be read, as is all that follows but `trouble`.
+    /// Empty, like everything below except `trouble`, if the session cannot be read.
     pub session_id: String,
     /// Start, UTC, RFC 3339 to the millisecond.
     pub started_at: String,
-    /// Who measured.
     pub operator: String,
-    /// What was indented.
     pub specimen: String,
-    /// The probe, in words.
     pub indenter: String,
-    /// Name of the protocol.
     pub protocol: String,
     /// Version of the protocol, where it has one.
     pub protocol_version: Option<u64>,
     /// Title of the protocol, where it has one.
     pub protocol_title: String,
-    /// Name of the rig.
     pub rig: String,
     /// The rig, as it describes itself.
     pub rig_identity: String,
-    /// Name of the load-cell calibration.
     pub calibration: String,
-    /// Serial number of the load cell, where the calibration tells it.
+    /// Serial number of the load cell, if the calibration has one.
     pub cell: String,
     /// SHA-256 of the compact JSON of the calibration, keys in alphabetical order; empty without one.
     pub calibration_sha256: String,
-    /// Version of the program that recorded.
     pub software_version: String,
     /// Samples up to the last whole chunk.
     pub samples: u64,
-    /// Session time of the end or, without one, of the last sample, in s.
+    /// Session time in s of the end or, without an end, of the last sample.
     pub duration_s: f64,
-    /// Bytes of the log.
     pub bytes: u64,
     /// Whether it was recorded here, imported, or recovered.
     pub origin: Origin,
-    /// How it ended; `None` if it was interrupted or is being recorded.
+    /// `None` if the recording was interrupted or is in progress.
     pub ending: Option<String>,
-    /// Why it ended.
     pub reason: String,
-    /// What it is worth, by the last verdict.
     pub verdict: Option<Verdict>,
-    /// Why.
     pub verdict_reason: String,
-    /// The last review, and which of edits and analyses have changed since; that the log has not is for
-    /// `palpate info`, which reads all of it.
+    /// The last review, compared with the edits and analyses; `palpate info`, which reads the whole log, compares that
+    /// too.
     pub review: Option<Review>,
     /// Words by which it is found.
     pub tags: Vec<String>,
-    /// The analyses that count.
-    pub analyses: Vec<Made>,
-    /// What can be searched by name: parameters of the protocol, what was told, parameters of its fits.
-    pub named: Vec<Named>,
-    /// Other words of it: acknowledgements, reasons of edits.
+    pub analyses: Vec<CatalogAnalysis>,
+    /// Values to search by name: protocol parameters, facts about specimen and series, fitted parameters.
+    pub named: Vec<NamedValue>,
+    /// Further text to search: acknowledgements, authors and reasons of edits and analyses.
     pub words: Vec<String>,
-    /// Why it cannot be read, or not all of it.
+    /// Why the session, or a part of it, cannot be read.
     pub trouble: Option<String>,
-    /// How far its edits and its analyses go, or went when there were most: what confirms that none was taken away.
-    pub heads: Heads,
+    /// Heads of edits and analyses; if lines are missing now, the heads from before.
+    pub heads: SessionHeads,
 }
 
-/// How far the files of lines beside a log go.
+/// Heads of the JSON-lines files beside a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Heads {
-    /// Its edits.
-    pub edits: Head,
-    /// Its analyses.
-    pub analyses: Head,
+pub struct SessionHeads {
+    pub edits: ChainHead,
+    pub analyses: ChainHead,
 }
 
-/// An analysis of a session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Made {
-    /// Its name.
+pub struct CatalogAnalysis {
     pub name: String,
     /// `fit`, `recalibration` or `mask`.
     pub what: String,
-    /// When.
     pub at: DateTime<Utc>,
-    /// By whom.
     pub by: String,
 }
 
@@ -105,64 +86,58 @@ pub struct Made {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Origin {
-    /// Recorded on a rig.
     #[default]
     Recorded,
-    /// Made of another program's file.
+    /// Made from another program's file.
     Imported,
-    /// What could be kept of a damaged or interrupted one.
+    /// The readable part of a damaged or interrupted session.
     Recovered,
 }
 
 palpate_model::named! {
-    /// Where a named value stands.
+    /// Origin of a named value.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Source {
-        /// In the protocol.
         Plan = "plan",
-        /// Among the facts about specimen, probe and series.
+        /// The facts about specimen, probe and series.
         About = "about",
-        /// A fitted parameter.
         Fit = "fit",
     }
 }
 
-/// A value with a name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Named {
-    /// Where it stands.
+pub struct NamedValue {
     pub source: Source,
-    /// Its name: a parameter such as `depth`, the key of a step such as `ramp.depth`, a key of what is told.
+    /// A parameter such as `depth`, a key of a step such as `ramp.depth`, or a key of the facts.
     pub name: String,
-    /// The number, in `unit`; `None` for words.
+    /// In `unit`; `None` for text.
     pub number: Option<f64>,
-    /// Base unit of the number; empty for a count and where the name alone tells it.
+    /// Base unit of the number; empty for a count, or where the name implies it.
     pub unit: String,
-    /// As it was written.
     pub text: String,
 }
 
+impl NamedValue {
+    fn new(source: Source, name: &str, number: (Option<f64>, &str), text: String) -> Self {
+        let (number, unit) = (number.0, number.1.to_owned());
+        Self { source, name: name.to_owned(), number, unit, text }
+    }
+}
+
 impl Entry {
-    /// Reads a session. One that cannot be read has its reason in `trouble`, as has one that lacks lines that are known to
-    /// have been there.
-    pub(super) fn read(place: &Place, known: &KnownHeads) -> Self {
-        let mut entry = Self { folder: place.name.clone(), ..Self::default() };
-        match Summary::read(&place.path) {
-            Ok(summary) => {
-                entry.take_manifest(&summary.manifest);
-                entry.take_summary(&summary);
-            }
-            Err(err) => {
-                entry.trouble = Some(err.to_string());
-                return entry;
-            }
+    /// Reads a session. `trouble` says why one cannot be read, or which known lines are missing.
+    pub(super) fn read(session: &LibrarySession, known: &KnownHeads) -> Self {
+        let mut entry = Self { folder: session.name.clone(), ..Self::default() };
+        match Summary::read(&session.path) {
+            Ok(summary) => entry.take_summary(&summary),
+            Err(err) => return Self { trouble: Some(err.to_string()), ..entry },
         }
         let id = &entry.session_id;
-        let heads = known.of_session(&place.name, id);
+        let heads = known.of_session(&session.name, id);
         entry.heads = heads;
-        let edits = Edits::read_since(&place.path, id, heads.edits);
-        let analyses = Analyses::read_since(&place.path, id, heads.analyses);
+        let edits = Edits::read_since(&session.path, id, heads.edits);
+        let analyses = Analyses::read_since(&session.path, id, heads.analyses);
         let mut trouble = Vec::new();
         let analyses = analyses.unwrap_or_else(|err| {
             trouble.push(err.to_string());
@@ -179,6 +154,7 @@ impl Entry {
     }
 
     fn take_summary(&mut self, summary: &Summary) {
+        self.take_manifest(&summary.manifest);
         self.samples = summary.samples;
         self.duration_s = summary.last.seconds().0;
         self.bytes = summary.bytes;
@@ -224,30 +200,18 @@ impl Entry {
         if let Some(values) = plan["source"]["values"].as_object() {
             named.extend(values.iter().map(|(name, value)| {
                 let text = text(value);
-                let (number, unit) = number_of(&text);
-                Named {
-                    source: Source::Plan,
-                    name: name.clone(),
-                    number,
-                    unit: unit.to_owned(),
-                    text,
-                }
+                NamedValue::new(Source::Plan, name, number_of(&text), text)
             }));
         }
         for step in plan["steps"].as_array().into_iter().flatten() {
             let name = step["step"].as_str().unwrap_or("step");
-            leaves(name, step, &mut named);
+            collect_leaves(name, step, &mut named);
         }
         for (name, text) in manifest.about.lines() {
-            named.push(Named {
-                source: Source::About,
-                name: name.to_owned(),
-                number: manifest.about.get(name).and_then(Value::as_f64),
-                unit: String::new(),
-                text,
-            });
+            let number = manifest.about.get(name).and_then(Value::as_f64);
+            named.push(NamedValue::new(Source::About, name, (number, ""), text));
         }
-        // Steps are repeated; what they say is said once.
+        // Repeated steps have the same values.
         let mut seen = BTreeSet::new();
         named.retain(|one| seen.insert((one.source, one.name.clone(), one.text.clone())));
         self.named = named;
@@ -270,7 +234,7 @@ impl Entry {
     fn take_analyses(&mut self, analyses: &Analyses) {
         for one in analyses.counting() {
             self.words.extend([one.by.clone(), one.reason.clone()]);
-            self.analyses.push(Made {
+            self.analyses.push(CatalogAnalysis {
                 name: one.name.clone(),
                 what: one.what.word().to_owned(),
                 at: one.at,
@@ -278,12 +242,12 @@ impl Entry {
             });
             if let Analysed::Fit { results, .. } = &one.what {
                 let parameters = results["parameters"].as_array();
-                self.named.extend(parameters.into_iter().flatten().filter_map(fitted));
+                self.named.extend(parameters.into_iter().flatten().filter_map(fitted_value));
             }
         }
     }
 
-    /// Everything in it that is words, for the search of any of them.
+    /// All text of the entry, for the full-text search.
     pub(super) fn text(&self) -> String {
         let own = [
             &self.folder,
@@ -311,46 +275,37 @@ impl Entry {
     }
 }
 
-/// A parameter of a fit, as `palpate fit --json` prints it.
-fn fitted(parameter: &Value) -> Option<Named> {
+/// A parameter in a fit's report, as `palpate fit --json` prints it.
+fn fitted_value(parameter: &Value) -> Option<NamedValue> {
     let number = parameter["value"].as_f64()?;
-    Some(Named {
-        source: Source::Fit,
-        name: parameter["name"].as_str()?.to_owned(),
-        number: Some(number),
-        unit: parameter["unit"].as_str().unwrap_or_default().to_owned(),
-        text: number.to_string(),
-    })
+    let unit = parameter["unit"].as_str().unwrap_or_default();
+    let name = parameter["name"].as_str()?;
+    Some(NamedValue::new(Source::Fit, name, (Some(number), unit), number.to_string()))
 }
 
-/// The number in a text such as `20 mm`, in its base unit; none where it is anything else.
+/// The number in a text such as `20 mm`, converted to its base unit.
 fn number_of(text: &str) -> (Option<f64>, &'static str) {
-    match split(text) {
-        Some((number, "")) => (Some(number), ""),
-        Some((number, unit)) => match (in_base_unit(number, unit), base_unit(unit)) {
-            (Some(number), Some(unit)) => (Some(number), unit),
-            _ => (None, ""),
-        },
-        None => (None, ""),
+    let Some((number, unit)) = split(text) else { return (None, "") };
+    match (in_base_unit(number, unit), base_unit(unit)) {
+        _ if unit.is_empty() => (Some(number), ""),
+        (Some(number), Some(unit)) => (Some(number), unit),
+        _ => (None, ""),
     }
 }
 
-/// Every number, word and truth in a step of a plan, by the keys that lead to it.
-fn leaves(name: &str, value: &Value, named: &mut Vec<Named>) {
+/// Collects every number, text and Boolean of a step, named by the path of keys.
+fn collect_leaves(name: &str, value: &Value, named: &mut Vec<NamedValue>) {
     match value {
         Value::Object(inner) => {
             for (key, value) in inner.iter().filter(|(key, _)| *key != "step") {
-                leaves(&format!("{name}.{key}"), value, named);
+                collect_leaves(&format!("{name}.{key}"), value, named);
             }
         }
-        Value::Number(_) | Value::String(_) | Value::Bool(_) => named.push(Named {
-            source: Source::Plan,
-            name: name.to_owned(),
-            number: value.as_f64(),
-            unit: String::new(),
-            text: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
-        }),
-        Value::Array(items) => items.iter().for_each(|item| leaves(name, item, named)),
+        Value::Number(_) | Value::String(_) | Value::Bool(_) => {
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            named.push(NamedValue::new(Source::Plan, name, (value.as_f64(), ""), text));
+        }
+        Value::Array(items) => items.iter().for_each(|item| collect_leaves(name, item, named)),
         Value::Null => {}
     }
 }

@@ -1,27 +1,25 @@
-//! How far files of lines went when the catalog last read them: what notices that lines were taken off the end together
-//! with the [`Head`] beside them.
+//! Heads of JSON-lines files as of the last update. They reveal that lines were cut off together with the [`ChainHead`]
+//! beside the file.
 //!
-//! Recorded are the edits and the analyses of every session, the daily checks of every rig and the journals of programmes
-//! in the library. It is the one thing that the catalog does not only repeat, so it stays when the catalog is rebuilt and
-//! when another version of palpate replaces the tables.
+//! The catalog records the edits and analyses of every session, the daily checks of every rig, and the journals of
+//! programmes. These heads are its only original data, so they survive a rebuild and a change of the catalog's version.
 //!
-//! It notices a file that is shorter or other than at the last update, whatever became of the head beside it. Not noticed
-//! is what was added and cut again between two updates, what was cut in a folder that was moved or renamed since, a programme
-//! whose whole folder is gone, and anything by somebody who also deletes or rewrites the catalog: it then knows only
-//! what it finds. A library that may not be written is never remembered.
+//! Unnoticed remain lines that were added and cut again between two updates, cuts in a folder that was moved or renamed
+//! since, a deleted programme folder, and any change together with a deletion or rewrite of the catalog. In a library
+//! without write permission nothing is recorded.
 
-use super::entry::{Entry, Heads};
+use super::entry::{Entry, SessionHeads};
+use super::schema::{bad_text, collect_rows};
 use super::update::entry_of;
 use super::walk::stamp;
 use super::{Catalog, CatalogError};
 use crate::analyses::ANALYSES_FILE;
-use crate::chain::{self, Head};
+use crate::chain::{self, ChainHead};
 use crate::checks::CHECKS_FOLDER;
 use crate::edits::EDITS_FILE;
 use crate::folder::PROGRAMMES_FOLDER;
 use crate::journal::JOURNAL_FILE;
 use crate::text::checksum;
-use rusqlite::types::Type;
 use rusqlite::{Connection, Row, params};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,45 +27,42 @@ use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-/// Longest first line that is looked at.
+/// Longest first line that is read, in bytes.
 const LINE_BYTES_MAX: u64 = 1 << 20;
 
-/// A file of lines that the catalog has read.
+/// The head of a JSON-lines file as of the last update.
 #[derive(Clone, Debug)]
 pub(super) struct RecordedHead {
-    /// Its path below the library, with `/` between.
+    /// Path below the library, separated by `/`.
     file: String,
-    /// What it belongs to: a session's id, a rig, or the journal's own name.
+    /// Seed of the file's checksums: a session's id, a rig, or the journal's name.
     name: String,
-    head: Head,
-    /// Size and time of change; empty where it is not asked for.
+    head: ChainHead,
+    /// Size and modification time; empty for files of a session, whose fingerprint has them.
     stamp: String,
 }
 
-/// All of them, by path.
 #[derive(Debug, Default)]
 pub(super) struct KnownHeads(BTreeMap<String, Vec<RecordedHead>>);
 
 impl KnownHeads {
-    /// How far a file went that belongs to `name`.
-    pub fn of(&self, file: &str, name: &str) -> Head {
+    pub fn of(&self, file: &str, name: &str) -> ChainHead {
         let own = self.0.get(file).into_iter().flatten().find(|one| one.name == name);
         own.map(|one| one.head).unwrap_or_default()
     }
 
-    /// How far the files of a session went.
-    pub fn of_session(&self, folder: &str, session_id: &str) -> Heads {
-        let [edits, analyses] = beside(folder).map(|file| self.of(&file, session_id));
-        Heads { edits, analyses }
+    pub fn of_session(&self, folder: &str, session_id: &str) -> SessionHeads {
+        let [edits, analyses] = session_files(folder).map(|file| self.of(&file, session_id));
+        SessionHeads { edits, analyses }
     }
 }
 
-/// The files of lines in a session's folder.
-fn beside(folder: &str) -> [String; 2] {
+/// The JSON-lines files of a session.
+fn session_files(folder: &str) -> [String; 2] {
     [EDITS_FILE, ANALYSES_FILE].map(|name| format!("{folder}/{name}"))
 }
 
-/// The file of lines of a rig's checks or a programme, which is in no session's folder.
+/// A JSON-lines file outside session folders: a rig's checks, or a programme's journal.
 struct LineFile<'a> {
     library: &'a Path,
     file: &'a str,
@@ -76,10 +71,10 @@ struct LineFile<'a> {
 impl LineFile<'_> {
     fn stamp(&self) -> String {
         let path = self.library.join(self.file);
-        stamp(&path, "lines") + &stamp(&Head::file_of(&path), "head")
+        stamp(&path, "lines") + &stamp(&ChainHead::file_of(&path), "head")
     }
 
-    /// What it belongs to, by its first line; none where that has no checksum, as in an old journal.
+    /// Seed of the checksums, from the first line; `None` for a line without checksum, as in old journals.
     fn name(&self) -> Option<String> {
         let mut line = Vec::new();
         let file = File::open(self.library.join(self.file)).ok()?;
@@ -94,7 +89,6 @@ impl LineFile<'_> {
 }
 
 impl Catalog {
-    /// The recorded head of every file.
     pub(super) fn heads(&self) -> Result<KnownHeads, CatalogError> {
         let mut known = KnownHeads::default();
         for one in read(&self.db).map_err(self.failed())? {
@@ -103,14 +97,14 @@ impl Catalog {
         Ok(known)
     }
 
-    /// Reads the changed files of lines outside sessions. Returns how far each goes and, by file, what is wrong.
+    /// Verifies changed JSON-lines files outside sessions. Returns their heads, and pairs of file and error.
     pub(super) fn confirm(
         &self,
         known: &KnownHeads,
         is_stamp_enough: bool,
     ) -> (Vec<RecordedHead>, Vec<(String, String)>) {
         let (mut read, mut wrong) = (Vec::new(), Vec::new());
-        let mut files = self.files_of_lines();
+        let mut files = self.line_files();
         files.extend(known.0.keys().filter(|file| self.is_expected(file)).cloned());
         for file in files {
             let lines = LineFile { library: &self.library, file: &file };
@@ -130,14 +124,14 @@ impl Catalog {
         (read, wrong)
     }
 
-    /// Whether a file that is remembered ought to be there: of checks always, of a programme as long as its folder is.
+    /// Whether a recorded file must exist: checks always, a journal while its folder exists.
     fn is_expected(&self, file: &str) -> bool {
         let top = file.split('/').next();
         let folder = || self.library.join(file).parent().is_some_and(Path::is_dir);
         top == Some(CHECKS_FOLDER) || (top == Some(PROGRAMMES_FOLDER) && folder())
     }
 
-    fn files_of_lines(&self) -> BTreeSet<String> {
+    fn line_files(&self) -> BTreeSet<String> {
         let names = |folder: &str| {
             let items = fs::read_dir(self.library.join(folder)).into_iter().flatten().flatten();
             items.filter_map(|item| item.file_name().into_string().ok())
@@ -151,8 +145,8 @@ impl Catalog {
     }
 }
 
-/// Remembers how far a file goes. What is remembered of more lines stays.
-pub(super) fn remember(db: &Connection, one: &RecordedHead) -> rusqlite::Result<()> {
+/// Records a head, unless one with more lines is recorded.
+pub(super) fn record_head(db: &Connection, one: &RecordedHead) -> rusqlite::Result<()> {
     let RecordedHead { file, name, head, stamp } = one;
     db.prepare_cached(
         "INSERT INTO head (file, name, lines, last, stamp, checksum) VALUES (?, ?, ?, ?, ?, ?)
@@ -164,15 +158,14 @@ pub(super) fn remember(db: &Connection, one: &RecordedHead) -> rusqlite::Result<
     .map(|_| ())
 }
 
-/// Remembers the files of a session.
-pub(super) fn remember_session(db: &Connection, entry: &Entry) -> rusqlite::Result<()> {
-    of_entry(entry).iter().try_for_each(|one| remember(db, one))
+pub(super) fn record_session_heads(db: &Connection, entry: &Entry) -> rusqlite::Result<()> {
+    of_entry(entry).iter().try_for_each(|one| record_head(db, one))
 }
 
 fn of_entry(entry: &Entry) -> Vec<RecordedHead> {
-    let Heads { edits, analyses } = entry.heads;
-    let heads = beside(&entry.folder).into_iter().zip([edits, analyses]);
-    let has_lines = |(_, head): &(String, Head)| head.lines > 0;
+    let SessionHeads { edits, analyses } = entry.heads;
+    let heads = session_files(&entry.folder).into_iter().zip([edits, analyses]);
+    let has_lines = |(_, head): &(String, ChainHead)| head.lines > 0;
     let name = &entry.session_id;
     heads
         .filter(has_lines)
@@ -180,35 +173,29 @@ fn of_entry(entry: &Entry) -> Vec<RecordedHead> {
         .collect()
 }
 
-/// What a catalog of another version remembers, as far as that can be understood.
+/// Heads from a catalog of another version, as far as they are readable.
 pub(super) fn heads_of_other_version(db: &Connection) -> Vec<RecordedHead> {
-    let entries = || -> rusqlite::Result<Vec<RecordedHead>> {
-        let mut statement = db.prepare("SELECT entry, checksum FROM session")?;
-        let entries = statement.query_map([], entry_of)?;
-        Ok(entries.flatten().flat_map(|entry| of_entry(&entry)).collect())
-    };
-    read(db).or_else(|_| entries()).unwrap_or_default()
+    // Older versions have no table `head`, but heads in their entries.
+    let sql = "SELECT entry, checksum FROM session";
+    let entries = || collect_rows(db, sql, [], |row| Ok(entry_of(row).ok()));
+    let of_entries =
+        |entries: Vec<Option<Entry>>| entries.iter().flatten().flat_map(of_entry).collect();
+    read(db).or_else(|_| entries().map(of_entries)).unwrap_or_default()
 }
 
 fn read(db: &Connection) -> rusqlite::Result<Vec<RecordedHead>> {
-    let mut statement =
-        db.prepare_cached("SELECT file, name, lines, last, stamp, checksum FROM head")?;
-    statement.query_map([], remembered)?.collect()
+    collect_rows(db, "SELECT file, name, lines, last, stamp, checksum FROM head", [], parse_head)
 }
 
-fn remembered(row: &Row<'_>) -> rusqlite::Result<RecordedHead> {
-    let head = Head { lines: row.get::<_, i64>(2)?.unsigned_abs(), checksum: row.get(3)? };
+fn parse_head(row: &Row<'_>) -> rusqlite::Result<RecordedHead> {
+    let head = ChainHead { lines: row.get::<_, i64>(2)?.unsigned_abs(), checksum: row.get(3)? };
     let one = RecordedHead { file: row.get(0)?, name: row.get(1)?, head, stamp: row.get(4)? };
     match sum(&one.file, &one.name, head) == row.get::<_, String>(5)? {
         true => Ok(one),
-        false => Err(rusqlite::Error::FromSqlConversionFailure(
-            0,
-            Type::Text,
-            "what is remembered of a file is not as it was written".into(),
-        )),
+        false => Err(bad_text("a recorded head has a wrong checksum")),
     }
 }
 
-fn sum(file: &str, name: &str, head: Head) -> String {
+fn sum(file: &str, name: &str, head: ChainHead) -> String {
     checksum(&format!("{file}\n{name}\n{} {}", head.lines, head.checksum))
 }

@@ -1,75 +1,61 @@
-//! What is known of a specimen, a rig or a load cell over time: its sessions with all that was said of them,
-//! the rig's daily checks and compliances, and the calibrations of rig and cell.
+//! History of a specimen, a rig or a load cell: sessions with edits and analyses, daily checks, machine compliances and
+//! calibrations.
 
-use super::entry::Made;
+use super::entry::CatalogAnalysis;
 use super::search::{Order, Query};
 use super::{Catalog, CatalogError};
 use crate::checks::read_checks_since;
 use crate::edits::{Change, Edit, Edits};
+use crate::manifest::format_utc;
 use crate::shelf::{Document, Shelf, taken_at};
-use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use serde::Serialize;
 
-/// Whose history it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Subject {
-    /// What was indented.
     Specimen,
-    /// A rig, by its name.
     Rig,
     /// A load cell, by its serial number.
     Cell,
 }
 
-/// Something that happened.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
-    /// When, UTC, RFC 3339 to the millisecond; empty where nobody knows.
+    /// UTC, RFC 3339 to the millisecond; empty if unknown.
     pub at: String,
     /// `session`, `verdict`, `contact`, `tags`, `note`, `review`, `fit`, `recalibration`, `mask`,
     /// `calibration`, `compliance` or `check`.
     pub what: String,
-    /// Folder of the session below the library; empty for what is of no session.
+    /// Folder of the session below the library; empty for an event outside sessions.
     pub folder: String,
-    /// By whom; empty where nobody is told.
+    /// Author; empty if unknown.
     pub by: String,
-    /// What, in words.
     pub sentence: String,
 }
 
-fn stamp(at: DateTime<Utc>) -> String {
-    at.to_rfc3339_opts(SecondsFormat::Millis, true)
-}
-
 impl Catalog {
-    /// The history of one of them, oldest first, and sentences about what cannot be read. The catalog is
-    /// taken as it is: see [`Catalog::update`].
+    /// Events as of the last [`Catalog::update`], oldest first, and one sentence for each unreadable file.
     pub fn history(
         &self,
         subject: Subject,
         name: &str,
     ) -> Result<(Vec<Event>, Vec<String>), CatalogError> {
-        let wanted = Some(name.to_owned());
+        let criterion = Some(name.to_owned());
         let mut query = Query { order: Order::Started, ..Query::default() };
         match subject {
-            Subject::Specimen => query.specimen = wanted,
-            Subject::Rig => query.rig = wanted,
-            Subject::Cell => query.cell = wanted,
+            Subject::Specimen => query.specimen = criterion,
+            Subject::Rig => query.rig = criterion,
+            Subject::Cell => query.cell = criterion,
         }
         let (mut events, mut remarks) = (Vec::new(), Vec::new());
         for entry in self.find(&query)?.entries {
             let ending = entry.ending.as_deref().unwrap_or("no end");
-            events.push(Event {
-                at: entry.started_at.clone(),
-                what: "session".into(),
-                folder: entry.folder.clone(),
-                by: entry.operator.clone(),
-                sentence: format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s),
-            });
-            // What of it cannot be read, its edits among them, is in the entry.
+            let sentence = format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s);
+            let (at, folder) = (entry.started_at.clone(), &entry.folder);
+            events.push(Event::new(at, "session", folder, &entry.operator, sentence));
+            // The entry's `trouble` reports unreadable edits.
             if let Ok(edits) = Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
                 events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)));
             }
@@ -77,7 +63,7 @@ impl Catalog {
             events.extend(entry.analyses.iter().map(|one| Event::made(&entry.folder, one)));
         }
         let calibrations = Shelf::<Calibration>::open(&self.library);
-        documents(&calibrations, &mut events, &mut remarks, |one| {
+        add_documents(&calibrations, &mut events, &mut remarks, |one| {
             let is_its = match subject {
                 Subject::Specimen => false,
                 Subject::Rig => one.rig == name,
@@ -86,58 +72,53 @@ impl Catalog {
             is_its.then(|| one.operator.clone())
         });
         let compliances = Shelf::<RigCompliance>::open(&self.library);
-        documents(&compliances, &mut events, &mut remarks, |one| {
+        add_documents(&compliances, &mut events, &mut remarks, |one| {
             (subject == Subject::Rig && one.rig == name).then(|| one.operator.clone())
         });
         if subject == Subject::Rig {
             let heads = self.heads()?;
             match read_checks_since(&self.library, name, |file| heads.of(file, name)) {
-                Ok(checks) => events.extend(checks.iter().map(|one| Event {
-                    at: stamp(one.at),
-                    what: "check".into(),
-                    folder: String::new(),
-                    by: one.by.clone(),
-                    sentence: match one.is_passed {
+                Ok(checks) => events.extend(checks.iter().map(|one| {
+                    let sentence = match one.is_passed {
                         true => "daily check passed".to_owned(),
                         false => format!("daily check failed: {}", one.failures()),
-                    },
+                    };
+                    Event::new(format_utc(one.at), "check", "", &one.by, sentence)
                 })),
                 Err(err) => remarks.push(err.to_string()),
             }
         }
-        // Times of one form sort as they are written; of equals, a session comes before what is said of it.
+        // RFC 3339 texts of one form sort by time. The sort is stable: a session precedes its edits of the same time.
         events.sort_by(|a, b| a.at.cmp(&b.at));
         Ok((events, remarks))
     }
 }
 
-/// The documents of a shelf as events; `author` tells who made one that belongs there.
-fn documents<D: Document>(
+/// Adds the documents for which `author` returns a name.
+fn add_documents<D: Document>(
     shelf: &Shelf<D>,
     events: &mut Vec<Event>,
     remarks: &mut Vec<String>,
     author: impl Fn(&D) -> Option<String>,
 ) {
     remarks.extend(shelf.unreadable.iter().map(ToString::to_string));
-    for kept in &shelf.kept {
-        let Some(by) = author(&kept.document) else {
+    for stored in &shelf.kept {
+        let Some(by) = author(&stored.document) else {
             continue;
         };
-        let at = taken_at(&kept.document).ok().flatten();
-        let instead = kept.document.supersedes();
-        let instead = instead.map_or(String::new(), |old| format!(" in the place of {old}"));
-        events.push(Event {
-            at: at.map_or(String::new(), |at| stamp(at.to_utc())),
-            what: D::KIND.into(),
-            folder: String::new(),
-            by,
-            sentence: format!("{}{instead}", kept.id),
-        });
+        let at = taken_at(&stored.document).ok().flatten();
+        let superseded = stored.document.supersedes();
+        let superseded = superseded.map_or(String::new(), |old| format!(" supersedes {old}"));
+        let at = at.map_or(String::new(), |at| format_utc(at.to_utc()));
+        events.push(Event::new(at, D::KIND, "", &by, format!("{}{superseded}", stored.id)));
     }
 }
 
 impl Event {
-    /// An edit of the session in this folder as an event.
+    fn new(at: String, what: &str, folder: &str, by: &str, sentence: String) -> Self {
+        Self { at, what: what.into(), folder: folder.into(), by: by.into(), sentence }
+    }
+
     #[must_use]
     pub fn said(folder: &str, edit: &Edit) -> Self {
         let (what, words) = match &edit.change {
@@ -154,28 +135,16 @@ impl Event {
             Change::Review { decision, .. } => ("review", decision.name().to_owned()),
             Change::Note => ("note", String::new()),
         };
-        Self {
-            at: stamp(edit.at),
-            what: what.into(),
-            folder: folder.to_owned(),
-            by: edit.by.clone(),
-            sentence: match (words.as_str(), edit.reason.as_str()) {
-                (_, "") => words,
-                ("", reason) => reason.to_owned(),
-                (_, reason) => format!("{words}: {reason}"),
-            },
-        }
+        let sentence = match (words.as_str(), edit.reason.as_str()) {
+            (_, "") => words,
+            ("", reason) => reason.to_owned(),
+            (_, reason) => format!("{words}: {reason}"),
+        };
+        Self::new(format_utc(edit.at), what, folder, &edit.by, sentence)
     }
 
-    /// An analysis of the session in this folder as an event.
     #[must_use]
-    pub fn made(folder: &str, one: &Made) -> Self {
-        Self {
-            at: stamp(one.at),
-            what: one.what.clone(),
-            folder: folder.to_owned(),
-            by: one.by.clone(),
-            sentence: one.name.clone(),
-        }
+    pub fn made(folder: &str, one: &CatalogAnalysis) -> Self {
+        Self::new(format_utc(one.at), &one.what, folder, &one.by, one.name.clone())
     }
 }

@@ -1,14 +1,16 @@
 //! The tables of the catalog.
 
-use rusqlite::{Connection, TransactionBehavior};
+use rusqlite::types::Type;
+use rusqlite::{Connection, Params, Row, TransactionBehavior};
+use std::error::Error;
 
-/// Marks the file as ours: "palp".
+/// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
-/// Version of the tables and of what stands in them. Another one is replaced, but for what it remembers of files of lines.
+/// Version of the tables and their content. A catalog of another version is replaced; only the table `head` is kept.
 pub(super) const VERSION: i64 = 8;
 
-/// `entry` has all that is known of a session, as JSON, with its own checksum, for SQLite has none; the other
-/// columns are what is searched. `head` is how far files of lines went, each row with its own checksum.
+/// `entry` is the whole entry as JSON, with a checksum because SQLite has none; the other columns are for search. `head`
+/// has the recorded heads of JSON-lines files, each row with its checksum.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -58,9 +60,9 @@ CREATE TABLE head (
 CREATE VIRTUAL TABLE words USING fts5 (text, tokenize = 'unicode61', prefix = '2 3');
 ";
 
-/// Makes the tables of a new file, all or none.
+/// Creates the tables of a new file, all or none.
 pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
-    // Readers and one writer at a time do not wait for each other.
+    // With a write-ahead log, readers and the one writer do not wait for each other.
     db.pragma_update(None, "journal_mode", "wal")?;
     let work = db.transaction_with_behavior(TransactionBehavior::Immediate)?;
     work.execute_batch(TABLES)?;
@@ -69,8 +71,22 @@ pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
     work.commit()
 }
 
-/// Settings of a connection.
 pub(super) fn prepare(db: &Connection) -> rusqlite::Result<()> {
     // With a write-ahead log a power cut can lose the last changes but not the file.
     db.pragma_update(None, "synchronous", "normal")
+}
+
+/// All rows of a statement.
+pub(super) fn collect_rows<T>(
+    db: &Connection,
+    sql: &str,
+    values: impl Params,
+    read: impl FnMut(&Row<'_>) -> rusqlite::Result<T>,
+) -> rusqlite::Result<Vec<T>> {
+    db.prepare_cached(sql)?.query_map(values, read)?.collect()
+}
+
+/// The error for a text column whose content is damaged.
+pub(super) fn bad_text(err: impl Into<Box<dyn Error + Send + Sync>>) -> rusqlite::Error {
+    rusqlite::Error::FromSqlConversionFailure(0, Type::Text, err.into())
 }

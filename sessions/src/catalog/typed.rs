@@ -1,48 +1,45 @@
-//! A query as people type it: days, and one line of words and conditions.
+//! Parsing of a typed query: days, and a line of words and conditions.
 
 use super::condition::{Condition, ConditionError, is_sign};
 use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
 use palpate_model::quantity::base_unit;
 use thiserror::Error;
 
-/// Something is no day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum DayError {
-    /// Neither a day nor a time.
     #[error("write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z")]
     Form,
-    /// There is no day after it.
-    #[error("no day can be that late")]
+    #[error("the day is too late to be represented; give an earlier one")]
     Late,
 }
 
-/// A day, or a time; and whether it is a day.
-fn moment(text: &str) -> Result<(DateTime<Utc>, bool), DayError> {
+/// Parses a day or a time; the second value is whether it is a day.
+fn parse_day_or_time(text: &str) -> Result<(DateTime<Utc>, bool), DayError> {
     let day = text.parse::<NaiveDate>();
     let day = day.map(|day| (day.and_time(NaiveTime::MIN).and_utc(), true));
     let time = DateTime::parse_from_rfc3339(text).map(|time| (time.to_utc(), false));
     day.or(time).map_err(|_| DayError::Form)
 }
 
-/// The first moment of a day of UTC, or a time.
+/// Start of a period: the beginning of a day in UTC, or a time.
 pub fn beginning(text: &str) -> Result<DateTime<Utc>, DayError> {
-    moment(text).map(|(at, _)| at)
+    parse_day_or_time(text).map(|(at, _)| at)
 }
 
-/// The first moment after a day of UTC, or a time: the first that does not count any more.
+/// End of a period, exclusive: the beginning of the next day in UTC, or a time.
 pub fn ending(text: &str) -> Result<DateTime<Utc>, DayError> {
-    let (at, is_day) = moment(text)?;
+    let (at, is_day) = parse_day_or_time(text)?;
     let next = at.checked_add_days(Days::new(u64::from(is_day)));
     next.ok_or(DayError::Late)
 }
 
-/// One line of words and conditions, in any order: `pig depth>=2cm "specimen.source=pig stomach"`.
+/// Parses a line of words and conditions in any order: `pig depth>=2cm "specimen.source=pig stomach"`.
 ///
-/// What has a sign of comparison in it is a condition; a sign may stand alone between spaces, and a unit after its number.
-/// Quotes keep together what has spaces in it.
+/// A piece with a sign of comparison is a condition. Spaces may surround the sign and precede the unit. Quotes keep
+/// spaces within a piece.
 pub fn words_and_conditions(line: &str) -> Result<(String, Vec<Condition>), ConditionError> {
     let mut pieces: Vec<String> = Vec::new();
-    for piece in unquoted(line) {
+    for piece in split_unquoted(line) {
         let is_unit = base_unit(&piece).is_some();
         let joins = pieces.last().is_some_and(|before| {
             let has_open_end = before.ends_with(is_sign);
@@ -66,8 +63,8 @@ pub fn words_and_conditions(line: &str) -> Result<(String, Vec<Condition>), Cond
     Ok((words.join(" "), conditions.collect::<Result<_, _>>()?))
 }
 
-/// The pieces of a line between spaces; within quotes spaces part nothing.
-fn unquoted(line: &str) -> Vec<String> {
+/// Splits a line at spaces outside quotes.
+fn split_unquoted(line: &str) -> Vec<String> {
     let (mut pieces, mut piece, mut is_within) = (Vec::new(), String::new(), false);
     for letter in line.chars() {
         match letter {
@@ -88,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_day_counts_whole_and_a_time_to_the_second() {
+    fn last_day_is_included_and_a_time_is_exact() {
         let text = |at: Result<DateTime<Utc>, DayError>| at.map(|at| at.to_rfc3339());
         let day = |text: &str| Ok(format!("{text}T00:00:00+00:00"));
         assert_eq!(text(beginning("2026-03-05")), day("2026-03-05"));

@@ -1,9 +1,10 @@
-//! The catalog follows the sessions: what changed is read again, what is gone goes.
+//! Update of the catalog: changed sessions are read again, deleted ones are removed.
 
 use super::entry::Entry;
-use super::heads::{remember, remember_session};
+use super::heads::{record_head, record_session_heads};
+use super::schema::{bad_text, collect_rows};
 use super::search::ReviewIs;
-use super::walk::{Place, walk};
+use super::walk::{LibrarySession, walk};
 use super::{Catalog, CatalogError};
 use crate::text::checksum;
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
@@ -11,58 +12,54 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-/// Sessions that are written at a time: another process waits a fraction of a second at most.
+/// Sessions per transaction, which makes another process wait a fraction of a second at most.
 const BATCH: usize = 100;
 
-/// What an update did.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Changes {
-    /// Sessions in the library.
     pub sessions: usize,
-    /// Sessions that were read, for the first time or again.
+    /// New and changed sessions.
     pub read: usize,
-    /// Sessions that are gone.
     pub removed: usize,
-    /// What could not be looked at, in sentences.
+    /// One sentence for each folder or file that could not be read.
     pub remarks: Vec<String>,
 }
 
-/// A session, or a file of checks or a journal, of which the catalog says something else than there is.
+/// A session, or a file of checks or a journal, that differs from its catalog entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Doubt {
-    /// Its folder, or the file, below the library.
+    /// Path of the folder or file below the library.
     pub folder: String,
-    /// What differs.
     pub sentence: String,
 }
 
-/// Hears how far it is: sessions done, sessions in all.
-pub type Progress<'a> = &'a mut dyn FnMut(usize, usize);
+/// Called with the number of finished sessions and of all sessions.
+pub type CatalogProgress<'a> = &'a mut dyn FnMut(usize, usize);
 
 impl Catalog {
-    /// Reads the sessions that are new or have changed, and forgets those that are gone. Several processes
-    /// may do so at a time.
-    pub fn update(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
+    /// Reads new and changed sessions and removes deleted ones. Several processes may do so at a time.
+    pub fn update(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
         self.update_while(&mut |done, of| {
             progress(done, of);
             ControlFlow::Continue(())
         })
     }
 
-    /// The same, which ends before its time when `progress` breaks it. What was read until then is kept.
+    /// Like [`update`](Self::update), until `progress` breaks. Sessions read so far stay in the catalog.
     pub fn update_while(
         &mut self,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     ) -> Result<Changes, CatalogError> {
-        let (places, remarks) = walk(&self.library);
+        let (sessions, remarks) = walk(&self.library);
         let mut known = self.fingerprints()?;
         let heads = self.heads()?;
-        let is_new = |place: &&Place| known.get(&place.name) != Some(&place.fingerprint);
-        let new: Vec<&Place> = places.iter().filter(is_new).collect();
-        for place in &places {
-            known.remove(&place.name);
+        let is_new =
+            |session: &&LibrarySession| known.get(&session.name) != Some(&session.fingerprint);
+        let new: Vec<&LibrarySession> = sessions.iter().filter(is_new).collect();
+        for session in &sessions {
+            known.remove(&session.name);
         }
-        let mut changes = Changes { sessions: places.len(), read: 0, removed: 0, remarks };
+        let mut changes = Changes { sessions: sessions.len(), read: 0, removed: 0, remarks };
         let mut done = 0;
         let mut flow = progress(done, new.len());
         for batch in new.chunks(BATCH) {
@@ -70,35 +67,36 @@ impl Catalog {
                 break;
             }
             let mut entries = Vec::with_capacity(batch.len());
-            for place in batch {
+            for session in batch {
                 if flow.is_break() {
                     break;
                 }
-                entries.push((*place, Entry::read(place, &heads)));
+                entries.push((*session, Entry::read(session, &heads)));
                 done += 1;
                 flow = progress(done, new.len());
             }
-            self.write(|db| entries.iter().try_for_each(|(place, entry)| put(db, place, entry)))?;
+            self.write(|db| {
+                entries.iter().try_for_each(|(session, entry)| put(db, session, entry))
+            })?;
         }
         changes.read = done;
-        let gone: Vec<String> = known.into_keys().collect();
-        // Another process may have read a session that came after our walk.
-        let is_gone = |name: &&String| !self.library.join(name).exists();
-        let gone: Vec<String> = gone.iter().filter(is_gone).cloned().collect();
+        // Another process may have added a session after our walk.
+        let is_gone = |name: &String| !self.library.join(name).exists();
+        let gone: Vec<String> = known.into_keys().filter(is_gone).collect();
         changes.removed = gone.len();
         if !gone.is_empty() {
             self.write(|db| gone.iter().try_for_each(|name| forget(db, name)))?;
         }
         let (read, wrong) = self.confirm(&heads, true);
         if !read.is_empty() {
-            self.write(|db| read.iter().try_for_each(|one| remember(db, one)))?;
+            self.write(|db| read.iter().try_for_each(|one| record_head(db, one)))?;
         }
         changes.remarks.extend(wrong.into_iter().map(|(_, sentence)| sentence));
         Ok(changes)
     }
 
-    /// Reads everything again. What was known of edits, analyses, checks and journals is not forgotten.
-    pub fn rebuild(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
+    /// Reads everything again. The recorded heads of edits, analyses, checks and journals stay.
+    pub fn rebuild(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
         self.write(|db| {
             db.execute_batch(
                 "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;
@@ -108,55 +106,44 @@ impl Catalog {
         self.update(progress)
     }
 
-    /// Reads every session and tells where the catalog says something else; it is left as it is.
-    pub fn check(&self, progress: Progress<'_>) -> Result<Vec<Doubt>, CatalogError> {
-        let (places, _) = walk(&self.library);
+    /// Compares every session with its entry, without changing the catalog.
+    pub fn check(&self, progress: CatalogProgress<'_>) -> Result<Vec<Doubt>, CatalogError> {
+        let (sessions, _) = walk(&self.library);
         let heads = self.heads()?;
         let mut known: BTreeMap<String, Entry> =
             self.all()?.into_iter().map(|entry| (entry.folder.clone(), entry)).collect();
         let mut doubts = Vec::new();
-        for (done, place) in places.iter().enumerate() {
-            progress(done, places.len());
-            let sentence = match known.remove(&place.name) {
+        for (done, session) in sessions.iter().enumerate() {
+            progress(done, sessions.len());
+            let sentence = match known.remove(&session.name) {
                 None => "the session is not in the catalog",
-                Some(entry) if entry != Entry::read(place, &heads) => {
+                Some(entry) if entry != Entry::read(session, &heads) => {
                     "the session has changed since the catalog read it"
                 }
                 Some(_) => continue,
             };
-            doubts.push(Doubt { folder: place.name.clone(), sentence: sentence.to_owned() });
+            doubts.push(Doubt { folder: session.name.clone(), sentence: sentence.to_owned() });
         }
         doubts.extend(known.into_keys().map(|folder| Doubt {
             folder,
-            sentence: "the catalog has a session that is gone".to_owned(),
+            sentence: "the session was deleted but is still in the catalog".to_owned(),
         }));
         let (_, wrong) = self.confirm(&heads, false);
         doubts.extend(wrong.into_iter().map(|(folder, sentence)| Doubt { folder, sentence }));
         Ok(doubts)
     }
 
-    /// Every entry, by folder.
     pub fn all(&self) -> Result<Vec<Entry>, CatalogError> {
-        let read = || -> rusqlite::Result<Vec<Entry>> {
-            let sql = "SELECT entry, checksum FROM session ORDER BY folder";
-            let mut statement = self.db.prepare_cached(sql)?;
-            let rows = statement.query_map([], entry_of)?;
-            rows.collect()
-        };
-        read().map_err(self.failed())
+        let sql = "SELECT entry, checksum FROM session ORDER BY folder";
+        collect_rows(&self.db, sql, [], entry_of).map_err(self.failed())
     }
 
     fn fingerprints(&self) -> Result<BTreeMap<String, String>, CatalogError> {
-        let read = || -> rusqlite::Result<BTreeMap<String, String>> {
-            let sql = "SELECT folder, fingerprint FROM session";
-            let mut statement = self.db.prepare_cached(sql)?;
-            let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-            rows.collect()
-        };
-        read().map_err(self.failed())
+        let sql = "SELECT folder, fingerprint FROM session";
+        let pairs = collect_rows(&self.db, sql, [], |row| Ok((row.get(0)?, row.get(1)?)));
+        Ok(pairs.map_err(self.failed())?.into_iter().collect())
     }
 
-    /// Writes all or nothing.
     fn write(
         &mut self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<()>,
@@ -171,24 +158,21 @@ impl Catalog {
     }
 }
 
-/// An entry as it stands in the table: its JSON and the checksum of that.
+/// Parses an entry from its JSON and the JSON's checksum.
 pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Entry> {
     let text: String = row.get(0)?;
-    let bad = |err: Box<dyn std::error::Error + Send + Sync>| {
-        rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, err)
-    };
     if checksum(&text) != row.get::<_, String>(1)? {
-        return Err(bad("an entry is not as it was written".into()));
+        return Err(bad_text("an entry has a wrong checksum"));
     }
-    serde_json::from_str(&text).map_err(|err| bad(err.into()))
+    serde_json::from_str(&text).map_err(bad_text)
 }
 
-fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
+fn put(db: &Connection, session: &LibrarySession, entry: &Entry) -> rusqlite::Result<()> {
     forget(db, &entry.folder)?;
     let text = serde_json::to_string(entry)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
     let started = chrono::DateTime::parse_from_rfc3339(&entry.started_at);
-    // Where it cannot be read nobody can say that there is none.
+    // An unreadable session may have a verdict or a review, so it must not be found as one without.
     let is_unread = entry.trouble.is_some();
     let verdict = match entry.verdict {
         Some(verdict) => verdict.name(),
@@ -205,7 +189,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     )?
     .execute(params![
         entry.folder,
-        place.fingerprint,
+        session.fingerprint,
         started.map_or(0, |at| at.timestamp_millis()),
         entry.operator,
         entry.specimen,
@@ -230,7 +214,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     for tag in &entry.tags {
         tags.execute(params![id, tag])?;
     }
-    remember_session(db, entry)?;
+    record_session_heads(db, entry)?;
     db.prepare_cached("INSERT INTO words (rowid, text) VALUES (?, ?)")?
         .execute(params![id, entry.text()])?;
     Ok(())

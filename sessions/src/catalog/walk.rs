@@ -1,4 +1,4 @@
-//! Which sessions a library holds, and what would show that one has changed.
+//! The session folders of a library, with fingerprints that reveal changes.
 
 use crate::folder::{LOCK_FILE, SPARE_FILE, segment_number};
 use std::ffi::OsString;
@@ -8,23 +8,21 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 use walkdir::WalkDir;
 
-/// A session folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Place {
-    /// Below the library, with `/` between; a name that is no Unicode has replacement characters in it.
+pub(super) struct LibrarySession {
+    /// Path below the library, separated by `/`; bytes that are not Unicode become replacement characters.
     pub name: String,
-    /// The folder itself.
     pub path: PathBuf,
-    /// Name, size and time of change of every file of the session. Taken before the session is read, so
-    /// that a change meanwhile is noticed the next time.
+    /// Name, size and modification time of every file. Taken before the session is read, so that the next update
+    /// notices a change in between.
     pub fingerprint: String,
 }
 
-/// Every session below a library, by name, and sentences about folders that could not be looked into.
+/// Every session below a library, by name, and a sentence for each unreadable folder.
 ///
-/// Links are not followed, so no walk is endless and nothing counts twice; hidden folders are left alone.
-pub(super) fn walk(library: &Path) -> (Vec<Place>, Vec<String>) {
-    let (mut places, mut remarks) = (Vec::new(), Vec::new());
+/// Links are not followed, so the walk ends and nothing counts twice; hidden folders are skipped.
+pub(super) fn walk(library: &Path) -> (Vec<LibrarySession>, Vec<String>) {
+    let (mut sessions, mut remarks) = (Vec::new(), Vec::new());
     let mut entries = WalkDir::new(library).into_iter();
     while let Some(entry) = entries.next() {
         let entry = match entry {
@@ -40,11 +38,11 @@ pub(super) fn walk(library: &Path) -> (Vec<Place>, Vec<String>) {
                 entries.skip_current_dir();
             }
         } else if (entry.file_type().is_dir() || !is_below)
-            // Where it cannot be looked into, the walk says so.
+            // The walk itself reports an unreadable folder.
             && let Ok(files) = files_of(entry.path())
             && files.iter().any(is_segment)
         {
-            places.push(Place {
+            sessions.push(LibrarySession {
                 name: name_below(library, entry.path()),
                 fingerprint: fingerprint(entry.path(), &files),
                 path: entry.into_path(),
@@ -52,15 +50,15 @@ pub(super) fn walk(library: &Path) -> (Vec<Place>, Vec<String>) {
             entries.skip_current_dir();
         }
     }
-    places.sort_by(|a, b| a.name.cmp(&b.name));
-    (places, remarks)
+    sessions.sort_by(|a, b| a.name.cmp(&b.name));
+    (sessions, remarks)
 }
 
 fn remark(library: &Path, err: walkdir::Error) -> String {
     let folder = err.path().unwrap_or(library).display().to_string();
     let words = err.to_string();
     let reason = err.into_io_error().map_or(words, |err| err.to_string());
-    format!("{folder} cannot be looked into ({reason}); sessions in it are not in the catalog")
+    format!("{folder} cannot be read ({reason}); its sessions are missing from the catalog")
 }
 
 fn name_below(library: &Path, folder: &Path) -> String {
@@ -69,7 +67,7 @@ fn name_below(library: &Path, folder: &Path) -> String {
     parts.collect::<Vec<_>>().join("/")
 }
 
-/// The names of what is in a folder and is none, in order.
+/// Sorted names of everything in a folder that is not a folder.
 fn files_of(folder: &Path) -> io::Result<Vec<OsString>> {
     let mut files = Vec::new();
     for item in fs::read_dir(folder)? {
@@ -102,7 +100,7 @@ fn fingerprint(folder: &Path, files: &[OsString]) -> String {
     text
 }
 
-/// One file: its name, bytes, and nanoseconds of its last change.
+/// A file's name, size, and modification time in ns.
 pub(super) fn stamp(path: &Path, name: &str) -> String {
     let Ok(facts) = fs::metadata(path) else {
         return format!("{name} gone;");

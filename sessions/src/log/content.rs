@@ -1,6 +1,6 @@
-//! What the records of a session log say, taken in their order and checked as they come.
+//! Content of a session log: parses and checks the records in their order.
 
-use super::frames::{Fields, frame_at};
+use super::frames::Fields;
 use super::segment::PROFILE;
 use crate::block::Block;
 use crate::health::{Health, HealthSummary};
@@ -12,76 +12,69 @@ use mcap::records::op;
 use palpate_model::Nanos;
 use std::collections::BTreeMap;
 
-/// A verified part of a session, as it passes by.
+/// A verified part of a session, in the order of recording.
 #[derive(Clone, Copy, Debug)]
 pub enum Part<'a> {
-    /// Samples.
     Samples(&'a Block),
-    /// Bytes as exchanged with a device.
+    /// Bytes exchanged with a device.
     Raw(&'a RawBlock<'a>),
-    /// How the computer kept up.
     Health(&'a Health),
 }
 
-/// Why a log is not for this program, however whole it is.
+/// Why this program cannot read an undamaged log.
 pub(crate) enum Refusal {
-    /// Another program's.
     Foreign,
-    /// A newer version's: program and record version.
+    /// Program version and record version.
     Newer(String, u64),
 }
 
-/// What is particular to a segment that was left.
-pub(crate) struct Left {
+/// What belongs to one segment alone.
+#[derive(Default)]
+pub(crate) struct SegmentState {
     topics: BTreeMap<u16, Option<Channel>>,
-    has_manifest: bool,
-    is_rewrite: bool,
+    pub has_manifest: bool,
+    /// Whether the segment repeats what the segments before may have lost.
+    pub is_rewrite: bool,
 }
 
-/// What has been read so far, over all segments.
+/// Everything read so far, over all segments.
 pub(crate) struct Content<'v> {
-    /// Gets every part once it is verified.
+    /// Receives every verified part.
     visit: &'v mut dyn FnMut(Part<'_>),
     block: Block,
-    /// Whether a raw half waits for its derived one.
+    /// Whether `block` has a raw half without its derived half.
     has_raw: bool,
-    /// Samples visited.
     pub samples: u64,
-    /// Session time of the newest of them.
+    /// Session time of the newest sample.
     pub last_sample: Nanos,
-    topics: BTreeMap<u16, Option<Channel>>,
-    /// The next message of each channel; `None` where a lone later segment may begin anywhere.
+    pub segment: SegmentState,
+    /// Number of the next message of each channel; `None` allows any, as in a later segment that is read alone.
     sequences: [Option<u32>; Channel::ALL.len()],
-    /// Number of the first sample; `None` until a lone later segment says.
+    /// Number of the first sample; `None` until a later segment that is read alone shows it.
     first_sample: Option<u64>,
-    /// Raw bytes visited, and missing ones before the newest.
+    /// Raw bytes up to the newest, missing ones included.
     pub raw_bytes: u64,
-    /// Number of the first of them, as of the first sample.
+    /// Like `first_sample`, for raw bytes.
     first_raw_byte: Option<u64>,
-    /// What is told of the computer.
     pub health: HealthSummary,
-    /// Whether the segment being read has shown its manifest.
-    pub has_manifest: bool,
-    /// Whether what came before the first segment read is missing.
+    /// Whether the first segment read is not the first of the session.
     pub is_later_part: bool,
-    /// Whether the segment being read writes again what may be lost of the ones before.
-    pub is_rewrite: bool,
     pub manifest: Option<Manifest>,
     pub refusal: Option<Refusal>,
     pub entries: Vec<Entry>,
     pub end: Option<EndRecord>,
-    /// Whether what is missing is counted instead of refused.
+    /// Whether gaps are counted instead of refused.
     allows_gaps: bool,
-    /// Messages with entries that are missing.
-    pub lost_entries: u64,
-    /// Those of them that were decisions.
-    pub lost_decisions: u64,
-    /// Raw bytes that are missing between those that are there.
-    pub lost_raw_bytes: u64,
+    /// Missing messages with entries.
+    pub missing_entries: u64,
+    /// Missing messages with decisions.
+    pub missing_decisions: u64,
+    /// Raw bytes missing between others.
+    pub missing_raw_bytes: u64,
 }
 
 impl<'v> Content<'v> {
-    /// Nothing read yet. A file that is read alone may be a later segment.
+    /// A file that is read alone may be a later segment.
     pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(Part<'_>)) -> Self {
         let mut sequences = [Some(0); Channel::ALL.len()];
         if is_alone {
@@ -93,58 +86,37 @@ impl<'v> Content<'v> {
             has_raw: false,
             samples: 0,
             last_sample: Nanos::ZERO,
-            topics: BTreeMap::new(),
+            segment: SegmentState::default(),
             sequences,
             first_sample: Some(0),
             raw_bytes: 0,
             first_raw_byte: Some(0),
             health: HealthSummary::default(),
-            has_manifest: false,
             is_later_part: false,
-            is_rewrite: false,
             manifest: None,
             refusal: None,
             entries: Vec::new(),
             end: None,
             allows_gaps: false,
-            lost_entries: 0,
-            lost_decisions: 0,
-            lost_raw_bytes: 0,
+            missing_entries: 0,
+            missing_decisions: 0,
+            missing_raw_bytes: 0,
         }
     }
 
-    /// Counts what is missing instead of refusing it. Blocks still come in order, each once.
+    /// Counts gaps instead of refusing them. Blocks must still be in order.
     pub fn allow_gaps(&mut self) {
         self.allows_gaps = true;
     }
 
-    /// Goes on with another file: everything counted goes on, its channels are named anew.
-    pub fn begin_segment(&mut self) {
-        self.topics.clear();
-        self.has_manifest = false;
-        self.is_rewrite = false;
-        // A raw block that was cut off from its other half is written again, if at all.
+    /// Continues with another segment: a new one, or one that was left. Returns the state of the present one.
+    pub fn enter_segment(&mut self, segment: SegmentState) -> SegmentState {
+        // A raw half without its derived half is rewritten in the next segment, if at all.
         self.has_raw = false;
+        std::mem::replace(&mut self.segment, segment)
     }
 
-    /// Leaves a segment to read another one first.
-    pub fn leave_segment(&mut self) -> Left {
-        Left {
-            topics: std::mem::take(&mut self.topics),
-            has_manifest: self.has_manifest,
-            is_rewrite: self.is_rewrite,
-        }
-    }
-
-    /// Goes on with a segment that was left.
-    pub fn return_to_segment(&mut self, left: Left) {
-        self.topics = left.topics;
-        self.has_manifest = left.has_manifest;
-        self.is_rewrite = left.is_rewrite;
-        self.has_raw = false;
-    }
-
-    /// Goes on at any later chunk of the same segment: what lies between is not missed.
+    /// Continues at any later chunk of the same segment; the part in between is not a gap.
     pub fn begin_anywhere(&mut self) {
         self.sequences = [None; Channel::ALL.len()];
         self.first_sample = None;
@@ -154,7 +126,7 @@ impl<'v> Content<'v> {
         self.has_raw = false;
     }
 
-    /// Reads the file's header: `profile` tells whose file it is.
+    /// Reads the file's header, whose profile names the program.
     pub fn take_header(&mut self, body: &[u8]) {
         if Fields(body).text() != Some(PROFILE) {
             self.refusal = Some(Refusal::Foreign);
@@ -163,17 +135,14 @@ impl<'v> Content<'v> {
 
     /// Reads the records of a verified chunk.
     pub fn take_chunk(&mut self, records: &[u8]) -> Result<(), String> {
-        let mut offset = 0;
-        while offset < records.len() && self.refusal.is_none() {
-            let frame = frame_at(records, offset)
-                .map_err(|_| "a record runs past the end of its chunk".to_owned())?;
-            match frame.opcode {
-                op::SCHEMA => {}
-                op::CHANNEL => self.take_channel(frame.body)?,
-                op::MESSAGE => self.take_message(frame.body)?,
+        let mut rest = Fields(records);
+        while !rest.0.is_empty() && self.refusal.is_none() {
+            match rest.record().ok_or("a record runs past the end of its chunk")? {
+                (op::SCHEMA, _) => {}
+                (op::CHANNEL, body) => self.take_channel(body)?,
+                (op::MESSAGE, body) => self.take_message(body)?,
                 _ => return Err("a chunk holds a record of an unexpected kind".into()),
             }
-            offset = frame.next;
         }
         Ok(())
     }
@@ -185,7 +154,7 @@ impl<'v> Content<'v> {
         let (Some(id), Some(topic)) = (id, topic) else {
             return Err("the list of channels is cut short".into());
         };
-        self.topics.insert(id, Channel::from_topic(topic));
+        self.segment.topics.insert(id, Channel::from_topic(topic));
         Ok(())
     }
 
@@ -196,41 +165,41 @@ impl<'v> Content<'v> {
         let (Some(id), Some(sequence), (Some(_), Some(_))) = (id, sequence, times) else {
             return Err("a message is cut short".into());
         };
-        let channel = match self.topics.get(&id) {
+        let channel = match self.segment.topics.get(&id) {
             Some(Some(channel)) => *channel,
-            // A channel of another program, or of a later version that adds one.
-            Some(None) if self.has_manifest => return Ok(()),
+            // A channel of another program or of a later version.
+            Some(None) if self.segment.has_manifest => return Ok(()),
             Some(None) => {
                 self.refusal = Some(Refusal::Foreign);
                 return Ok(());
             }
-            None => return Err("a message is on a channel that was never named".into()),
+            None => return Err("a message is on an unknown channel".into()),
         };
-        if !self.has_manifest && channel != Channel::Manifest {
+        if !self.segment.has_manifest && channel != Channel::Manifest {
             self.refusal = Some(Refusal::Foreign);
             return Ok(());
         }
         let next = &mut self.sequences[channel as usize];
         let expected = next.unwrap_or(sequence);
         let is_bookkeeping = matches!(channel, Channel::Manifest | Channel::Rewrite);
-        let may_repeat = self.is_rewrite || is_bookkeeping || self.allows_gaps;
-        let is_again = sequence < expected && may_repeat;
-        if is_again && !is_bookkeeping {
-            // It was read, and verified, where it was first written.
+        let may_repeat = self.segment.is_rewrite || is_bookkeeping || self.allows_gaps;
+        let is_repeated = sequence < expected && may_repeat;
+        if is_repeated && !is_bookkeeping {
+            // Already read and verified in the former segment.
             return Ok(());
         }
         if sequence > expected && self.allows_gaps {
             let is_entry = matches!(channel, Channel::Input | Channel::Decision | Channel::Fit);
-            let lost = u64::from(sequence - expected);
-            self.lost_entries += lost * u64::from(is_entry);
-            self.lost_decisions += lost * u64::from(channel == Channel::Decision);
+            let missing = u64::from(sequence - expected);
+            self.missing_entries += missing * u64::from(is_entry);
+            self.missing_decisions += missing * u64::from(channel == Channel::Decision);
             if matches!(channel, Channel::Daq | Channel::Derived) {
                 self.has_raw &= channel == Channel::Derived;
             }
-        } else if sequence != expected && !is_again {
+        } else if sequence != expected && !is_repeated {
             return Err(format!("message {expected} of {} is missing", channel.name()));
         }
-        if !is_again {
+        if !is_repeated {
             *next = Some(sequence.wrapping_add(1));
         }
         if self.end.is_some() && !is_bookkeeping {
@@ -240,10 +209,10 @@ impl<'v> Content<'v> {
         match channel {
             Channel::Manifest => self.take_manifest(sequence, data),
             Channel::Rewrite => {
-                self.is_rewrite = true;
+                self.segment.is_rewrite = true;
                 Ok(())
             }
-            // A thinned copy of the samples, for other programs.
+            // A thinned copy of the samples for other programs.
             Channel::View => Ok(()),
             Channel::Daq => self.take_raw(data),
             Channel::Derived => self.take_derived(data),
@@ -263,14 +232,14 @@ impl<'v> Content<'v> {
 
     fn take_manifest(&mut self, sequence: u32, data: &[u8]) -> Result<(), String> {
         let unreadable = |err: serde_json::Error| format!("the manifest is unreadable: {err}");
-        if self.has_manifest {
+        if self.segment.has_manifest {
             return Err("there is a second manifest".into());
         }
-        // The version is read first: the rest of a newer manifest may not fit this program.
+        // The version comes first, because the rest of a newer manifest may not parse.
         let value: serde_json::Value = serde_json::from_slice(data).map_err(unreadable)?;
         let version = &value["record_version"];
         if version.is_number() && !version.is_u64() {
-            return Err(format!("the manifest's record version is {version}, and none is"));
+            return Err(format!("the manifest's record version is {version}, not a whole number"));
         }
         let Some(version) = version.as_u64() else {
             self.refusal = Some(Refusal::Foreign);
@@ -284,11 +253,11 @@ impl<'v> Content<'v> {
         let manifest: Manifest = serde_json::from_value(value).map_err(unreadable)?;
         match &self.manifest {
             Some(first) if *first != manifest => {
-                return Err("its manifest is not that of the segments before".into());
+                return Err("its manifest differs from that of the segments before".into());
             }
             Some(_) => {}
             None if sequence > 0 => {
-                // The manifest's place tells a later segment: the other channels go on there too.
+                // A later segment: the other channels do not start at 0 either.
                 self.is_later_part = true;
                 self.sequences = [None; Channel::ALL.len()];
                 self.sequences[Channel::Manifest as usize] = Some(sequence.wrapping_add(1));
@@ -298,13 +267,13 @@ impl<'v> Content<'v> {
             None => {}
         }
         self.manifest = Some(manifest);
-        self.has_manifest = true;
+        self.segment.has_manifest = true;
         Ok(())
     }
 
     fn take_raw(&mut self, data: &[u8]) -> Result<(), String> {
         if self.has_raw && !self.allows_gaps {
-            return Err("a block of raw samples has no derived ones".into());
+            return Err("a block of raw samples lacks its derived samples".into());
         }
         self.block.take_raw(data)?;
         let raw = self.block.first_sample();
@@ -326,7 +295,7 @@ impl<'v> Content<'v> {
             if self.allows_gaps {
                 return Ok(());
             }
-            return Err("a block of derived samples has no raw ones".into());
+            return Err("a block of derived samples lacks its raw samples".into());
         }
         self.block.take_derived(data)?;
         self.samples += self.block.len() as u64;
@@ -341,7 +310,7 @@ impl<'v> Content<'v> {
         let first = *self.first_raw_byte.get_or_insert(number);
         let expected = first.saturating_add(self.raw_bytes);
         if number > expected && self.allows_gaps {
-            self.lost_raw_bytes += number - expected;
+            self.missing_raw_bytes += number - expected;
             self.raw_bytes = number - first;
         } else if number != expected {
             return Err(format!(
@@ -379,12 +348,12 @@ impl<'v> Content<'v> {
         Ok(())
     }
 
-    /// Compares what is there with what the end record counted, if there is one.
+    /// Compares the content with the counts of the end record, if there is one.
     pub fn check_totals(&self) -> Result<(), String> {
         let Some(end) = &self.end else {
             return Ok(());
         };
-        // What a lone later segment does not know of the ones before is not compared.
+        // A later segment that is read alone does not know the segments before.
         let first = self.first_sample.unwrap_or_else(|| end.samples.saturating_sub(self.samples));
         let samples = first.saturating_add(self.samples);
         let entries = self.entries.len() as u64;
@@ -394,13 +363,13 @@ impl<'v> Content<'v> {
         let raw_bytes = before.saturating_add(self.raw_bytes);
         if end.raw_bytes != raw_bytes {
             let recorded = end.raw_bytes;
-            return Err(format!("{recorded} raw bytes were recorded but {raw_bytes} are there"));
+            return Err(format!("{recorded} raw bytes were recorded, and the log has {raw_bytes}"));
         }
         if !self.has_raw && end.samples == samples && has_entries {
             return Ok(());
         }
         Err(format!(
-            "{} samples and {} entries were recorded but {samples} and {entries} are there",
+            "{} samples and {} entries were recorded, and the log has {samples} and {entries}",
             end.samples, end.entries
         ))
     }

@@ -1,4 +1,4 @@
-//! Which files a session's log is in.
+//! The files of a session's log.
 
 use super::reader::ReadError;
 use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
@@ -6,11 +6,9 @@ use std::collections::BTreeMap;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// With more missing segments than that, what is behind them is not looked at: a name alone must not
-/// ask for endless work.
+/// Limit of missing segments, so that the name of one file cannot cause endless work.
 const MISSING_MAX: usize = 1000;
 
-/// The files to read.
 pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.exists() {
         return Err(ReadError::Missing { path: path.into() });
@@ -30,11 +28,11 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         Ok(())
     };
     add(path).map_err(failed)?;
-    // If it is not there, neither is its disk: see `absent_spare`.
+    // Without the folder its disk is missing too: see `absent_spare`.
     if let Some(spare) = spare_of(path).filter(|spare| spare.is_dir()) {
         add(&spare).map_err(failed)?;
     }
-    // A missing one is listed too: it will be looked for and not found.
+    // Missing segments are listed, so that the reader reports them.
     let last = found.last_key_value().map_or(0, |(number, _)| *number);
     let many = last as usize > found.len() + MISSING_MAX;
     let last = if many { found.len() as u32 } else { last };
@@ -46,10 +44,10 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         .collect())
 }
 
-/// The other folder that segments of a session may be in.
+/// The session's spare folder.
 fn spare_of(path: &Path) -> Option<PathBuf> {
     let pointer = path.join(SPARE_FILE);
-    // Whatever somebody put there in place of the file is neither waited for nor read without end.
+    // A pipe or device in place of the file must not block or flood the reader.
     if !std::fs::symlink_metadata(&pointer).ok()?.is_file() {
         return None;
     }
@@ -62,16 +60,15 @@ fn spare_of(path: &Path) -> Option<PathBuf> {
 /// The longest path that Linux takes (`PATH_MAX`).
 const SPARE_BYTES_MAX: u64 = 4096;
 
-/// The folder that segments may be in and that is not there, as on a disk that is not connected. The writer makes
-/// it before the log.
+/// The session's spare folder if it is missing, as on a disconnected disk. The writer creates it before the log.
 pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
     spare_of(path).filter(|spare| !spare.is_dir())
 }
 
-/// What to say of such a folder.
-pub(crate) fn away(spare: &Path) -> String {
+/// The remark about a missing spare folder.
+pub(crate) fn describe_absent(spare: &Path) -> String {
     let spare = spare.display();
-    format!("a part of it may be in {spare}, which is not there; connect that disk")
+    format!("a part of the session may be in {spare}, which is missing; connect that disk")
 }
 
 /// Refuses a folder without a log.
@@ -79,5 +76,5 @@ pub(crate) fn check_files(path: &Path, files: &[PathBuf]) -> Result<(), ReadErro
     if files[0].is_file() || (files.len() > 1 && path.is_dir()) {
         return Ok(());
     }
-    Err(ReadError::NotASession { path: path.into(), reason: format!("it holds no {LOG_FILE}") })
+    Err(ReadError::NotASession { path: path.into(), reason: format!("it has no {LOG_FILE}") })
 }

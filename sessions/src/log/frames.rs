@@ -1,52 +1,16 @@
-//! A strict walk over the frames of an MCAP file: opcode, length, body.
+//! Strict parsing of MCAP records and chunks (<https://mcap.dev/spec>).
 //!
-//! Nothing is trusted: lengths are bounded by the file and by 24 MiB, the checksum of every chunk
-//! is verified before anything in it is looked at, and record bodies are parsed here so that no
-//! length inside a record can ask for memory. See <https://mcap.dev/spec>.
+//! Nothing is trusted: the file and 24 MiB bound every length, a chunk's checksum is verified before its content is
+//! parsed, and no length inside a record allocates memory.
 
-/// Largest frame, and largest chunk once decompressed: a chunk is cut at 4 MiB, by a message of at
-/// most 16 MiB. Both together stay below 64 MiB.
+/// Largest frame, and largest decompressed chunk: the writer ends a chunk beyond 4 MiB, and a message has at most 16 MiB.
+/// A frame and a decompressed chunk together stay below 64 MiB.
 pub(crate) const FRAME_BYTES_MAX: usize = 24 << 20;
-/// Opcode and length.
 pub(crate) const FRAME_HEADER_BYTES: usize = 9;
 /// Footer frame and closing magic.
 pub(crate) const FOOTER_BYTES: usize = FRAME_HEADER_BYTES + 20 + mcap::MAGIC.len();
 
-/// One frame within a slice.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame<'a> {
-    pub opcode: u8,
-    pub body: &'a [u8],
-    /// Place of the next frame.
-    pub next: usize,
-}
-
-/// Why there is no frame at a place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FrameError {
-    /// The frame runs past the end.
-    PastEnd,
-    /// The frame is larger than any this program writes.
-    TooLong,
-}
-
-/// The frame at `offset`.
-pub(crate) fn frame_at(bytes: &[u8], offset: usize) -> Result<Frame<'_>, FrameError> {
-    let mut fields = Fields(bytes.get(offset..).unwrap_or_default());
-    let opcode = fields.u8().ok_or(FrameError::PastEnd)?;
-    let length = fields.u64().ok_or(FrameError::PastEnd)?;
-    let remaining = fields.0.len();
-    let length = usize::try_from(length)
-        .ok()
-        .filter(|&length| length <= remaining)
-        .ok_or(FrameError::PastEnd)?;
-    if length > FRAME_BYTES_MAX {
-        return Err(FrameError::TooLong);
-    }
-    Ok(Frame { opcode, body: &fields.0[..length], next: offset + FRAME_HEADER_BYTES + length })
-}
-
-/// Reads little-endian fields off the front of a slice; `None` when it is too short.
+/// Takes little-endian fields off the front of a slice; `None` if it is too short.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Fields<'a>(pub &'a [u8]);
 
@@ -73,16 +37,26 @@ impl<'a> Fields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// A UTF-8 text behind its length.
-    pub fn text(&mut self) -> Option<&'a str> {
-        let length = self.u32()? as usize;
+    fn bytes(&mut self, length: usize) -> Option<&'a [u8]> {
         let (head, tail) = self.0.split_at_checked(length)?;
         self.0 = tail;
-        std::str::from_utf8(head).ok()
+        Some(head)
+    }
+
+    /// A UTF-8 text after its length.
+    pub fn text(&mut self) -> Option<&'a str> {
+        let length = self.u32()? as usize;
+        std::str::from_utf8(self.bytes(length)?).ok()
+    }
+
+    /// Opcode and body of a record.
+    pub fn record(&mut self) -> Option<(u8, &'a [u8])> {
+        let (opcode, length) = (self.u8()?, self.u64()?);
+        Some((opcode, self.bytes(usize::try_from(length).ok()?)?))
     }
 }
 
-/// Verifies and decompresses chunks, reusing its memory.
+/// Verifies and decompresses chunks into one reused buffer.
 pub(crate) struct ChunkReader {
     decompressor: zstd::bulk::Decompressor<'static>,
     records: Vec<u8>,
@@ -93,7 +67,7 @@ impl ChunkReader {
         Ok(Self { decompressor: zstd::bulk::Decompressor::new()?, records: Vec::new() })
     }
 
-    /// The records of a chunk, or what is wrong with it.
+    /// The records of a chunk.
     pub fn open(&mut self, body: &[u8]) -> Result<&[u8], String> {
         let too_short = || "a chunk is too short".to_owned();
         let mut fields = Fields(body);
@@ -118,7 +92,7 @@ impl ChunkReader {
                     .decompress_to_buffer(fields.0, &mut self.records)
                     .map_err(|err| format!("a chunk does not decompress ({err})"))?;
             }
-            _ => return Err("a chunk is compressed in an unknown way".into()),
+            _ => return Err("a chunk has an unknown compression".into()),
         }
         if self.records.len() != size {
             return Err("a chunk has the wrong length".into());

@@ -1,12 +1,11 @@
-//! Messages of a log that are JSON, refused where they would not be read back as they were.
+//! JSON messages of a log; a message that would not read back unchanged is refused.
 
-use super::error::{LogError, json_error};
+use super::error::{LogError, encode_error};
 use crate::record::{Entry, EntryMessage};
 
-/// Deepest nesting of an entry; the JSON parser that reads it back stops at 128.
+/// Deepest nesting of an entry; the parser's limit is 128.
 const JSON_DEPTH_MAX: usize = 100;
 
-/// An entry's message.
 pub(super) fn entry_json(entry: &Entry) -> Result<Vec<u8>, LogError> {
     if !is_shallow(&entry.body, JSON_DEPTH_MAX) {
         return Err(LogError::Encode {
@@ -20,7 +19,7 @@ pub(super) fn entry_json(entry: &Entry) -> Result<Vec<u8>, LogError> {
         now_ns: entry.now.0,
         body: &entry.body,
     };
-    serde_json::to_vec(&message).map_err(json_error("entry"))
+    serde_json::to_vec(&message).map_err(encode_error("entry"))
 }
 
 fn is_shallow(value: &serde_json::Value, depth: usize) -> bool {
@@ -35,16 +34,16 @@ fn is_shallow(value: &serde_json::Value, depth: usize) -> bool {
     }
 }
 
-/// JSON that reads back as the same value; a number that is not finite would come back as null.
+/// Refuses a value that does not read back as the same; a non-finite number would read back as null.
 pub(super) fn readable_json<T>(what: &'static str, value: &T) -> Result<Vec<u8>, LogError>
 where
     T: serde::Serialize + serde::de::DeserializeOwned + PartialEq,
 {
-    let json = serde_json::to_vec(value).map_err(json_error(what))?;
-    let back: T = serde_json::from_slice(&json).map_err(json_error(what))?;
+    let json = serde_json::to_vec(value).map_err(encode_error(what))?;
+    let back: T = serde_json::from_slice(&json).map_err(encode_error(what))?;
     if back == *value {
         Ok(json)
     } else {
-        Err(LogError::Encode { what, reason: "it does not read back as it was written".into() })
+        Err(LogError::Encode { what, reason: "it would not read back unchanged".into() })
     }
 }

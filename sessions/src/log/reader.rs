@@ -1,18 +1,17 @@
-//! Opens a recorded session, or says why not. It never returns a number that was not recorded.
+//! Strict reading of a recorded session: it never returns a number that was not recorded.
 //!
-//! A finished log must be whole: every chunk's checksum, the checksum over all data and that of
-//! the index must be right. A log without an end, as a crash leaves it, opens with everything up
-//! to its last whole chunk and a note that says so.
+//! In a finished log, the checksums of every chunk, of all data and of the index must be right. A log without an end, as a
+//! crash leaves it, opens with everything up to its last complete chunk and a note.
 //!
-//! The segments of a long recording are read one after the other as if they were one file: sample
-//! numbers, message numbers and entries must go on where the segment before stopped.
+//! The segments of a long recording are read like one file: sample numbers, message numbers and entries must continue where
+//! the segment before stopped.
 
 pub use super::error::ReadError;
 
-use super::content::{Content, Part, Refusal};
-use super::files::{absent_spare, away, check_files, find_files};
+use super::content::{Content, Part, Refusal, SegmentState};
+use super::files::{absent_spare, check_files, describe_absent, find_files};
 use super::frames::ChunkReader;
-use super::source::Source;
+use super::log_file::LogFile;
 use super::walk::walk;
 use crate::block::Block;
 use crate::health::HealthSummary;
@@ -24,55 +23,47 @@ use std::path::{Path, PathBuf};
 /// A recorded session in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
-    /// The log it was read from, or its first segment.
+    /// The log, or its first segment.
     pub path: PathBuf,
-    /// What the session says about itself.
     pub manifest: Manifest,
-    /// Every sample, in order.
     pub rows: Vec<Row>,
     /// Every entry, by `order`.
     pub entries: Vec<Entry>,
-    /// How the session ended; `None` if it was interrupted.
+    /// `None` if the recording was interrupted.
     pub end: Option<EndRecord>,
-    /// What a user of the data must know, one sentence each.
+    /// Remarks for users of the data, one sentence each.
     pub notes: Vec<String>,
-    /// What is recorded beside samples and entries.
     pub beside: Beside,
 }
 
-/// What a log holds beside samples and entries, counted and summed up.
+/// Summary of a log's data other than samples and entries.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Beside {
-    /// Bytes as exchanged with devices; [`Session::scan_parts`] hands them out.
+    /// Number of bytes exchanged with devices; [`Session::scan_parts`] visits them.
     pub raw_bytes: u64,
-    /// How the computer kept up.
     pub health: HealthSummary,
 }
 
 /// A recorded session without its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
-    /// The log it was read from, or its first segment.
+    /// The log, or its first segment.
     pub path: PathBuf,
-    /// What the session says about itself.
     pub manifest: Manifest,
-    /// How many samples there are.
     pub samples: u64,
     /// Every entry, by `order`.
     pub entries: Vec<Entry>,
-    /// How the session ended; `None` if it was interrupted.
+    /// `None` if the recording was interrupted.
     pub end: Option<EndRecord>,
-    /// What a user of the data must know, one sentence each.
+    /// Remarks for users of the data, one sentence each.
     pub notes: Vec<String>,
-    /// What is recorded beside samples and entries.
     pub beside: Beside,
 }
 
 impl Session {
-    /// Opens a session folder, or one file of it alone.
+    /// Opens a session folder, or a single file of it.
     ///
-    /// A log that was never ended opens with everything in its whole chunks; one that is damaged
-    /// anywhere else is refused.
+    /// A log without an end opens with its complete chunks; a damaged log is refused.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let mut rows = Vec::new();
         let mut visit = |block: &Block| rows.extend(block.rows());
@@ -88,8 +79,8 @@ impl Session {
         })
     }
 
-    /// Whether it is as it was recorded, to the end: nothing was interrupted, lost, cut off or left out. Files that a
-    /// failing disk made a recording go on in do not make it less.
+    /// Whether the session is complete: not interrupted, cut off or recovered with losses. A change of files after a disk
+    /// failure does not matter.
     pub fn is_whole(&self) -> bool {
         let recovered = self.manifest.recovered.as_ref();
         let is_cut = |note: &String| [NO_INDEX, LATER_PART].contains(&note.as_str());
@@ -98,8 +89,8 @@ impl Session {
             && !self.notes.iter().any(is_cut)
     }
 
-    /// CRC-32 over the raw of every sample in order: tick, volts and pulses, eight bytes each, lowest first.
-    /// How the log is cut into files is not in it.
+    /// CRC-32 over tick, volts and pulses of every sample in order, eight bytes each, little-endian; independent of the
+    /// division into segments.
     pub fn checksum(&self) -> u32 {
         let mut hasher = crc32fast::Hasher::new();
         for row in &self.rows {
@@ -110,8 +101,8 @@ impl Session {
         hasher.finalize()
     }
 
-    /// Goes through the samples of a session block by block, so that no more than one block is in
-    /// memory. Nothing of it counts before this has returned without an error.
+    /// Visits the samples block by block, with at most one block in memory. The visited data is valid only if this returns
+    /// without an error.
     pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
         Self::scan_parts(path, &mut |part| {
             if let Part::Samples(block) = part {
@@ -120,7 +111,7 @@ impl Session {
         })
     }
 
-    /// As [`scan`](Self::scan), with raw bytes and health too, in the order in which they were written.
+    /// Like [`scan`](Self::scan), with raw bytes and health, in the order of recording.
     pub fn scan_parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Outline, ReadError> {
         Reader::new(path, visit)?.read()
     }
@@ -134,10 +125,10 @@ impl Session {
 }
 
 /// What a segment adds to the session.
-enum Outcome {
-    /// The next segment goes on from here.
-    GoOn,
-    /// The segment was begun and holds nothing.
+enum SegmentOutcome {
+    /// The next segment continues here.
+    Content,
+    /// The segment was begun but has no data.
     Nothing,
 }
 
@@ -146,7 +137,7 @@ struct Damage {
     path: PathBuf,
     offset: u64,
     reason: String,
-    /// Whether this is how an interrupted write looks.
+    /// Whether an interrupted write explains it.
     is_torn: bool,
 }
 
@@ -166,11 +157,11 @@ struct Reader<'v> {
     content: Content<'v>,
     /// Session time of the newest sample.
     last_sample: Nanos,
-    /// Where the segments before broke off, until a later one has made that good.
+    /// Damage at the end of former segments, until a later segment makes up for it.
     broken_off: Vec<Damage>,
-    /// Name of the segment before, if it was not finished.
+    /// Name of the former segment if it is unfinished.
     unfinished: Option<String>,
-    /// Whether the file read last has its data's checksum and its index.
+    /// Whether the last file read has a checksum over its data, and an index.
     is_finished: bool,
     notes: Vec<String>,
 }
@@ -202,11 +193,11 @@ impl<'v> Reader<'v> {
         let mut damage = None;
         for (number, file) in files.iter().enumerate() {
             match self.read_file(file, number == 0, files.len() == 1)? {
-                Ok(Outcome::GoOn) => {}
-                Ok(Outcome::Nothing) => {
+                Ok(SegmentOutcome::Content) => {}
+                Ok(SegmentOutcome::Nothing) => {
                     let name = name_of(file);
                     self.notes.push(format!(
-                        "{name} was begun but nothing was recorded in it before the interruption"
+                        "{name} is empty: the recording was interrupted before it got data"
                     ));
                 }
                 Err(found) => {
@@ -215,7 +206,7 @@ impl<'v> Reader<'v> {
                 }
             }
         }
-        // Damage that no later segment made good.
+        // Damage that no later segment made up for.
         let damage = damage.or_else(|| {
             let is_damaged = self.broken_off.iter().any(|one| !one.is_torn);
             is_damaged.then(|| self.broken_off.swap_remove(0))
@@ -240,21 +231,22 @@ impl<'v> Reader<'v> {
             notes.extend(imported.notes());
         }
         if let Some(recovered) = &manifest.recovered {
-            let lost = recovered.missing.sentences();
-            let lost = if lost.is_empty() { "nothing is missing".into() } else { lost.join("; ") };
-            notes.push(format!("recovered from {}: {lost}", recovered.from));
+            let missing = recovered.missing.sentences();
+            let missing =
+                if missing.is_empty() { "nothing is missing".into() } else { missing.join("; ") };
+            notes.push(format!("recovered from {}: {missing}", recovered.from));
         }
-        // Only a segment that others follow is finished without an end.
+        // Only a segment with a successor is finished without an end.
         let goes_on = !self.is_folder && self.is_finished && end.is_none();
         if goes_on {
             notes.push(format!(
-                "no end record: this part of a recording goes to {last:.1} s; open the session's folder for what follows"
+                "no end record: this part of a recording ends at {last:.1} s; open the session's folder for what follows"
             ));
         } else if end.is_none()
             && let Some(spare) = &self.absent_spare
         {
-            let away = away(spare);
-            notes.push(format!("no end record: the recording stops at {last:.1} s here; {away}"));
+            let absent = describe_absent(spare);
+            notes.push(format!("no end record: the data here ends at {last:.1} s; {absent}"));
         } else if end.is_none() {
             notes.push(format!(
                 "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
@@ -276,55 +268,55 @@ impl<'v> Reader<'v> {
         })
     }
 
-    /// Reads one file. The outer error is of a kind that even recovery cannot pass.
+    /// Reads one file. The outer error also prevents a recovery.
     fn read_file(
         &mut self,
         path: &Path,
         is_first: bool,
         is_alone: bool,
-    ) -> Result<Result<Outcome, Damage>, ReadError> {
+    ) -> Result<Result<SegmentOutcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
         let failed = |source| ReadError::Io { path: path.into(), source };
         if !path.is_file() {
             let mut reason = "this segment is missing, though a later one is there".to_owned();
             if let Some(spare) = &self.absent_spare {
-                reason = format!("{reason}; {}", away(spare));
+                reason = format!("{reason}; {}", describe_absent(spare));
             }
             return Ok(Err(damage(0, &reason)));
         }
-        let source = Source::open(path).map_err(failed)?;
+        let source = LogFile::open(path).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
         if is_first && is_alone {
             check_beginning(path, &source, is_ours)?;
         } else if is_first && !is_ours {
             return Ok(Err(damage(0, NO_BEGINNING)));
         } else if !is_first && source.is_barely_begun().map_err(failed)? {
-            // What should be in it shows as missing in the next, if anything follows.
-            return Ok(Ok(Outcome::Nothing));
+            // Its data, if any, is missed by the next segment.
+            return Ok(Ok(SegmentOutcome::Nothing));
         } else if !is_ours {
             self.broken_off.push(damage(0, NO_BEGINNING));
-            return Ok(Ok(Outcome::GoOn));
+            return Ok(Ok(SegmentOutcome::Content));
         }
         self.read_segment(path, &source, is_first)
     }
 
-    /// As [`read_file`](Self::read_file), of a file that begins like a segment.
+    /// Like [`read_file`](Self::read_file), for a file that begins like a segment.
     fn read_segment(
         &mut self,
         path: &Path,
-        source: &Source,
+        source: &LogFile,
         is_first: bool,
-    ) -> Result<Result<Outcome, Damage>, ReadError> {
+    ) -> Result<Result<SegmentOutcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
         let failed = |source| ReadError::Io { path: path.into(), source };
         let had_end = self.content.end.is_some();
-        self.content.begin_segment();
+        self.content.enter_segment(SegmentState::default());
         let walked = walk(source, &mut self.chunks, &mut self.content).map_err(failed)?;
         self.last_sample = self.last_sample.max(self.content.last_sample);
         if let Some(refusal) = self.content.refusal.take() {
             return Err(refused(path, refusal));
         }
-        let is_rewrite = self.content.is_rewrite;
+        let is_rewrite = self.content.segment.is_rewrite;
         if had_end && !is_rewrite {
             let reason = "a segment follows the one that ended the recording";
             return Ok(Err(damage(0, reason)));
@@ -332,14 +324,14 @@ impl<'v> Reader<'v> {
         let is_finished = source.has_footer().map_err(failed)?;
         let stop = walked.err();
         if stop.as_ref().is_none_or(|stop| stop.is_torn) {
-            if !self.content.has_manifest {
+            if !self.content.segment.has_manifest {
                 return Ok(if is_first || is_finished {
                     Err(damage(source.length(), NOT_BEGUN))
                 } else {
-                    Ok(Outcome::Nothing)
+                    Ok(SegmentOutcome::Nothing)
                 });
             }
-            // However a file ends: once there is an end record, all it counted must be there.
+            // With an end record, everything that it counts must be present.
             if let Err(reason) = self.content.check_totals() {
                 return Ok(Err(damage(source.length(), &reason)));
             }
@@ -347,8 +339,8 @@ impl<'v> Reader<'v> {
         let here =
             stop.map(|stop| Damage { is_torn: stop.is_torn, ..damage(stop.offset, &stop.reason) });
         let is_damaged = here.as_ref().is_some_and(|here| !here.is_torn);
-        // Messages that go on without a gap prove that nothing is missing. But what is damaged, and
-        // not only torn, is made good by nothing but a segment that was begun because of it.
+        // Messages without a gap prove that nothing is missing. But only a rewriting segment makes up for damage that no
+        // interrupted write explains.
         let is_strange = self.broken_off.iter().any(|one| !one.is_torn);
         if !self.broken_off.is_empty() && !is_rewrite && (is_damaged || is_strange) {
             return Ok(Err(self.broken_off.swap_remove(0)));
@@ -360,22 +352,20 @@ impl<'v> Reader<'v> {
         if let Some(name) = self.unfinished.take() {
             self.notes.push(if is_rewrite {
                 let name_here = name_of(path);
-                format!(
-                    "{name} failed while it was written; {name_here} holds what it may have lost"
-                )
+                format!("writing {name} failed; {name_here} repeats what it may have lost")
             } else {
-                format!("{name} was not finished; the next segment goes on where it stops")
+                format!("{name} is unfinished; the next segment continues where it stops")
             });
         }
         self.is_finished = is_finished;
         if !is_finished || is_damaged {
             self.unfinished = Some(name_of(path));
         }
-        Ok(Ok(Outcome::GoOn))
+        Ok(Ok(SegmentOutcome::Content))
     }
 }
 
-const NO_INDEX: &str = "the index at the end is missing; all samples and entries are there";
+const NO_INDEX: &str = "the index at the end is missing; all samples and entries are present";
 const LATER_PART: &str =
     "this is a later part of a recording; open the session's folder for what came before";
 
@@ -393,11 +383,11 @@ pub(crate) fn name_of(path: &Path) -> String {
 
 pub(crate) fn check_beginning(
     path: &Path,
-    source: &Source,
+    source: &LogFile,
     is_ours: bool,
 ) -> Result<(), ReadError> {
     let reason = if source.length() == 0 {
-        "it is empty: nothing was ever recorded"
+        "it is empty: nothing was recorded"
     } else if !is_ours {
         "it does not begin like one"
     } else {

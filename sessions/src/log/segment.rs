@@ -1,25 +1,25 @@
-//! One file of a session log: the container, its bytes on their way to the sink, and the sink.
+//! One file of a session log: the MCAP container, its buffer, and the sink.
 
 use super::error::{LogError, encode_error};
-use super::sink::{Alteration, ClosedCheck, Sink};
+use super::sink::{Alteration, Sink, WrittenFile};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The profile in the file's header, which tells our files from other MCAP files.
+/// The profile in the file's header, which distinguishes palpate's files from other MCAP files.
 pub(crate) const PROFILE: &str = "palpate";
-/// A chunk is cut when it grows beyond this.
+/// A chunk ends when it exceeds this size.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// The container's bytes on their way to the sink.
+/// Buffer between container and sink.
 #[derive(Clone, Default)]
 struct Tape(Arc<Mutex<TapeState>>);
 
 #[derive(Default)]
 struct TapeState {
     bytes: Vec<u8>,
-    /// Bytes ever written, which is the place in the file.
+    /// Bytes written so far, which is the position in the file.
     position: u64,
 }
 
@@ -47,32 +47,31 @@ impl Seek for Tape {
         let position = self.state().position;
         match to {
             SeekFrom::Current(0) => Ok(position),
-            SeekFrom::Start(place) if place == position => Ok(position),
-            // The container is told not to seek; this keeps the file append-only if it tries.
+            SeekFrom::Start(start) if start == position => Ok(position),
+            // Seeking is disabled in the container; this keeps the file append-only in any case.
             _ => Err(io::Error::other("a session log is only ever appended to")),
         }
     }
 }
 
-/// A complete MCAP file in the making.
+/// An MCAP file being written.
 pub(crate) struct Segment<S: Sink> {
     container: mcap::Writer<Tape>,
     tape: Tape,
     sink: S,
-    /// Shown in errors.
     path: String,
     channel_ids: [u16; Channel::ALL.len()],
 }
 
 impl<S: Sink> Segment<S> {
-    /// Starts a file in memory; nothing is handed to the sink yet.
+    /// Starts a file in memory; the sink gets nothing yet.
     pub fn begin(sink: S, path: String, library: &str) -> Result<Self, LogError> {
         let tape = Tape::default();
         let container = mcap::WriteOptions::new()
             .profile(PROFILE)
             .library(library)
             .compression(Some(mcap::Compression::Zstd))
-            // Level 1 is the cheapest; packed doubles hardly shrink further at higher ones.
+            // Level 1 is the fastest; higher levels hardly compress packed doubles further.
             .compression_level(1)
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
@@ -88,25 +87,21 @@ impl<S: Sink> Segment<S> {
 
     fn add_channels(&mut self) -> Result<(), LogError> {
         for channel in Channel::ALL {
-            let (name, encoding) = (channel.schema_name(), channel.schema_encoding());
-            let id = self
-                .container
-                .add_schema(name, encoding, &channel.schema())
+            let (encoding, schema_encoding) = channel.encodings();
+            let (name, schema) = (channel.schema_name(), channel.schema());
+            let container = &mut self.container;
+            self.channel_ids[channel as usize] = container
+                .add_schema(&name, schema_encoding, &schema)
                 .and_then(|schema_id| {
-                    self.container.add_channel(
-                        schema_id,
-                        channel.name(),
-                        channel.message_encoding(),
-                        &channel.metadata(),
-                    )
+                    let metadata = channel.metadata();
+                    container.add_channel(schema_id, channel.name(), encoding, &metadata)
                 })
                 .map_err(encode_error("list of channels"))?;
-            self.channel_ids[channel as usize] = id;
         }
         Ok(())
     }
 
-    /// Adds a message. The header's channel is filled in here.
+    /// Adds a message; sets the header's channel.
     pub fn put(
         &mut self,
         channel: Channel,
@@ -117,39 +112,40 @@ impl<S: Sink> Segment<S> {
         self.container.write_to_known_channel(&header, data).map_err(encode_error(channel.name()))
     }
 
-    /// Ends the chunk and hands everything so far to the sink.
+    /// Ends the chunk and passes everything so far to the sink.
     pub fn flush(&mut self) -> Result<(), LogError> {
         self.container.flush().map_err(encode_error("chunk"))?;
         self.hand_over()
     }
 
-    /// Makes everything handed to the sink survive a power cut, and sees that it is still there.
+    /// Makes everything in the sink survive a power cut, and checks that no other program changed the file.
     pub fn sync(&mut self) -> Result<(), LogError> {
         let outcome = self.sink.sync();
         self.disk(outcome)?;
-        self.unaltered(self.sink.check())
+        self.unaltered(self.sink.written().map_or(Ok(()), WrittenFile::check))
     }
 
-    /// Its path, and what checks it once it is closed.
-    pub fn closed(self) -> (String, ClosedCheck) {
-        (self.path, self.sink.closed_check())
+    /// The path, and what was written, to check the closed file.
+    pub fn closed(self) -> (String, Option<WrittenFile>) {
+        let written = self.sink.written().cloned();
+        (self.path, written)
     }
 
     fn unaltered(&self, outcome: Result<(), Alteration>) -> Result<(), LogError> {
         outcome.map_err(|alteration| LogError::Altered { alteration, path: self.path.clone() })
     }
 
-    /// Free room on the sink's disk in bytes, if that is known.
+    /// Free space on the sink's disk in bytes, if known.
     pub fn free_bytes(&self) -> Option<u64> {
         self.sink.free_bytes()
     }
 
-    /// Writes the index, makes the whole file durable and reads it back.
+    /// Writes the index, synchronises the file and reads it back.
     pub fn finish(&mut self) -> Result<(), LogError> {
         self.container.finish().map_err(encode_error("index"))?;
         self.hand_over()?;
         self.sync()?;
-        self.unaltered(self.sink.read_back())
+        self.unaltered(self.sink.written().map_or(Ok(()), WrittenFile::read_back))
     }
 
     fn hand_over(&mut self) -> Result<(), LogError> {
@@ -159,7 +155,7 @@ impl<S: Sink> Segment<S> {
         }
         let outcome = self.sink.append(&bytes);
         bytes.clear();
-        // The buffer is handed back so that no flush has to grow a new one.
+        // The buffer is reused, so that no flush has to grow a new one.
         self.tape.state().bytes = bytes;
         self.disk(outcome)
     }

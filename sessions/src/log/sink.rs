@@ -1,84 +1,61 @@
-//! The one door to the disk: appending bytes, making them durable, and finding out whether they are still there.
+//! Output of a log: appends bytes, synchronises them with the disk, and checks that they are still there.
 
 use crate::folder::{SPARE_FILE, create_folder, segment_file};
+use crate::text::crc32_of_file;
 use std::fs::{File, OpenOptions};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// How a file differs from what was written to it. Only another program can have done that, or a disk that lies.
+/// Difference between a file and what was written to it, caused by another program or a failing disk.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Alteration {
-    /// No file has its name.
-    #[error("it is not there any more")]
+    #[error("the file was deleted")]
     Gone,
-    /// Another file has its name.
-    #[error("another file is in its place")]
+    #[error("another file replaced it")]
     Replaced,
-    /// It was cut, emptied or added to.
-    #[error("it has {found} bytes and {written} were written")]
-    Length {
-        /// Bytes it has.
-        found: u64,
-        /// Bytes that were written.
-        written: u64,
-    },
-    /// As many bytes as were written, but others.
-    #[error("its content is not what was written")]
+    #[error("it has {found} bytes, and {written} were written")]
+    Length { found: u64, written: u64 },
+    #[error("its content differs from what was written")]
     Content,
-    /// The system does not let it be read.
     #[error("it cannot be read back ({0})")]
     Unreadable(String),
 }
 
-/// Checks a file that was closed.
-pub type ClosedCheck = Box<dyn Fn() -> Result<(), Alteration> + Send>;
-
-/// Takes bytes in order. After an error it is not used again.
+/// Takes bytes in order. It is not used again after an error.
 pub trait Sink: Send {
-    /// Writes all bytes at the end.
+    /// Appends all bytes.
     fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Returns once everything appended survives a power cut.
+    /// Returns when everything appended survives a power cut.
     fn sync(&mut self) -> io::Result<()>;
 
-    /// Compares what the disk says of the file with what was written: name and length. That is quickly done.
-    fn check(&self) -> Result<(), Alteration> {
-        Ok(())
+    /// What was written so far, to compare with the disk; `None` for a sink without a file.
+    fn written(&self) -> Option<&WrittenFile> {
+        None
     }
 
-    /// As [`check`](Self::check), and compares every byte.
-    fn read_back(&self) -> Result<(), Alteration> {
-        self.check()
-    }
-
-    /// What checks the file as [`read_back`](Self::read_back) does once it is finished and closed.
-    fn closed_check(&self) -> ClosedCheck {
-        Box::new(|| Ok(()))
-    }
-
-    /// Free room on its disk in bytes, if that is known. May wait for the disk.
+    /// Free space on the disk in bytes, if known. May wait for the disk.
     fn free_bytes(&self) -> Option<u64> {
         None
     }
 }
 
-/// Makes the files of a session that is written in segments.
+/// Creates the segments of a session.
 pub trait SegmentSource: Send {
-    /// What a segment is written to.
     type Sink: Sink;
 
-    /// What errors call the segment.
+    /// Name of the segment in messages.
     fn path(&self, number: u32) -> String;
 
-    /// Makes the segment. Its first `sync` must make its name durable too.
+    /// Creates a segment, whose first `sync` must make its name durable too.
     fn create(&mut self, number: u32) -> io::Result<Self::Sink>;
 
-    /// Makes the segment in another place because its own cannot have it, and says where.
+    /// Creates the segment in another place after a failure; returns its path too.
     fn create_elsewhere(&mut self, number: u32) -> io::Result<(Self::Sink, String)> {
         let path = self.path(number);
-        Err(io::Error::other(format!("there is no other place for {path}")))
+        Err(io::Error::other(format!("there is no spare folder for {path}")))
     }
 }
 
@@ -90,20 +67,19 @@ pub struct FolderSegments {
 }
 
 impl FolderSegments {
-    /// Segments in this folder.
     #[must_use]
     pub fn new(folder: &Path) -> Self {
         Self { folder: folder.into(), spare: None }
     }
 
-    /// Segments in this folder, or in one in `spare`, named by the session's id, when its disk fails. The
-    /// session's folder says so in its file [`SPARE_FILE`], so that a reader finds them.
+    /// Segments in this folder or, after a disk failure, in the subfolder `session_id` of `spare`. The file [`SPARE_FILE`] in
+    /// the session's folder leads a reader there.
     pub fn with_spare(folder: &Path, spare: &Path, session_id: &str) -> io::Result<Self> {
         let spare = std::path::absolute(spare)?.join(session_id);
         let text = spare
             .to_str()
             .ok_or_else(|| io::Error::other("the spare folder's name is not Unicode"))?;
-        // Made now, so that a reader knows: if it is not there, neither is its disk.
+        // Created now, so that a missing folder later means a missing disk.
         create_folder(&spare)?;
         let mut pointer = FileSink::create(&folder.join(SPARE_FILE))?;
         pointer.append(text.as_bytes())?;
@@ -132,17 +108,17 @@ impl SegmentSource for FolderSegments {
     }
 }
 
-/// A new file that is only ever appended to.
+/// A new, append-only file.
 #[derive(Debug)]
 pub struct FileSink {
     file: File,
-    /// The file's folder, until its entry for the file is known to be on disk.
+    /// The file's folder, until the first synchronisation.
     folder: Option<File>,
     written: WrittenFile,
 }
 
 impl FileSink {
-    /// Makes a file. An existing one is never touched.
+    /// Fails if the file exists.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
         let folder = match path.parent() {
@@ -151,7 +127,7 @@ impl FileSink {
         };
         let own = file.metadata()?;
         let written = WrittenFile {
-            // The program may go to another folder before the file is looked for again.
+            // The current folder of the process may change.
             path: std::path::absolute(path)?,
             id: (own.dev(), own.ino()),
             bytes: 0,
@@ -171,7 +147,7 @@ impl Sink for FileSink {
 
     fn sync(&mut self) -> io::Result<()> {
         self.file.sync_data()?;
-        // A new file is only found after a power cut if its folder was synced too (fsync(2)).
+        // The name of a new file survives a power cut only if its folder is synchronised (fsync(2)).
         if let Some(folder) = &self.folder {
             folder.sync_all()?;
             self.folder = None;
@@ -179,17 +155,8 @@ impl Sink for FileSink {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), Alteration> {
-        self.written.check()
-    }
-
-    fn read_back(&self) -> Result<(), Alteration> {
-        self.written.read_back()
-    }
-
-    fn closed_check(&self) -> ClosedCheck {
-        let written = self.written.clone();
-        Box::new(move || written.read_back())
+    fn written(&self) -> Option<&WrittenFile> {
+        Some(&self.written)
     }
 
     fn free_bytes(&self) -> Option<u64> {
@@ -198,23 +165,20 @@ impl Sink for FileSink {
     }
 }
 
-/// What was written to a file, by which it is known again.
+/// Identity, size and checksum of a written file.
 #[derive(Clone, Debug)]
-struct WrittenFile {
+pub struct WrittenFile {
     path: PathBuf,
-    /// The device and the file's number on it.
+    /// Device and inode.
     id: (u64, u64),
     bytes: u64,
     /// CRC-32 of them.
     sum: crc32fast::Hasher,
 }
 
-/// Bytes that are read back at once.
-const WINDOW_BYTES: usize = 1 << 18;
-
 impl WrittenFile {
-    /// Whether the file still has its name, and so many bytes.
-    fn check(&self) -> Result<(), Alteration> {
+    /// Quick check of name and length.
+    pub fn check(&self) -> Result<(), Alteration> {
         let there = std::fs::metadata(&self.path).map_err(unreadable)?;
         if (there.dev(), there.ino()) != self.id {
             return Err(Alteration::Replaced);
@@ -225,18 +189,10 @@ impl WrittenFile {
         }
     }
 
-    fn read_back(&self) -> Result<(), Alteration> {
+    /// Like [`check`](Self::check), and compares every byte.
+    pub fn read_back(&self) -> Result<(), Alteration> {
         self.check()?;
-        let mut file = File::open(&self.path).map_err(unreadable)?;
-        let mut sum = crc32fast::Hasher::new();
-        let mut window = vec![0; WINDOW_BYTES];
-        loop {
-            match file.read(&mut window).map_err(unreadable)? {
-                0 => break,
-                count => sum.update(&window[..count]),
-            }
-        }
-        match sum.finalize() == self.sum.clone().finalize() {
+        match crc32_of_file(&self.path).map_err(unreadable)? == self.sum.clone().finalize() {
             true => Ok(()),
             false => Err(Alteration::Content),
         }

@@ -1,10 +1,10 @@
-//! What a session is, from its first and its last chunk alone: the same effort for any length.
+//! Summary of a session from its first and last chunk, in constant time for any length.
 
 use super::content::{Content, Part};
 use super::files::find_files;
 use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
+use super::log_file::LogFile;
 use super::reader::{NOT_BEGUN, ReadError, check_beginning, damaged, refused};
-use super::source::Source;
 use crate::manifest::Manifest;
 use crate::record::EndRecord;
 use mcap::records::op;
@@ -12,40 +12,36 @@ use palpate_model::Nanos;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What a session says about itself, and how far it goes.
-///
-/// Everything in it is verified; damage between the first and the last chunk is not looked for.
+/// Everything in the summary is verified; damage between the first and the last chunk goes unnoticed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
     /// The log, or its first segment.
     pub path: PathBuf,
-    /// What the session says about itself.
     pub manifest: Manifest,
-    /// Samples up to the last whole chunk.
+    /// Samples up to the last complete chunk.
     pub samples: u64,
-    /// Session time of the last sample, or of the end.
+    /// Session time of the end record or, without it, of the last sample.
     pub last: Nanos,
-    /// How the session ended; `None` if it was interrupted or is being recorded.
+    /// `None` if the recording was interrupted or is in progress.
     pub end: Option<EndRecord>,
-    /// Bytes of all its files.
     pub bytes: u64,
 }
 
 impl Summary {
-    /// Reads the summary of a session folder, or of one file of it.
+    /// `path` is a session folder or a file of it.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let first = &files[0];
         let failed = |source| ReadError::Io { path: path.into(), source };
         let mut chunks = ChunkReader::new().map_err(failed)?;
-        let (manifest, mut found) = read_ends(first, &mut chunks)?;
+        let (manifest, mut found) = read_first_and_last_chunk(first, &mut chunks)?;
         let mut bytes = std::fs::metadata(first).map_err(failed)?.len();
         for file in &files[1..] {
             bytes += std::fs::metadata(file).map_err(failed)?.len();
         }
-        // The last segment may have been begun only.
+        // The last segment may be empty.
         for file in files[1..].iter().rev() {
-            if let Ok((theirs, ends)) = read_ends(file, &mut chunks)
+            if let Ok((theirs, ends)) = read_first_and_last_chunk(file, &mut chunks)
                 && theirs.session_id == manifest.session_id
                 && (ends.samples > 0 || ends.end.is_some())
             {
@@ -64,16 +60,18 @@ impl Summary {
     }
 }
 
-/// What the last chunk of a file tells.
-struct Ends {
+struct LastChunk {
     samples: u64,
     last: Nanos,
     end: Option<EndRecord>,
 }
 
-fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), ReadError> {
+fn read_first_and_last_chunk(
+    path: &Path,
+    chunks: &mut ChunkReader,
+) -> Result<(Manifest, LastChunk), ReadError> {
     let failed = |source| ReadError::Io { path: path.into(), source };
-    let source = Source::open(path).map_err(failed)?;
+    let source = LogFile::open(path).map_err(failed)?;
     let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
     check_beginning(path, &source, is_ours)?;
     let (mut samples, mut last) = (0, Nanos::ZERO);
@@ -89,14 +87,14 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
     if header.map_err(failed)?.is_ok_and(|frame| frame.opcode == op::HEADER) {
         content.take_header(&bytes[FRAME_HEADER_BYTES..]);
     }
-    let places = chunk_places(&source).map_err(failed)?;
-    for (number, place) in places.iter().enumerate() {
+    let offsets = chunk_offsets(&source).map_err(failed)?;
+    for (number, offset) in offsets.iter().enumerate() {
         if number > 0 && content.manifest.is_some() {
             content.begin_anywhere();
         }
-        let read = source.frame_at(*place, &mut bytes).map_err(failed)?;
+        let read = source.frame_at(*offset, &mut bytes).map_err(failed)?;
         if read.is_err() {
-            return Err(damaged(path, *place, "a chunk is not where the index says"));
+            return Err(damaged(path, *offset, "the index points to a wrong offset"));
         }
         let outcome = chunks
             .open(&bytes[FRAME_HEADER_BYTES..])
@@ -106,9 +104,9 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
         }
         match outcome {
             Ok(()) => {}
-            // The last chunk of an interrupted log may be torn; the one before was whole.
-            Err(_) if number + 1 == places.len() && number > 0 => {}
-            Err(reason) => return Err(damaged(path, *place, &reason)),
+            // The last chunk of an interrupted log may be incomplete.
+            Err(_) if number + 1 == offsets.len() && number > 0 => {}
+            Err(reason) => return Err(damaged(path, *offset, &reason)),
         }
     }
     let (manifest, end) = (content.manifest.take(), content.end.take());
@@ -116,44 +114,44 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
     let Some(manifest) = manifest else {
         return Err(damaged(path, 0, NOT_BEGUN));
     };
-    Ok((manifest, Ends { samples, last, end }))
+    Ok((manifest, LastChunk { samples, last, end }))
 }
 
-/// Places of the first chunk and of the last two, in order.
-fn chunk_places(source: &Source) -> io::Result<Vec<u64>> {
-    let mut places =
+/// Offsets of the first chunk and of the last two, in order.
+fn chunk_offsets(source: &LogFile) -> io::Result<Vec<u64>> {
+    let mut offsets =
         if source.has_footer()? { indexed_chunks(source)? } else { walked_chunks(source)? };
-    if places.len() > 3 {
-        places.drain(1..places.len() - 2);
+    if offsets.len() > 3 {
+        offsets.drain(1..offsets.len() - 2);
     }
-    Ok(places)
+    Ok(offsets)
 }
 
-/// Where the index says the chunks are.
-fn indexed_chunks(source: &Source) -> io::Result<Vec<u64>> {
-    let mut places = Vec::new();
+/// Offsets of the chunks from the index.
+fn indexed_chunks(source: &LogFile) -> io::Result<Vec<u64>> {
+    let mut offsets = Vec::new();
     let mut bytes = Vec::new();
     let mut offset = source.summary_start()?;
     while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
         if frame.opcode == op::CHUNK_INDEX {
             let mut fields = Fields(&bytes[FRAME_HEADER_BYTES..]);
             let _times = (fields.u64(), fields.u64());
-            places.extend(fields.u64());
+            offsets.extend(fields.u64());
         }
         offset = frame.next;
     }
-    Ok(places)
+    Ok(offsets)
 }
 
-/// Where the chunks of an unfinished file are: from frame to frame, their bodies not read.
-fn walked_chunks(source: &Source) -> io::Result<Vec<u64>> {
-    let mut places = Vec::new();
+/// Offsets of the chunks of an unfinished file, from frame to frame without reading bodies.
+fn walked_chunks(source: &LogFile) -> io::Result<Vec<u64>> {
+    let mut offsets = Vec::new();
     let mut offset = mcap::MAGIC.len() as u64;
     while let Ok(frame) = source.head_at(offset)? {
         if frame.opcode == op::CHUNK {
-            places.push(offset);
+            offsets.push(offset);
         }
         offset = frame.next;
     }
-    Ok(places)
+    Ok(offsets)
 }

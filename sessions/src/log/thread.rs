@@ -1,13 +1,12 @@
-//! The session writer: collects samples on the caller's thread, writes on its own.
+//! The session writer: collects samples on the caller's thread and writes them on its own thread.
 //!
-//! A batch is 100 ms of session time. At virtual pace a batch is only handed over when the one
-//! before it is on its way to the disk, so a killed process loses at most two batches. At real
-//! pace handing over never waits: 30 s of batches fit in a bounded queue, and a queue that is
-//! full is a failure the caller sees, never a silent gap.
+//! A batch is 100 ms of session time. At virtual pace the caller waits until the thread has taken the batch before, so a
+//! killed process loses at most two batches. At real pace the caller never waits: a bounded queue holds 30 s of batches,
+//! and a full queue is a reported failure, never a silent gap.
 
+use super::batch_writer::{monotonic_now, write_batches};
 use super::error::LogError;
-use super::news::{News, Notice, QUEUE, QUEUE_RAW, QUEUE_SECONDS, Shared};
-use super::scribe::{monotonic_now, write_batches};
+use super::notices::{LogNotices, Notice, QUEUE_SECONDS, WriterStatus};
 use super::sink::{FolderSegments, SegmentSource, Sink};
 use super::writer::{BATCHES_PER_SEGMENT, LogWriter, Parts, check_order};
 use crate::folder::SessionFolder;
@@ -22,20 +21,20 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
-/// Session time in one batch.
 pub(super) const BATCH: Nanos = Nanos::from_millis(100);
-/// Samples in one batch, however little time they take.
+/// Largest number of samples in one batch.
 const BATCH_ROWS_MAX: usize = 1 << 16;
-/// Batches that fit in it: more than 30 s of batches, which slow samples make shorter.
+/// Batches that the queue holds: more than 30 s, because events and slow samples end batches early.
 const QUEUE_BATCHES: usize = 4096;
-/// Raw bytes in one batch, however little time they take: a chunk of the log holds four times as many.
+/// Largest number of raw bytes in one batch; a chunk of the log holds four times as many.
 const BATCH_RAW_MAX: usize = 1 << 20;
-/// How session time passes against wall time.
+
+/// Relation of session time to wall time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// As fast as it is computed: the caller waits for the disk.
+    /// As fast as the computation: the caller waits for the disk.
     Virtual,
-    /// With the wall clock: the caller never waits.
+    /// In step with the wall clock: the caller never waits.
     Real,
 }
 
@@ -47,12 +46,11 @@ pub(super) struct Batch {
     /// Bytes in `raw`.
     pub raw_bytes: usize,
     pub health: Vec<Health>,
-    /// Newest time in the batch.
     pub through: Nanos,
-    /// Session time it covers, a pause before it not counted.
+    /// Session time that it covers, without a pause before it.
     pub span: Nanos,
     pub end: Option<EndRecord>,
-    /// Whether it holds an event, which must survive a power cut at once.
+    /// Whether it holds an event, which is synchronised at once.
     pub has_event: bool,
 }
 
@@ -64,29 +62,28 @@ impl Batch {
 
 /// Records one session on the thread `session-writer`.
 ///
-/// Dropped without [`close`](Self::close), it saves what it was given but writes no end record,
-/// so that the session is seen to be incomplete.
+/// Without [`close`](Self::close), dropping it saves everything but writes no end record, so that the session counts as
+/// interrupted.
 pub struct SessionWriter {
     batch: Batch,
-    /// Where the batch's 100 ms begin: the end of the batch before, or the first item.
+    /// Start of the batch's 100 ms: the end of the batch before, or the first item.
     batch_start: Option<Nanos>,
     last_order: Option<u64>,
     pace: Pace,
     path: String,
     sender: Option<SyncSender<Batch>>,
-    shared: Arc<Shared>,
+    status: Arc<WriterStatus>,
     thread: Option<JoinHandle<()>>,
-    /// The worst that was told of a slow disk.
-    told_slow: Option<Notice>,
-    // Held until the log is closed.
+    /// The most severe notice of a slow disk so far.
+    reported_slow: Option<Notice>,
+    // Keeps the folder locked until the log is closed.
     _folder: Option<SessionFolder>,
 }
 
 impl SessionWriter {
-    /// Starts a session in a folder. When this returns, the manifest survives a power cut.
+    /// Starts a session in a folder. Once this returns, the manifest survives a power cut.
     ///
-    /// Should the folder's disk fail, the recording goes on in a folder of the session's id in
-    /// `spare`, best on another disk.
+    /// If the folder's disk fails, the recording continues in a subfolder of `spare`, which should be on another disk.
     pub fn start(
         folder: SessionFolder,
         spare: Option<&Path>,
@@ -105,7 +102,7 @@ impl SessionWriter {
         Ok(writer)
     }
 
-    /// Starts a session that goes on in a new segment after every so many batches.
+    /// Starts a session with a new segment after every `batches_per_segment` batches.
     pub fn start_in_segments<G: SegmentSource + 'static>(
         source: G,
         batches_per_segment: u32,
@@ -117,7 +114,7 @@ impl SessionWriter {
         Self::start_log(log, &path, pace)
     }
 
-    /// Starts a session on one sink, however long it gets; `path` is only shown in errors.
+    /// Starts a session in a single file; `path` is only for messages.
     pub fn start_on<S: Sink + 'static>(
         sink: S,
         path: &str,
@@ -133,16 +130,16 @@ impl SessionWriter {
         path: &str,
         pace: Pace,
     ) -> Result<Self, LogError> {
-        // A queue of none makes handing over wait until the thread is free.
+        // A queue of length 0 makes the sender wait until the thread takes the batch.
         let (sender, receiver) = sync_channel(match pace {
             Pace::Virtual => 0,
             Pace::Real => QUEUE_BATCHES,
         });
-        let shared = Arc::new(Shared::default());
-        let thread_shared = Arc::clone(&shared);
+        let status = Arc::new(WriterStatus::default());
+        let thread_status = Arc::clone(&status);
         let thread = std::thread::Builder::new()
             .name("session-writer".into())
-            .spawn(move || write_batches(log, &receiver, &thread_shared, monotonic_now))
+            .spawn(move || write_batches(log, &receiver, &thread_status, monotonic_now))
             .map_err(|err| LogError::Disk {
                 reason: format!("no thread to write on: {err}"),
                 path: path.into(),
@@ -154,16 +151,16 @@ impl SessionWriter {
             pace,
             path: path.into(),
             sender: Some(sender),
-            shared,
+            status,
             thread: Some(thread),
-            told_slow: None,
+            reported_slow: None,
             _folder: None,
         })
     }
 
-    /// Records one sample. Costs well under a microsecond unless a batch is handed over.
+    /// Takes well under 1 µs unless a batch is full.
     pub fn push_row(&mut self, row: Row) -> Result<(), LogError> {
-        self.shared.check()?;
+        self.status.check()?;
         if let Some(what) = row.non_finite() {
             return Err(LogError::NotFinite { what: format!("{what} of a sample") });
         }
@@ -172,9 +169,9 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Records one entry; its order must be above that of the entry before.
+    /// The entry's order must exceed that of the entry before.
     pub fn push_entry(&mut self, entry: Entry) -> Result<(), LogError> {
-        self.shared.check()?;
+        self.status.check()?;
         check_order(entry.order, self.last_order)?;
         self.make_room(entry.now)?;
         self.last_order = Some(entry.order);
@@ -183,10 +180,10 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Records bytes as exchanged with devices, each at its session time; `now` is that of the newest input.
+    /// Records bytes exchanged with devices, each at its session time; `now` is the time of the newest input.
     pub fn push_raw(&mut self, now: Nanos, raw: Vec<RawBytes>) -> Result<(), LogError> {
         for piece in raw {
-            self.shared.check()?;
+            self.status.check()?;
             self.make_room(now)?;
             self.batch.raw_bytes += piece.bytes.len();
             self.batch.raw.push(piece);
@@ -194,83 +191,81 @@ impl SessionWriter {
         Ok(())
     }
 
-    /// Records how the computer keeps up.
     pub fn push_health(&mut self, health: Health) -> Result<(), LogError> {
-        self.shared.check()?;
+        self.status.check()?;
         self.make_room(health.now)?;
         self.batch.health.push(health);
         Ok(())
     }
 
-    /// How the disk keeps up: the log's part of a [`MachineState`], the longest synchronisation since this was
-    /// last asked.
+    /// The log's part of a [`MachineState`], with the longest synchronisation since the last call.
     pub fn disk_state(&self) -> MachineState {
-        let sync_ns = self.shared.sync_ns.swap(0, Ordering::AcqRel);
-        let free = self.shared.free_bytes.load(Ordering::Acquire);
+        let sync_ns = self.status.sync_ns.swap(0, Ordering::AcqRel);
+        let free = self.status.free_bytes.load(Ordering::Acquire);
         MachineState {
-            queue_share: self.shared.queue_share(),
+            queue_share: self.status.queue_share(),
             sync_s: (sync_ns > 0).then(|| Nanos(sync_ns).seconds().0),
             free_bytes: free.checked_sub(1),
             ..MachineState::default()
         }
     }
 
-    /// What becomes of the log after it was last asked, also once the writer is closed.
-    pub fn news(&self) -> News {
-        News::of(&self.shared)
+    /// Access to notices that remains after the writer is closed.
+    pub fn news(&self) -> LogNotices {
+        LogNotices::of(&self.status)
     }
 
-    /// News of the log since this was last asked.
+    /// Notices since the last call.
     pub fn take_notices(&mut self) -> Vec<Notice> {
-        let mut news = self.shared.take_moves();
-        let share = self.shared.queue_share();
+        let mut notices = self.status.take_notices();
+        let share = self.status.queue_share();
         let slow = match self.pace {
             Pace::Real if share >= 0.9 => Some(Notice::TooSlow),
             Pace::Real if share >= 0.5 => Some(Notice::Slow),
             _ => None,
         };
-        if slow.is_some() && slow != self.told_slow && self.told_slow != Some(Notice::TooSlow) {
-            self.told_slow.clone_from(&slow);
-            news.extend(slow);
+        let is_new = slow != self.reported_slow && self.reported_slow != Some(Notice::TooSlow);
+        if slow.is_some() && is_new {
+            self.reported_slow.clone_from(&slow);
+            notices.extend(slow);
         }
-        news
+        notices
     }
 
-    /// Hands over a batch that is old enough, for callers that go without samples for long.
+    /// Sends a batch that is due, for callers without samples for a while.
     pub fn on_tick(&mut self, now: Nanos) -> Result<(), LogError> {
-        self.shared.check()?;
+        self.status.check()?;
         if self.is_due(now) {
             self.hand_over()?;
         }
         Ok(())
     }
 
-    /// Why nothing more is saved; `None` while all is well.
+    /// Why nothing is saved any more; `None` without a failure.
     pub fn failure(&self) -> Option<String> {
-        self.shared.check().err().map(|err| err.to_string())
+        self.status.check().err().map(|err| err.to_string())
     }
 
-    /// Session time up to which everything is handed to the system, and so survives the death
-    /// of this process.
+    /// Session time up to which the system has everything, so that it survives the death of this process.
     pub fn saved_through(&self) -> Nanos {
-        Nanos(self.shared.saved_through_ns.load(Ordering::Acquire))
+        Nanos(self.status.saved_through_ns.load(Ordering::Acquire))
     }
 
-    /// Writes the end record, waits until it is on the disk and ends the thread.
+    /// Writes the end record, waits for the disk and ends the thread.
     pub fn close(mut self, end: EndRecord) -> Result<(), LogError> {
-        let outcome = self.shared.check().and_then(|()| {
+        let outcome = self.status.check().and_then(|()| {
             let mut batch = std::mem::take(&mut self.batch);
             batch.through = batch.through.max(end.ended_at);
             batch.end = Some(end);
-            self.send_waiting(batch)
+            self.send(batch, Pace::Virtual)
         });
         self.join();
-        outcome.and_then(|()| self.shared.check())
+        outcome.and_then(|()| self.status.check())
     }
 
     fn is_due(&self, now: Nanos) -> bool {
         let is_old = |start| now.since(start).0 >= BATCH.0;
-        // With the wall clock, what belongs to one moment goes to the disk as soon as it is over.
+        // At real pace an event is sent as soon as session time moves on.
         let is_event = self.batch.has_event && self.pace == Pace::Real && now > self.batch.through;
         self.batch_start.is_some_and(is_old) || is_event || self.is_full()
     }
@@ -300,44 +295,29 @@ impl SessionWriter {
         let next =
             Batch { rows: Vec::with_capacity(self.batch.rows.len()), through, ..Batch::default() };
         let batch = std::mem::replace(&mut self.batch, next);
-        match self.pace {
-            Pace::Virtual => self.send_waiting(batch),
-            Pace::Real => self.send_at_once(batch),
-        }
+        self.send(batch, self.pace)
     }
 
-    fn send_waiting(&mut self, batch: Batch) -> Result<(), LogError> {
+    /// Sends a batch to the thread; waits for it at virtual pace only.
+    fn send(&mut self, batch: Batch, pace: Pace) -> Result<(), LogError> {
         let Some(sender) = &self.sender else {
             return Err(LogError::Closed);
         };
-        self.shared.queued_ns.fetch_add(batch.span.0, Ordering::AcqRel);
-        let raw = batch.raw_bytes as u64;
-        self.shared.queued_raw.fetch_add(raw, Ordering::AcqRel);
-        // The thread only goes away after it has failed, and then has said why.
-        sender.send(batch).or_else(|_| self.shared.check().and(Err(LogError::Closed)))
-    }
-
-    fn send_at_once(&mut self, batch: Batch) -> Result<(), LogError> {
-        let Some(sender) = &self.sender else {
-            return Err(LogError::Closed);
-        };
-        let span = batch.span.0;
-        let queued = self.shared.queued_ns.fetch_add(span, Ordering::AcqRel);
-        let raw = batch.raw_bytes as u64;
-        let queued_raw = self.shared.queued_raw.fetch_add(raw, Ordering::AcqRel);
-        let outcome = if queued + span > QUEUE.0 || queued_raw + raw > QUEUE_RAW {
-            Err(TrySendError::Full(batch))
-        } else {
-            sender.try_send(batch)
+        let is_over = self.status.add_queued(batch.span, batch.raw_bytes);
+        let outcome = match pace {
+            Pace::Virtual => sender.send(batch).map_err(|err| TrySendError::Disconnected(err.0)),
+            Pace::Real if is_over => Err(TrySendError::Full(batch)),
+            Pace::Real => sender.try_send(batch),
         };
         match outcome {
             Ok(()) => Ok(()),
             Err(TrySendError::Full(_)) => {
-                self.shared
+                self.status
                     .fail(LogError::TooSlow { seconds: QUEUE_SECONDS, path: self.path.clone() });
-                self.shared.check()
+                self.status.check()
             }
-            Err(TrySendError::Disconnected(_)) => self.shared.check().and(Err(LogError::Closed)),
+            // The thread ends early only after it has reported a failure.
+            Err(TrySendError::Disconnected(_)) => self.status.check().and(Err(LogError::Closed)),
         }
     }
 
@@ -347,7 +327,7 @@ impl SessionWriter {
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            self.shared.fail(LogError::Disk {
+            self.status.fail(LogError::Disk {
                 reason: "the writer stopped unexpectedly".into(),
                 path: self.path.clone(),
             });
@@ -358,10 +338,10 @@ impl SessionWriter {
 impl Drop for SessionWriter {
     fn drop(&mut self) {
         let has_rest = !self.batch.parts().is_empty();
-        if self.thread.is_some() && has_rest && self.shared.check().is_ok() {
+        if self.thread.is_some() && has_rest && self.status.check().is_ok() {
             let batch = std::mem::take(&mut self.batch);
-            // There is nobody left to tell: the failure shows as a missing end record.
-            let _ = self.send_waiting(batch);
+            // A failure cannot be returned here; it shows as a missing end record.
+            let _ = self.send(batch, Pace::Virtual);
         }
         self.join();
     }

@@ -1,22 +1,22 @@
-//! Goes through one file of a log and verifies every checksum on the way.
+//! Reads one file of a log and verifies every checksum.
 
 use super::content::Content;
 use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
-use super::source::{NoFrame, Source};
+use super::log_file::{FrameError, LogFile};
 use mcap::records::op;
 use std::io;
 
-/// Why the walk ended before the end of the data.
+/// Why reading stopped before the end of the data.
 pub(crate) struct Stop {
     pub offset: u64,
     pub reason: String,
-    /// Whether this is how an interrupted write looks, and not damage.
+    /// Whether an interrupted write explains it.
     pub is_torn: bool,
 }
 
-/// Goes through all frames of the data section.
+/// Reads all frames of the data section.
 pub(crate) fn walk(
-    source: &Source,
+    source: &LogFile,
     chunks: &mut ChunkReader,
     content: &mut Content<'_>,
 ) -> io::Result<Result<(), Stop>> {
@@ -28,19 +28,20 @@ pub(crate) fn walk(
     sum.update(mcap::MAGIC);
     while offset < source.length() {
         let damage = |reason: String, is_torn: bool| Ok(Err(Stop { offset, reason, is_torn }));
-        // Zeros from within a frame to the end of the file are what a power cut leaves.
+        // A power cut leaves zeros from within a frame to the end of the file.
         let is_zeroed = |frame_end: u64| -> io::Result<bool> {
             let written = source.written_length()?;
             Ok(!is_finished && written <= frame_end && written < source.length())
         };
         let frame = match source.frame_at(offset, &mut bytes)? {
             Ok(frame) => frame,
-            Err(NoFrame::TooLong) => {
+            Err(FrameError::TooLong) => {
                 let is_torn = is_zeroed(offset)?;
-                return damage("a record is longer than any that is written".into(), is_torn);
+                return damage("a record is longer than the largest possible one".into(), is_torn);
             }
-            Err(NoFrame::PastEnd) => {
-                let is_torn = !is_finished && !has_chunk_after(source, offset, chunks)?;
+            Err(FrameError::PastEnd) => {
+                // A later chunk distinguishes damage from an incomplete end.
+                let is_torn = !is_finished && next_chunk(source, offset, chunks)?.is_none();
                 return damage("a record runs past the end of the file".into(), is_torn);
             }
         };
@@ -65,7 +66,7 @@ pub(crate) fn walk(
                 }
                 return check_index(source, frame.next, is_finished);
             }
-            // Other tools may add these to a finished file, whose checksums prove them.
+            // Other tools may add these to a finished file; its checksums cover them.
             op::ATTACHMENT | op::METADATA | 0x80.. if is_finished => {}
             _ => {
                 let is_torn = is_zeroed(frame.next)?;
@@ -81,8 +82,8 @@ pub(crate) fn walk(
     Ok(Ok(()))
 }
 
-/// Checks the checksum of what is behind the data. The footer's own first two fields are in it.
-fn check_index(source: &Source, start: u64, is_finished: bool) -> io::Result<Result<(), Stop>> {
+/// Verifies the checksum of everything after the data, including the footer's first two fields.
+fn check_index(source: &LogFile, start: u64, is_finished: bool) -> io::Result<Result<(), Stop>> {
     if is_finished {
         let (stored, summed) = source.index_checksums(start)?;
         if stored != summed {
@@ -96,16 +97,9 @@ fn check_index(source: &Source, start: u64, is_finished: bool) -> io::Result<Res
     Ok(Ok(()))
 }
 
-/// Whether a whole, undamaged chunk lies anywhere after `offset`.
-///
-/// Tells a torn end, after which there is nothing, from damage in the middle.
-fn has_chunk_after(source: &Source, offset: u64, chunks: &mut ChunkReader) -> io::Result<bool> {
-    Ok(next_chunk(source, offset, chunks)?.is_some())
-}
-
-/// The place of the next whole, undamaged chunk after `offset`.
+/// Offset of the next undamaged chunk after `offset`.
 pub(crate) fn next_chunk(
-    source: &Source,
+    source: &LogFile,
     offset: u64,
     chunks: &mut ChunkReader,
 ) -> io::Result<Option<u64>> {

@@ -1,19 +1,16 @@
-//! Turns rows and entries into MCAP bytes, one whole chunk per call.
+//! Encodes rows and entries as MCAP, one complete chunk per call.
 //!
-//! The container is written in memory and handed to the [`Sink`] in one append per call, so the
-//! file on disk always ends with a whole chunk plus at most one torn one, and the system's own
-//! reason for a failed write is kept.
+//! Each call passes its bytes to the [`Sink`] in one append, so the file on disk ends with a complete chunk and at most one
+//! incomplete one.
 //!
-//! The container keeps an index entry of about 600 bytes per chunk in memory until its file is
-//! finished. A log is therefore written in segments: after [`BATCHES_PER_SEGMENT`] batches a new
-//! file goes on where the old one stopped, and the old one's index is written and let go. No more
-//! than the index of one segment is ever held, so the memory of a run does not grow with its
-//! length.
+//! The container holds an index entry of about 600 bytes per chunk in memory until its file is finished. A log is therefore
+//! written in segments: after [`BATCHES_PER_SEGMENT`] batches a new file continues, and the index of the old one is written
+//! and freed. So memory does not grow with the length of a run.
 
 use super::error::LogError;
 use super::json::{entry_json, readable_json};
 use super::segment::Segment;
-use super::sink::{ClosedCheck, SegmentSource, Sink};
+use super::sink::{SegmentSource, Sink, WrittenFile};
 use crate::block::{block_slices, blocks_from_rows};
 use crate::health::Health;
 use crate::manifest::Manifest;
@@ -25,39 +22,33 @@ use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 use prost::Message;
 
-/// Batches in one segment: ten minutes of batches of 100 ms. Each ends a chunk, whose index entry
-/// of about 600 bytes stays in memory until the segment is finished: under 4 MB in all. Shorter
-/// segments would save little more and leave many files.
+/// Batches in one segment: ten minutes of 100 ms. Their index entries of about 600 bytes take under 4 MB. Shorter segments
+/// would save little and leave many files.
 pub const BATCHES_PER_SEGMENT: u32 = 6000;
-/// Largest message the writer makes; the reader's limit for a whole chunk is four times this.
+/// Largest message that the writer accepts.
 pub(crate) const MESSAGE_BYTES_MAX: usize = 16 << 20;
-/// Session time between two samples of the thinned channel: a plot of 50 points a second shows
-/// every step of a run, and its messages, each with an index entry of 16 bytes, stay below a tenth
-/// of a log at 1 kHz.
+/// Session time between two samples of the thinned channel: 50 points a second show every step of a run, and the messages,
+/// each with an index entry of 16 bytes, stay below a tenth of a log at 1 kHz.
 const VIEW_EVERY: Nanos = Nanos::from_millis(20);
 
-/// What is written together.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Parts<'a> {
-    /// Samples.
     pub rows: &'a [Row],
     /// Entries, by strictly increasing `order`.
     pub entries: &'a [Entry],
-    /// Bytes as exchanged with devices, at session times.
+    /// Bytes exchanged with devices, at session times.
     pub raw: &'a [RawBytes],
-    /// How the computer keeps up.
     pub health: &'a [Health],
 }
 
 impl Parts<'_> {
-    /// Whether there is nothing.
     pub fn is_empty(&self) -> bool {
         let has_more = !self.raw.is_empty() || !self.health.is_empty();
         self.rows.is_empty() && self.entries.is_empty() && !has_more
     }
 }
 
-/// How far a log has come: what a segment that is written again begins with.
+/// Progress of a log, and the state in which a rewriting segment begins.
 #[derive(Clone, Default)]
 struct Counters {
     sequences: [u32; Channel::ALL.len()],
@@ -66,45 +57,41 @@ struct Counters {
     entries: u64,
     raw_bytes: u64,
     last_order: Option<u64>,
-    /// Session time from which the next sample is shown in the thinned channel.
+    /// Session time of the next sample in the thinned channel.
     next_view: Nanos,
 }
 
-/// Where the next segments come from and when.
 struct Rotation<S: Sink> {
     source: Box<dyn SegmentSource<Sink = S>>,
     batches_per_segment: u32,
 }
 
-/// Writes one session log.
 pub struct LogWriter<S: Sink> {
     segment: Segment<S>,
     /// `None` for a log that stays in one file.
     rotation: Option<Rotation<S>>,
     /// Number of the segment being written.
     number: u32,
-    /// Batches in it.
     batches: u32,
-    /// What every segment begins with.
     manifest_json: Vec<u8>,
     library: String,
     started_ns: u64,
     /// `None` in an imported session, whose ticks are picoseconds.
     tick_nanos: Option<u64>,
     at: Counters,
-    /// Where `at` stood when everything before was known to survive a power cut.
+    /// Value of `at` at the last synchronisation.
     synced: Counters,
     failure: Option<LogError>,
-    /// Segments that are finished: their paths and what checks them.
-    closed: Vec<(String, ClosedCheck)>,
-    /// What became of one of them; the log goes on all the same.
+    /// Finished segments: path and written content.
+    closed: Vec<(String, Option<WrittenFile>)>,
+    /// Alteration of a finished segment, which does not stop the recording.
     altered: Option<LogError>,
 }
 
 impl<S: Sink> LogWriter<S> {
-    /// Starts a log that stays in one file. When this returns, the manifest survives a power cut.
+    /// Starts a log in a single file. Once this returns, the manifest survives a power cut.
     ///
-    /// `path` is only shown in errors.
+    /// `path` is only for messages.
     pub fn begin(sink: S, path: &str, manifest: &Manifest) -> Result<Self, LogError> {
         let library = format!("palpate {}", manifest.software_version);
         let started_ns = manifest.started_at.timestamp_nanos_opt().unwrap_or(0);
@@ -128,8 +115,8 @@ impl<S: Sink> LogWriter<S> {
         Ok(writer)
     }
 
-    /// Starts a log that goes on in a new segment after every so many batches. When this returns,
-    /// the manifest survives a power cut.
+    /// Starts a log with a new segment after every `batches_per_segment` batches. Once this returns, the manifest survives a
+    /// power cut.
     pub fn begin_in_segments(
         mut source: Box<dyn SegmentSource<Sink = S>>,
         batches_per_segment: u32,
@@ -142,10 +129,10 @@ impl<S: Sink> LogWriter<S> {
         Ok(writer)
     }
 
-    /// Goes on in a new segment if the present one is full.
+    /// Begins a new segment if the present one is full.
     ///
-    /// The new one's manifest is durable before the old one is finished, and the old one is
-    /// durable before the new one gets any data: wherever this is cut short, nothing is lost.
+    /// The new manifest is durable before the old segment is finished, and the old segment is durable before the new one gets
+    /// data, so an interruption at any point loses nothing.
     fn rotate_if_full(&mut self) -> Result<(), LogError> {
         let Some(rotation) = &mut self.rotation else {
             return Ok(());
@@ -160,17 +147,17 @@ impl<S: Sink> LogWriter<S> {
             .create(number)
             .map_err(|err| LogError::disk(&err, &path))
             .and_then(|sink| Segment::begin(sink, path, &self.library));
-        let next = self.noted(outcome)?;
+        let next = self.remember_failure(outcome)?;
         let mut former = std::mem::replace(&mut self.segment, next);
         (self.number, self.batches) = (number, 0);
         self.put_manifest()?;
         let outcome = self.segment.sync();
-        self.noted(outcome)?;
+        self.remember_failure(outcome)?;
         match former.finish() {
-            // Nothing can be written to it again; what comes goes into the new one.
+            // The recording continues in the new segment.
             Err(err @ LogError::Altered { .. }) => drop(self.altered.get_or_insert(err)),
             outcome => {
-                self.noted(outcome)?;
+                self.remember_failure(outcome)?;
                 self.closed.push(former.closed());
             }
         }
@@ -180,21 +167,19 @@ impl<S: Sink> LogWriter<S> {
     /// Begins the segment with the manifest.
     fn put_manifest(&mut self) -> Result<(), LogError> {
         let json = std::mem::take(&mut self.manifest_json);
-        // Timed at the session's start in every segment: it is the same manifest.
+        // Timed at the session's start in every segment.
         let outcome = self.put(Channel::Manifest, Nanos::ZERO, &json);
         self.manifest_json = json;
         outcome?;
         self.flush()
     }
 
-    /// Adds rows and entries and hands everything so far to the sink.
-    ///
-    /// Entries are JSON and must come in strictly increasing `order`.
+    /// Adds rows and entries, in strictly increasing `order`, and passes everything so far to the sink.
     pub fn append(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
         self.append_parts(&Parts { rows, entries, ..Parts::default() })
     }
 
-    /// As [`append`](Self::append), for everything that a log holds.
+    /// Like [`append`](Self::append), for all kinds of data.
     pub fn append_parts(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
         self.check_alive()?;
         self.check_input(parts)?;
@@ -207,7 +192,7 @@ impl<S: Sink> LogWriter<S> {
 
     fn put_batch(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
         self.batches += u32::from(!parts.is_empty());
-        // What was exchanged stands before what was made of it.
+        // Exchanged bytes precede the samples made from them.
         for block in raw_blocks(self.at.raw_bytes, parts.raw) {
             let at = Nanos(block.at_delta_ns.first().map_or(0, |at| *at as u64));
             self.put(Channel::Raw, at, &block.encode_to_vec())?;
@@ -238,36 +223,34 @@ impl<S: Sink> LogWriter<S> {
         Ok(())
     }
 
-    /// Makes everything handed to the sink survive a power cut.
+    /// Makes everything in the sink survive a power cut.
     pub fn sync(&mut self) -> Result<(), LogError> {
         self.check_alive()?;
         let outcome = self.segment.sync();
-        self.noted(outcome)?;
+        self.remember_failure(outcome)?;
         self.synced = self.at.clone();
         Ok(())
     }
 
-    /// Goes on in a new segment after the disk failed, and writes again what the old one may have
-    /// lost: `since_sync`, the batches appended since the last [`sync`](Self::sync) that
-    /// succeeded, in order, the one that failed at their end. The old file is not touched again.
+    /// Continues in a new segment after a disk failure and rewrites `since_sync`, the batches since the last successful
+    /// [`sync`](Self::sync) in order, with the failed one at the end. The old file is not touched again.
     ///
-    /// When this returns, all of it survives a power cut. Returns the new segment's path, and
-    /// whether it is in the other place.
-    pub fn write_again(&mut self, since_sync: &[Parts<'_>]) -> Result<(String, bool), LogError> {
+    /// Once this returns, all of it survives a power cut. Returns the new segment's path, and whether it is in the spare
+    /// folder.
+    pub fn rewrite(&mut self, since_sync: &[Parts<'_>]) -> Result<(String, bool), LogError> {
         let Some(cause) = self.failure.take() else {
             return Err(LogError::Closed);
         };
         for is_elsewhere in [false, true] {
-            if let Ok(path) = self.try_write_again(&cause, since_sync, is_elsewhere) {
+            if let Ok(path) = self.try_rewrite(&cause, since_sync, is_elsewhere) {
                 return Ok((path, is_elsewhere));
             }
         }
-        // What cannot be helped keeps its first cause.
         self.failure = Some(cause.clone());
         Err(cause)
     }
 
-    fn try_write_again(
+    fn try_rewrite(
         &mut self,
         cause: &LogError,
         since_sync: &[Parts<'_>],
@@ -323,9 +306,9 @@ impl<S: Sink> LogWriter<S> {
         Ok(())
     }
 
-    /// Writes the end record and the index, makes them durable and reads the file back.
+    /// Writes the end record and the index, synchronises them and reads the file back.
     ///
-    /// `samples`, `entries` and `raw_bytes` of the record are replaced by what was really written.
+    /// Sets `samples`, `entries` and `raw_bytes` of the record to the numbers written.
     pub fn finish(&mut self, end: EndRecord) -> Result<(), LogError> {
         self.check_alive()?;
         if let Some((name, _)) = end.time_use.iter().find(|(_, secs)| !secs.is_finite()) {
@@ -340,39 +323,35 @@ impl<S: Sink> LogWriter<S> {
         let json = readable_json("end record", &end)?;
         self.put(Channel::End, end.ended_at, &json)?;
         let outcome = self.segment.finish();
-        self.noted(outcome)?;
-        for (path, check) in &self.closed {
-            if let Err(alteration) = check() {
+        self.remember_failure(outcome)?;
+        for (path, written) in &self.closed {
+            if let Some(Err(alteration)) = written.as_ref().map(WrittenFile::read_back) {
                 let path = path.clone();
-                let err = LogError::Altered { alteration, path };
-                self.altered.get_or_insert(err);
+                self.altered.get_or_insert(LogError::Altered { alteration, path });
             }
         }
         Ok(())
     }
 
-    /// What another program did to a segment that was finished before; told once. Nothing of it can be made good here.
+    /// Takes the alteration of a finished segment by another program.
     pub fn take_altered(&mut self) -> Option<LogError> {
         self.altered.take()
     }
 
-    /// Free room on the log's disk in bytes, if that is known.
+    /// Free space on the log's disk in bytes, if known.
     pub fn free_bytes(&self) -> Option<u64> {
         self.segment.free_bytes()
-    }
-
-    /// Samples written so far.
-    pub fn samples(&self) -> u64 {
-        self.at.samples
     }
 
     fn check_alive(&self) -> Result<(), LogError> {
         self.failure.clone().map_or(Ok(()), Err)
     }
 
-    /// Refuses what a reader would refuse, before any of it is written.
+    /// Refuses data that a reader would refuse.
     fn check_input(&self, parts: &Parts<'_>) -> Result<(), LogError> {
-        check_rows(parts.rows)?;
+        if let Some(what) = parts.rows.iter().find_map(Row::non_finite) {
+            return Err(LogError::NotFinite { what: format!("{what} of a sample") });
+        }
         let mut previous = self.at.last_order;
         for entry in parts.entries {
             check_order(entry.order, previous)?;
@@ -395,26 +374,19 @@ impl<S: Sink> LogWriter<S> {
             log_time: self.started_ns.saturating_add(at.0),
             publish_time: self.at.controller_ns,
         };
-        // A gap in the sequence shows a reader that a message is missing.
+        // A gap in the sequence reveals a missing message to a reader.
         self.at.sequences[index] = self.at.sequences[index].wrapping_add(1);
         self.segment.put(channel, header, data)
     }
 
     fn flush(&mut self) -> Result<(), LogError> {
         let outcome = self.segment.flush();
-        self.noted(outcome)
+        self.remember_failure(outcome)
     }
 
-    /// Remembers a failure: nothing is written after it.
-    fn noted<T>(&mut self, outcome: Result<T, LogError>) -> Result<T, LogError> {
+    /// Stores a failure; nothing is written after it.
+    fn remember_failure<T>(&mut self, outcome: Result<T, LogError>) -> Result<T, LogError> {
         outcome.inspect_err(|err| self.failure = Some(err.clone()))
-    }
-}
-
-pub(crate) fn check_rows(rows: &[Row]) -> Result<(), LogError> {
-    match rows.iter().find_map(Row::non_finite) {
-        Some(what) => Err(LogError::NotFinite { what: format!("{what} of a sample") }),
-        None => Ok(()),
     }
 }
 

@@ -1,68 +1,60 @@
-//! Tells in which state a session is.
+//! Examination of sessions.
 
+use super::companions::find_damaged;
 use super::write::{is_in_use, recover};
-use super::wrong_beside::wrong_beside;
 use super::{Missing, recovered_folder, salvage};
-use crate::log::files::{absent_spare, away};
+use crate::log::files::{absent_spare, describe_absent};
 use crate::log::{ReadError, Session, Summary};
 use chrono::{DateTime, Utc};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The state of a session.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "health")]
 pub enum Health {
-    /// Whole: every checksum is right and the end is there.
+    /// Complete, with correct checksums.
     Healthy,
-    /// Somebody records it now.
     BeingRecorded,
-    /// Everything in it is whole, but the recording broke off.
+    /// Undamaged, but without an end.
     Interrupted,
-    /// The end is not there, and neither is a disk that it may be on.
+    /// Without an end, and a disk that may hold it is missing.
     Incomplete,
-    /// Parts of it are damaged or missing.
     Damaged {
-        /// Which.
         missing: Missing,
     },
-    /// Nothing of it can be used.
     Lost,
     /// A newer version of the program wrote it.
     Newer,
-    /// It is something else.
     Foreign,
 }
 
-/// A session that was looked at.
+/// Result of an examination.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Patient {
-    /// Where it is.
     pub path: PathBuf,
-    /// How it is.
     #[serde(flatten)]
     pub health: Health,
-    /// Samples that can be used.
     pub samples: u64,
-    /// Session time of the last of them, in s.
+    /// Session time of the last usable sample, in s.
     pub until_s: f64,
-    /// Everything there is to know, one sentence each.
+    /// Remarks, one sentence each.
     pub findings: Vec<String>,
-    /// What stands beside the log and is not as it was written, one sentence each.
+    /// Damaged files beside the log, one sentence each.
+    #[serde(rename = "wrong_beside")]
     pub wrong_beside: Vec<String>,
-    /// What it was recovered into.
+    /// Folder of the recovered copy, if there is one.
     pub recovered: Option<PathBuf>,
 }
 
-/// Looks at every byte of a session.
+/// Reads every byte of a session.
 #[must_use]
 pub fn examine(path: &Path) -> Patient {
     let mut until = 0.0;
     let opened = Session::scan(path, &mut |block| {
         until = block.last_time().map_or(until, |time| time.seconds().0);
     });
-    let patient = |health, samples, until_s, findings| Patient {
+    let result = |health, samples, until_s, findings| Patient {
         path: path.into(),
         health,
         samples,
@@ -83,36 +75,35 @@ pub fn examine(path: &Path) -> Patient {
                 Health::Interrupted
             };
             Patient {
-                wrong_beside: wrong_beside(path, &outline.manifest),
-                ..patient(health, outline.samples, until, outline.notes)
+                wrong_beside: find_damaged(path, &outline.manifest),
+                ..result(health, outline.samples, until, outline.notes)
             }
         }
-        Err(err @ ReadError::Newer { .. }) => patient(Health::Newer, 0, 0.0, vec![err.to_string()]),
+        Err(err @ ReadError::Newer { .. }) => result(Health::Newer, 0, 0.0, vec![err.to_string()]),
         Err(err @ (ReadError::NotASession { .. } | ReadError::Missing { .. })) => {
-            patient(Health::Foreign, 0, 0.0, vec![err.to_string()])
+            result(Health::Foreign, 0, 0.0, vec![err.to_string()])
         }
         Err(err) => {
             let mut until = 0.0;
-            let left = salvage(path, &mut |block| {
+            let salvage = salvage(path, &mut |block| {
                 until = block.last_time().map_or(until, |time| time.seconds().0);
             });
-            match left {
-                Ok(left) => {
-                    let mut findings = left.missing.sentences();
-                    let lacks_files = left.missing.is_end_lost || left.lacks_segments;
+            match salvage {
+                Ok(salvage) => {
+                    let mut findings = salvage.missing.sentences();
+                    let lacks_files = salvage.missing.is_end_lost || salvage.lacks_segments;
                     let spare = absent_spare(path).filter(|_| lacks_files);
-                    findings.extend(spare.map(|spare| away(&spare)));
-                    let missing = left.missing;
-                    patient(Health::Damaged { missing }, left.samples, until, findings)
+                    findings.extend(spare.map(|spare| describe_absent(&spare)));
+                    let missing = salvage.missing;
+                    result(Health::Damaged { missing }, salvage.samples, until, findings)
                 }
-                Err(_) => patient(Health::Lost, 0, 0.0, vec![err.to_string()]),
+                Err(_) => result(Health::Lost, 0, 0.0, vec![err.to_string()]),
             }
         }
     }
 }
 
-/// Recovers the unfinished sessions of a library and tells what came of it, a line each. What fails is told and
-/// stays as it is.
+/// Recovers the interrupted sessions of a library; returns lines with the results and errors.
 #[must_use]
 pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>) -> Vec<String> {
     let found = match examine_library(library) {
@@ -129,9 +120,7 @@ pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>
     found.iter().flat_map(one).collect()
 }
 
-/// The unfinished sessions of a library that nobody records and nobody recovered, newest first.
-///
-/// Only the ends of their files are looked at.
+/// The interrupted sessions of a library without a recovered copy, newest first. Reads only their ends.
 pub fn examine_library(library: &Path) -> io::Result<Vec<PathBuf>> {
     let sessions = library.join("sessions");
     if !sessions.is_dir() {
@@ -144,7 +133,7 @@ pub fn examine_library(library: &Path) -> io::Result<Vec<PathBuf>> {
         if is_made || !path.is_dir() || recovered_folder(&path).is_dir() || is_in_use(&path) {
             continue;
         }
-        // What cannot be read at all is not made better by a copy; the doctor tells of it.
+        // An unreadable session cannot be recovered; an examination reports it.
         if Summary::read(&path).is_ok_and(|summary| summary.end.is_none()) {
             found.push(path);
         }

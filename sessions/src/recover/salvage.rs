@@ -1,12 +1,12 @@
-//! Goes through a session's files and keeps everything that is whole.
+//! Reads everything undamaged from a session's files.
 
-use super::{Gap, Missing, Wound};
+use super::{DamageSite, Missing, SampleGap};
 use crate::block::Block;
-use crate::log::content::{Content, Part};
+use crate::log::content::{Content, Part, SegmentState};
 use crate::log::files::{check_files, find_files};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
+use crate::log::log_file::LogFile;
 use crate::log::reader::{NO_BEGINNING, NOT_BEGUN, check_beginning, damaged, name_of, refused};
-use crate::log::source::Source;
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
 use crate::manifest::Manifest;
@@ -15,45 +15,43 @@ use mcap::records::op;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What is left of a session, its samples apart.
+/// The readable part of a session, without its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Salvage {
-    /// What the session says about itself.
     pub manifest: Manifest,
-    /// Samples that are left.
     pub samples: u64,
-    /// Entries that are left, by `order`. Their `after_sample` counts the samples that were recorded.
+    /// Readable entries, by `order`. Their `after_sample` counts the recorded samples.
     pub entries: Vec<Entry>,
-    /// Whether every decision up to the last sample is among them.
+    /// Whether the entries include every decision up to the last sample.
     pub has_every_decision: bool,
-    /// Whether a segment between others is not there at all.
+    /// Whether a segment between others is missing.
     pub lacks_segments: bool,
-    /// Raw bytes of devices that are left.
     pub raw_bytes: u64,
-    /// How the session ended, if that is left.
     pub end: Option<EndRecord>,
-    /// What is not.
     pub missing: Missing,
 }
 
-/// Hands out every block of samples that is whole, in order, and tells what is missing.
+/// Visits every undamaged block of samples in order.
 pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
-    let mut left = parts(path, &mut |part| {
+    let mut salvage = salvage_parts(path, &mut |part| {
         if let Part::Samples(block) = part {
             visit(block);
         }
     })?;
-    // All that is kept may be whole and the file still be damaged where none of it is, as in its index.
-    if !left.missing.is_lossy()
+    // The file may be damaged outside the data, as in its index.
+    if !salvage.missing.is_lossy()
         && let Err(ReadError::Damaged { path, offset, reason }) = Session::scan(path, &mut |_| {})
     {
-        left.missing.wounds.push(Wound { file: name_of(&path), offset, reason });
+        salvage.missing.damage.push(DamageSite { file: name_of(&path), offset, reason });
     }
-    Ok(left)
+    Ok(salvage)
 }
 
-/// As [`salvage`] for everything a log holds, and only what lies where samples are is looked at.
-pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salvage, ReadError> {
+/// Like [`salvage`], for all kinds of data, without a check of the index.
+pub(super) fn salvage_parts(
+    path: &Path,
+    visit: &mut dyn FnMut(Part<'_>),
+) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     check_files(path, &files)?;
     let failed = |source| ReadError::Io { path: path.into(), source };
@@ -70,17 +68,17 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         files: &files,
         chunks: ChunkReader::new().map_err(failed)?,
         content,
-        wounds: Vec::new(),
+        damage: Vec::new(),
     };
     let mut next = 0;
     while next < files.len() {
         next = search.read(next)?;
     }
-    let Search { mut content, wounds, .. } = search;
-    let (mut lost_entries, later) = (content.lost_entries, content.is_later_part);
-    let lost_decisions = content.lost_decisions;
-    let (raw_bytes, mut lost_raw_bytes) = (content.raw_bytes, content.lost_raw_bytes);
-    let raw_bytes_left = raw_bytes - lost_raw_bytes;
+    let Search { mut content, damage, .. } = search;
+    let (mut missing_entries, is_later) = (content.missing_entries, content.is_later_part);
+    let missing_decisions = content.missing_decisions;
+    let (raw_bytes, mut missing_raw_bytes) = (content.raw_bytes, content.missing_raw_bytes);
+    let readable_raw_bytes = raw_bytes - missing_raw_bytes;
     let entries = std::mem::take(&mut content.entries);
     let (manifest, end) = (content.manifest.take(), content.end.take());
     drop(content);
@@ -88,71 +86,73 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         return Err(damaged(path, 0, NOT_BEGUN));
     };
     if let Some(end) = &end {
-        tally.expect(end.samples, None);
+        tally.add_gap_before(end.samples, None);
     }
-    let Tally { kept, mut gaps, .. } = tally;
-    let mut lost_after_last = 0;
+    let Tally { readable, mut gaps, .. } = tally;
+    let mut missing_after_last = 0;
     if let Some(end) = &end
-        && (!later || path.is_dir())
+        && (!is_later || path.is_dir())
     {
-        lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
-        lost_after_last = end.entries.saturating_sub(entries.len() as u64 + lost_entries);
-        lost_entries += lost_after_last;
+        missing_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
+        missing_after_last = end.entries.saturating_sub(entries.len() as u64 + missing_entries);
+        missing_entries += missing_after_last;
     }
-    // The first sample of a later part that is read alone is not its first.
-    if later && !path.is_dir() {
+    // A later segment that is read alone does not begin with the first sample.
+    if is_later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
     }
     let missing = Missing {
         gaps,
-        entries: lost_entries,
-        raw_bytes: lost_raw_bytes,
+        entries: missing_entries,
+        raw_bytes: missing_raw_bytes,
         is_end_lost: end.is_none(),
-        wounds,
+        damage,
         left_out: Vec::new(),
     };
-    // Without the end nobody knows what the last damage took.
+    // Without the end, the extent of the last damage is unknown.
     let is_end_known = end.is_some() || !missing.is_lossy();
     Ok(Salvage {
-        has_every_decision: lost_decisions + lost_after_last == 0 && is_end_known && !later,
+        has_every_decision: missing_decisions + missing_after_last == 0
+            && is_end_known
+            && !is_later,
         missing,
         lacks_segments: files.iter().any(|file| !file.is_file()),
         manifest,
-        samples: kept,
-        raw_bytes: raw_bytes_left,
+        samples: readable,
+        raw_bytes: readable_raw_bytes,
         entries,
         end,
     })
 }
 
-/// Counts the samples that are whole, and those that are missing between them.
+/// Counts readable samples and the gaps between them.
 #[derive(Default)]
 struct Tally {
-    kept: u64,
-    /// Number of the sample that comes next where none is missing.
+    readable: u64,
+    /// Number of the next sample if none is missing.
     expected: u64,
     /// Session time of the last sample, in s.
     last_s: f64,
-    gaps: Vec<Gap>,
+    gaps: Vec<SampleGap>,
 }
 
 impl Tally {
     fn count(&mut self, block: &Block) {
         let first = block.rows().next();
         let from_s = first.map_or(self.last_s, |row| row.host.seconds().0);
-        self.expect(block.first_sample(), Some(from_s));
+        self.add_gap_before(block.first_sample(), Some(from_s));
         let count = block.len() as u64;
         self.expected = block.first_sample() + count;
-        self.kept += count;
+        self.readable += count;
         let last = block.last_time();
         self.last_s = last.map_or(self.last_s, |time| time.seconds().0);
     }
 
-    /// The next sample has this number, and this session time in s where it is known.
-    fn expect(&mut self, number: u64, to_s: Option<f64>) {
+    /// Records a gap if the next sample, at session time `to_s` if known, has a number beyond the expected one.
+    fn add_gap_before(&mut self, number: u64, to_s: Option<f64>) {
         if number > self.expected {
-            self.gaps.push(Gap {
-                after_sample: self.kept,
+            self.gaps.push(SampleGap {
+                after_sample: self.readable,
                 samples: number - self.expected,
                 from_s: self.last_s,
                 to_s,
@@ -161,79 +161,77 @@ impl Tally {
     }
 }
 
-/// Goes through the files of a session.
 struct Search<'f, 'v> {
     files: &'f [PathBuf],
     chunks: ChunkReader,
     content: Content<'v>,
-    wounds: Vec<Wound>,
+    damage: Vec<DamageSite>,
 }
 
 impl Search<'_, '_> {
-    /// Reads what is whole of one file; returns the number of the next one to read.
+    /// Reads the undamaged part of one file; returns the number of the next one to read.
     ///
-    /// Where a file is damaged and the next one was begun because of that, the next one is read first: it
-    /// has everything from before the damage on. What lies behind the damage may still go further.
+    /// If a file is damaged and the next one rewrites it, the next one is read at the damage, because it has everything from
+    /// there on. Data after the damage may still go further.
     fn read(&mut self, number: usize) -> Result<usize, ReadError> {
         let file = &self.files[number];
         let mut next = number + 1;
         if !file.is_file() {
-            self.wound(file, 0, "this segment is missing");
+            self.add_damage(file, 0, "this segment is missing");
             return Ok(next);
         }
         let failed = |source| ReadError::Io { path: file.clone(), source };
-        let source = Source::open(file).map_err(failed)?;
+        let source = LogFile::open(file).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
         if !is_ours && self.content.manifest.is_none() {
             let refused = check_beginning(file, &source, is_ours);
-            // Where others follow, it was one: a later one tells what the session is.
+            // A later segment shows what the session is.
             if next == self.files.len() {
                 refused?;
             }
-            self.wound(file, 0, NO_BEGINNING);
+            self.add_damage(file, 0, NO_BEGINNING);
         }
-        self.content.begin_segment();
+        self.content.enter_segment(SegmentState::default());
         let mut from = Some(mcap::MAGIC.len() as u64);
         while let Some(offset) = from {
             from = self.read_on(file, &source, offset).map_err(failed)?;
             if from.is_some() && next == number + 1 {
                 let until = self.rewrite_after(number).map_err(failed)?;
-                let left = self.content.leave_segment();
+                let segment = self.content.enter_segment(SegmentState::default());
                 while next <= until {
                     next = self.read(next)?;
                 }
-                self.content.return_to_segment(left);
+                self.content.enter_segment(segment);
             }
         }
         if let Some(refusal) = self.content.refusal.take() {
-            // A first file that is another's is refused; a later one is left out.
+            // A first file of another program is refused; a later one is left out.
             if self.content.manifest.is_none() {
                 return Err(refused(file, refusal));
             }
-            self.wound(file, 0, "this segment is of another recording");
+            self.add_damage(file, 0, "this segment is of another recording");
         }
         Ok(next)
     }
 
-    fn wound(&mut self, file: &Path, offset: u64, reason: &str) {
-        self.wounds.push(Wound { file: name_of(file), offset, reason: reason.into() });
+    fn add_damage(&mut self, file: &Path, offset: u64, reason: &str) {
+        self.damage.push(DamageSite { file: name_of(file), offset, reason: reason.into() });
     }
 
-    /// The number of the file that was begun because this one failed; its own if none was. What was begun
-    /// in between and failed at once holds nothing.
+    /// Number of the file that rewrites this one; its own if there is none. Files in between that failed at once are empty.
     fn rewrite_after(&mut self, number: usize) -> io::Result<usize> {
         for (later, file) in self.files.iter().enumerate().skip(number + 1) {
-            match kind_of(file, &mut self.chunks)? {
-                Kind::Rewrite => return Ok(later),
-                Kind::Nothing => {}
-                Kind::Next => break,
+            match segment_kind(file, &mut self.chunks)? {
+                SegmentKind::Rewrite => return Ok(later),
+                SegmentKind::Nothing => {}
+                SegmentKind::Next => break,
             }
         }
         Ok(number)
     }
 
-    /// Reads to the end of a file, or to where it is damaged: then the place from which to go on.
-    fn read_on(&mut self, file: &Path, source: &Source, from: u64) -> io::Result<Option<u64>> {
+    /// Reads to the end of a file, or to a damaged place; then returns the offset of the next undamaged data.
+    fn read_on(&mut self, file: &Path, source: &LogFile, from: u64) -> io::Result<Option<u64>> {
         let mut bytes = Vec::new();
         let mut offset = from;
         while offset < source.length() && self.content.refusal.is_none() {
@@ -265,13 +263,13 @@ impl Search<'_, '_> {
                     _ => ("a record is of an unexpected kind".to_owned(), None),
                 },
             };
-            // The damaged record's length may be right, or may lead anywhere: what lies at its end tells.
+            // The damaged record's length is credible if another record follows it.
             let resumed = match next {
                 Some(next) if is_record(source, next)? => Some(next),
                 _ => next_chunk(source, offset, &mut self.chunks)?,
             };
             if resumed.is_some() || source.has_footer()? {
-                self.wound(file, offset, &reason);
+                self.add_damage(file, offset, &reason);
             }
             return Ok(resumed);
         }
@@ -279,52 +277,51 @@ impl Search<'_, '_> {
     }
 }
 
-/// What a file is to the one before.
-enum Kind {
-    /// It goes on where that one ends.
+/// Relation of a segment to the one before.
+enum SegmentKind {
+    /// It continues the segment before.
     Next,
-    /// It was begun because that one failed.
+    /// It was begun because the segment before failed.
     Rewrite,
-    /// It holds no samples.
     Nothing,
 }
 
-fn kind_of(file: &Path, chunks: &mut ChunkReader) -> io::Result<Kind> {
+fn segment_kind(file: &Path, chunks: &mut ChunkReader) -> io::Result<SegmentKind> {
     if !file.is_file() {
-        return Ok(Kind::Next);
+        return Ok(SegmentKind::Next);
     }
-    let source = Source::open(file)?;
+    let source = LogFile::open(file)?;
     let mut ignore = |_: Part<'_>| {};
     let mut content = Content::new(true, &mut ignore);
     content.allow_gaps();
     let mut bytes = Vec::new();
     let mut offset = mcap::MAGIC.len() as u64;
-    // A file says so in the chunk after the manifest's.
+    // The mark of a rewriting segment is in the chunk after the manifest's.
     while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
-        let had_manifest = content.has_manifest;
+        let had_manifest = content.segment.has_manifest;
         if frame.opcode == op::CHUNK {
             let records = chunks.open(&bytes[FRAME_HEADER_BYTES..]);
             let is_read = records.is_ok_and(|records| content.take_chunk(records).is_ok());
-            if content.is_rewrite {
-                return Ok(Kind::Rewrite);
+            if content.segment.is_rewrite {
+                return Ok(SegmentKind::Rewrite);
             }
             if !is_read {
                 break;
             }
             if had_manifest {
-                return Ok(Kind::Next);
+                return Ok(SegmentKind::Next);
             }
         }
         offset = frame.next;
     }
     match next_chunk(&source, offset, chunks)? {
-        Some(_) => Ok(Kind::Next),
-        None => Ok(Kind::Nothing),
+        Some(_) => Ok(SegmentKind::Next),
+        None => Ok(SegmentKind::Nothing),
     }
 }
 
-/// Whether a record that follows a chunk, or the end, is at a place.
-fn is_record(source: &Source, offset: u64) -> io::Result<bool> {
+/// Whether a record that may follow a chunk is at `offset`.
+fn is_record(source: &LogFile, offset: u64) -> io::Result<bool> {
     Ok(source
         .head_at(offset)?
         .is_ok_and(|head| matches!(head.opcode, op::CHUNK | op::MESSAGE_INDEX | op::DATA_END)))

@@ -1,12 +1,12 @@
-//! Writes what is left of a session as a session of its own, beside the original.
+//! Writes the readable part of a session as a new session beside the original.
 
-use super::beside::Beside;
-use super::salvage::parts;
+use super::companions::CompanionFiles;
+use super::salvage::salvage_parts;
 use super::{Missing, Salvage, salvage};
 use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
-use crate::lock::{self, Busy, NotLocked};
-use crate::log::files::{absent_spare, away};
+use crate::lock::{self, LockFailure, LockTimeout};
+use crate::log::files::{absent_spare, describe_absent};
 use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
@@ -17,111 +17,66 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// What a recovered session says of the one it comes from.
+/// The original of a recovered session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recovered {
-    /// Name of the session it was recovered from.
+pub struct RecoveryOrigin {
+    /// Name of the original session.
     pub from: String,
-    /// When.
     pub at: DateTime<Utc>,
-    /// The program that did it.
     pub software_version: String,
-    /// What is not in it.
     pub missing: Missing,
 }
 
-/// A session was not recovered.
 #[derive(Debug, Error)]
 pub enum RecoverError {
-    /// Nothing of it can be used.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// It lacks nothing.
-    #[error("{} is whole; there is nothing to recover", path.display())]
-    Whole {
-        /// The session.
-        path: PathBuf,
-    },
-    /// It is being written.
+    #[error("{} is complete; there is nothing to recover", path.display())]
+    Whole { path: PathBuf },
     #[error("{} is being recorded; wait for the run to end", path.display())]
-    InUse {
-        /// The session.
-        path: PathBuf,
-    },
-    /// Somebody else is at it.
-    #[error("{} is being recovered by {} already; wait until that is done, and use what it made", path.display(), lock::named(*holder))]
-    InProgress {
-        /// The session.
-        path: PathBuf,
-        /// Process number of who does it, where the system tells.
-        holder: Option<u32>,
-    },
-    /// A disk that its segments may be on is not there.
-    #[error("{} is not recovered yet: {}, or, if it is lost for good, take the file 'spare' out of the session's folder", path.display(), away(spare))]
-    Away {
-        /// The session.
-        path: PathBuf,
-        /// The folder on that disk.
-        spare: PathBuf,
-    },
-    /// It was done before.
-    #[error("{} was recovered before, into {}; use that", path.display(), folder.display())]
-    Before {
-        /// The session.
-        path: PathBuf,
-        /// What was recovered.
-        folder: PathBuf,
-    },
-    /// The new folder cannot be had.
+    InUse { path: PathBuf },
+    #[error("{} is already being recovered by {}; wait for it to end, and use its result", path.display(), lock::holder_name(*holder))]
+    InProgress { path: PathBuf, holder: Option<u32> },
+    #[error("{} is not recovered yet: {}, or, if the disk is lost for good, delete the file 'spare' in the session's folder", path.display(), describe_absent(spare))]
+    Away { path: PathBuf, spare: PathBuf },
+    #[error("{} was already recovered into {}; use that", path.display(), folder.display())]
+    Before { path: PathBuf, folder: PathBuf },
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// The new session cannot be written.
     #[error(transparent)]
     Write(#[from] LogError),
-    /// Its edits or analyses cannot be written.
     #[error(transparent)]
     Beside(#[from] ChainError),
-    /// What an import was made from cannot be copied.
-    #[error("the files in {} cannot be copied ({source}); check their permissions and the room on the disk", path.display())]
-    Original {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error("the files in {} cannot be copied ({source}); check their permissions and the free space on the disk", path.display())]
+    Original { path: PathBuf, source: std::io::Error },
 }
 
-/// A recovered session and what is missing of it.
 #[derive(Clone, Debug)]
 pub struct Recovery {
-    /// Its folder.
     pub folder: PathBuf,
-    /// Its name.
     pub session_id: String,
-    /// What is in it and what is not.
     pub salvage: Salvage,
 }
 
 impl Recovery {
-    /// What was kept of the session at `from` and, after it, what is missing.
+    /// A line with the result, then one for each kind of missing data; `from` is the original.
     pub fn sentences(&self, from: &Path) -> Vec<String> {
         let raw = match self.salvage.raw_bytes {
             0 => String::new(),
             count => format!(" and {count} raw bytes"),
         };
-        let kept = format!(
-            "{}: {} samples{raw} kept in {}",
+        let result = format!(
+            "{}: {} samples{raw} recovered into {}",
             from.display(),
             self.salvage.samples,
             self.folder.display()
         );
         let missing = self.salvage.missing.sentences().into_iter();
         let missing = missing.map(|sentence| format!("  {sentence}"));
-        [kept].into_iter().chain(missing).collect()
+        [result].into_iter().chain(missing).collect()
     }
 }
 
-/// Where a session is recovered to: beside it, with its name and an ending.
 #[must_use]
 pub fn recovered_folder(path: &Path) -> PathBuf {
     let folder = session_folder(path);
@@ -129,9 +84,9 @@ pub fn recovered_folder(path: &Path) -> PathBuf {
     folder.with_file_name(format!("{name}.recovered"))
 }
 
-/// A file stands for the folder it is in.
+/// A file stands for its folder.
 fn session_folder(path: &Path) -> PathBuf {
-    // A file of the present folder, or that folder itself, has no name before it.
+    // The path of the current folder, or of a file in it, has no folder's name.
     let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
     match path.parent() {
         Some(folder) if path.is_file() => folder.into(),
@@ -139,66 +94,64 @@ fn session_folder(path: &Path) -> PathBuf {
     }
 }
 
-/// The name that what is recovered of a session gets.
 #[must_use]
 pub fn recovered_id(session_id: &str) -> String {
     format!("{session_id}-recovered")
 }
 
-/// Whether a session's folder, given it or a file in it, is locked by whoever records it. The lock is only looked at.
+/// Whether a session, given its folder or a file of it, is being recorded.
 #[must_use]
 pub fn is_in_use(path: &Path) -> bool {
     let lock = std::fs::File::open(session_folder(path).join(crate::folder::LOCK_FILE));
     lock.is_ok_and(|file| {
-        let looked = file.try_lock_shared();
-        // Not left to closing: a program started at this moment would hold it a little longer.
+        let outcome = file.try_lock_shared();
+        // Closing is not enough: a child process that is just starting shares the file, and with it the lock.
         let _ = file.unlock();
-        matches!(looked, Err(std::fs::TryLockError::WouldBlock))
+        matches!(outcome, Err(std::fs::TryLockError::WouldBlock))
     })
 }
 
 /// Recovers an interrupted or damaged session into a folder beside it. The original is only read.
 ///
-/// Samples are numbered anew without gaps; their times are the recorded ones, and the manifest
-/// says what is missing between them. Edits, analyses and the original of an import go with it, unless they
-/// would mean something else.
+/// Samples get new numbers without gaps and keep their times; the manifest lists what is missing. Edits, analyses and the
+/// original of an import are copied unless their meaning would change.
 pub fn recover(
     path: &Path,
     software_version: &str,
     at: DateTime<Utc>,
 ) -> Result<Recovery, RecoverError> {
-    let _alone = alone(path)?;
+    let _lock = lock_recovery(path)?;
     if is_in_use(path) {
         return Err(RecoverError::InUse { path: path.into() });
     }
     let folder = recovered_folder(path);
-    // A finished one is not made anew; an unfinished one is what a crash left of another attempt.
+    // A copy without an end is the remainder of an attempt that crashed.
     if crate::log::Summary::read(&folder).is_ok_and(|summary| summary.end.is_some()) {
         return Err(RecoverError::Before { path: path.into(), folder });
     }
-    let mut left = salvage(path, &mut |_| {})?;
-    let lacks_files = left.missing.is_end_lost || left.lacks_segments;
+    let mut salvage = salvage(path, &mut |_| {})?;
+    let lacks_files = salvage.missing.is_end_lost || salvage.lacks_segments;
     if let Some(spare) = absent_spare(path).filter(|_| lacks_files) {
         let path = path.into();
         return Err(RecoverError::Away { path, spare });
     }
-    if !left.missing.is_lossy() && !left.missing.is_end_lost {
+    if !salvage.missing.is_lossy() && !salvage.missing.is_end_lost {
         return Err(RecoverError::Whole { path: path.into() });
     }
-    let beside = Beside::of(path, &left);
-    left.missing.left_out.clone_from(&beside.left_out);
+    let companions = CompanionFiles::read(path, &salvage);
+    salvage.missing.left_out.clone_from(&companions.left_out);
     let unfinished = folder.with_extension("recovering");
     clear(&unfinished)?;
-    let session_id = recovered_id(&left.manifest.session_id);
+    let session_id = recovered_id(&salvage.manifest.session_id);
     let manifest = Manifest {
         session_id: session_id.clone(),
-        recovered: Some(Recovered {
-            from: left.manifest.session_id.clone(),
+        recovered: Some(RecoveryOrigin {
+            from: salvage.manifest.session_id.clone(),
             at,
             software_version: software_version.into(),
-            missing: left.missing.clone(),
+            missing: salvage.missing.clone(),
         }),
-        ..left.manifest.clone()
+        ..salvage.manifest.clone()
     };
     {
         let held = SessionFolder::create(&unfinished)?;
@@ -206,34 +159,33 @@ pub fn recover(
         let shown = log_path.display().to_string();
         let sink = FileSink::create(&log_path).map_err(|err| LogError::disk(&err, &shown))?;
         let mut log = LogWriter::begin(sink, &shown, &manifest)?;
-        copy(path, &left, &mut log)?;
-        beside.write(&unfinished, &session_id)?;
+        copy(path, &salvage, &mut log)?;
+        companions.write(&unfinished, &session_id)?;
     }
-    // Either all of it is there, or nothing is.
+    // The rename makes the copy appear complete or not at all.
     std::fs::rename(&unfinished, &folder)
         .and_then(|()| sync_folder_of(&folder))
         .map_err(|source| FolderError::Io { path: folder.clone(), source })?;
-    Ok(Recovery { folder, session_id, salvage: left })
+    Ok(Recovery { folder, session_id, salvage })
 }
 
-/// Makes sure that nobody else recovers the session, and waits a little for who does. The folder itself is locked, so nothing is
-/// written into it or left beside it, and whether it or a file in it was named makes no difference; where a disk cannot do
-/// that, nothing is made sure of.
-fn alone(path: &Path) -> Result<Option<File>, RecoverError> {
+/// Excludes other recoveries of the session; waits a little for another one. The lock is on the folder itself, so it needs no
+/// file and is the same for every path into the folder. On a file system without locks, nothing is excluded.
+fn lock_recovery(path: &Path) -> Result<Option<File>, RecoverError> {
     let Ok(session) = File::open(session_folder(path)) else {
-        // It is told why when it is read.
+        // Reading the session reports the error.
         return Ok(None);
     };
-    match lock::lock_soon(&session, &session_folder(path)) {
+    match lock::lock_waiting(&session, &session_folder(path)) {
         Ok(()) => Ok(Some(session)),
-        Err(NotLocked::Io(_)) => Ok(None),
-        Err(NotLocked::Busy(Busy { holder, .. })) => {
+        Err(LockFailure::Io(_)) => Ok(None),
+        Err(LockFailure::LockTimeout(LockTimeout { holder, .. })) => {
             Err(RecoverError::InProgress { path: path.into(), holder })
         }
     }
 }
 
-/// Takes away what an attempt that died left behind. It holds nothing that the original does not.
+/// Deletes the remainder of an attempt that crashed.
 fn clear(folder: &Path) -> Result<(), RecoverError> {
     if folder.exists() {
         std::fs::remove_dir_all(folder)
@@ -242,10 +194,10 @@ fn clear(folder: &Path) -> Result<(), RecoverError> {
     Ok(())
 }
 
-fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<(), RecoverError> {
-    let mut pending = left.entries.iter().peekable();
+fn copy(path: &Path, salvage: &Salvage, log: &mut LogWriter<FileSink>) -> Result<(), RecoverError> {
+    let mut pending = salvage.entries.iter().peekable();
     let mut outcome = Ok(());
-    let (mut kept, mut last) = (0u64, Nanos::ZERO);
+    let (mut written, mut last) = (0u64, Nanos::ZERO);
     let mut visit = |part: Part<'_>| {
         if outcome.is_err() {
             return;
@@ -267,28 +219,25 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         let end = block.first_sample() + rows.len() as u64;
         let mut entries = Vec::new();
         while let Some(entry) = pending.next_if(|entry| entry.after_sample < end) {
-            // Between the samples that are left it comes where it came.
+            // The entry keeps its position between the remaining samples.
             let seen = entry.after_sample.saturating_sub(block.first_sample());
-            entries.push(Entry { after_sample: kept + seen, ..entry.clone() });
+            entries.push(Entry { after_sample: written + seen, ..entry.clone() });
         }
-        kept += rows.len() as u64;
+        written += rows.len() as u64;
         last = block.last_time().unwrap_or(last);
         outcome = log.append(&rows, &entries);
     };
-    parts(path, &mut visit)?;
+    salvage_parts(path, &mut visit)?;
     outcome?;
     let rest: Vec<Entry> =
-        pending.map(|entry| Entry { after_sample: kept, ..entry.clone() }).collect();
+        pending.map(|entry| Entry { after_sample: written, ..entry.clone() }).collect();
     log.append(&[], &rest)?;
     let ended_at = rest.last().map_or(last, |entry| entry.now.max(last));
-    let end = left.end.clone().unwrap_or(EndRecord {
+    let end = salvage.end.clone().unwrap_or(EndRecord {
         outcome: "interrupted".into(),
-        reason: "the recording was interrupted; this is what was left of it".into(),
-        samples: 0,
-        entries: 0,
-        raw_bytes: 0,
+        reason: "the recording was interrupted; this is its readable part".into(),
         ended_at,
-        time_use: Vec::new(),
+        ..EndRecord::default()
     });
     log.finish(end)?;
     Ok(())

@@ -1,4 +1,4 @@
-//! How fast a session becomes Parquet, from its log and from memory. `scripts/measure export` compares it with pyarrow.
+//! Speed of exporting a session to Parquet, from its log and from memory. `scripts/measure export` compares it with pyarrow.
 //!
 //! `cargo run --release -p palpate-tables --example export_speed -- SESSION FOLDER`
 //! prints one JSON object, times in s; the tables stay in FOLDER.

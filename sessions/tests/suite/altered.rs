@@ -1,4 +1,4 @@
-//! Logs that another program changes while they are recorded: told, as a fault of the session, and what comes after is kept.
+//! Logs that another program changes during the recording: the change is reported, and later data is saved.
 
 use crate::support::{end, entries, manifest, rows};
 use palpate_model::Nanos;
@@ -25,7 +25,7 @@ const ADD: &str = "printf x >> \"$1\"";
 const CHANGE: &str = "printf x | dd of=\"$1\" bs=1 seek=5000 conv=notrunc status=none";
 
 #[test]
-fn whatever_another_program_does_to_a_log_is_told_when_it_is_closed() {
+fn alteration_by_another_program_is_reported_when_the_log_is_closed() {
     let rows = rows(2000, 5);
     for command in [EMPTY, CUT, REMOVE, REPLACE, ADD, CHANGE] {
         let folder = tempfile::tempdir().unwrap();
@@ -36,7 +36,7 @@ fn whatever_another_program_does_to_a_log_is_told_when_it_is_closed() {
         log.sync().unwrap();
         stranger(command, &path);
         let Err(LogError::Altered { alteration, .. }) = log.finish(end(Nanos(0))) else {
-            panic!("not told: {command}");
+            panic!("not reported: {command}");
         };
         let is_right = match command {
             EMPTY | CUT | ADD => {
@@ -63,7 +63,7 @@ fn push(writer: &mut SessionWriter, rows: &[Row], order: u64) {
 }
 
 #[test]
-fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
+fn altered_log_is_reported_at_once_and_the_recording_continues() {
     let rows = rows(6000, 6);
     let (first, rest) = rows.split_at(3000);
     for command in [EMPTY, CUT, REMOVE, REPLACE] {
@@ -83,18 +83,18 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
             let notices = writer.take_notices();
             (!notices.is_empty()).then_some(notices)
         };
-        let told = until(first_notices, || "a notice".into());
+        let notices = until(first_notices, || "a notice".into());
         assert!(
-            matches!(&told[..], [Notice::Altered(LogError::Altered { .. })]),
-            "{command}: {told:?}"
+            matches!(&notices[..], [Notice::Altered(LogError::Altered { .. })]),
+            "{command}: {notices:?}"
         );
-        assert!(told[0].ends_the_run());
+        assert!(notices[0].ends_the_run());
         let closed = writer.close(end(rows[5999].host));
         assert!(matches!(closed, Err(LogError::Altered { .. })), "{command}: {closed:?}");
-        // What came after is whole, and what is missing is told.
+        // Later data is complete, and missing data is reported.
         let patient = examine(&path);
         if command == REPLACE {
-            // What was on the disk by then is in the copy: nothing is missing, and it was told all the same.
+            // The copy has everything on the disk by then: nothing is missing, and the alteration is reported all the same.
             assert_eq!((&patient.health, patient.samples), (&Health::Healthy, 6000));
             continue;
         }
@@ -103,14 +103,14 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
         };
         assert!(!missing.is_end_lost, "{command}: {missing:?}");
         assert!(patient.samples >= 3000 && patient.until_s > 5.9, "{command}: {patient:?}");
-        let lost: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
-        assert_eq!(patient.samples + lost, 6000, "{command}");
+        let missing_samples: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
+        assert_eq!(patient.samples + missing_samples, 6000, "{command}");
         assert!(Session::open(&path).is_err());
     }
 }
 
 #[test]
-fn a_segment_that_was_finished_is_looked_at_too() {
+fn finished_segment_is_checked_too() {
     let rows = rows(4000, 7);
     let (first, rest) = rows.split_at(2000);
     for (command, is_open) in [(CHANGE, true), (CUT, false), (CHANGE, false), (REPLACE, false)] {

@@ -1,5 +1,5 @@
 //! The catalog against the sessions themselves: every search against a plain scan, every update against a
-//! catalog made anew.
+//! rebuilt catalog.
 
 use crate::support::{MemorySink, Random, end, manifest, rows};
 use chrono::{Duration, TimeZone, Utc};
@@ -263,7 +263,7 @@ fn random_query(random: &mut Random) -> Query {
         "programmes day",
         "s00",
         "damaged",
-        "nobody",
+        "unknown",
         "pilot",
         "somer",
         "second",
@@ -376,7 +376,7 @@ fn pages_and_orders_make_up_the_whole() {
 }
 
 #[test]
-fn an_updated_catalog_is_one_made_anew() {
+fn updated_catalog_equals_a_rebuilt_one() {
     let library = library(8, 11);
     let at = library.path();
     let mut random = Random(12);
@@ -423,10 +423,10 @@ fn an_updated_catalog_is_one_made_anew() {
     {
         let _ = fs::remove_file(at.join(name));
     }
-    let anew = updated(at);
-    assert_eq!(anew.all().unwrap(), grown);
-    assert_eq!(anew.find(&words).unwrap(), found);
-    assert!(anew.remarks.is_empty());
+    let rebuilt = updated(at);
+    assert_eq!(rebuilt.all().unwrap(), grown);
+    assert_eq!(rebuilt.find(&words).unwrap(), found);
+    assert!(rebuilt.remarks.is_empty());
 }
 
 #[test]
@@ -546,7 +546,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
     fs::write(&file, "thesis, last chapter").unwrap();
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap(), expected);
-    assert!(catalog.remarks[0].contains("set aside"), "{:?}", catalog.remarks);
+    assert!(catalog.remarks[0].contains("was renamed to"), "{:?}", catalog.remarks);
     let aside = at.join(format!("{CATALOG_FILE}.aside-1"));
     assert_eq!(fs::read_to_string(aside).unwrap(), "thesis, last chapter");
     drop(catalog);
@@ -582,7 +582,7 @@ fn random_byte(random: &mut Random) -> u8 {
 }
 
 #[test]
-fn a_catalog_of_another_version_is_made_anew_without_a_word() {
+fn catalog_of_another_version_is_rebuilt_silently() {
     let library = library(3, 61);
     let at = library.path();
     let expected = updated(at).all().unwrap();

@@ -1,4 +1,4 @@
-//! Files of lines beside a log that are damaged or lack lines: told by name, and the rest is shown.
+//! JSON-lines files beside a log that are damaged or lack lines: reported by name, and the rest is shown.
 
 use crate::support::{end, log_bytes, manifest, rows};
 use chrono::{TimeZone, Utc};
@@ -58,11 +58,11 @@ fn cut_last_line(path: &Path) {
 
 /// Kinds of events in the history of a subject, and its remarks.
 fn history(library: &Path, subject: Subject, name: &str) -> (Vec<String>, Vec<String>) {
-    let told = Catalog::with(library, |catalog| {
+    let history = Catalog::with(library, |catalog| {
         catalog.update(&mut |_, _| {})?;
         catalog.history(subject, name)
     });
-    let (events, remarks) = told.unwrap();
+    let (events, remarks) = history.unwrap();
     (events.into_iter().map(|one| one.what).collect(), remarks)
 }
 
@@ -76,7 +76,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     assert_eq!(of_specimen(), (all.to_vec(), vec![]));
     for damage in [flip, cut_last_line] {
         let analyses = session.join(ANALYSES_FILE);
-        let kept = fs::read(&analyses).unwrap();
+        let original = fs::read(&analyses).unwrap();
         damage(&analyses);
         let (events, remarks) = of_specimen();
         assert_eq!(events, all[..3]);
@@ -90,7 +90,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
         let remarks = remarks.join("\n");
         assert!(remarks.contains(ANALYSES_FILE) && remarks.contains(EDITS_FILE), "{remarks}");
         fs::write(&edits, kept_edits).unwrap();
-        fs::write(&analyses, kept).unwrap();
+        fs::write(&analyses, original).unwrap();
     }
     let check = DailyCheck {
         at: Utc.with_ymd_and_hms(2026, 3, 5, 8, 0, 0).unwrap(),
@@ -105,13 +105,13 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     let (events, remarks) = history(at, Subject::Rig, "sim");
     assert!(events.contains(&"check".into()) && remarks.is_empty(), "{events:?}");
     let file = at.join("checks/sim.jsonl");
-    let kept = fs::read(&file).unwrap();
+    let original = fs::read(&file).unwrap();
     for damage in [flip, cut_last_line, |path: &Path| fs::remove_file(path).unwrap()] {
         damage(&file);
         let (events, remarks) = history(at, Subject::Rig, "sim");
         assert_eq!(events, all);
         assert!(remarks.len() == 1 && remarks[0].contains("sim.jsonl"), "{remarks:?}");
-        fs::write(&file, &kept).unwrap();
+        fs::write(&file, &original).unwrap();
     }
 }
 
@@ -132,19 +132,19 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
     let edits = session.join(EDITS_FILE);
     let whole = fs::read(&edits).unwrap();
     cut_last_line(&edits);
-    let is_told = |text: &str| text.contains(EDITS_FILE) && text.contains("1 of 2");
+    let is_reported = |text: &str| text.contains(EDITS_FILE) && text.contains("1 of 2");
     assert!(matches!(
         Edits::read(&session, &id),
         Err(EditError::Chain(ChainError::Shortened { found: 1, written: 2, .. }))
     ));
     let wrong = examine(&session).wrong_beside;
-    assert!(wrong.len() == 1 && is_told(&wrong[0]), "{wrong:?}");
-    assert!(trouble().is_some_and(|text| is_told(&text)));
-    // Whoever takes the head away too is told by the catalog, for as long as it is kept.
+    assert!(wrong.len() == 1 && is_reported(&wrong[0]), "{wrong:?}");
+    assert!(trouble().is_some_and(|text| is_reported(&text)));
+    // The catalog notices even if the head is deleted too.
     fs::remove_file(session.join("edits.jsonl.head")).unwrap();
     assert!(examine(&session).wrong_beside.is_empty());
     for _ in 0..2 {
-        assert!(trouble().is_some_and(|text| is_told(&text)));
+        assert!(trouble().is_some_and(|text| is_reported(&text)));
         // Changed again, it is read again.
         fs::write(session.join("spoor"), "").unwrap();
     }
@@ -154,12 +154,12 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
     cut_last_line(&edits);
     let catalog = at.join("catalog.sqlite");
     Catalog::open(at).unwrap().rebuild(&mut |_, _| {}).unwrap();
-    assert!(trouble().is_some_and(|text| is_told(&text)));
+    assert!(trouble().is_some_and(|text| is_reported(&text)));
     let mut bytes = fs::read(&catalog).unwrap();
     // The user version, four bytes at 60 (SQLite file format, 1.3).
     bytes[60..64].copy_from_slice(&999u32.to_be_bytes());
     fs::write(&catalog, bytes).unwrap();
-    assert!(trouble().is_some_and(|text| is_told(&text)));
+    assert!(trouble().is_some_and(|text| is_reported(&text)));
     fs::write(&edits, &whole).unwrap();
     assert_eq!(trouble(), None);
     // A session from before there were heads.

@@ -42,37 +42,37 @@ impl Original {
 }
 
 impl Original {
-    /// What is kept of a damaged file is as recorded, and what is not is told to the sample.
+    /// Recovered data is as recorded, and missing data is reported to the sample.
     pub fn check_salvage(&self, path: &Path, context: &str) -> Option<usize> {
         let mut blocks = Vec::new();
         let mut visit = |block: &Block| {
             blocks.push((block.first_sample() as usize, block.rows().collect::<Vec<_>>()));
         };
-        let left = salvage(path, &mut visit).ok()?;
-        assert_eq!(left.manifest, manifest(), "{context}");
+        let salvage = salvage(path, &mut visit).ok()?;
+        assert_eq!(salvage.manifest, manifest(), "{context}");
         let mut next = 0;
-        let mut kept = 0;
-        let mut gaps = left.missing.gaps.iter();
+        let mut remaining = 0;
+        let mut gaps = salvage.missing.gaps.iter();
         for (first, rows) in &blocks {
             let there = &self.rows[*first..first + rows.len()];
             assert!(same_bits(rows, there), "{context}: wrong rows");
             if *first > next {
                 let gap = gaps.next().unwrap();
                 assert_eq!(gap.samples as usize, first - next, "{context}");
-                assert_eq!(gap.after_sample as usize, kept, "{context}");
+                assert_eq!(gap.after_sample as usize, remaining, "{context}");
                 assert_eq!(gap.to_s, Some(rows[0].host.seconds().0), "{context}");
             }
             assert!(*first >= next, "{context}: a block twice");
-            (next, kept) = (first + rows.len(), kept + rows.len());
+            (next, remaining) = (first + rows.len(), remaining + rows.len());
         }
-        assert_eq!(left.samples as usize, kept, "{context}");
-        let is_kept = |entry: &&Entry| left.entries.contains(entry);
+        assert_eq!(salvage.samples as usize, remaining, "{context}");
+        let is_kept = |entry: &&Entry| salvage.entries.contains(entry);
         let entries: Vec<&Entry> = self.entries.iter().filter(is_kept).collect();
-        assert!(entries.iter().copied().eq(&left.entries), "{context}: wrong entries");
-        if kept < self.rows.len() || entries.len() < self.entries.len() {
-            assert!(!left.missing.sentences().is_empty(), "{context}: short without a word");
+        assert!(entries.iter().copied().eq(&salvage.entries), "{context}: wrong entries");
+        if remaining < self.rows.len() || entries.len() < self.entries.len() {
+            assert!(!salvage.missing.sentences().is_empty(), "{context}: short without a word");
         }
-        Some(kept)
+        Some(remaining)
     }
 }
 
@@ -118,9 +118,9 @@ fn damage_in_the_middle_is_refused_and_can_be_recovered_from() {
             panic!("{refusal}");
         };
         assert!(*offset as usize <= middle && middle - (*offset as usize) < 20_000);
-        let kept = original.check_salvage(&path, "recovered").unwrap();
+        let remaining = original.check_salvage(&path, "recovered").unwrap();
         // One batch is hit, or two at their edge.
-        assert!(kept >= 2800, "{kept}");
+        assert!(remaining >= 2800, "{remaining}");
     }
 }
 
@@ -153,8 +153,8 @@ fn a_length_that_leads_past_the_end_hides_nothing() {
             panic!("{refusal}");
         };
         assert_eq!(offset, *place as u64);
-        let kept = original.check_salvage(&path, "a wrong length");
-        assert_eq!(kept, Some(2900), "a batch and no more");
+        let remaining = original.check_salvage(&path, "a wrong length");
+        assert_eq!(remaining, Some(2900), "a batch and no more");
     }
 }
 
@@ -167,7 +167,7 @@ fn one_flipped_bit_costs_a_batch() {
     let folder = quick_folder();
     let path = folder.path().join("000.mcap");
     let mut random = Random(14);
-    let (mut kept, mut lost) = (0, 0);
+    let (mut remaining, mut refused) = (0, 0);
     let cases = count_from("PALPATE_MUTATIONS", 60);
     for case in 0..cases {
         let mut bytes = original.bytes.clone();
@@ -175,13 +175,13 @@ fn one_flipped_bit_costs_a_batch() {
         bytes[place] ^= 1 << random.below(8);
         put(&path, &bytes);
         match original.check_salvage(&path, &format!("bit flip, case {case}")) {
-            Some(count) => kept += count,
-            None => lost += 1,
+            Some(count) => remaining += count,
+            None => refused += 1,
         }
     }
-    let share = kept as f64 / (cases * original.rows.len()) as f64;
+    let share = remaining as f64 / (cases * original.rows.len()) as f64;
     println!(
-        "{cases} flipped bits: {:.2} % of the samples kept, {lost} files lost whole",
+        "{cases} flipped bits: {:.2} % of the samples recovered, {refused} files refused",
         100.0 * share
     );
     assert!(share >= 0.95, "{share}");
@@ -232,22 +232,22 @@ fn raw_bytes_that_are_lost_are_counted() {
     };
     let whole = sink.bytes();
     // The fourth batch, and the last: behind that one only the end tells.
-    for (lost, batch) in [(300..400, 3), (900..1000, 9)] {
+    for (removed, batch) in [(300..400, 3), (900..1000, 9)] {
         let mut bytes = whole.clone();
         bytes[places[batch] + 100] ^= 1;
         let folder = quick_folder();
         let session = folder.path().join("one");
         put(&session.join("000.mcap"), &bytes);
-        let left = salvage(&session, &mut |_| {}).unwrap();
-        let missing = bytes_of(&rows[lost.clone()]);
-        assert_eq!(left.missing.raw_bytes, missing);
-        assert_eq!(left.raw_bytes, bytes_of(&rows) - missing);
-        let told = left.missing.sentences().join("; ");
-        assert!(told.contains(&format!("{missing} raw bytes")), "{told}");
+        let salvage = salvage(&session, &mut |_| {}).unwrap();
+        let missing = bytes_of(&rows[removed.clone()]);
+        assert_eq!(salvage.missing.raw_bytes, missing);
+        assert_eq!(salvage.raw_bytes, bytes_of(&rows) - missing);
+        let sentences = salvage.missing.sentences().join("; ");
+        assert!(sentences.contains(&format!("{missing} raw bytes")), "{sentences}");
         let copy = recover(&session, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
-        let kept: Vec<Row> = [&rows[..lost.start], &rows[lost.end..]].concat();
-        check_raw(&read_raw(&copy.folder).unwrap(), &kept, kept.len(), "a copy");
+        let remaining: Vec<Row> = [&rows[..removed.start], &rows[removed.end..]].concat();
+        check_raw(&read_raw(&copy.folder).unwrap(), &remaining, remaining.len(), "a copy");
         let copied = Session::open(&copy.folder).unwrap();
-        assert_eq!(copied.beside.raw_bytes, left.raw_bytes);
+        assert_eq!(copied.beside.raw_bytes, salvage.raw_bytes);
     }
 }

@@ -19,8 +19,8 @@ pub enum Step {
     Sync(u32),
     /// All names are on the disk.
     SyncFolder,
-    /// The caller was told that so many samples survive a power cut.
-    Told(usize),
+    /// The caller knows that so many samples survive a power cut.
+    Reported(usize),
 }
 
 /// A step and how many samples had been taken when it was done.
@@ -30,7 +30,7 @@ pub struct Traced {
     pub taken: usize,
 }
 
-/// The disk: it can be told which of its operations fail.
+/// A disk with a chosen set of failing operations.
 #[derive(Clone, Default)]
 pub struct Disk(Arc<Mutex<State>>);
 
@@ -59,7 +59,7 @@ impl Disk {
     }
 
     pub fn tell(&self, samples: usize) {
-        self.note(Step::Told(samples));
+        self.note(Step::Reported(samples));
     }
 
     pub fn trace(&self) -> Vec<Traced> {
@@ -95,8 +95,8 @@ impl Sink for DiskSink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         let outcome = self.disk.count();
         // A failing write leaves a part of what it was given.
-        let kept = bytes.len() / if outcome.is_ok() { 1 } else { 3 };
-        let bytes = bytes[..kept].to_vec();
+        let length = bytes.len() / if outcome.is_ok() { 1 } else { 3 };
+        let bytes = bytes[..length].to_vec();
         self.disk.note(Step::Write(self.number, bytes));
         outcome
     }
@@ -229,7 +229,7 @@ pub fn cut(trace: &[Traced], at: usize, fate: Fate, random: &mut Random, folder:
                 file.unsynced.clear();
             }
             Step::SyncFolder => files.values_mut().for_each(|file| file.has_name = true),
-            Step::Told(_) => {}
+            Step::Reported(_) => {}
         }
     }
     for (number, file) in files {

@@ -66,16 +66,16 @@ fn csv_holds_every_digit_and_reads_back() {
 
     let table = read_table(&path, None).unwrap();
     let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold | Phase::Unload);
-    let kept: Vec<usize> =
+    let remaining: Vec<usize> =
         (0..session.rows.len()).filter(|&i| is_measured(session.rows[i].phase)).collect();
-    assert_eq!(table.t.len(), kept.len());
-    for (k, &i) in kept.iter().enumerate() {
+    assert_eq!(table.t.len(), remaining.len());
+    for (k, &i) in remaining.iter().enumerate() {
         assert_eq!(table.t[k], time_of(&session, i));
         assert_eq!(Some(table.force[k]), session.rows[i].force);
         assert_eq!(Some(table.depth[k]), session.rows[i].depth);
         assert_eq!(table.is_unload[k], session.rows[i].phase == Phase::Unload);
     }
-    let left_out = session.rows.len() - kept.len();
+    let left_out = session.rows.len() - remaining.len();
     assert_eq!(table.notes.len(), 1);
     assert!(table.notes[0].starts_with(&format!("{left_out} rows")));
 }
@@ -227,7 +227,7 @@ fn exports_never_replace_a_file() {
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
         assert!(matches!(export(&session, format, &all, &nowhere), Err(ExportError::Io { .. })));
-        // Nor a dictionary that somebody wrote.
+        // Nor an existing dictionary.
         let path = folder.path().join(format!("two.{name}"));
         std::fs::write(dictionary_path(&path), "mine").unwrap();
         let refusal = export(&session, format, &all, &path).unwrap_err();
@@ -329,7 +329,7 @@ fn text_that_looks_like_a_formula_is_harmless_and_numbers_stay_numbers() {
 }
 
 #[test]
-fn the_dictionary_tells_every_column_of_the_table() {
+fn dictionary_describes_every_column_of_the_table() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = session();
     session.notes.push("a | b\nc".into());
@@ -348,8 +348,8 @@ fn the_dictionary_tells_every_column_of_the_table() {
         export(&session, CSV, &selection, &path).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
-        let told = std::fs::read_to_string(dictionary_path(&path)).unwrap();
-        let rows: Vec<Vec<&str>> = told
+        let dictionary = std::fs::read_to_string(dictionary_path(&path)).unwrap();
+        let rows: Vec<Vec<&str>> = dictionary
             .lines()
             .filter(|line| line.starts_with("| "))
             .skip(1)
@@ -359,8 +359,8 @@ fn the_dictionary_tells_every_column_of_the_table() {
         assert_eq!(names, header);
         // Every column has a type, a meaning and an origin.
         assert!(rows.iter().all(|row| row.len() == 5 && !row[2..].contains(&"")));
-        assert!(told.contains("a \\| b c"), "{told}");
-        assert_eq!(told.contains("every 100th"), selection.every.is_some());
+        assert!(dictionary.contains("a \\| b c"), "{dictionary}");
+        assert_eq!(dictionary.contains("every 100th"), selection.every.is_some());
     }
 }
 

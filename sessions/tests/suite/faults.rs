@@ -100,11 +100,11 @@ fn the_thread_reports_its_failure_on_the_next_push_and_on_close() {
 fn a_folder_that_cannot_be_written_refuses_the_start() {
     let parent = tempfile::tempdir().unwrap();
     let folder = SessionFolder::create(parent.path()).unwrap();
-    // Somebody puts a log in the locked folder: it is not overwritten.
+    // A log that appears in the locked folder is not overwritten.
     std::fs::write(parent.path().join("000.mcap"), "precious").unwrap();
     let refusal = SessionWriter::start(folder, None, &manifest(), Pace::Virtual);
     let text = refusal.err().unwrap().to_string();
     assert!(text.contains("File exists"), "{text}");
-    let kept = std::fs::read(parent.path().join("000.mcap")).unwrap();
-    assert_eq!(kept, b"precious");
+    let bytes = std::fs::read(parent.path().join("000.mcap")).unwrap();
+    assert_eq!(bytes, b"precious");
 }

@@ -7,46 +7,46 @@ use palpate_model::about::Labels;
 use palpate_model::rig::Phase;
 use palpate_sessions::{FolderError, ORIGINAL_FOLDER, Session};
 use palpate_tables::import::{
-    Foreign, ForeignPart, KeepError, Kept, Sample, Told, folder_name, keep, open_foreign,
+    Foreign, ForeignPart, ForeignSample, KeepError, Kept, Told, folder_name, keep, open_foreign,
     parse_foreign,
 };
 use palpate_test_support::skip;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-fn told() -> Told {
+fn detect_all() -> Told {
     Told::default()
 }
 
-/// Tells `QUANTITY=...` options, as the command line does.
-fn telling(options: &[(&str, &str)]) -> Told {
-    let mut told = told();
+/// Options as on the command line.
+fn parse_options(options: &[(&str, &str)]) -> Told {
+    let mut result = detect_all();
     for (option, value) in options {
         let text = *value;
         match *option {
-            "column" => told.columns.push(text.parse().unwrap()),
-            "unit" => told.units.push(text.parse().unwrap()),
-            "zero" => told.zeros.push(text.parse().unwrap()),
-            "skip" => told.skip.push(text.parse().unwrap()),
-            "decimal" => told.decimal = Some(text.parse().unwrap()),
-            "delimiter" => told.delimiter = Some(text.parse().unwrap()),
-            "columns" => told.names = text.split(',').map(str::to_owned).collect(),
-            "header-row" => told.header_row = Some(text.parse().unwrap()),
-            "units-row" => told.units_row = Some(text.parse().unwrap()),
-            "part" => told.parts.push(text.to_owned()),
+            "column" => result.columns.push(text.parse().unwrap()),
+            "unit" => result.units.push(text.parse().unwrap()),
+            "zero" => result.zeros.push(text.parse().unwrap()),
+            "skip" => result.skip.push(text.parse().unwrap()),
+            "decimal" => result.decimal = Some(text.parse().unwrap()),
+            "delimiter" => result.delimiter = Some(text.parse().unwrap()),
+            "columns" => result.names = text.split(',').map(str::to_owned).collect(),
+            "header-row" => result.header_row = Some(text.parse().unwrap()),
+            "units-row" => result.units_row = Some(text.parse().unwrap()),
+            "part" => result.parts.push(text.to_owned()),
             other => panic!("{other}"),
         }
     }
-    told
+    result
 }
 
-fn read(text: &str, told: &Told) -> Foreign {
-    parse_foreign("file.txt", text.as_bytes().to_vec(), told)
+fn read(text: &str, options: &Told) -> Foreign {
+    parse_foreign("file.txt", text.as_bytes().to_vec(), options)
         .unwrap_or_else(|reason| panic!("{reason}\n{text}"))
 }
 
-fn refused(text: &str, told: &Told) -> String {
-    match parse_foreign("file.txt", text.as_bytes().to_vec(), told) {
+fn refused(text: &str, options: &Told) -> String {
+    match parse_foreign("file.txt", text.as_bytes().to_vec(), options) {
         Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
         Err(reason) => reason,
     }
@@ -54,14 +54,14 @@ fn refused(text: &str, told: &Told) -> String {
 
 /// Time, depth and force of a part.
 fn numbers(part: &ForeignPart) -> Vec<[f64; 3]> {
-    let one = |sample: &Sample| [sample.t, sample.depth.unwrap(), sample.force.unwrap()];
+    let one = |sample: &ForeignSample| [sample.t, sample.depth.unwrap(), sample.force.unwrap()];
     part.samples.iter().map(one).collect()
 }
 
-fn said(part: &ForeignPart, what: &str) -> String {
+fn reading(part: &ForeignPart, what: &str) -> String {
     let readings = &part.imported.readings;
     let one = readings.iter().find(|one| one.what == what);
-    let one = one.unwrap_or_else(|| panic!("nothing said of {what}: {readings:?}"));
+    let one = one.unwrap_or_else(|| panic!("no reading of {what}: {readings:?}"));
     format!("{} ({})", one.found, one.how)
 }
 
@@ -71,11 +71,11 @@ fn utf16(text: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_table_is_understood_and_everything_is_said() {
+fn table_is_read_and_every_property_is_reported() {
     let text = "Sample;gel 3\nOperator;Ada\n\nPrüfzeit;Weg;Kraft;Spannung\ns;µm;mN;mV\n\
         0,0;0;0,3;1,5\n0,1;250;1.250,5;2,5\n0,2;500;2.500,75;3,5\n";
     let bytes: Vec<u8> = text.chars().map(|c| c as u8).collect();
-    let read = parse_foreign("Zug.csv", bytes.clone(), &told()).unwrap();
+    let read = parse_foreign("Zug.csv", bytes.clone(), &detect_all()).unwrap();
     let part = &read.parts[0];
     let expected = [[0.0, 0.0, 0.0003], [0.1, 0.25, 1.2505], [0.2, 0.5, 2.50075]];
     assert_eq!(numbers(part), expected);
@@ -91,13 +91,13 @@ fn a_table_is_understood_and_everything_is_said() {
         ("depth", "column 2 'Weg' in µm"),
         ("force", "column 3 'Kraft' in mN"),
     ] {
-        let found = said(part, what);
+        let found = reading(part, what);
         assert!(found.contains(expected) && found.ends_with("(detected)"), "{found}");
     }
 }
 
 #[test]
-fn what_is_told_outweighs_what_is_detected() {
+fn options_override_detection() {
     let text = "time;z;up;load\n0;10,5;1;-2\n1;10,25;1;-3\n2;10;2;-4\n";
     let options = [
         ("column", "depth=-z"),
@@ -107,7 +107,7 @@ fn what_is_told_outweighs_what_is_detected() {
         ("unit", "time=ms"),
         ("zero", "depth=first"),
     ];
-    let read = read(text, &telling(&options));
+    let read = read(text, &parse_options(&options));
     let part = &read.parts[0];
     let gram = 0.009_806_65;
     let expected = [[0.0, 0.0, 2.0 * gram], [1e-3, 0.25, 3.0 * gram], [2e-3, 0.5, 4.0 * gram]];
@@ -117,12 +117,12 @@ fn what_is_told_outweighs_what_is_detected() {
         }
     }
     for (what, expected) in [("depth", "column 2 'z' in mm"), ("force", "column 4 'load' in gf")] {
-        let found = said(part, what);
+        let found = reading(part, what);
         assert!(found.starts_with(expected) && found.ends_with("(told)"), "{found}");
     }
     // A file without names.
     let bare = "0 0,5 1\n1 0,75 2\n";
-    let read_bare = |options: &[(&str, &str)]| numbers(&read_one(bare, &telling(options)));
+    let read_bare = |options: &[(&str, &str)]| numbers(&read_one(bare, &parse_options(options)));
     let expected = [[0.0, 0.5, 1.0], [1.0, 0.75, 2.0]];
     assert_eq!(read_bare(&[("columns", "t_s,x_mm,F_N")]), expected);
     let numbered = [
@@ -136,13 +136,13 @@ fn what_is_told_outweighs_what_is_detected() {
     assert_eq!(read_bare(&numbered), expected);
 }
 
-fn read_one(text: &str, told: &Told) -> ForeignPart {
-    read(text, told).parts.remove(0)
+fn read_one(text: &str, options: &Told) -> ForeignPart {
+    read(text, options).parts.remove(0)
 }
 
 #[test]
-fn what_has_two_readings_is_refused_with_the_question() {
-    for (text, options, told) in [
+fn ambiguous_file_is_refused_with_a_question() {
+    for (text, options, expected) in [
         ("t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n", &[][..], "'1,234' in line 2"),
         ("t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n", &[], "'0.75' in line 3"),
         ("t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n", &[("decimal", "comma")], "line 3: the depth '0.75'"),
@@ -150,13 +150,13 @@ fn what_has_two_readings_is_refused_with_the_question() {
         ("t_s,x_mm,F_furlong\n0,0,0\n1,1,1\n", &[], "'furlong'"),
         ("t_s,x_mm,force\n0,0,0\n1,1,1\n", &[], "N, mN"),
         ("t_s,x_mm\n0,0\n1,1\n", &[], "'t_s', 'x_mm'"),
-        ("0,0,0\n1,1,1\n", &[], "names of columns"),
+        ("0,0,0\n1,1,1\n", &[], "no column names"),
         ("0,0,0\n1,1,1\n", &[("columns", "t_s,x_mm")], "3 columns"),
-        ("t_s,x_mm,F_N\n0,0,0\n1,1,1\n", &[("column", "depth=y")], "'y' in line 1"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,1\n", &[("column", "depth=y")], "line 1 has no column 'y'"),
         ("t_s,x_mm,F_N\n0,0,0\n1,1,1,9\n", &[], "column 4"),
         ("t_s,x_mm,F_N\n0,0,0\n1,1,one\n2,2,2\n", &[], "line 3: the force 'one'"),
-        ("t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n", &[], "line 3: there is no depth"),
-        ("t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n", &[], "line 3: there is no force"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n", &[], "line 3: the depth is missing"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n", &[], "line 3: the force is missing"),
         ("t_s,x_mm,F_N\n0,0,0\n0,1,1\n2,2,2\n", &[], "line 3: the time 0 s"),
         ("t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n", &[], "from 2 to 1 s"),
         ("t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n", &[("part", "x")], "'x'"),
@@ -164,14 +164,14 @@ fn what_has_two_readings_is_refused_with_the_question() {
         ("nothing of use\n", &[], "two numbers"),
         ("t_s,x_mm,F_N\n0,0,0\n1,1,\"1\n", &[], "line 3: a quote"),
     ] {
-        let reason = refused(text, &telling(options));
-        assert!(reason.contains(told), "{told}: {text:?}: {reason}");
+        let reason = refused(text, &parse_options(options));
+        assert!(reason.contains(expected), "{expected}: {text:?}: {reason}");
     }
-    assert!(parse_foreign("f", Vec::new(), &self::told()).is_err());
+    assert!(parse_foreign("f", Vec::new(), &detect_all()).is_err());
 }
 
 #[test]
-fn rows_left_out_are_counted_and_gaps_are_told() {
+fn skipped_rows_are_counted_and_gaps_are_reported() {
     let mut text = "t_s,x_mm,F_N\n".to_owned();
     for i in 0..50 {
         let t = 0.1 * f64::from(i);
@@ -179,13 +179,13 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
     }
     text += "5.0,,1\n4.9,1,1\n4.9,1,1\n4.0,1,1\n5.5,1,1\n5.6,1,nan\n";
     let all = [("skip", "missing"), ("skip", "repeated"), ("skip", "backward")];
-    let part = read_one(&text, &telling(&all));
+    let part = read_one(&text, &parse_options(&all));
     assert_eq!(part.samples.len(), 51);
     let expected = [
         ["2 rows without a value", "line 52"],
         ["2 rows with the time", "line 53"],
-        ["1 rows whose time", "line 55"],
-        ["1 gaps: after line 51", "0.600000 s"],
+        ["1 rows with decreasing time", "line 55"],
+        ["1 gaps: no row follows line 51", "0.600000 s"],
     ];
     assert_eq!(part.imported.remarks.len(), expected.len());
     for (remark, facts) in part.imported.remarks.iter().zip(expected) {
@@ -193,12 +193,16 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
     }
     for (option, value) in all {
         let others: Vec<(&str, &str)> = all.into_iter().filter(|one| one.1 != value).collect();
-        let reason = refused(&text, &telling(&others));
+        let reason = refused(&text, &parse_options(&others));
         assert!(reason.ends_with(value), "{option} {value}: {reason}");
     }
-    let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &told());
-    assert!(turned.imported.remarks[0].contains("turn its sign"), "{:?}", turned.imported.remarks);
-    let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &told());
+    let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &detect_all());
+    assert!(
+        turned.imported.remarks[0].contains("invert its sign"),
+        "{:?}",
+        turned.imported.remarks
+    );
+    let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &detect_all());
     assert!(uneven.imported.remarks[0].contains("1.000000 to 90.000000 s"));
 }
 
@@ -224,7 +228,7 @@ fn mach1() -> String {
 
 #[test]
 fn mach1_blocks_become_parts_in_newtons() {
-    let read = read(&mach1(), &told());
+    let read = read(&mach1(), &detect_all());
     let names: Vec<&str> = read.parts.iter().map(|part| part.imported.part.as_str()).collect();
     let expected = ["Move Relative 1", "Stress Relaxation 1 ramp 1", "Stress Relaxation 1 ramp 2"];
     assert_eq!(names, expected);
@@ -233,8 +237,8 @@ fn mach1_blocks_become_parts_in_newtons() {
     assert!((last[1][2] - 29.0 * 0.009_806_65).abs() < 1e-15);
     let facts = &read.parts[0].imported.facts;
     assert!(facts.contains(&("Velocity, mm/s".into(), "0.1".into())), "{facts:?}");
-    assert_eq!(said(&read.parts[0], "layout"), "mach-1 (detected)");
-    let by_number = self::read(&mach1(), &telling(&[("part", "3")]));
+    assert_eq!(reading(&read.parts[0], "layout"), "mach-1 (detected)");
+    let by_number = self::read(&mach1(), &parse_options(&[("part", "3")]));
     assert_eq!(by_number.parts.len(), 1);
     assert_eq!(numbers(&by_number.parts[0]), last);
 }
@@ -263,8 +267,8 @@ fn rheometer() -> String {
 
 #[test]
 fn rheometer_intervals_in_utf16_become_parts() {
-    let told = telling(&[("column", "depth=-Gap")]);
-    let read = parse_foreign("gel.csv", utf16(&rheometer()), &told).unwrap();
+    let options = parse_options(&[("column", "depth=-Gap")]);
+    let read = parse_foreign("gel.csv", utf16(&rheometer()), &options).unwrap();
     assert_eq!(read.parts.len(), 2);
     let part = &read.parts[1];
     assert_eq!(part.imported.part, "Squeeze 1 interval 2");
@@ -274,14 +278,14 @@ fn rheometer_intervals_in_utf16_become_parts() {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }
-    assert!(said(part, "encoding").starts_with("UTF-16LE"));
-    assert!(said(part, "decimal sign").starts_with("comma, from '"));
+    assert!(reading(part, "encoding").starts_with("UTF-16LE"));
+    assert!(reading(part, "decimal sign").starts_with("comma, from '"));
     // The header of the second interval and its units, two lines below.
     assert_eq!(
-        (said(part, "header"), said(part, "units")),
+        (reading(part, "header"), reading(part, "units")),
         ("line 16 (detected)".into(), "line 18 (detected)".into())
     );
-    let reason = parse_foreign("gel.csv", utf16(&rheometer()), &self::told()).unwrap_err();
+    let reason = parse_foreign("gel.csv", utf16(&rheometer()), &detect_all()).unwrap_err();
     assert!(
         reason.contains("part 'Squeeze 1 interval 1': ") && reason.contains("depth"),
         "{reason}"
@@ -295,7 +299,7 @@ fn data(name: &str) -> PathBuf {
 #[test]
 fn sheets_with_a_time_become_parts_in_both_formats() {
     for name in ["zwick.xlsx", "zwick.xls"] {
-        let read = open_foreign(&data(name), &told()).unwrap_or_else(|err| panic!("{err}"));
+        let read = open_foreign(&data(name), &detect_all()).unwrap_or_else(|err| panic!("{err}"));
         let names: Vec<&str> = read.parts.iter().map(|part| part.imported.part.as_str()).collect();
         assert_eq!(names, ["P002-1", "P002-2"], "{name}");
         assert_eq!(read.left_out.len(), 2, "{:?}", read.left_out);
@@ -311,22 +315,22 @@ fn sheets_with_a_time_become_parts_in_both_formats() {
                 }
             }
         }
-        let force = said(&read.parts[1], "force");
+        let force = reading(&read.parts[1], "force");
         assert!(force.starts_with("column 3 'Force standard' in mN"), "{force}");
     }
 }
 
 #[test]
-fn a_session_is_made_and_the_original_kept() {
+fn import_makes_a_session_and_stores_the_original() {
     let folder = tempfile::tempdir().unwrap();
     let original = mach1().into_bytes();
-    let read = parse_foreign("Gel 3 (first).txt", original.clone(), &told()).unwrap();
+    let read = parse_foreign("Gel 3 (first).txt", original.clone(), &detect_all()).unwrap();
     let part = &read.parts[2];
     let name = folder_name(&part.imported);
     assert_eq!(name, "Gel-3--first--Stress-Relaxation-1-ramp-2");
     let at = folder.path().join(name);
     let make = || {
-        let kept = Kept {
+        let target = Kept {
             folder: &at,
             original: &original,
             session_id: "20260305T141507Z-0badcafe".into(),
@@ -334,7 +338,7 @@ fn a_session_is_made_and_the_original_kept() {
             software_version: "0.1.0",
             labels: Labels { specimen: "gel 3".into(), ..Labels::default() },
         };
-        keep(part, kept)
+        keep(part, target)
     };
     make().unwrap();
     assert_eq!(
@@ -366,8 +370,8 @@ fn times_that_no_session_holds_are_refused() {
         ("t_s,x_mm,F_N\n0,0,0\n1e7,1,1\n", "106 days"),
         ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "picosecond"),
     ] {
-        let part = read_one(text, &told());
-        let kept = Kept {
+        let part = read_one(text, &detect_all());
+        let target = Kept {
             folder: &folder.path().join("no"),
             original: text.as_bytes(),
             session_id: "id".into(),
@@ -375,7 +379,7 @@ fn times_that_no_session_holds_are_refused() {
             software_version: "0.1.0",
             labels: Labels::default(),
         };
-        let refusal = keep(&part, kept).unwrap_err().to_string();
+        let refusal = keep(&part, target).unwrap_err().to_string();
         assert!(refusal.contains(expected), "{refusal}");
         assert!(!folder.path().join("no").exists());
     }
@@ -391,7 +395,7 @@ fn real_recordings_are_read_as_another_reader_reads_them() {
     let text = std::fs::read_to_string(&path).unwrap();
     // Columns t_s, F_N, x_mm; the reader of tables for fits goes another way to the numbers.
     let table = palpate_tables::parse_table(&text, None).unwrap();
-    let part = open_foreign(&path, &told()).unwrap().parts.remove(0);
+    let part = open_foreign(&path, &detect_all()).unwrap().parts.remove(0);
     let expected: Vec<[f64; 3]> =
         (0..table.t.len()).map(|i| [table.t[i], table.depth[i], table.force[i]]).collect();
     assert_eq!(numbers(&part), expected);

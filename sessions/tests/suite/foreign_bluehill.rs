@@ -4,8 +4,8 @@
 use palpate_tables::import::{Foreign, Told, parse_foreign};
 use std::fmt::Write;
 
-fn read(text: &str, told: &Told) -> Result<Foreign, String> {
-    parse_foreign("Specimen_RawData_1.csv", text.as_bytes().to_vec(), told)
+fn read(text: &str, options: &Told) -> Result<Foreign, String> {
+    parse_foreign("Specimen_RawData_1.csv", text.as_bytes().to_vec(), options)
 }
 
 fn detected(text: &str) -> Foreign {
@@ -19,8 +19,8 @@ fn detected(text: &str) -> Foreign {
 }
 
 fn refused(text: &str) -> String {
-    let told = Told { format: Some("bluehill".parse().unwrap()), ..Told::default() };
-    match read(text, &told) {
+    let options = Told { format: Some("bluehill".parse().unwrap()), ..Told::default() };
+    match read(text, &options) {
         Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
         Err(reason) => reason,
     }
@@ -72,14 +72,14 @@ fn specimen_is_read_with_what_the_file_says_of_it() {
     assert_eq!(fact(&read, 0, "Test : Rate 1"), Some("15.00000 mm/min"));
     assert_eq!(fact(&read, 0, "Test : Load cell"), Some("2530-100N"));
     assert_eq!(fact(&read, 0, "Notes"), None);
-    let said = |what: &str| {
+    let reading = |what: &str| {
         let readings = &read.parts[0].imported.readings;
         let one = readings.iter().find(|one| one.what == what);
         one.unwrap().found.clone()
     };
-    assert_eq!((said("header"), said("units")), ("line 6".into(), "line 7".into()));
-    assert_eq!(said("force"), "column 3 'Load' in N");
-    // One that nobody named has no name.
+    assert_eq!((reading("header"), reading("units")), ("line 6".into(), "line 7".into()));
+    assert_eq!(reading("force"), "column 3 'Load' in N");
+    // A specimen without a label has no name.
     assert_eq!(names(&detected(&specimen("", 0))), [""]);
 }
 
@@ -98,8 +98,8 @@ fn specimens_of_one_file_are_parts_of_their_own() {
     assert_eq!(numbers(&read, 1), expected(7));
     assert_eq!(numbers(&read, 2), expected(2));
     assert_eq!(numbers(&read, 4), [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]);
-    let told = Told { parts: vec!["b".into()], ..Told::default() };
-    assert_eq!(names(&self::read(&text, &told).unwrap()), ["b"]);
+    let options = Told { parts: vec!["b".into()], ..Told::default() };
+    assert_eq!(names(&self::read(&text, &options).unwrap()), ["b"]);
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn extension_and_its_compressive_twin_are_a_question() {
         reason.contains("columns 'Extension' and 'Compressive extension' could both be the depth"),
         "{reason}"
     );
-    let told =
+    let options =
         Told { columns: vec!["depth=Compressive extension".parse().unwrap()], ..Told::default() };
-    let read = read(twins, &told).unwrap();
+    let read = read(twins, &options).unwrap();
     assert_eq!(numbers(&read, 0), [[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]);
 }
 
@@ -149,31 +149,28 @@ fn damaged_files_are_refused_with_the_line() {
         lines.join("\n")
     };
     for (text, expected) in [
-        (lines[8..].join("\n"), "line 1: numbers stand here before the names"),
-        (with(7, ""), "line 8: numbers stand here before the names"),
-        (with(7, "(s),(mm),(N)"), "line 7: there are 3 units for the 4 columns of line 6"),
-        (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' stands among the numbers or behind them"),
+        (lines[8..].join("\n"), "line 1: the numbers have no column names"),
+        (with(7, ""), "line 8: the numbers have no column names"),
+        (with(7, "(s),(mm),(N)"), "line 7: it has 3 units for the 4 columns of line 6"),
+        (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' is among or after the numbers"),
         (with(11, "\"0.3"), "line 11: a quote is not closed"),
-        (
-            with(11, "End of test,1"),
-            "line 11: 'End of test,1' stands among the numbers or behind them",
-        ),
+        (with(11, "End of test,1"), "line 11: 'End of test,1' is among or after the numbers"),
         (with(10, "\"0.2\",\"x\",\"1\",\"0\""), "line 10: the depth 'x' is not a number"),
-        (with(10, "\"0.2\",\"\",\"1\",\"0\""), "line 10: there is no depth"),
+        (with(10, "\"0.2\",\"\",\"1\",\"0\""), "line 10: the depth is missing"),
         (
             with(10, "\"0.1\",\"0\",\"1\",\"0\""),
-            "line 10: the time 0.1 s is that of the row before",
+            "line 10: the time 0.1 s equals that of the row before",
         ),
         (with(10, "0.2,0,1,0,0"), "line 10 has a cell in column 5"),
-        (with(1, "a remark of somebody"), "line 1: 'a remark of somebody' is neither"),
+        (with(1, "a remark by hand"), "line 1: 'a remark by hand' is neither"),
         (lines[..7].join("\n") + "\n1,1,1,1\n", "fewer than two rows"),
-        ("0,1\n1,2\n".to_owned(), "line 1: numbers stand here"),
-        (lines[..3].join("\n") + "\na,1,2\n", "no names of columns above a line of units"),
+        ("0,1\n1,2\n".to_owned(), "line 1: the numbers have"),
+        (lines[..3].join("\n") + "\na,1,2\n", "no column names above a line of units"),
         (whole.clone() + &lines[..4].join("\n"), "line 12: 'Test : Rate 1"),
     ] {
         let reason = refused(&text);
         assert!(reason.contains(expected), "{reason}\n{text}");
-        // Where Bluehill's own words are left, nothing less strict takes the file.
+        // A file with a fact of Bluehill's is never read as a plain table.
         if text.contains(" : ") && !expected.contains("units") && !expected.contains("names") {
             assert_eq!(read(&text, &Told::default()).unwrap_err(), reason);
         }
@@ -186,14 +183,14 @@ fn a_file_cut_off_anywhere_is_refused_or_has_what_is_left() {
     let whole = detected(&text);
     let all: Vec<_> = (0..2).flat_map(|part| numbers(&whole, part)).collect();
     for length in 0..text.len() {
-        let Ok(left) = read(&text[..length], &Told::default()) else {
+        let Ok(part) = read(&text[..length], &Told::default()) else {
             continue;
         };
-        let left_parts = left.parts.len();
-        let mut left: Vec<_> = (0..left_parts).flat_map(|part| numbers(&left, part)).collect();
+        let parts = part.parts.len();
+        let mut found: Vec<_> = (0..parts).flat_map(|index| numbers(&part, index)).collect();
         // The last number may be cut off within; the rest is as it was.
-        left.pop();
-        assert_eq!(left, all[..left.len()], "{length}");
+        found.pop();
+        assert_eq!(found, all[..found.len()], "{length}");
     }
 }
 

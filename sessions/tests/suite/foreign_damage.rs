@@ -2,7 +2,7 @@
 
 use crate::hostile::limit_memory;
 use crate::support::{put, quick_folder};
-use crate::worker::{command, told};
+use crate::worker::{command, reported_numbers};
 use palpate_tables::import::{Told, parse_foreign};
 use std::fs;
 use std::io::{Cursor, Write};
@@ -161,7 +161,7 @@ fn the_largest_workbook_is_read_in_little_memory_and_a_larger_one_is_refused() {
     put(&folder.path().join("book.xlsx"), &workbook(WORKBOOK_ROWS));
     let output = command(&[], "workbook", folder.path()).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(told(&output, "rows"), [WORKBOOK_ROWS as u64]);
+    assert_eq!(reported_numbers(&output, "rows"), [WORKBOOK_ROWS as u64]);
     let reason = reason_of(workbook(WORKBOOK_ROWS + 1));
     assert!(reason.contains("524288 cells"), "{reason}");
     let texts = xlsx_with("xl/sharedStrings.xml", &mut |file| {

@@ -4,7 +4,7 @@
 //! SIGKILL at the one that is asked for.
 
 use crate::support::{check_raw, count_from, log_bytes, manifest, read_raw, same_bits};
-use crate::worker::{Work, command, edit, told};
+use crate::worker::{Work, command, edit, reported_numbers};
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{recover, recovered_folder, salvage};
 use palpate_sessions::{EDITS_FILE, Edit, Edits, LOG_FILE, Session, SessionFolder, segment_file};
@@ -19,7 +19,7 @@ pub fn is_hindered() -> bool {
 }
 
 /// What a killed process left.
-struct Left {
+struct KillOutcome {
     /// What it called saved last.
     saved: u64,
     /// What it had taken by then.
@@ -28,7 +28,7 @@ struct Left {
 }
 
 /// Does a task and kills it at the `number`-th call of a kind on the files named.
-fn kill(task: &str, folder: &Path, files: &[PathBuf], call: &str, number: u32) -> Left {
+fn kill(task: &str, folder: &Path, files: &[PathBuf], call: &str, number: u32) -> KillOutcome {
     let inject = format!("inject={call}:signal=SIGKILL:when={number}");
     let trace = format!("trace={call}");
     let mut program = vec!["strace", "-f", "-qq", "-o", "/dev/null"];
@@ -37,8 +37,8 @@ fn kill(task: &str, folder: &Path, files: &[PathBuf], call: &str, number: u32) -
     }
     program.extend(["-e", &trace, "-e", &inject]);
     let output = command(&program, task, folder).output().expect("strace is there");
-    let last = |word| told(&output, word).last().copied().unwrap_or(0);
-    Left { saved: last("saved"), taken: last("taken"), was_killed: !output.status.success() }
+    let last = |word| reported_numbers(&output, word).last().copied().unwrap_or(0);
+    KillOutcome { saved: last("saved"), taken: last("taken"), was_killed: !output.status.success() }
 }
 
 /// Calls that change what is on the disk.
@@ -49,7 +49,7 @@ fn sweep(
     task: &str,
     points: usize,
     prepare: &dyn Fn(&Path) -> Vec<PathBuf>,
-    check: &mut dyn FnMut(&Path, &Left, &str),
+    check: &mut dyn FnMut(&Path, &KillOutcome, &str),
 ) -> usize {
     let mut killed = 0;
     for call in CALLS {
@@ -60,10 +60,10 @@ fn sweep(
             let parent = tempfile::tempdir().expect("a folder to work in");
             let folder = parent.path().join("session");
             let files = prepare(&folder);
-            let left = kill(task, &folder, &files, call, number);
+            let outcome = kill(task, &folder, &files, call, number);
             let context = format!("{task}, killed at {call} {number}");
-            check(&folder, &left, &context);
-            if !left.was_killed {
+            check(&folder, &outcome, &context);
+            if !outcome.was_killed {
                 break;
             }
             of_kind += 1;
@@ -87,13 +87,13 @@ fn log_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Nothing that was called saved is missing or changed; returns how many samples more and less than that are there.
-fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u64, u64) {
-    let saved = left.saved as usize;
+fn check_recording(work: &Work, folder: &Path, outcome: &KillOutcome, context: &str) -> (u64, u64) {
+    let saved = outcome.saved as usize;
     let session = match Session::open(folder) {
         Ok(session) => session,
         Err(refusal) => {
             assert_eq!(saved, 0, "{context}: {refusal}");
-            return (0, left.taken);
+            return (0, outcome.taken);
         }
     };
     let count = session.rows.len();
@@ -113,8 +113,8 @@ fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u
         assert!(same_bits(&copy.rows, &session.rows), "{context}");
         assert_eq!(copy.beside, session.beside, "{context}");
     }
-    let taken = left.taken.max(count as u64);
-    (count as u64 - left.saved, taken - count as u64)
+    let taken = outcome.taken.max(count as u64);
+    (count as u64 - outcome.saved, taken - count as u64)
 }
 
 #[test]
@@ -129,9 +129,9 @@ fn a_killed_recording_has_everything_it_called_saved() {
             &format!("{task} {samples}"),
             points(),
             &log_files,
-            &mut |folder, left, context| {
-                let (more, less) = check_recording(&work, folder, left, context);
-                assert!(left.was_killed || less == 0, "{context}");
+            &mut |folder, outcome, context| {
+                let (more, less) = check_recording(&work, folder, outcome, context);
+                assert!(outcome.was_killed || less == 0, "{context}");
                 (most_more, most_less) = (more.max(most_more), less.max(most_less));
             },
         );
@@ -194,17 +194,17 @@ fn a_killed_recovery_leaves_the_original_and_can_be_repeated() {
         let parent = folder.parent().expect("it has one").to_path_buf();
         vec![parent, unfinished, log, copy]
     };
-    let killed = sweep("recover", points(), &prepare, &mut |folder, left, context| {
+    let killed = sweep("recover", points(), &prepare, &mut |folder, outcome, context| {
         assert_eq!(fs::read(folder.join(LOG_FILE)).expect(context), bytes);
         let copy = recovered_folder(folder);
-        if left.saved == 0 && !copy.exists() {
+        if outcome.saved == 0 && !copy.exists() {
             recover(folder, "1", chrono::DateTime::UNIX_EPOCH).expect(context);
         }
         let copy = Session::open(&copy).expect(context);
         assert!(same_bits(&copy.rows, &work.rows), "{context}");
         assert_eq!(copy.entries, work.entries, "{context}");
-        let left = salvage(folder, &mut |_| {}).expect(context);
-        assert_eq!(left.samples, 2000, "{context}");
+        let salvage = salvage(folder, &mut |_| {}).expect(context);
+        assert_eq!(salvage.samples, 2000, "{context}");
     });
     println!("{killed} crash points of a recovery");
     assert!(killed >= 3, "{killed}");
@@ -221,13 +221,13 @@ fn a_killed_edit_counts_or_does_not() {
             fs::create_dir(folder).expect("a folder to work in");
             vec![folder.join(file), folder.to_path_buf()]
         };
-        killed += sweep(task, points(), &prepare, &mut |folder, left, context| {
+        killed += sweep(task, points(), &prepare, &mut |folder, outcome, context| {
             let found: Vec<Edit> = match file {
                 JOURNAL_FILE => Journal::open(folder).expect(context).1,
                 _ => Edits::read(folder, &manifest().session_id).expect(context).all,
             };
-            assert!(found.len() as u64 >= left.saved, "{context}");
-            assert!(found.len() as u64 <= left.saved + 1, "{context}");
+            assert!(found.len() as u64 >= outcome.saved, "{context}");
+            assert!(found.len() as u64 <= outcome.saved + 1, "{context}");
             let expected: Vec<Edit> = (1..=found.len()).map(edit).collect();
             assert_eq!(found, expected, "{context}");
         });

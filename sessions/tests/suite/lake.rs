@@ -37,7 +37,7 @@ fn session() -> Session {
     open_bytes(&log_bytes(&rows, &entries, Some(end(Nanos(5_000_000_000))))).unwrap()
 }
 
-fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError> {
+fn put(lake: &Path, session: &Session, quality: Told) -> Result<Added, ExportError> {
     let outline = Outline {
         path: session.path.clone(),
         manifest: session.manifest.clone(),
@@ -47,7 +47,7 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
         notes: session.notes.clone(),
         beside: session.beside.clone(),
     };
-    add(lake, &outline, told, &mut |visit| {
+    add(lake, &outline, quality, &mut |visit| {
         visit(&session.rows);
         Ok(())
     })
@@ -102,10 +102,10 @@ fn files_of_a_lake_never_change() {
     // What a killed writer left.
     let samples = &files(lake)[2];
     let name = samples.file_name().unwrap().to_string_lossy();
-    let left = samples.with_file_name(format!(".{name}.abcdef.palpate.tmp"));
-    fs::write(&left, vec![7; 1 << 20]).unwrap();
+    let abandoned = samples.with_file_name(format!(".{name}.abcdef.palpate.tmp"));
+    fs::write(&abandoned, vec![7; 1 << 20]).unwrap();
     assert!(put(lake, &session, Told::default()).unwrap().was_there);
-    assert_eq!(atomic::sweep(lake, usize::MAX), [left]);
+    assert_eq!(atomic::sweep(lake, usize::MAX), [abandoned]);
     let mut other = session.clone();
     other.rows[100].force = Some(1.0);
     let refusal = put(lake, &other, Told::default()).unwrap_err();

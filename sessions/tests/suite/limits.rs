@@ -4,7 +4,7 @@
 use crate::hostile::limit_memory;
 use crate::killed::is_hindered;
 use crate::support::{end, log_bytes, manifest, rows, same_bits};
-use crate::worker::{Work, command, told};
+use crate::worker::{Work, command, reported_numbers};
 use palpate_model::Nanos;
 use palpate_sessions::recover::recovered_folder;
 use palpate_sessions::{
@@ -51,7 +51,7 @@ pub fn record_with_spare(folder: &Path, samples: usize) {
     eprintln!("saved {}", session.rows.len());
 }
 
-/// The work of a process: records as much as it is told with little memory.
+/// The work of a process: records as much as its task says, with little memory.
 pub fn record_in_little_memory(folder: &Path, samples: usize) {
     let work = Work::new(samples);
     let held = SessionFolder::create(&folder.join("one")).unwrap();
@@ -95,22 +95,22 @@ fn a_disk_that_is_really_full_sends_the_recording_elsewhere() {
     let program = [&own_disk[..], &[&script]].concat();
     let output = command(&program, "spare 40000", &mounted).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    assert_eq!(told(&output, "moved"), [1], "it is the last place");
+    assert_eq!(reported_numbers(&output, "moved"), [1], "it is the last place");
     assert!(reasons(&output).contains("No space left on device"), "{output:?}");
-    assert_eq!(told(&output, "saved"), [40_000]);
+    assert_eq!(reported_numbers(&output, "saved"), [40_000]);
 }
 
 #[test]
 fn a_file_that_may_not_grow_is_left_for_another() {
     let folder = tempfile::tempdir().unwrap();
-    // In blocks of 512 bytes; the signal that would end the process is told to be ignored.
+    // In blocks of 512 bytes; the signal that would end the process is ignored.
     let script = "trap '' XFSZ; ulimit -f 400; exec \"$0\" \"$@\"";
     let output = command(&["sh", "-c", script], "spare 15000", folder.path()).output();
     let output = output.unwrap();
     assert!(output.status.success(), "{output:?}");
     assert!(reasons(&output).contains("File too large"), "{output:?}");
     assert!(folder.path().join("one").join(segment_file(1)).exists());
-    assert_eq!(told(&output, "saved"), [15_000]);
+    assert_eq!(reported_numbers(&output, "saved"), [15_000]);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn an_error_of_the_disk_costs_a_real_recording_nothing() {
 }
 
 #[test]
-fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
+fn disk_error_during_a_recovery_is_reported_and_leaves_the_original() {
     if is_hindered() {
         return;
     }
@@ -178,9 +178,9 @@ fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
         let log = copy.with_extension("recovering").join(LOG_FILE);
         let program = failing(&log, call, error, &number.to_string());
         let output = command(&words(&program), "recover", &folder).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(!output.status.success(), "{call} {number}: {said}");
-        assert!(said.contains("Disk {"), "{said}");
+        let output_text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{call} {number}: {output_text}");
+        assert!(output_text.contains("Disk {"), "{output_text}");
         assert!(!copy.exists());
         assert_eq!(fs::read(folder.join(LOG_FILE)).unwrap(), bytes);
         let output = command(&[], "recover", &folder).output().unwrap();
@@ -196,19 +196,19 @@ fn two_processes_never_record_in_one_folder() {
     let held = SessionFolder::create(&folder).unwrap();
     let output = command(&[], "log 100", &folder).output().unwrap();
     assert!(!output.status.success());
-    let said = String::from_utf8_lossy(&output.stderr);
+    let output_text = String::from_utf8_lossy(&output.stderr);
     let holder = format!("holder: \"{}\"", std::process::id());
-    assert!(said.contains(&holder), "{said}");
+    assert!(output_text.contains(&holder), "{output_text}");
     drop(held);
-    // And the other way round: the process is there, and is told by its number.
+    // The other way round: the process is named by its number.
     let mut child = command(&[], "hold", &folder)
         .stdin(std::process::Stdio::piped())
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    let mut said = BufReader::new(child.stderr.take().unwrap());
-    said.read_line(&mut String::new()).unwrap();
+    let mut output_text = BufReader::new(child.stderr.take().unwrap());
+    output_text.read_line(&mut String::new()).unwrap();
     let refusal = SessionFolder::create(&folder).unwrap_err();
     let FolderError::Lock(LockError::Held { holder, .. }) = refusal else {
         panic!("{refusal}");
@@ -239,7 +239,7 @@ fn two_processes_make_one_catalog() {
         .collect();
     for child in children {
         let output = child.wait_with_output().unwrap();
-        assert_eq!(told(&output, "saved"), [12], "{output:?}");
+        assert_eq!(reported_numbers(&output, "saved"), [12], "{output:?}");
     }
     let catalog = Catalog::open(library.path()).unwrap();
     assert_eq!(catalog.check(&mut |_, _| {}).unwrap(), []);

@@ -2,9 +2,9 @@
 #![cfg(test)]
 
 mod altered;
-mod beside;
 mod catalog;
 mod chains;
+mod companions;
 mod damage;
 mod disk;
 mod exports;

@@ -1,4 +1,4 @@
-//! The words of what sessions, their folders and tables refuse.
+//! Wording of the errors of sessions, folders and tables.
 
 use palpate_sessions::catalog::ConditionError;
 use palpate_sessions::{FolderError, LockError, LogError, ReadError};
@@ -12,7 +12,7 @@ fn path() -> PathBuf {
 }
 
 #[test]
-fn what_a_reader_refuses_is_worded() {
+fn read_errors_are_worded() {
     assert_messages! {
         ReadError::Missing { path: path() } => ["/data/one"],
         ReadError::NotASession { path: path(), reason: "it holds no log".into() } => ["/data/one", "it holds no log"],
@@ -20,13 +20,13 @@ fn what_a_reader_refuses_is_worded() {
         ReadError::Damaged { path: path(), offset: 77, reason: "a wrong checksum".into() } => ["/data/one", "byte 77", "a wrong checksum"],
         ReadError::Io { path: path(), source: ErrorKind::PermissionDenied.into() } => ["/data/one", "permission denied"],
     }
-    // The way out is the front end's to tell.
+    // The front end adds the remedy.
     let damaged = ReadError::Damaged { path: path(), offset: 77, reason: "torn".into() };
     assert!(!damaged.to_string().contains("palpate"), "{damaged}");
 }
 
 #[test]
-fn what_a_writer_tells_is_worded() {
+fn write_errors_are_worded() {
     let path = || "/data/000.mcap".to_owned();
     assert_messages! {
         LogError::Disk { reason: "no room".into(), path: path() } => ["no room", "/data/000.mcap"],
@@ -39,7 +39,7 @@ fn what_a_writer_tells_is_worded() {
 }
 
 #[test]
-fn what_a_folder_and_a_search_refuse_is_worded() {
+fn folder_and_condition_errors_are_worded() {
     assert_messages! {
         FolderError::NotEmpty { path: path() } => ["/data/one"],
         FolderError::NotAFolder { path: path() } => ["/data/one"],
@@ -57,11 +57,11 @@ fn what_a_folder_and_a_search_refuse_is_worded() {
 }
 
 #[test]
-fn what_a_table_of_weights_refuses_is_worded() {
+fn weights_errors_are_worded() {
     let cell = || "one".to_owned();
     assert_messages! {
-        WeightsError::NoColumn { wanted: "mass_g" } => ["mass_g"],
-        WeightsError::Cell { line: 3, column: "volts", cell: cell(), wanted: "a number" } => ["line 3", "\"one\"", "volts", "a number"],
+        WeightsError::NoColumn { expected: "mass_g" } => ["mass_g"],
+        WeightsError::Cell { line: 3, column: "volts", cell: cell(), expected: "a number" } => ["line 3", "\"one\"", "volts", "a number"],
         WeightsError::Comma { line: 3, cell: cell() } => ["line 3", "\"one\""],
         WeightsError::Falling { line: 4, mass_g: 50.0, before_g: 100.0 } => ["line 4", "50 g", "100 g"],
     }

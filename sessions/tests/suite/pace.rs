@@ -81,13 +81,13 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
     let rows = rows(40_000, 33);
     let stuck = gate.lock().unwrap();
-    let mut told = Vec::new();
+    let mut notices = Vec::new();
     let mut failed_at = None;
     for row in &rows {
         // Were any push to wait for the disk, this test would never end.
         let outcome = writer.push_row(*row);
         for notice in writer.take_notices() {
-            told.push((notice, row.host.seconds().0));
+            notices.push((notice, row.host.seconds().0));
         }
         if let Err(err) = outcome {
             assert!(matches!(err, LogError::TooSlow { seconds: 30, .. }), "{err}");
@@ -97,8 +97,8 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     }
     let failed_at = failed_at.unwrap();
     // Once each, and the second while there is still room for the end of the run.
-    let [(Notice::Slow, slow_at), (Notice::TooSlow, too_slow_at)] = told[..] else {
-        panic!("{told:?}");
+    let [(Notice::Slow, slow_at), (Notice::TooSlow, too_slow_at)] = notices[..] else {
+        panic!("{notices:?}");
     };
     assert!((14.0..16.5).contains(&slow_at), "{slow_at}");
     assert!((26.0..28.5).contains(&too_slow_at), "{too_slow_at}");

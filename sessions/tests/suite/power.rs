@@ -37,7 +37,7 @@ impl Recording {
         Self { rows, entries, trace: Vec::new() }
     }
 
-    /// Written as the writer thread does it, but step by step, and the caller told of every synchronisation.
+    /// Writes like the writer thread, but step by step, and reports every synchronisation to the caller.
     pub fn by_log(mut self, batches_per_segment: u32, fail_at: &[u32]) -> Self {
         let disk = Disk::new(fail_at);
         let outcome = self.write(&disk, batches_per_segment);
@@ -67,20 +67,20 @@ impl Recording {
             if outcome.is_ok() && (is_event || since_sync.len() >= BATCHES_PER_SYNC) {
                 outcome = log.sync();
                 if outcome.is_err() {
-                    log.write_again(&since_sync)?;
+                    log.rewrite(&since_sync)?;
                     outcome = Ok(());
                 }
                 disk.tell((number + 1) * BATCH);
                 since_sync.clear();
             }
             if outcome.is_err() {
-                log.write_again(&since_sync)?;
+                log.rewrite(&since_sync)?;
                 disk.tell((number + 1) * BATCH);
                 since_sync.clear();
             }
         }
         if log.finish(end(Nanos::from_millis(1))).is_err() {
-            log.write_again(&since_sync)?;
+            log.rewrite(&since_sync)?;
             log.finish(end(Nanos::from_millis(1)))?;
         }
         disk.tell(self.rows.len());
@@ -122,26 +122,26 @@ impl Recording {
     fn tell_what_is_synchronised(&mut self) {
         let taken = self.rows.len();
         // So that there is a step under way after the last synchronisation.
-        self.trace.extend([0, 0].map(|told| Traced { step: Step::Told(told), taken }));
+        self.trace.extend([0, 0].map(|reported| Traced { step: Step::Reported(reported), taken }));
         for at in (0..self.trace.len()).rev() {
             if matches!(self.trace[at].step, Step::Sync(_)) {
                 // The folder's own may follow.
                 let after = at + 2;
-                let lost = self.check_cut(after, Fate::Dropped, 0);
+                let lost_samples = self.check_cut(after, Fate::Dropped, 0);
                 let taken = self.trace[after].taken;
-                let step = Step::Told(taken - lost);
+                let step = Step::Reported(taken - lost_samples);
                 self.trace.insert(after, Traced { step, taken });
             }
         }
     }
 
-    /// Samples that the caller was told survive, at a step.
-    fn told_by(&self, at: usize) -> Option<usize> {
-        let told = self.trace[..at].iter().filter_map(|one| match one.step {
-            Step::Told(samples) => Some(samples),
+    /// Samples reported to survive, at a step.
+    fn reported_by(&self, at: usize) -> Option<usize> {
+        let reported = self.trace[..at].iter().filter_map(|one| match one.step {
+            Step::Reported(samples) => Some(samples),
             _ => None,
         });
-        told.max()
+        reported.max()
     }
 
     /// Everything that is read is as it was recorded; returns how many samples from the first on are there.
@@ -167,8 +167,8 @@ impl Recording {
 
     fn check_left(&self, folder: &Path, context: &str) -> usize {
         let mut unbroken = 0;
-        let mut kept = 0;
-        let left = salvage(folder, &mut |block| {
+        let mut remaining = 0;
+        let salvage = salvage(folder, &mut |block| {
             let first = block.first_sample() as usize;
             let found: Vec<Row> = block.rows().collect();
             let there = &self.rows[first..first + found.len()];
@@ -176,15 +176,15 @@ impl Recording {
             if first == unbroken {
                 unbroken += found.len();
             }
-            kept += found.len();
+            remaining += found.len();
         });
         // Nothing but the beginning that never reached the disk makes a session useless.
-        let Ok(Salvage { entries, missing, .. }) = left else {
+        let Ok(Salvage { entries, missing, .. }) = salvage else {
             return 0;
         };
         let is_own = |entry: &Entry| self.entries.contains(entry);
         assert!(entries.iter().all(is_own), "{context}: wrong entries");
-        let is_short = kept < self.rows.len() || entries.len() < self.entries.len();
+        let is_short = remaining < self.rows.len() || entries.len() < self.entries.len();
         assert!(!is_short || !missing.sentences().is_empty(), "{context}");
         unbroken
     }
@@ -196,10 +196,10 @@ impl Recording {
         let session = folder.path().join("one");
         std::fs::create_dir(&session).expect("a folder to write in");
         cut(&self.trace, at, fate, &mut Random(seed), &session);
-        let kept = self.check_right(&session, &context);
+        let remaining = self.check_right(&session, &context);
         let taken = self.trace[at].taken;
-        if let Some(told) = self.told_by(at) {
-            assert!(kept >= told, "{context}: {kept} of {told}");
+        if let Some(reported) = self.reported_by(at) {
+            assert!(remaining >= reported, "{context}: {remaining} of {reported}");
             let is_recovered = recover(&session, "1", chrono::DateTime::UNIX_EPOCH);
             if let Ok(recovery) = is_recovered {
                 let copy = Session::open(&recovery.folder).expect("a copy is whole");
@@ -207,11 +207,11 @@ impl Recording {
                 let same = unbroken.take_while(|(a, b)| same_bits(&[**a], &[**b]));
                 let same = same.count();
                 let raw = read_raw(&recovery.folder).expect("a copy is whole");
-                check_raw_begins(&raw, &self.rows[..kept], &context);
-                assert!(same >= kept, "{context}: {same} of {kept} in the copy");
+                check_raw_begins(&raw, &self.rows[..remaining], &context);
+                assert!(same >= remaining, "{context}: {same} of {remaining} in the copy");
             }
         }
-        taken.saturating_sub(kept)
+        taken.saturating_sub(remaining)
     }
 }
 
@@ -269,7 +269,7 @@ fn a_power_cut_under_the_writer_thread_loses_nothing_that_was_synchronised() {
         let mut recording = Recording::new(2000, seed).by_thread(6, fail_at);
         recording.tell_what_is_synchronised();
         let all = recording.rows.len();
-        assert_eq!(recording.told_by(recording.trace.len()), Some(all));
+        assert_eq!(recording.reported_by(recording.trace.len()), Some(all));
         sweep(&recording, cuts(), seed);
     }
 }

@@ -53,12 +53,12 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
         "{:?}",
         session.notes
     );
-    let mut told = session.manifest.clone();
-    let recovered = told.recovered.take().unwrap();
+    let mut original = session.manifest.clone();
+    let recovered = original.recovered.take().unwrap();
     assert_eq!(recovered.from, manifest().session_id);
     assert_eq!((recovered.at, recovered.software_version.as_str()), (at(), "1.2.3"));
-    told.session_id = manifest().session_id;
-    assert_eq!(told, manifest());
+    original.session_id = manifest().session_id;
+    assert_eq!(original, manifest());
     // Found no more, and not made twice.
     assert_eq!(examine_library(library.path()).unwrap(), Vec::<std::path::PathBuf>::new());
     assert!(matches!(recover(&folder, "1.2.3", at()), Err(RecoverError::Before { .. })));
@@ -105,7 +105,7 @@ fn the_doctor_says_what_each_file_is() {
     let ending = || Some(end(Nanos::from_millis(1500)));
     let whole = log_bytes(&rows, &[], ending());
     let open = log_bytes(&rows, &[], None);
-    // The first byte behind the middle that costs samples: others describe, or are told twice.
+    // The first byte behind the middle that costs samples: others describe, or are stored twice.
     let costs_samples = |place: &usize| {
         let mut hurt = whole.clone();
         hurt[*place] ^= 4;
@@ -133,8 +133,8 @@ fn the_doctor_says_what_each_file_is() {
     hurt[index] ^= 4;
     let patient = health("index", &hurt);
     assert_eq!(patient.samples, 1500);
-    let wounds = patient.findings.join("; ");
-    assert!(wounds.contains("the index"), "{wounds}");
+    let damage = patient.findings.join("; ");
+    assert!(damage.contains("the index"), "{damage}");
     let copy = recover(&library.path().join("sessions/index"), "1", at()).unwrap();
     let copy = Session::open(&copy.folder).unwrap();
     assert!(same_bits(&copy.rows, &rows) && copy.end.is_some());
@@ -152,7 +152,7 @@ fn the_doctor_says_what_each_file_is() {
         "{refusal:?}"
     );
 
-    // Somebody records it: it is left alone.
+    // A session in use is left alone.
     let path = library.path().join("sessions/live");
     let held = SessionFolder::create(&path).unwrap();
     let mut writer = SessionWriter::start(held, None, &manifest(), Pace::Virtual).unwrap();
@@ -166,7 +166,7 @@ fn the_doctor_says_what_each_file_is() {
 }
 
 #[test]
-fn a_record_version_that_is_none_is_told_as_it_is() {
+fn invalid_record_version_is_quoted() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = std::io::Cursor::new(Vec::new());
     let options = mcap::WriteOptions::new().profile("palpate");
@@ -182,6 +182,6 @@ fn a_record_version_that_is_none_is_told_as_it_is() {
     writer.finish().unwrap();
     drop(writer);
     let path = session_with(folder.path(), "odd", &file.into_inner());
-    let told = Session::open(&path).unwrap_err().to_string();
-    assert!(told.contains("record version is -1"), "{told}");
+    let reason = Session::open(&path).unwrap_err().to_string();
+    assert!(reason.contains("record version is -1"), "{reason}");
 }

@@ -44,7 +44,7 @@ fn a_session_comes_back_bit_for_bit_at_either_pace() {
     }
 }
 
-/// The container's own library, told to check everything, agrees that the file is whole.
+/// The container's own library, with all checks, accepts the file.
 #[test]
 fn the_file_is_a_valid_mcap_file() {
     let rows = rows(1000, 2);
@@ -103,7 +103,7 @@ fn a_newer_session_is_refused_with_both_versions() {
 }
 
 #[test]
-fn what_is_no_session_is_told_apart() {
+fn files_other_than_sessions_are_distinguished() {
     let folder = tempfile::tempdir().unwrap();
     let missing = Session::open(&folder.path().join("nothing")).unwrap_err();
     assert!(matches!(missing, ReadError::Missing { .. }), "{missing}");
@@ -182,14 +182,14 @@ fn raw_bytes_and_health_come_back_at_either_pace() {
         let rows = rows(3000, 21);
         let source = FolderSegments::new(&path);
         let mut writer = SessionWriter::start_in_segments(source, 9, &manifest(), pace).unwrap();
-        let mut told = Vec::new();
+        let mut recorded = Vec::new();
         for (number, row) in rows.iter().enumerate() {
             let raw = raw_of(std::slice::from_ref(row));
             writer.push_raw(row.host, raw).unwrap();
             writer.push_row(*row).unwrap();
             if number % 1000 == 999 {
-                told.push(health(row.host, number as f64 * 1e-6));
-                writer.push_health(told[told.len() - 1].clone()).unwrap();
+                recorded.push(health(row.host, number as f64 * 1e-6));
+                writer.push_health(recorded[recorded.len() - 1].clone()).unwrap();
             }
         }
         writer.close(end(Nanos::from_millis(3000))).unwrap();
@@ -209,7 +209,7 @@ fn raw_bytes_and_health_come_back_at_either_pace() {
             }
         })
         .unwrap();
-        assert_eq!(found, told);
+        assert_eq!(found, recorded);
         let worst = session.beside.health.worst.unwrap();
         assert_eq!((worst.lateness_s, worst.missed_readings), (2999e-6, 3));
         // A later segment alone knows what it holds.

@@ -19,7 +19,7 @@ enum Step {
     Append(u32, Vec<u8>),
 }
 
-/// Remembers in which order the disk saw what, and can be told to fail.
+/// Records the order of operations, with chosen failures.
 #[derive(Clone, Default)]
 struct Journal(Arc<Mutex<JournalState>>);
 
@@ -47,8 +47,8 @@ impl Sink for JournalSink {
         let mut state = self.0.0.lock().unwrap();
         let outcome = state.count();
         // A failing write leaves a part of what it was given.
-        let kept = bytes.len() / if outcome.is_ok() { 1 } else { 2 };
-        state.steps.push(Step::Append(self.1, bytes[..kept].into()));
+        let remaining = bytes.len() / if outcome.is_ok() { 1 } else { 2 };
+        state.steps.push(Step::Append(self.1, bytes[..remaining].into()));
         outcome
     }
 
@@ -130,8 +130,8 @@ fn check(session: &Session, rows: &[Row], entries: &[Entry], at_least: usize, co
     assert!(entry_count >= due.count(), "{context}: entries are missing");
     assert_eq!(session.manifest, manifest());
     if session.end.is_none() {
-        let is_told = |note: &String| note.contains("no end record");
-        assert!(session.notes.iter().any(is_told), "{context}");
+        let is_no_end = |note: &String| note.contains("no end record");
+        assert!(session.notes.iter().any(is_no_end), "{context}");
     } else {
         assert_eq!((count, entry_count), (rows.len(), entries.len()));
     }
@@ -152,8 +152,8 @@ fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
 
 fn salvaged(folder: &Path) -> (Salvage, Vec<Row>) {
     let mut rows = Vec::new();
-    let left = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
-    (left, rows)
+    let salvage = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
+    (salvage, rows)
 }
 
 fn cut(path: &Path, length: usize) {
@@ -185,8 +185,8 @@ fn a_session_in_segments_comes_back_bit_for_bit() {
         assert_eq!(session.notes, Vec::<String>::new());
         let ending = session.end.clone().unwrap();
         assert_eq!((ending.samples, ending.entries), (3000, 99));
-        let left = salvage(folder.path(), &mut |_| {}).unwrap();
-        assert_eq!((left.samples, left.missing.sentences()), (3000, Vec::new()));
+        let salvage = salvage(folder.path(), &mut |_| {}).unwrap();
+        assert_eq!((salvage.samples, salvage.missing.sentences()), (3000, Vec::new()));
         // Thirty batches, four to a segment; each a valid file with a bounded index. With the wall
         // clock entries end batches early.
         let present = |number: &u32| folder.path().join(segment_file(*number)).exists();
@@ -314,12 +314,15 @@ fn a_missing_segment_is_refused_and_can_be_recovered_from() {
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
     assert!(refusal.to_string().contains("001.mcap"), "{refusal}");
-    // What came before and after it can be kept; what is between is told.
-    let (left, kept) = salvaged(folder.path());
-    assert!(same_bits(&kept[..2 * BATCH], &rows[..2 * BATCH]));
-    assert!(same_bits(&kept[2 * BATCH..], &rows[4 * BATCH..]));
-    let told = left.missing.sentences().join("; ");
-    assert!(told.contains("001.mcap") && told.contains("80 samples between"), "{told}");
+    // The parts before and after are recovered; the gap is reported.
+    let (salvage, remaining) = salvaged(folder.path());
+    assert!(same_bits(&remaining[..2 * BATCH], &rows[..2 * BATCH]));
+    assert!(same_bits(&remaining[2 * BATCH..], &rows[4 * BATCH..]));
+    let sentences = salvage.missing.sentences().join("; ");
+    assert!(
+        sentences.contains("001.mcap") && sentences.contains("80 samples between"),
+        "{sentences}"
+    );
     // Another segment does not pass for it, nor for the first one.
     fs::rename(folder.path().join("002.mcap"), folder.path().join("001.mcap")).unwrap();
     assert!(Session::open(folder.path()).is_err());
@@ -344,11 +347,11 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     cut(&middle, data);
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
-    let (left, kept) = salvaged(folder.path());
-    let gap = &left.missing.gaps[0];
+    let (salvage, remaining) = salvaged(folder.path());
+    let gap = &salvage.missing.gaps[0];
     let (before, after) = (gap.after_sample as usize, (gap.after_sample + gap.samples) as usize);
-    assert!(same_bits(&kept[..before], &rows[..before]));
-    assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
+    assert!(same_bits(&remaining[..before], &rows[..before]));
+    assert!(same_bits(&remaining[before..], &rows[after..]) && after <= 4 * BATCH);
 }
 
 /// That the next segment goes on without a gap does not make up for it: only one begun because of it would.
@@ -366,10 +369,10 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
         let refusal = Session::open(folder.path()).unwrap_err().to_string();
         assert!(refusal.contains("the index"), "{refusal}");
         assert!(refusal.contains(&segment_file(number)), "{refusal}");
-        let (left, kept) = salvaged(folder.path());
-        assert!(same_bits(&kept, &rows));
-        let told = left.missing.sentences().join("; ");
-        assert!(told.contains(&segment_file(number)), "{told}");
+        let (salvage, remaining) = salvaged(folder.path());
+        assert!(same_bits(&remaining, &rows));
+        let sentences = salvage.missing.sentences().join("; ");
+        assert!(sentences.contains(&segment_file(number)), "{sentences}");
         fs::write(&path, &whole).unwrap();
     }
     Session::open(folder.path()).unwrap();
@@ -379,7 +382,7 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
 fn segments_of_another_session_are_refused() {
     let (folder, rows, entries) = three_segments();
     let mut other = manifest();
-    other.operator = "somebody else".into();
+    other.operator = "Eve".into();
     let journal = Journal::default();
     let mut log = LogWriter::begin_in_segments(Box::new(journal.clone()), 2, &other).unwrap();
     for batch in rows.chunks(BATCH) {

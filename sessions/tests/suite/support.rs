@@ -213,7 +213,7 @@ pub fn end(ended_at: Nanos) -> EndRecord {
     }
 }
 
-/// A sink in memory that can be told to fail.
+/// A sink in memory with chosen failures.
 #[derive(Clone, Default)]
 pub struct MemorySink(pub Arc<Mutex<Memory>>);
 
@@ -251,11 +251,11 @@ impl Sink for MemorySink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         let mut memory = self.0.lock().unwrap();
         let outcome = memory.count();
-        let kept = match outcome {
+        let remaining = match outcome {
             Ok(()) => bytes.len(),
             Err(_) => (bytes.len() as f64 * memory.torn) as usize,
         };
-        memory.bytes.extend_from_slice(&bytes[..kept]);
+        memory.bytes.extend_from_slice(&bytes[..remaining]);
         outcome
     }
 
@@ -331,7 +331,7 @@ pub fn quick_folder() -> tempfile::TempDir {
     folder.expect("a folder to write in")
 }
 
-/// Writes a file anew: overwriting in place makes some file systems wait for the disk.
+/// Replaces a file: overwriting in place makes some file systems wait for the disk.
 pub fn put(path: &std::path::Path, bytes: &[u8]) {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).expect("a folder to write in");

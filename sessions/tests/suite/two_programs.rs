@@ -1,11 +1,11 @@
-//! Two programs at once: nobody waits for ever, one of several wins, and nothing is left over.
+//! Two programs at once: waits are limited, one of several wins, and nothing remains.
 
 use crate::support::{count_from, end, log_bytes, manifest, rows};
-use crate::worker::{command, edit, told};
+use crate::worker::{command, edit, reported_numbers};
 use palpate_model::Nanos;
 use palpate_sessions::atomic::{leftovers, sweep};
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError};
-use palpate_sessions::folder::Busy;
+use palpate_sessions::folder::LockTimeout;
 use palpate_sessions::recover::{RecoverError, recover, recovered_folder};
 use palpate_sessions::{
     ChainError, EDITS_FILE, EditError, LOG_FILE, Session, SessionFolder, add_edit,
@@ -16,27 +16,27 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 
 /// A process that has begun its task and does it until it is let go.
-struct Beside(Child);
+struct OtherProgram(Child);
 
-impl Beside {
+impl OtherProgram {
     fn start(task: &str, folder: &Path) -> Self {
         let mut command = command(&[], task, folder);
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
         let mut child = piped.spawn().expect("a test is a program");
-        let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
+        let mut errors = BufReader::new(child.stderr.take().expect("it is piped"));
         let mut line = String::new();
-        said.read_line(&mut line).expect("it says so");
+        errors.read_line(&mut line).expect("it says so");
         assert_eq!(line, "saved 0\n");
         Self(child)
     }
 
-    /// Whether this is the process that is told as the holder, where the system tells any.
-    fn is(&self, busy: &Busy) -> bool {
+    /// Whether this process is reported as the holder, if the system shows one.
+    fn is(&self, busy: &LockTimeout) -> bool {
         busy.holder.is_none_or(|number| number == self.0.id())
     }
 }
 
-impl Drop for Beside {
+impl Drop for OtherProgram {
     fn drop(&mut self) {
         drop(self.0.stdin.take());
         let _ = self.0.wait();
@@ -44,14 +44,14 @@ impl Drop for Beside {
 }
 
 #[test]
-fn a_strangers_lock_on_edits_is_waited_for_a_little_and_told() {
+fn lock_on_edits_by_another_program_is_waited_for_and_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let id = manifest().session_id;
     add_edit(at, &id, &edit(1)).unwrap();
-    let stranger = Beside::start(&format!("lock {EDITS_FILE}"), at);
+    let stranger = OtherProgram::start(&format!("lock {EDITS_FILE}"), at);
     match add_edit(at, &id, &edit(2)) {
-        Err(EditError::Chain(ChainError::Busy(busy))) => {
+        Err(EditError::Chain(ChainError::LockTimeout(busy))) => {
             assert!(stranger.is(&busy), "{busy}");
             assert!(busy.path.ends_with(EDITS_FILE), "{busy}");
         }
@@ -62,7 +62,7 @@ fn a_strangers_lock_on_edits_is_waited_for_a_little_and_told() {
 }
 
 #[test]
-fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
+fn lock_on_the_catalog_by_another_program_is_waited_for_and_reported() {
     let library = tempfile::tempdir().unwrap();
     let at = library.path();
     let session = at.join("sessions/one");
@@ -71,9 +71,9 @@ fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
     let count = || Catalog::with(at, |catalog| Ok(catalog.update(&mut |_, _| {})?.sessions));
     assert_eq!(count().unwrap(), 1);
     for task in ["lock catalog.lock".to_owned(), format!("sqlite {CATALOG_FILE}")] {
-        let stranger = Beside::start(&task, at);
+        let stranger = OtherProgram::start(&task, at);
         match count() {
-            Err(CatalogError::Busy(busy)) => assert!(stranger.is(&busy), "{busy}"),
+            Err(CatalogError::LockTimeout(busy)) => assert!(stranger.is(&busy), "{busy}"),
             other => panic!("{task}: {other:?}"),
         }
         drop(stranger);
@@ -82,17 +82,20 @@ fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
 }
 
 #[test]
-fn what_a_killed_process_was_writing_is_told_and_swept_and_no_other() {
+fn drafts_of_a_killed_process_are_found_and_removed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut killed = Beside::start("draft killed.csv", at);
-    let _going_on = Beside::start("draft written.csv", at);
+    let mut killed = OtherProgram::start("draft killed.csv", at);
+    let _going_on = OtherProgram::start("draft written.csv", at);
     assert!(leftovers(at, 1).is_empty());
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
-    let left = leftovers(at, 1);
-    assert!(left.len() == 1 && left[0].to_string_lossy().contains("killed.csv"), "{left:?}");
-    assert_eq!(sweep(at, 1), left);
+    let abandoned = leftovers(at, 1);
+    assert!(
+        abandoned.len() == 1 && abandoned[0].to_string_lossy().contains("killed.csv"),
+        "{abandoned:?}"
+    );
+    assert_eq!(sweep(at, 1), abandoned);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1);
 }
 
@@ -113,7 +116,7 @@ fn of_many_recoveries_at_once_one_wins_and_nothing_is_left_over() {
             .collect();
         let outputs: Vec<_> =
             children.into_iter().map(|it| it.wait_with_output().unwrap()).collect();
-        let won: u64 = outputs.iter().flat_map(|output| told(output, "saved")).sum();
+        let won: u64 = outputs.iter().flat_map(|output| reported_numbers(output, "saved")).sum();
         assert_eq!(won, 1, "{outputs:?}");
         assert!(outputs.iter().all(|output| output.status.success()), "{outputs:?}");
         assert_eq!(Session::open(&recovered_folder(&folder)).unwrap().rows.len(), all.len());

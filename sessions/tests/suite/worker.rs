@@ -49,8 +49,8 @@ pub fn command(program: &[&str], task: &str, folder: &Path) -> Command {
     command
 }
 
-/// The numbers that a process told with a word, as `saved 300`.
-pub fn told(output: &std::process::Output, word: &str) -> Vec<u64> {
+/// The numbers that a process printed after a word, as in `saved 300`.
+pub fn reported_numbers(output: &std::process::Output, word: &str) -> Vec<u64> {
     let text = String::from_utf8_lossy(&output.stderr);
     let numbers = text.lines().filter_map(|line| {
         let number = line.strip_prefix(word)?.strip_prefix(' ')?;

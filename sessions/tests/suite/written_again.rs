@@ -190,7 +190,7 @@ fn whichever_operation_fails_the_session_lacks_nothing() {
 }
 
 #[test]
-fn several_failures_lose_nothing_and_too_many_are_told() {
+fn several_failures_lose_nothing_and_too_many_are_reported() {
     let rows = rows(1000, 62);
     let entries = entries(&rows, 60);
     let mut random = Random(62);
@@ -208,7 +208,7 @@ fn several_failures_lose_nothing_and_too_many_are_told() {
             }
             Err((_, LogError::Disk { .. })) => {
                 failed += 1;
-                // Nothing that is there is wrong, and a missing end is told.
+                // The present data is correct, and a missing end is reported.
                 match Session::open(folder.path()) {
                     Ok(session) => {
                         let count = session.rows.len();
@@ -296,7 +296,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
                 session.notes
             );
             assert!(session.is_whole());
-            away += u32::from(is_told_away(folder.path(), spare.path()));
+            away += u32::from(is_spare_reported(folder.path(), spare.path()));
             fs::remove_file(folder.path().join(SPARE_FILE)).unwrap();
             let rest = Session::open(folder.path()).unwrap();
             assert!(same_bits(&rest.rows, &rows[..rest.rows.len()]));
@@ -307,8 +307,8 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
     assert!(away > 2, "{away}");
 }
 
-/// While the spare disk is away, nobody takes what is left for all there is; whether something is missing at all.
-fn is_told_away(folder: &Path, spare: &Path) -> bool {
+/// Checks that a missing spare disk is reported; returns whether something is missing.
+fn is_spare_reported(folder: &Path, spare: &Path) -> bool {
     let away = spare.with_extension("away");
     fs::rename(spare, &away).unwrap();
     let words = "connect that disk";

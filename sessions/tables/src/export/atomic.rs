@@ -1,4 +1,4 @@
-//! Exports as files that appear whole under their names or not at all.
+//! Atomic writing of exports.
 
 use super::ExportError;
 use palpate_sessions::atomic::{Draft, Existing};
@@ -6,20 +6,18 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// What became of a file that may be there already.
+/// Result of writing a file that may exist.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kept {
-    /// It is new.
+pub enum WriteOutcome {
     Written,
-    /// It was there with the same content.
-    Same,
+    /// The file existed with the same content.
+    Unchanged,
 }
 
 pub(crate) fn io_error(path: &Path) -> impl Fn(io::Error) -> ExportError {
     move |source| ExportError::Io { path: path.to_owned(), source }
 }
 
-/// Refuses a file that is there.
 pub(super) fn check_new(path: &Path) -> Result<(), ExportError> {
     match path.exists() {
         true => Err(ExportError::Exists { path: path.into() }),
@@ -27,50 +25,49 @@ pub(super) fn check_new(path: &Path) -> Result<(), ExportError> {
     }
 }
 
-/// Writes a new file.
 pub(super) fn write<T>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<T, ExportError>,
 ) -> Result<T, ExportError> {
     check_new(path)?;
-    let (draft, told) = filled(path, fill)?;
+    let (draft, value) = fill_draft(path, fill)?;
     match draft.persist(Existing::Keep) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {
             Err(ExportError::Exists { path: path.into() })
         }
-        done => done.map(|()| told).map_err(io_error(path)),
+        outcome => outcome.map(|()| value).map_err(io_error(path)),
     }
 }
 
-/// As [`write`], but a file that is there may stay if its content is the same to the byte.
+/// Like [`write`], but accepts an existing file with exactly the same content.
 pub(crate) fn write_or_same(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), ExportError>,
-) -> Result<Kept, ExportError> {
-    let (draft, ()) = filled(path, fill)?;
+) -> Result<WriteOutcome, ExportError> {
+    let (draft, ()) = fill_draft(path, fill)?;
     let written = File::open(draft.hidden_path()).map_err(io_error(path))?;
     match draft.persist(Existing::Keep) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {}
-        done => return done.map(|()| Kept::Written).map_err(io_error(path)),
+        outcome => return outcome.map(|()| WriteOutcome::Written).map_err(io_error(path)),
     }
     match same_content(&written, &File::open(path).map_err(io_error(path))?)
         .map_err(io_error(path))?
     {
-        true => Ok(Kept::Same),
+        true => Ok(WriteOutcome::Unchanged),
         false => Err(ExportError::Different { path: path.into() }),
     }
 }
 
-fn filled<T>(
+fn fill_draft<T>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<T, ExportError>,
 ) -> Result<(Draft, T), ExportError> {
     let draft = Draft::new(path).map_err(io_error(path))?;
     let mut out = draft.writer();
-    let told = fill(&mut out)?;
+    let value = fill(&mut out)?;
     out.flush().map_err(io_error(path))?;
     drop(out);
-    Ok((draft, told))
+    Ok((draft, value))
 }
 
 fn same_content(one: &File, other: &File) -> io::Result<bool> {

@@ -1,4 +1,4 @@
-//! The columns of every table of samples: what they are called and mean, and how they are filled.
+//! The columns of tables of samples: names, meanings and values.
 
 use palpate_sessions::manifest::Manifest;
 use palpate_sessions::record::Row;
@@ -6,7 +6,6 @@ use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, Primiti
 use polars_core::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
 use polars_core::prelude::{Series, StringChunked};
 
-/// What stands in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Field {
     SessionId,
@@ -25,32 +24,28 @@ enum Field {
     Status,
     Age,
     AgeWithin,
-    /// One of [`Beside`], by number.
-    Beside(usize),
-    /// The number of the sample, in a table that holds every so many only.
+    /// A column of [`Beside`], by index.
+    Extra(usize),
+    /// Number of the sample in a thinned table.
     EveryNth,
 }
 
-/// A column, as a reader is told of it.
+/// Description of a column for readers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnInfo {
     field: Field,
-    /// Its name, with the unit where it has one.
+    /// With the unit, if any.
     pub name: String,
-    /// Its unit; `1` is a plain count, empty is text.
+    /// `1` for a count, empty for text.
     pub unit: &'static str,
-    /// Its type.
     pub kind: &'static str,
-    /// What it means.
     pub meaning: String,
-    /// Where it comes from.
     pub how: &'static str,
 }
 
-/// The column of times.
 pub(super) const TIME_COLUMN: &str = "t_s";
 
-/// Columns of every table, in order.
+/// Default columns, in order.
 const USUAL: [Field; 8] = [
     Field::Time,
     Field::Depth,
@@ -62,7 +57,7 @@ const USUAL: [Field; 8] = [
     Field::Cycle,
 ];
 
-/// Columns that can be asked for by name.
+/// Columns available by name.
 const MORE: [Field; 8] = [
     Field::SessionId,
     Field::Specimen,
@@ -74,132 +69,108 @@ const MORE: [Field; 8] = [
     Field::AgeWithin,
 ];
 
-/// Columns that stand beside the session's own, such as corrected depths.
+/// Columns in addition to the session's own, such as corrected depths.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Beside {
-    /// Name, unit and values, one for each sample and none where it is not known.
+    /// Name, unit and one value per sample, `None` where unknown.
     pub columns: Vec<(&'static str, &'static str, Vec<Option<f64>>)>,
-    /// What a reader must know of them: keys and texts of the file's metadata.
+    /// Entries of the file's metadata that explain them.
     pub metadata: Vec<(String, String)>,
 }
 
 impl Field {
-    #[expect(clippy::too_many_lines, reason = "a table of columns")]
-    fn told(self) -> ColumnInfo {
-        let (name, unit, kind, meaning, how) = match self {
-            Self::SessionId => (
-                "session_id",
-                "",
-                "text",
-                "name of the session",
-                "given at the start, sorts by time",
-            ),
-            Self::Specimen => {
-                ("specimen", "", "text", "what was indented", "typed by the operator")
-            }
-            Self::Sample => (
-                "sample",
-                "1",
-                "whole number",
-                "number of the sample in the session, from 0",
-                "counted",
-            ),
+    fn describe(self) -> ColumnInfo {
+        let (name, unit, meaning) = match self {
+            Self::SessionId => ("session_id", "", "name of the session"),
+            Self::Specimen => ("specimen", "", "what was indented"),
+            Self::Sample => ("sample", "1", "number of the sample in the session, from 0"),
             Self::Time => (
                 TIME_COLUMN,
                 "s",
-                "number",
                 "time since the session's first sample; negative after a restart of the controller",
-                "controller ticks times the true length of a tick",
             ),
             Self::Depth => (
                 "depth_mm",
                 "mm",
-                "number",
                 "depth below contact, positive into the tissue; empty before contact is known",
-                "the commanded path, within one pulse of the pulses, from the contact found or corrected",
             ),
             Self::Force => (
                 "force_N",
                 "N",
-                "number",
-                "force on the probe above tare, positive in compression; empty before the tare and where left out",
-                "signal through the load-cell calibration, less the tare",
+                "force on the probe above tare, positive in compression; empty before the tare and where masked",
             ),
-            Self::Signal => (
-                "signal_V",
-                "V",
-                "number",
-                "load-cell signal; empty in an imported session without one",
-                "as received",
-            ),
-            Self::Counts => (
-                "counts",
-                "1",
-                "whole number",
-                "converter counts; empty on a rig without a converter",
-                "as received",
-            ),
+            Self::Signal => {
+                ("signal_V", "V", "load-cell signal; empty in an imported session without one")
+            }
+            Self::Counts => ("counts", "1", "converter counts; empty on a rig without a converter"),
             Self::Pulses => (
                 "pulses",
                 "1",
-                "whole number",
                 "commanded position in motor pulses from home; empty in an imported session",
-                "as received",
             ),
-            Self::Phase => ("phase", "", "text", "what the run was doing", "decided by the engine"),
-            Self::Cycle => (
-                "cycle",
-                "1",
-                "whole number",
-                "indentation cycle, from 1; 0 outside cycles",
-                "decided by the engine",
-            ),
+            Self::Phase => ("phase", "", "what the run was doing"),
+            Self::Cycle => ("cycle", "1", "indentation cycle, from 1; 0 outside cycles"),
             Self::Tick => (
                 "tick",
                 "1",
-                "whole number",
                 "the controller's clock in its own counts; picoseconds in an imported session",
-                "as received",
             ),
-            Self::Host => (
-                "host_ns",
-                "ns",
-                "whole number",
-                "arrival on the computer, since the start of the session",
-                "the computer's monotonic clock",
-            ),
-            Self::Status => {
-                ("status", "1", "whole number", "bits of the axis' status", "as received")
+            Self::Host => {
+                ("host_ns", "ns", "arrival on the computer, since the start of the session")
             }
+            Self::Status => ("status", "1", "bits of the axis' status"),
             Self::Age => (
                 "age_ns",
                 "ns",
-                "whole number",
-                "the sample was taken so long before it arrived; empty where the link does not tell",
-                "measured by the driver, sample by sample",
+                "delay from acquisition to arrival; empty if the link does not measure it",
             ),
             Self::AgeWithin => (
                 "age_within_ns",
                 "ns",
-                "whole number",
-                "how far age_ns may be wrong either way; empty where the link does not tell",
-                "measured by the driver, sample by sample",
+                "largest error of age_ns in either direction; empty if the link does not measure it",
             ),
-            // Named by those who make them.
-            Self::Beside(_) | Self::EveryNth => ("", "", "", "", ""),
+            // `Layout::new` describes these.
+            Self::Extra(_) | Self::EveryNth => ("", "", ""),
         };
+        let (kind, how) = (self.kind(), self.origin());
         ColumnInfo { field: self, name: name.into(), unit, kind, meaning: meaning.into(), how }
+    }
+
+    fn kind(self) -> &'static str {
+        match self {
+            Self::SessionId | Self::Specimen | Self::Phase => "text",
+            Self::Time | Self::Depth | Self::Force | Self::Signal | Self::Extra(_) => "number",
+            _ => "whole number",
+        }
+    }
+
+    fn origin(self) -> &'static str {
+        match self {
+            Self::SessionId => "given at the start, sorts by time",
+            Self::Specimen => "typed by the operator",
+            Self::Sample | Self::EveryNth => "counted",
+            Self::Time => "controller ticks times the true length of a tick",
+            Self::Depth => {
+                "commanded path from the recorded or corrected contact, within one pulse of the pulses"
+            }
+            Self::Force => "signal converted by the load-cell calibration, minus the tare",
+            Self::Signal | Self::Counts | Self::Pulses | Self::Tick | Self::Status => "as received",
+            Self::Phase | Self::Cycle => "decided by the engine",
+            Self::Host => "the computer's monotonic clock",
+            Self::Age | Self::AgeWithin => "measured by the driver, sample by sample",
+            Self::Extra(_) => "computed at export; the file's metadata has the method",
+        }
     }
 }
 
-/// The columns of one table and what is the same in every row.
+/// The columns of one table, and values that are the same in every row.
 pub(super) struct Layout<'a> {
     pub columns: Vec<ColumnInfo>,
-    beside: &'a Beside,
+    extra: &'a Beside,
     manifest: &'a Manifest,
 }
 
-/// Samples of the table, which are as many numbers in the session as rows.
+/// Selected samples: their numbers in the session, and their rows.
 #[derive(Clone, Copy)]
 pub(super) struct Samples<'a> {
     pub numbers: &'a [u64],
@@ -208,49 +179,43 @@ pub(super) struct Samples<'a> {
     pub first_tick: u64,
 }
 
-/// Time in s of a sample. A controller that restarted counts from zero again: its time is negative, not a failure.
+/// Time of a sample in s. After a restart of the controller, which counts from zero again, the time is negative.
 pub(super) fn time_of(manifest: &Manifest, row: &Row, first_tick: u64) -> f64 {
     manifest.time_of(row.tick.wrapping_sub(first_tick) as i64).0
 }
 
 impl<'a> Layout<'a> {
-    /// The usual columns and those beside, or those that are named, in that order; or the name there is no
-    /// column of. A table of every `every`-th sample begins with the numbers of its samples.
+    /// The default and extra columns or, if any are named, those in that order. A table of every `every`-th sample begins with
+    /// the numbers of its samples.
     pub fn new(
         manifest: &'a Manifest,
-        beside: &'a Beside,
-        wanted: &[String],
+        extra: &'a Beside,
+        names: &[String],
         every: u64,
     ) -> Result<Self, String> {
-        let mut known: Vec<ColumnInfo> = USUAL.map(Field::told).into();
-        known.extend(beside.columns.iter().enumerate().map(|(number, (name, unit, _))| {
-            ColumnInfo {
-                field: Field::Beside(number),
-                name: (*name).into(),
-                unit,
-                kind: "number",
-                meaning: "beside the session's own columns; empty where it is not known".into(),
-                how: "computed at export; how is in the file's metadata",
-            }
+        let mut known: Vec<ColumnInfo> = USUAL.map(Field::describe).into();
+        known.extend(extra.columns.iter().enumerate().map(|(number, (name, unit, _))| {
+            let (name, meaning) = ((*name).into(), "extra column; empty where unknown".into());
+            ColumnInfo { name, unit, meaning, ..Field::Extra(number).describe() }
         }));
         let usual = known.len();
-        known.extend(MORE.map(Field::told));
+        known.extend(MORE.map(Field::describe));
         let mut columns = Vec::new();
         if every > 1 {
             columns.push(ColumnInfo {
                 name: format!("sample_every_{every}"),
                 meaning: format!(
-                    "number of the sample in the session, from 0; only every {every}th of those selected is here, none is averaged"
+                    "number of the sample in the session, from 0; the table has only every {every}th selected sample, without averaging"
                 ),
                 field: Field::EveryNth,
-                ..Field::Sample.told()
+                ..Field::Sample.describe()
             });
         }
-        if wanted.is_empty() {
+        if names.is_empty() {
             known.truncate(usual);
             columns.append(&mut known);
         }
-        for name in wanted {
+        for name in names {
             let found = known.iter().find(|one| one.name == *name);
             let Some(found) = found else {
                 let all: Vec<&str> = known.iter().map(|one| one.name.as_str()).collect();
@@ -264,23 +229,22 @@ impl<'a> Layout<'a> {
             }
             columns.push(found.clone());
         }
-        Ok(Self { columns, beside, manifest })
+        Ok(Self { columns, extra, manifest })
     }
 
-    /// A frame of these columns to fill, with room for so many samples.
-    pub fn filling(&self, room: usize) -> Vec<Cells> {
+    /// Empty cells with capacity for `room` samples.
+    pub fn empty_cells(&self, room: usize) -> Vec<Cells> {
         let columns = self.columns.iter();
         columns.map(|column| Cells::new(column.field, self.manifest, room)).collect()
     }
 
-    /// Adds samples to a frame.
     pub fn fill(&self, frame: &mut [Cells], samples: Samples) {
         for (cells, column) in frame.iter_mut().zip(&self.columns) {
             cells.extend(samples, column.field, self);
         }
     }
 
-    /// The frame of so many samples.
+    /// Builds the frame of `rows` samples.
     pub fn frame(&self, cells: Vec<Cells>, rows: usize) -> PolarsResult<DataFrame> {
         let columns = self.columns.iter().zip(cells);
         let columns =
@@ -289,9 +253,9 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// What a column of a frame holds so far.
+/// Cells of a column while it is filled.
 pub(super) enum Cells {
-    /// A text that is the same in every row, and their number.
+    /// The same text in every row, and the number of rows.
     Same(String, usize),
     Numbers(Vec<f64>),
     Wide(Vec<u64>),
@@ -313,7 +277,7 @@ impl Cells {
             }
             Field::Cycle | Field::Status => Self::Whole(Vec::with_capacity(room)),
             Field::Phase => Self::Words(MutableBinaryViewArray::with_capacity(room)),
-            Field::Depth | Field::Force | Field::Signal | Field::Beside(_) => {
+            Field::Depth | Field::Force | Field::Signal | Field::Extra(_) => {
                 Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
             }
             Field::Pulses | Field::Age | Field::AgeWithin => {
@@ -343,15 +307,15 @@ impl Cells {
             Self::MaybeNumbers(cells) => match field {
                 Field::Depth => cells.extend(rows.map(|row| row.depth)),
                 Field::Force => cells.extend(rows.map(|row| row.force)),
-                Field::Beside(one) => {
-                    let values = &layout.beside.columns[one].2;
+                Field::Extra(one) => {
+                    let values = &layout.extra.columns[one].2;
                     let of = |number: &u64| *values.get(*number as usize)?;
                     cells.extend(samples.numbers.iter().map(of));
                 }
                 _ => cells.extend(rows.map(|row| row.volts)),
             },
             Self::MaybeWide(cells) => match field {
-                // No link is as slow as i64::MAX nanoseconds.
+                // A delay never reaches i64::MAX ns, 292 years.
                 Field::Age => cells.extend(rows.map(|row| row.age.map(|age| age.by.0 as i64))),
                 Field::AgeWithin => {
                     cells.extend(rows.map(|row| row.age.map(|age| age.within.0 as i64)))

@@ -1,11 +1,11 @@
-//! The data dictionary: what stands beside a table for those who read it years later.
+//! The data dictionary beside a table.
 
 use super::columns::ColumnInfo;
 use super::select::Selection;
 use palpate_sessions::manifest::Manifest;
 use std::path::{Path, PathBuf};
 
-/// Where the dictionary of a table stands: beside it, as `NAME.columns.md`.
+/// `NAME.columns.md` beside the table.
 #[must_use]
 pub fn dictionary_path(table: &Path) -> PathBuf {
     let name = table.file_name().unwrap_or(table.as_os_str());
@@ -30,7 +30,7 @@ pub(super) fn dictionary(
             selection.sentence()
         ),
         String::new(),
-        "| column | unit | type | meaning | how it came about |".into(),
+        "| column | unit | type | meaning | origin |".into(),
         "|---|---|---|---|---|".into(),
     ];
     lines.extend(columns.iter().map(|one| {
@@ -51,7 +51,7 @@ pub(super) fn dictionary(
     lines.join("\n")
 }
 
-/// A text in one line of a Markdown table.
+/// A text for a cell of a Markdown table.
 fn cell(text: &str) -> String {
     text.replace(['\n', '\r'], " ").replace('|', "\\|")
 }

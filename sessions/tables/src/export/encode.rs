@@ -1,6 +1,6 @@
-//! A table written frame by frame in one of the formats, so that memory does not grow with it.
+//! Encoding of a table frame by frame, so that memory does not grow with its length.
 
-use super::harmless::harmless_frame;
+use super::formula::escape_frame;
 use super::parquet::ParquetFile;
 use polars_arrow::io::ipc::write::{FileWriter, WriteOptions};
 use polars_core::prelude::{CompatLevel, DataFrame, PolarsResult, SchemaExt};
@@ -10,21 +10,17 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::Arc;
 
-/// The format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Text with a header (RFC 4180), cells apart by this character: `.` as decimal mark, shortest digits
-    /// that read back to the same number, empty cells for missing values. A text that a spreadsheet
-    /// would take for a formula begins with `'`.
+    /// Text with a header (RFC 4180) and this delimiter: decimal point, shortest digits that read back to the same number,
+    /// empty cells for missing values. A text that a spreadsheet would take for a formula begins with `'`.
     Csv(u8),
-    /// Apache Parquet, zstd.
     Parquet,
-    /// An Apache Arrow IPC file, not compressed, which programs map into memory.
+    /// Apache Arrow IPC file without compression, so that programs can map it into memory.
     Arrow,
 }
 
 impl Format {
-    /// The ending of its files' names.
     #[must_use]
     pub fn ending(self) -> &'static str {
         match self {
@@ -35,7 +31,7 @@ impl Format {
     }
 }
 
-/// Keys and texts about a table.
+/// Pairs of key and text in the file's metadata.
 pub(crate) type Metadata = Vec<(String, String)>;
 
 pub(crate) enum Encoder<W: Write> {
@@ -45,7 +41,7 @@ pub(crate) enum Encoder<W: Write> {
 }
 
 impl<W: Write> Encoder<W> {
-    /// Begins a table whose frames are like `empty`. CSV has no place for metadata.
+    /// Begins a table with frames like `empty`. CSV has no metadata.
     pub fn new(
         format: Format,
         file: W,
@@ -55,7 +51,7 @@ impl<W: Write> Encoder<W> {
         Ok(match format {
             Format::Csv(delimiter) => {
                 let writer = CsvWriter::new(file).with_separator(delimiter);
-                let empty = harmless_frame(empty.clone())?;
+                let empty = escape_frame(empty.clone())?;
                 Self::Csv(writer.batched(empty.schema())?)
             }
             Format::Parquet => Self::Parquet(Box::new(ParquetFile::new(file, empty)?), metadata),
@@ -74,7 +70,7 @@ impl<W: Write> Encoder<W> {
 
     pub fn write(&mut self, frame: DataFrame) -> PolarsResult<()> {
         match self {
-            Self::Csv(writer) => writer.write_batch(&harmless_frame(frame)?),
+            Self::Csv(writer) => writer.write_batch(&escape_frame(frame)?),
             Self::Parquet(file, _) => file.write(frame),
             Self::Arrow(writer) => frame
                 .iter_chunks(CompatLevel::oldest(), true)

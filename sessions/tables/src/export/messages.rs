@@ -1,5 +1,5 @@
-//! A session's samples as an MCAP file of one message each, for programs that draw messages, such as Foxglove and
-//! PlotJuggler. It is no session: its samples are all there, and nothing of what was decided.
+//! Export of a session's samples as an MCAP file with one message each, for programs such as Foxglove and PlotJuggler. The
+//! file is not a session, because it has no entries.
 
 use super::{ExportError, Feed, Table, atomic};
 use mcap::records::{MessageHeader, Metadata};
@@ -9,10 +9,10 @@ use prost::Message;
 use std::io::{self, Seek, Write};
 use std::path::Path;
 
-/// A chunk is cut when it grows beyond this: what a viewer unpacks at once, about 50 000 samples.
+/// Size of a chunk, which a viewer decompresses at once: about 50 000 samples.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// One sample; what is not known is left out.
+/// One sample; unknown values are left out.
 #[derive(Clone, PartialEq, prost::Message)]
 struct Sample {
     #[prost(double, tag = "1")]
@@ -36,11 +36,11 @@ struct Sample {
 }
 
 impl Table<'_> {
-    /// Writes the selected samples as messages, and tells how many. The file is new. Samples pass by: no more than
-    /// a chunk of them is in memory. Columns are not chosen, and those beside are left out.
+    /// Writes the selected samples as messages into a new file; returns their number. At most one chunk is in memory. The
+    /// selection of columns and the extra columns are ignored.
     pub fn write_messages(&self, path: &Path, feed: Feed) -> Result<u64, ExportError> {
         atomic::write(path, |file| {
-            let mut writing = Writing::begin(self, file).map_err(failed(path))?;
+            let mut writing = MessageWriter::begin(self, file).map_err(failed(path))?;
             feed(&mut |rows| rows.iter().for_each(|row| writing.take(row)))?;
             writing.finish().map_err(failed(path))
         })
@@ -57,8 +57,7 @@ fn failed(path: &Path) -> impl Fn(mcap::McapError) -> ExportError {
     }
 }
 
-/// A file that is being written.
-struct Writing<'a, W: Write + Seek> {
+struct MessageWriter<'a, W: Write + Seek> {
     table: &'a Table<'a>,
     container: mcap::Writer<W>,
     channel_id: u16,
@@ -72,7 +71,7 @@ struct Writing<'a, W: Write + Seek> {
     failure: Option<mcap::McapError>,
 }
 
-impl<'a, W: Write + Seek> Writing<'a, W> {
+impl<'a, W: Write + Seek> MessageWriter<'a, W> {
     fn begin(table: &'a Table<'a>, file: W) -> mcap::McapResult<Self> {
         let manifest = table.manifest;
         let mut container = mcap::WriteOptions::new()
@@ -86,16 +85,16 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
         let schema_id = container.add_schema("palpate.Sample", "protobuf", &sample_schema())?;
         let channel_id =
             container.add_channel(schema_id, SAMPLE_TOPIC, "protobuf", &sample_metadata())?;
-        let told = [
+        let metadata = [
             ("session", manifest.session_id.clone()),
             ("specimen", manifest.specimen.clone()),
-            ("selection", table.selection.told()),
+            ("selection", table.selection.to_json()),
             ("notes", serde_json::json!(table.notes).to_string()),
             ("manifest", serde_json::json!(manifest).to_string()),
         ];
         container.write_metadata(&Metadata {
             name: "palpate".into(),
-            metadata: told.map(|(key, text)| (key.to_owned(), text)).into(),
+            metadata: metadata.map(|(key, text)| (key.to_owned(), text)).into(),
         })?;
         let started_ns = manifest.started_at.timestamp_nanos_opt().unwrap_or(0);
         Ok(Self {
@@ -141,7 +140,7 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
         let time = self.started_ns.saturating_add(row.host.0);
         let header = MessageHeader {
             channel_id: self.channel_id,
-            // A plain count, which begins again after 2^32 messages.
+            // Wraps after 2^32 messages.
             sequence: self.written as u32,
             log_time: time,
             publish_time: time,

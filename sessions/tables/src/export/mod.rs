@@ -1,21 +1,21 @@
-//! A session's samples as a table in a foreign format. Polars lives only here and in [`crate::lake`].
+//! Export of a session's samples as a table. Polars is used only here and in [`crate::lake`].
 
 pub(crate) mod atomic;
 mod columns;
 mod dictionary;
 mod encode;
-mod harmless;
+mod formula;
 mod messages;
 mod parquet;
 mod row_group;
 mod select;
 
-pub use atomic::Kept;
+pub use atomic::WriteOutcome;
 pub use columns::Beside;
 pub use dictionary::dictionary_path;
 pub(crate) use encode::Encoder;
 pub use encode::Format;
-pub use harmless::harmless;
+pub use formula::harmless;
 pub use select::Selection;
 
 use columns::{Cells, Layout, Samples, time_of};
@@ -29,91 +29,60 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Version of the tables: their columns, units and metadata. It rises when a column changes its meaning.
+/// Version of the tables' columns, units and metadata; a changed meaning raises it.
 pub const TABLE_VERSION: u32 = 1;
 
-/// Samples in a frame and in a row group: a reader of part of a session decodes little more than that
-/// part, and a writer holds no more in memory.
+/// Samples in a frame and in a row group: limits the writer's memory, and the excess that a reader of a part decodes.
 const FRAME_ROWS: usize = 1 << 18;
 
-/// Samples that go from rows into columns at once: few enough to be still at hand, in the processor's own
-/// memory, for each column.
+/// Samples that are copied into columns at once: few enough to stay in the processor's cache for all columns.
 const HAND_ROWS: usize = 1 << 10;
 
 /// A table could not be written.
 #[derive(Debug, Error)]
 pub enum ExportError {
-    /// Exports never replace a file.
     #[error("{} exists already; move it away or export to another folder", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Files of a lake never change.
-    #[error("{} exists already and holds something else, and files of a lake never change; use another lake, or move the file away if it is the wrong one", path.display())]
-    Different {
-        /// The file.
-        path: PathBuf,
-    },
-    /// No column has that name.
+    Exists { path: PathBuf },
+    #[error("{} already exists with other content, and files of a lake never change; use another lake, or move the file away if it is wrong", path.display())]
+    Different { path: PathBuf },
     #[error("{0}")]
     Columns(String),
-    /// The session's name cannot be that of a file.
-    #[error("the session's name {name:?} cannot be that of a file in a lake; export it as a table")]
-    BadName {
-        /// The name.
-        name: String,
-    },
-    /// The session could not be read to its end.
+    #[error(
+        "the session's name {name:?} is unfit for a file in a lake; export the session as a table"
+    )]
+    BadName { name: String },
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The disk refused.
-    #[error("cannot write {} ({source}); choose a folder that may be written and has room", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The table could not be formed or encoded.
+    #[error("cannot write {} ({source}); choose a writable folder with free space", path.display())]
+    Io { path: PathBuf, source: io::Error },
     #[error("cannot write {} ({source}); check the disk's free space", path.display())]
-    Table {
-        /// The file.
-        path: PathBuf,
-        /// What polars said.
-        source: PolarsError,
-    },
+    Table { path: PathBuf, source: PolarsError },
 }
 
-/// What is exported.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
-    /// What the session says about itself.
     pub manifest: &'a Manifest,
-    /// What a user of the data must know.
+    /// Remarks for users of the data.
     pub notes: &'a [String],
-    /// Columns beside the session's own.
     pub beside: &'a Beside,
-    /// Which samples and columns.
     pub selection: &'a Selection,
 }
 
-/// Gives every sample of a session in order, some at a time, to what it is handed.
+/// Passes every sample of a session in order, some at a time, to its argument.
 pub type Feed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&[Row])) -> Result<(), ReadError>;
 
 impl Table<'_> {
-    /// Writes the table and, beside it, its data dictionary ([`dictionary_path`]), and tells how many rows
-    /// it has. Both are new files. Samples pass by: no more than a frame of them is in memory.
+    /// Writes the table and, beside it, its data dictionary ([`dictionary_path`]), both as new files; returns the number of
+    /// rows. At most one frame of samples is in memory.
     ///
-    /// The metadata of Parquet and Arrow carries the units (`palpate.columns`, JSON from column to unit),
-    /// where the numbers come from (`palpate.session`, `palpate.software`, `palpate.record_version`,
-    /// `palpate.calibration_sha256`), of what (`palpate.specimen`, `palpate.about`, a JSON object), what is
-    /// in it (`palpate.table_version`, `palpate.selection`, a JSON object), what a reader must know
-    /// (`palpate.notes`, a JSON list of sentences), and what is told of the columns beside.
+    /// The metadata of Parquet and Arrow has the units (`palpate.columns`, JSON from column to unit), the source
+    /// (`palpate.session`, `palpate.software`, `palpate.record_version`, `palpate.calibration_sha256`), the specimen
+    /// (`palpate.specimen`, `palpate.about`, a JSON object), the content (`palpate.table_version`, `palpate.selection`, a JSON
+    /// object), remarks (`palpate.notes`, a JSON list of sentences), and the metadata of the extra columns.
     pub fn write(&self, format: Format, path: &Path, feed: Feed) -> Result<u64, ExportError> {
         let layout = self.layout()?;
-        let beside = dictionary_path(path);
-        atomic::check_new(&beside)?;
+        let dictionary = dictionary_path(path);
+        atomic::check_new(&dictionary)?;
         let rows = atomic::write(path, |file| self.encode(&layout, format, path, file, feed))?;
         let text = dictionary::dictionary(
             path,
@@ -122,15 +91,18 @@ impl Table<'_> {
             &layout.columns,
             self.selection,
         );
-        atomic::write(&beside, |file| {
-            file.write_all(text.as_bytes()).map_err(atomic::io_error(&beside))
+        atomic::write(&dictionary, |file| {
+            file.write_all(text.as_bytes()).map_err(atomic::io_error(&dictionary))
         })?;
         Ok(rows)
     }
 
-    /// Writes the table as Parquet of a lake: without a dictionary, and a file that is there may stay if it
-    /// is the same.
-    pub(crate) fn write_to_lake(&self, path: &Path, feed: Feed) -> Result<Kept, ExportError> {
+    /// Writes the table as Parquet without a dictionary; accepts an existing file with the same content.
+    pub(crate) fn write_to_lake(
+        &self,
+        path: &Path,
+        feed: Feed,
+    ) -> Result<WriteOutcome, ExportError> {
         let layout = self.layout()?;
         atomic::write_or_same(path, |file| {
             self.encode(&layout, Format::Parquet, path, file, feed).map(|_rows| ())
@@ -151,9 +123,9 @@ impl Table<'_> {
         feed: Feed,
     ) -> Result<u64, ExportError> {
         let failed = |source| ExportError::Table { path: path.to_owned(), source };
-        let mut filling = Filling::new(self, layout, format, file).map_err(failed)?;
-        feed(&mut |rows| filling.take(rows))?;
-        filling.finish().map_err(failed)
+        let mut writer = TableWriter::new(self, layout, format, file).map_err(failed)?;
+        feed(&mut |rows| writer.take(rows))?;
+        writer.finish().map_err(failed)
     }
 
     fn metadata(&self, layout: &Layout) -> Metadata {
@@ -169,7 +141,7 @@ impl Table<'_> {
             ("specimen", manifest.specimen.clone()),
             ("about", serde_json::json!(manifest.about).to_string()),
             ("notes", serde_json::json!(self.notes).to_string()),
-            ("selection", self.selection.told()),
+            ("selection", self.selection.to_json()),
         ];
         if !manifest.calibration.is_null() {
             let hash = sha256(manifest.calibration.to_string().as_bytes());
@@ -180,12 +152,11 @@ impl Table<'_> {
     }
 }
 
-/// A table that is being filled.
-struct Filling<'a, W: Write> {
+struct TableWriter<'a, W: Write> {
     table: &'a Table<'a>,
     layout: &'a Layout<'a>,
     encoder: Encoder<W>,
-    /// Those selected of the samples at hand.
+    /// The selected ones of the present samples.
     numbers: Vec<u64>,
     rows: Vec<Row>,
     frame: Vec<Cells>,
@@ -199,22 +170,22 @@ struct Filling<'a, W: Write> {
     failure: Option<PolarsError>,
 }
 
-impl<'a, W: Write> Filling<'a, W> {
+impl<'a, W: Write> TableWriter<'a, W> {
     fn new(
         table: &'a Table<'a>,
         layout: &'a Layout<'a>,
         format: Format,
         file: W,
     ) -> PolarsResult<Self> {
-        let empty = layout.frame(layout.filling(0), 0)?;
+        let empty = layout.frame(layout.empty_cells(0), 0)?;
         Ok(Self {
             table,
             layout,
             encoder: Encoder::new(format, file, &empty, table.metadata(layout))?,
             numbers: Vec::new(),
             rows: Vec::new(),
-            // Grows to its size once: most sessions are no longer than a frame.
-            frame: layout.filling(0),
+            // Grows on demand, because most sessions are shorter than a frame.
+            frame: layout.empty_cells(0),
             frame_rows: 0,
             seen: 0,
             selected: 0,
@@ -247,7 +218,6 @@ impl<'a, W: Write> Filling<'a, W> {
         }
     }
 
-    /// Picks what is wanted of some rows.
     fn select(&mut self, rows: &[Row], first_tick: u64) {
         let first = self.seen;
         self.seen += rows.len() as u64;
@@ -271,7 +241,7 @@ impl<'a, W: Write> Filling<'a, W> {
 
     fn flush(&mut self) -> PolarsResult<()> {
         let rows = std::mem::take(&mut self.frame_rows);
-        let next = self.layout.filling(rows);
+        let next = self.layout.empty_cells(rows);
         let full = std::mem::replace(&mut self.frame, next);
         self.written += rows as u64;
         self.encoder.write(self.layout.frame(full, rows)?)
@@ -281,7 +251,7 @@ impl<'a, W: Write> Filling<'a, W> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
-        // A table without rows has its columns all the same.
+        // A table without rows still has its columns.
         if self.frame_rows > 0 || self.written == 0 {
             self.flush()?;
         }

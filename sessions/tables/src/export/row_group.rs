@@ -1,4 +1,4 @@
-//! A row group of a Parquet file, encoded and compressed apart from the file, so that several threads can each make one.
+//! Encoding of a row group apart from its Parquet file, so that several threads can work at once.
 
 use super::columns::TIME_COLUMN;
 use polars_arrow::datatypes::ArrowSchema;
@@ -9,24 +9,23 @@ use polars_parquet::write::{
 };
 use std::io::Write;
 
-/// How the row groups of a file are made.
-pub(super) struct Recipe {
+/// Encodes the row groups of a file.
+pub(super) struct RowGroupEncoder {
     types: Vec<ParquetType>,
     encodings: Vec<Vec<Encoding>>,
     options: WriteOptions,
 }
 
-/// A row group that is ready for its file: its pages, column by column.
+/// An encoded row group: its pages, column by column.
 pub(super) struct RowGroup {
     rows: u64,
     columns: Vec<Vec<CompressedPage>>,
 }
 
-impl Recipe {
-    /// Of a file with this schema.
+impl RowGroupEncoder {
     pub fn new<W: Write>(schema: &ArrowSchema, file: &FileWriter<W>) -> Self {
         let encodings = schema.iter_values().map(|one| {
-            // No two samples are of the same time, so nobody need look for values that come again.
+            // Times never repeat, so a dictionary of values would only cost time.
             if one.name == TIME_COLUMN {
                 vec![Encoding::Plain]
             } else {
@@ -40,7 +39,7 @@ impl Recipe {
         }
     }
 
-    /// Encodes and compresses a frame that has this schema.
+    /// Encodes and compresses a frame of the file's schema.
     pub fn row_group(&self, frame: DataFrame) -> PolarsResult<RowGroup> {
         let rows = frame.height() as u64;
         let mut columns = Vec::new();
@@ -60,7 +59,6 @@ impl Recipe {
 }
 
 impl RowGroup {
-    /// Adds the row group to its file.
     pub fn write<W: Write>(self, file: &mut FileWriter<W>) -> PolarsResult<()> {
         let columns = self.columns.iter().map(|pages| {
             let pages = pages.iter().map(PolarsResult::Ok);

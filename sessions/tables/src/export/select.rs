@@ -1,28 +1,28 @@
-//! Which samples a table holds.
+//! Selection of samples and columns.
 
 use palpate_model::rig::Phase;
 use palpate_sessions::record::Row;
 use serde::Serialize;
 
-/// Which samples and columns are wanted. The default is all samples and the usual columns.
+/// The default is all samples and the default columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
-    /// Phases; empty for all.
+    /// Empty for all.
     pub phases: Vec<Phase>,
-    /// Cycles; empty for all.
+    /// Empty for all.
     pub cycles: Vec<u32>,
-    /// Names of columns; empty for the usual ones.
+    /// Names; empty for the default columns.
     pub columns: Vec<String>,
     /// Earliest time in s since the session's first sample.
     pub from_s: Option<f64>,
     /// Latest time in s.
     pub to_s: Option<f64>,
-    /// Only every so many of the samples that are left; `None` for each. None is averaged.
+    /// Keeps only every n-th selected sample, without averaging; `None` keeps all.
     pub every: Option<u64>,
 }
 
 #[derive(Serialize)]
-struct Told<'a> {
+struct SelectionJson<'a> {
     phases: Vec<&'a str>,
     cycles: &'a [u32],
     from_s: Option<f64>,
@@ -31,7 +31,7 @@ struct Told<'a> {
 }
 
 impl Selection {
-    /// Whether a sample of this time in s is wanted, apart from [`Self::every`].
+    /// Whether a sample at time `t` in s is selected, apart from [`Self::every`].
     pub(super) fn takes(&self, t: f64, row: &Row) -> bool {
         (self.phases.is_empty() || self.phases.contains(&row.phase))
             && (self.cycles.is_empty() || self.cycles.contains(&row.cycle))
@@ -49,7 +49,7 @@ impl Selection {
         self.every.unwrap_or(1).max(1)
     }
 
-    /// The name of a table: a thinned one says so.
+    /// File name of a table; a thinned one is marked.
     pub fn file_name(&self, stem: &str, ending: &str) -> String {
         match self.step() {
             1 => format!("{stem}.{ending}"),
@@ -58,18 +58,17 @@ impl Selection {
     }
 
     /// As one JSON object, for metadata.
-    pub(super) fn told(&self) -> String {
-        let told = Told {
+    pub(super) fn to_json(&self) -> String {
+        let json = SelectionJson {
             phases: self.phases.iter().map(|phase| phase.name()).collect(),
             cycles: &self.cycles,
             from_s: self.from_s,
             to_s: self.to_s,
             every: self.step(),
         };
-        serde_json::json!(told).to_string()
+        serde_json::json!(json).to_string()
     }
 
-    /// One sentence for people.
     pub(super) fn sentence(&self) -> String {
         let mut parts = Vec::new();
         if !self.phases.is_empty() {
@@ -84,7 +83,7 @@ impl Selection {
         parts.extend(self.to_s.map(|to| format!("to {to} s")));
         if self.step() > 1 {
             let every = self.step();
-            parts.push(format!("every {every}th sample of these, none averaged"));
+            parts.push(format!("every {every}th of these samples, without averaging"));
         }
         match parts.is_empty() {
             true => "All samples of the session.".into(),

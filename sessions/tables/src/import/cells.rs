@@ -1,7 +1,6 @@
-//! A line of delimited text as cells, quoted ones included (RFC 4180, section 2). A quoted cell
-//! must end on its line.
+//! Splitting of a line of delimited text into cells (RFC 4180, section 2). A quoted cell must end on its line.
 
-/// The delimiter of a table, told from its first line.
+/// Detects the delimiter from the first line.
 pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
     let mut is_quoted = false;
     let bare: String = first
@@ -16,16 +15,16 @@ pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
     })
 }
 
-/// The cells of line `number`, without quotes and surrounding space.
+/// The cells of line `number`, without quotes and surrounding spaces.
 pub(super) fn split(line: &str, delimiter: char, number: usize) -> Result<Vec<String>, String> {
     let mut cells = Vec::new();
     let mut cell = String::new();
     let mut characters = line.chars().peekable();
     let mut is_quoted = false;
     while let Some(character) = characters.next() {
-        // A quote within an unquoted cell is an inch, not a quotation.
+        // A quote within an unquoted cell means inches.
         if character == '"' && (is_quoted || cell.trim().is_empty()) {
-            // Two quotes within a quoted cell are one that is meant.
+            // Two quotes within a quoted cell stand for one.
             if is_quoted && characters.next_if_eq(&'"').is_some() {
                 cell.push('"');
             } else {
@@ -50,14 +49,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn delimiters_in_quotes_do_not_count() {
+    fn delimiter_in_quotes_is_ignored() {
         assert_eq!(delimiter_of("\"a;b\",c"), Ok(','));
         assert_eq!(delimiter_of("a\tb;c"), Ok('\t'));
         assert!(delimiter_of("\"a,b\"").is_err());
     }
 
     #[test]
-    fn cells_are_as_rfc_4180_says() {
+    fn cells_are_split_by_rfc_4180() {
         let inch = split("6\" probe,7", ',', 1).unwrap();
         assert_eq!(inch, ["6\" probe", "7"]);
         let cells = split(" a ,\"b, c\",\"d \"\"e\"\"\",,", ',', 1).unwrap();

@@ -1,4 +1,4 @@
-//! Which column of a table is which, and in which unit, from its name alone; and every unit that is known.
+//! Quantity and unit of a column from its name, and all known units.
 
 palpate_model::named! {
     /// What a fit needs from a table.
@@ -11,8 +11,7 @@ palpate_model::named! {
     }
 }
 
-/// A unit as a quotient, each part of which is a float without error where the unit has a decimal or whole
-/// factor: what is converted is then rounded once.
+/// Factor of a unit as a quotient of two exact floats, so that a conversion rounds once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     times: f64,
@@ -27,7 +26,7 @@ impl Scale {
     }
 }
 
-/// A unit's names, the first being the one shown, and its scale to s, mm, N or V.
+/// A unit's names, the displayed one first, and its factor to s, mm, N or V as a quotient.
 type Unit = (&'static [&'static str], f64, f64);
 
 const TIMES: &[Unit] = &[
@@ -65,10 +64,9 @@ const SIGNALS: &[Unit] =
     &[(&["V", "volt", "volts"], 1.0, 1.0), (&["mV"], 1.0, 1e3), (&["µV", "uV", "μV"], 1.0, 1e6)];
 
 impl Quantity {
-    /// What a fit takes.
     pub const FITTED: [Self; 3] = [Self::Time, Self::Depth, Self::Force];
 
-    /// A header that would be understood.
+    /// An example of a valid header.
     pub fn example(self) -> &'static str {
         match self {
             Self::Time => "t_s",
@@ -96,7 +94,7 @@ impl Quantity {
         }
     }
 
-    /// Scale of a unit to s, mm, N or V.
+    /// Factor of a unit to s, mm, N or V.
     pub fn scale(self, unit: &str) -> Option<Scale> {
         let known = |(names, ..): &&Unit| names.contains(&unit);
         let (_, times, over) = *self.units().iter().find(known)?;
@@ -110,39 +108,37 @@ impl Quantity {
     }
 }
 
-/// What a header cell says.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Meaning {
-    /// A quantity with the scale to its unit here.
+pub(super) enum HeaderCell {
+    /// A quantity with the factor of its unit.
     Known(Quantity, Scale),
-    /// A quantity by its name alone.
+    /// A quantity without a unit.
     Bare(Quantity),
-    /// A quantity whose unit is unknown.
+    /// A quantity with an unknown unit.
     Unitless(Quantity),
-    /// Something else.
     Other,
 }
 
 /// Reads `t_s`, `time (s)`, `Force [mN]`, `x mm` and the like.
-pub(super) fn meaning(cell: &str) -> Meaning {
+pub(super) fn parse_header_cell(cell: &str) -> HeaderCell {
     let words: Vec<&str> = cell
         .split(|c: char| c == '_' || c.is_whitespace() || "()[]/,:".contains(c))
         .filter(|word| !word.is_empty())
         .collect();
     let Some((name, rest)) = words.split_first() else {
-        return Meaning::Other;
+        return HeaderCell::Other;
     };
     let name = name.to_lowercase();
     let Some(quantity) = Quantity::FITTED.into_iter().find(|q| q.words().contains(&name.as_str()))
     else {
-        return Meaning::Other;
+        return HeaderCell::Other;
     };
     match rest {
-        [] => Meaning::Bare(quantity),
+        [] => HeaderCell::Bare(quantity),
         [unit] => quantity
             .scale(unit)
-            .map_or(Meaning::Unitless(quantity), |scale| Meaning::Known(quantity, scale)),
-        _ => Meaning::Unitless(quantity),
+            .map_or(HeaderCell::Unitless(quantity), |scale| HeaderCell::Known(quantity, scale)),
+        _ => HeaderCell::Unitless(quantity),
     }
 }
 
@@ -151,10 +147,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_with_units_are_understood() {
+    fn names_with_units_are_recognised() {
         let check = |cell: &str, quantity: Quantity, one: f64| {
-            let Meaning::Known(found, scale) = meaning(cell) else {
-                panic!("{cell}: {:?}", meaning(cell));
+            let HeaderCell::Known(found, scale) = parse_header_cell(cell) else {
+                panic!("{cell}: {:?}", parse_header_cell(cell));
             };
             assert_eq!((found, scale.apply(1.0)), (quantity, one), "{cell}");
         };
@@ -171,12 +167,12 @@ mod tests {
     }
 
     #[test]
-    fn names_without_units_and_foreign_names_are_told_apart() {
-        assert_eq!(meaning("force"), Meaning::Bare(Quantity::Force));
-        assert_eq!(meaning("Time"), Meaning::Bare(Quantity::Time));
-        assert_eq!(meaning("depth_furlong"), Meaning::Unitless(Quantity::Depth));
-        assert_eq!(meaning("signal_V"), Meaning::Other);
-        assert_eq!(meaning(""), Meaning::Other);
+    fn names_without_units_and_foreign_names_are_distinguished() {
+        assert_eq!(parse_header_cell("force"), HeaderCell::Bare(Quantity::Force));
+        assert_eq!(parse_header_cell("Time"), HeaderCell::Bare(Quantity::Time));
+        assert_eq!(parse_header_cell("depth_furlong"), HeaderCell::Unitless(Quantity::Depth));
+        assert_eq!(parse_header_cell("signal_V"), HeaderCell::Other);
+        assert_eq!(parse_header_cell(""), HeaderCell::Other);
     }
 
     #[test]

@@ -1,14 +1,14 @@
-//! A delimited text with a header that names time, depth and force. What it cannot tell it
-//! refuses with a reason; nothing is guessed and nothing repaired.
+//! Tables for a fit: delimited text with a header that names time, depth and force. Anything unclear is refused with a
+//! reason; nothing is guessed or repaired.
 
 use super::cells::{delimiter_of, split};
-use super::header::{Meaning, Quantity, Scale, meaning};
-use super::torn;
+use super::header::{HeaderCell, Quantity, Scale, parse_header_cell};
+use super::truncated;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Largest table read, in bytes: ten million rows of three columns.
+/// Largest table in bytes: ten million rows of three columns.
 const BYTES_MAX: u64 = 1 << 30;
 
 /// Time, depth and force of a table, one element per row.
@@ -22,41 +22,20 @@ pub struct Table {
     pub force: Vec<f64>,
     /// Whether a row's phase is `unload`; all false where the table has no phases.
     pub is_unload: Vec<bool>,
-    /// What a reader should know.
     pub notes: Vec<String>,
 }
 
-/// A table could not be understood.
 #[derive(Debug, Error)]
 pub enum TableError {
-    /// The file cannot be read.
-    #[error("cannot read the table {} ({source})", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The file is too large or is not text.
+    #[error("cannot read the table {} ({source}); check the path", path.display())]
+    Io { path: PathBuf, source: io::Error },
     #[error("{} is not a text table ({reason}); give a delimited text with a header", path.display())]
-    NotText {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-    /// The text is not a table of time, depth and force.
+    NotText { path: PathBuf, reason: String },
     #[error("{}: {reason}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, where, and what to do.
-        reason: String,
-    },
+    Content { path: PathBuf, reason: String },
 }
 
-/// Names for the columns of a table that has no header, in its order: `t_s`, `x_mm`, `F_N` and the
-/// like; a column of another name is not read.
+/// Column names of a table without a header, in order, such as `t_s`, `x_mm`, `F_N`; a column of another name is ignored.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnNames(Vec<String>);
 
@@ -65,13 +44,13 @@ impl std::str::FromStr for ColumnNames {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
-        // A mistake is told before any file is read.
+        // Reports a mistake before any file is read.
         Layout::of(&names, ',')?;
         Ok(Self(names))
     }
 }
 
-/// Reads a table from a file; `columns` names the columns of one without a header.
+/// `columns` names the columns of a table without a header.
 pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, TableError> {
     let io_error = |source: io::Error| TableError::Io { path: path.to_owned(), source };
     let not_text =
@@ -89,7 +68,7 @@ pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, T
         .map_err(|reason| TableError::Content { path: path.to_owned(), reason })
 }
 
-/// Parses a table; `columns` names the columns of one without a header. The error is one sentence.
+/// Like [`read_table`], from text; the error is one sentence.
 pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text
@@ -113,16 +92,16 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
         }
         (false, Some(ColumnNames(names))) => {
             return Err(format!(
-                "the table has {} columns but {} are named; name every one",
+                "the table has {} columns, and {} are named; name every one",
                 cells.len(),
                 names.len()
             ));
         }
         (true, Some(_)) => {
-            return Err("the table names its columns in its first line already; leave out the names given beside it".into());
+            return Err("the table already names its columns in its first line; leave out the separate names".into());
         }
         (false, None) => {
-            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or beside the file".into());
+            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or separately".into());
         }
     };
     let mut table = Table::default();
@@ -132,7 +111,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
         let cells = split(line, delimiter, number)?;
         if cells.len() != layout.width {
             return Err(format!(
-                "line {number} has {} cells where the header has {}; mend the line",
+                "line {number} has {} cells, and the header has {}; correct the line",
                 cells.len(),
                 layout.width
             ));
@@ -157,30 +136,29 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
         return Err("the table has no rows to fit".into());
     }
     let last_cell = |line: &str| split(line, delimiter, 0).ok()?.pop();
-    table.notes.extend(torn::remark(text, last_cell));
+    table.notes.extend(truncated::remark(text, last_cell));
     if left_out > 0 {
         table.notes.push(format!("{left_out} rows outside ramp, hold and unload are left out"));
     }
     Ok(table)
 }
 
-/// The number in a cell, written with the decimal sign of its table.
-fn number_in(cell: &str, has_decimal_comma: bool) -> Option<f64> {
+/// Parses a number with the decimal sign of the table.
+fn parse_number(cell: &str, has_decimal_comma: bool) -> Option<f64> {
     if has_decimal_comma { cell.replace(',', ".").parse().ok() } else { cell.parse().ok() }
 }
 
 fn is_number(cell: &str, has_decimal_comma: bool) -> bool {
-    number_in(cell, has_decimal_comma).is_some()
+    parse_number(cell, has_decimal_comma).is_some()
 }
 
-/// Where the three quantities are.
+/// Positions of the columns.
 struct Layout {
     width: usize,
     /// Column and scale of time, depth and force.
     places: [(usize, Scale); 3],
     phase: Option<usize>,
     has_decimal_comma: bool,
-    /// What was assumed.
     note: Option<String>,
 }
 
@@ -190,25 +168,26 @@ impl Layout {
             let found: Vec<(usize, Option<Scale>)> = cells
                 .iter()
                 .enumerate()
-                .filter_map(|(i, cell)| match meaning(cell) {
-                    Meaning::Known(q, scale) if q == quantity => Some((i, Some(scale))),
-                    // A time by its name alone is in seconds in every instrument's table we know;
-                    // depths and forces come in too many units to assume one.
-                    Meaning::Bare(Quantity::Time) if quantity == Quantity::Time => {
+                .filter_map(|(i, cell)| match parse_header_cell(cell) {
+                    HeaderCell::Known(q, scale) if q == quantity => Some((i, Some(scale))),
+                    // All known instruments write times without a unit in seconds; depths and forces have too many
+                    // common units to assume one.
+                    HeaderCell::Bare(Quantity::Time) if quantity == Quantity::Time => {
                         Some((i, Some(Scale::ONE)))
                     }
-                    Meaning::Bare(q) | Meaning::Unitless(q) if q == quantity => Some((i, None)),
+                    HeaderCell::Bare(q) | HeaderCell::Unitless(q) if q == quantity => {
+                        Some((i, None))
+                    }
                     _ => None,
                 })
                 .collect();
             let (name, example) = (quantity.name(), quantity.example());
             match found[..] {
                 [(i, Some(scale))] => Ok((i, scale)),
-                [(i, None)] => Err(format!(
-                    "column '{}' has no unit that is known; name it like {example}",
-                    cells[i]
-                )),
-                [] => Err(format!("no column is a {name}; name one like {example}")),
+                [(i, None)] => {
+                    Err(format!("column '{}' has no known unit; name it like {example}", cells[i]))
+                }
+                [] => Err(format!("no column is the {name}; name one like {example}")),
                 [(i, _), (j, _), ..] => Err(format!(
                     "columns '{}' and '{}' could both be the {name}; rename one of them",
                     cells[i], cells[j]
@@ -217,12 +196,11 @@ impl Layout {
         };
         let time = place(Quantity::Time)?;
         let name = &cells[time.0];
-        let is_bare = meaning(name) == Meaning::Bare(Quantity::Time);
+        let is_bare = parse_header_cell(name) == HeaderCell::Bare(Quantity::Time);
         Ok(Self {
             width: cells.len(),
             places: [time, place(Quantity::Depth)?, place(Quantity::Force)?],
-            note: is_bare
-                .then(|| format!("column '{name}' has no unit; it is taken to be in seconds")),
+            note: is_bare.then(|| format!("column '{name}' has no unit; seconds are assumed")),
             phase: cells.iter().position(|cell| cell == "phase"),
             has_decimal_comma: delimiter != ',',
         })
@@ -234,10 +212,10 @@ impl Layout {
             values.iter_mut().zip(self.places.iter().zip(Quantity::FITTED))
         {
             let cell = &cells[*column];
-            let read = number_in(cell, self.has_decimal_comma).map(|read| scale.apply(read));
+            let read = parse_number(cell, self.has_decimal_comma).map(|read| scale.apply(read));
             *value = read.filter(|read| read.is_finite()).ok_or_else(|| {
                 format!(
-                    "line {number}: the {} '{cell}' is not a number; mend or remove the line",
+                    "line {number}: the {} '{cell}' is not a number; correct or remove the line",
                     quantity.name()
                 )
             })?;
@@ -251,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_units_order_and_foreign_columns() {
+    fn units_order_and_foreign_columns_are_read() {
         let table =
             parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n", None)
                 .unwrap();
@@ -261,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn our_own_export_keeps_what_is_indentation() {
+    fn exported_table_is_read_without_rows_outside_indentation() {
         let text = "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,unload\n4,-1,0,retract\n";
         let table = parse_table(text, None).unwrap();
         assert_eq!(table.t, [1.0, 2.0, 3.0]);
@@ -270,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_without_a_unit_is_seconds_and_says_so() {
+    fn time_without_unit_is_seconds_with_a_remark() {
         let table = parse_table("Time,x_mm,F_N\n0,0,0\n0.5,1,2\n", None).unwrap();
         assert_eq!(table.t, [0.0, 0.5]);
         assert!(table.notes[0].contains("'Time'") && table.notes.len() == 1);
@@ -279,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_without_a_header_takes_names_from_beside_it() {
+    fn table_without_header_takes_separate_names() {
         let names: ColumnNames = "t_s, x_mm, F_N".parse().unwrap();
         let table = parse_table("0;0,5;1\n1;1,5;2\n", Some(&names)).unwrap();
         assert_eq!(
@@ -297,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_last_number_that_may_be_cut_off_is_told() {
+    fn possibly_truncated_last_number_is_reported() {
         let notes = |text: &str| parse_table(text, None).unwrap().notes;
         let cut = notes("t_s,x_mm,F_N\n0,0,0.1034\n1,1,2.3310\n2,2,3.4");
         assert!(cut[0].contains("'3.4'") && cut[0].contains("cut off"), "{cut:?}");
@@ -306,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn quoted_cells_may_hold_the_delimiter() {
+    fn quoted_cells_may_contain_the_delimiter() {
         let text = "\"note, free\",t_s,x_mm,F_N\n\"a, b\",0,0,0\n\"say \"\"c\"\"\",1,1,\"2.5\"\n";
         let table = parse_table(text, None).unwrap();
         assert_eq!(table.force, [0.0, 2.5]);
@@ -315,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_it_cannot_tell_it_refuses() {
+    fn unclear_tables_are_refused() {
         let check = |text: &str, expected: &str| {
             let reason = parse_table(text, None).unwrap_err();
             assert!(reason.contains(expected), "{text:?}: {reason}");
@@ -323,7 +301,7 @@ mod tests {
         check("", "empty");
         check("0,0,0\n1,1,1\n", "no header");
         check("t_s depth_mm force_N\n", "names no columns");
-        check("t_s,depth_mm\n0,0\n", "is a force");
+        check("t_s,depth_mm\n0,0\n", "is the force");
         check("t_s,depth_mm,force\n0,0,0\n", "'force'");
         check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "'depth_mm' and 'x_mm'");
         check("t_s,depth_mm,force_N\n0,0,0\n1,one,1\n", "line 3: the depth 'one'");

@@ -1,4 +1,4 @@
-//! A table of weights and voltages: what somebody wrote down at the rig.
+//! Tables of weights and voltages for a calibration, as written by hand.
 
 use super::cells::{delimiter_of, split};
 use super::foreign::decimal::{self, Decimal, Evidence};
@@ -8,7 +8,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Names under which each column is known, the first being the one to use.
+/// Names of each column, the preferred one first.
 const MASS: &[&str] = &["mass_g", "weight_g", "weight", "mass", "g", "grams"];
 const VOLTS: &[&str] = &["volts", "signal_v", "v", "voltage", "volts_v"];
 const DIRECTION: &[&str] = &["direction"];
@@ -17,65 +17,43 @@ const NOISE: &[&str] = &["noise_v", "noise"];
 const SAMPLES: &[&str] = &["samples"];
 const WAITED: &[&str] = &["waited_s"];
 
-/// A table of weights could not be read.
 #[derive(Debug, Error)]
 pub enum WeightsError {
-    /// The disk refused.
     #[error("cannot read {} ({source}); check the path", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// No column of that kind.
+    Io { path: PathBuf, source: io::Error },
     #[error(
-        "the table has no column {wanted} in its first line; name its columns mass_g,volts and, where they are known, direction,repeat,noise_v,samples,waited_s"
+        "the table has no column {expected} in its first line; name its columns mass_g,volts and, where they are known, direction,repeat,noise_v,samples,waited_s"
     )]
-    NoColumn {
-        /// The column.
-        wanted: &'static str,
-    },
-    /// A cell that is no number.
-    #[error("line {line} has \"{cell}\" for {column}, which is not {wanted}; correct it")]
+    NoColumn { expected: &'static str },
+    #[error("line {line} has \"{cell}\" for {column}, which is not {expected}; correct it")]
     Cell {
         /// Line, counted from 1.
         line: usize,
-        /// The column.
         column: &'static str,
-        /// What stands there.
         cell: String,
-        /// What should.
-        wanted: &'static str,
+        expected: &'static str,
     },
-    /// A row that is not as wide as the first line, or a quote that does not end.
     #[error("{0}")]
     Row(String),
-    /// A comma in a number that may be a decimal one or stand between thousands.
     #[error(
-        "line {line} has \"{cell}\", in which the comma may be a decimal one or stand between thousands; write every number of the table with a decimal point"
+        "line {line} has \"{cell}\", whose comma may be a decimal comma or a separator of thousands; write every number of the table with a decimal point"
     )]
     Comma {
         /// Line, counted from 1.
         line: usize,
-        /// What stands there.
         cell: String,
     },
-    /// Falling masses without a direction.
     #[error(
         "line {line} has {mass_g} g after {before_g} g; add a column direction that says loading or unloading"
     )]
     Falling {
         /// Line, counted from 1.
         line: usize,
-        /// Its mass in g.
         mass_g: f64,
-        /// The mass before in g.
         before_g: f64,
     },
 }
 
-/// One line of the table.
 struct Row {
     line: usize,
     direction: Option<Direction>,
@@ -83,22 +61,22 @@ struct Row {
     step: SeriesStep,
 }
 
-/// Reads a table of weights as the series of a calibration that has no name yet.
+/// Reads a table of weights as a calibration without a name.
 pub fn read_weights(path: &Path) -> Result<Calibration, WeightsError> {
     let text = std::fs::read_to_string(path)
         .map_err(|source| WeightsError::Io { path: path.into(), source })?;
     parse_weights(&text)
 }
 
-/// As [`read_weights`], from text. Cells stand between commas, semicolons or tabs and may be quoted; decimals
-/// have a point or, in the whole table, a comma; lines that are empty or begin with `#` do not count.
+/// Like [`read_weights`], from text. Commas, semicolons or tabs separate cells, which may be quoted; the decimal sign is a
+/// point or, in the whole table, a comma; empty lines and lines that begin with `#` are ignored.
 pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines
         .map(|(index, line)| (index + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
     let (number, head) = lines.next().unwrap_or((1, ""));
-    // Without a delimiter there is one column, and another is missed below.
+    // Without a delimiter there is only one column, which is reported below.
     let mark = delimiter_of(head).unwrap_or(',');
     let names: Vec<String> = split(head, mark, number)
         .map_err(WeightsError::Row)?
@@ -107,8 +85,8 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         .collect();
     let place = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
     let (Some(mass), Some(volts)) = (place(MASS), place(VOLTS)) else {
-        let wanted = if place(MASS).is_none() { MASS[0] } else { VOLTS[0] };
-        return Err(WeightsError::NoColumn { wanted });
+        let expected = if place(MASS).is_none() { MASS[0] } else { VOLTS[0] };
+        return Err(WeightsError::NoColumn { expected });
     };
     let optional = [DIRECTION, REPEAT, NOISE, SAMPLES, WAITED].map(place);
     let mut table = Vec::new();
@@ -116,7 +94,7 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         let cells = split(text, mark, line).map_err(WeightsError::Row)?;
         if cells.len() > names.len() {
             return Err(WeightsError::Row(format!(
-                "line {line} has {} cells where the first line names {} columns; quote a number with a decimal comma, or write it with a point",
+                "line {line} has {} cells, and the first line names {} columns; quote a number with a decimal comma, or write it with a point",
                 cells.len(),
                 names.len()
             )));
@@ -124,7 +102,7 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         table.push((line, cells));
     }
     let reals = [Some(mass), Some(volts), optional[2], optional[4]];
-    let decimal = decimal_of(&table, &reals)?;
+    let decimal = detect_decimal(&table, &reals)?;
     let rows = table.iter().map(|(line, cells)| {
         let line = *line;
         let cell = |place: usize| cells.get(place).map_or("", String::as_str);
@@ -162,14 +140,13 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
     });
     Ok(Calibration {
         format: CALIBRATION_FORMAT,
-        series: series_of(rows.collect::<Result<_, _>>()?)?,
+        series: group_series(rows.collect::<Result<_, _>>()?)?,
         ..Calibration::default()
     })
 }
 
-/// The decimal sign of the numbers in those columns: a point where no number has a comma, else the one sign
-/// that explains every number.
-fn decimal_of(
+/// The decimal sign of the columns `reals`: a point if no number has a comma, else the only sign that fits every number.
+fn detect_decimal(
     table: &[(usize, Vec<String>)],
     reals: &[Option<usize>],
 ) -> Result<Decimal, WeightsError> {
@@ -194,12 +171,12 @@ fn decimal_of(
     }
 }
 
-fn wrong(line: usize, column: &'static str, cell: &str, wanted: &'static str) -> WeightsError {
-    WeightsError::Cell { line, column, cell: cell.to_owned(), wanted }
+fn wrong(line: usize, column: &'static str, cell: &str, expected: &'static str) -> WeightsError {
+    WeightsError::Cell { line, column, cell: cell.to_owned(), expected }
 }
 
-/// Rows into series: a new one where direction or repeat change, or where the masses begin again.
-fn series_of(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
+/// Groups rows into series: a new one begins where direction or repeat changes, or where the masses restart.
+fn group_series(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
     let mut series: Vec<Series> = Vec::new();
     for row in rows {
         let direction = row.direction.unwrap_or(Direction::Loading);
@@ -250,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_and_whole_tables_become_series() {
+    fn minimal_and_complete_tables_become_series() {
         let plain =
             parse_weights("mass_g,volts\n0,1.28\n140,1.60\n240,1.73\n0,1.29\n140,1.61\n").unwrap();
         use Direction::{Loading, Unloading};
@@ -268,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn quoted_and_decimal_comma_cells_are_read_whole() {
+    fn quoted_cells_and_decimal_commas_are_read() {
         let volts = |text: &str| -> Vec<f64> {
             let read = parse_weights(text).unwrap();
             read.series_steps().map(|(_, step)| step.volts.0).collect()
@@ -276,15 +253,15 @@ mod tests {
         let quoted = "mass_g,volts\n0,\"1,280\"\n140,\"1,600\"\n240,\"2,730\"\n340,\"3,78\"\n";
         assert_eq!(volts(quoted), [1.28, 1.6, 2.73, 3.78]);
         assert_eq!(volts("mass_g;volts\n0;1,28\n1.040;2,5\n"), [1.28, 2.5]);
-        // Thousands where every other number has a point, and three decimals as they always were.
+        // A comma separates thousands if every other number has a point.
         let thousands = parse_weights("mass_g,volts\n0,1.28\n\"1,040\",2.84\n").unwrap();
         assert_eq!(thousands.series[0].steps[1].mass_g, 1040.0);
         assert_eq!(volts("mass_g,volts\n0,1.280\n140,1.600\n"), [1.28, 1.6]);
     }
 
     #[test]
-    fn mistakes_name_line_and_cell() {
-        for (text, line_wanted, cell_wanted, column_wanted) in [
+    fn errors_name_line_and_cell() {
+        for (text, line_expected, cell_expected, column_expected) in [
             ("mass_g,volts\n0,1\n100,one", 3, "one", "volts"),
             ("mass_g,volts\n0", 2, "", "volts"),
             ("mass_g,volts,direction\n0,1,sideways", 2, "sideways", "direction"),
@@ -294,7 +271,7 @@ mod tests {
             match parse_weights(text) {
                 Err(WeightsError::Cell { line, column, cell, .. }) => assert_eq!(
                     (line, cell.as_str(), column),
-                    (line_wanted, cell_wanted, column_wanted)
+                    (line_expected, cell_expected, column_expected)
                 ),
                 other => panic!("{text}: {other:?}"),
             }
@@ -302,16 +279,16 @@ mod tests {
         for (text, column) in [("", "mass_g"), ("mass_g,force\n1,2", "volts")] {
             assert!(matches!(
                 parse_weights(text),
-                Err(WeightsError::NoColumn { wanted }) if wanted == column
+                Err(WeightsError::NoColumn { expected }) if expected == column
             ));
         }
-        for (text, line_wanted, cell_wanted) in [
+        for (text, line_expected, cell_expected) in [
             ("mass_g,volts\n0,\"1,280\"\n140,\"1,600\"", 2, "1,280"),
             ("mass_g;volts\n0;1.28\n140;1,6", 3, "1,6"),
         ] {
             assert!(matches!(
                 parse_weights(text),
-                Err(WeightsError::Comma { line, cell }) if (line, cell.as_str()) == (line_wanted, cell_wanted)
+                Err(WeightsError::Comma { line, cell }) if (line, cell.as_str()) == (line_expected, cell_expected)
             ));
         }
         assert!(matches!(
@@ -324,7 +301,7 @@ mod tests {
         ] {
             assert!(matches!(
                 parse_weights(text),
-                Err(WeightsError::Row(told)) if told.starts_with(fact)
+                Err(WeightsError::Row(reason)) if reason.starts_with(fact)
             ));
         }
     }

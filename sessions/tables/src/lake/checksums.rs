@@ -1,13 +1,14 @@
-//! Checksums of a session's files in a lake: Parquet as polars writes it has none of its own, and what a
-//! flipped bit makes of a number must not be read.
+//! Checksums of a session's files in a lake. Parquet files by polars have none, and a flipped bit must not become a wrong
+//! number.
 
-use super::layout::{Part, part};
+use super::layout::{LakePart, part_folder};
 use super::read::LakeError;
 use crate::export::atomic::{io_error, write_or_same};
-use crate::export::{ExportError, Kept};
+use crate::export::{ExportError, WriteOutcome};
+use palpate_sessions::text::crc32_of_file;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The CRC-32 of each of a session's files.
@@ -18,28 +19,15 @@ pub(super) struct Checksums {
     sessions_crc32: u32,
 }
 
-/// The file of a session's checksums, below the folder of its partition.
 fn path_of(lake: &Path, partition: &Path, id: &str) -> PathBuf {
-    let folder = part(lake, Part::Checksums).join(partition);
+    let folder = part_folder(lake, LakePart::Checksums).join(partition);
     folder.join(format!("{id}.json"))
 }
 
-/// CRC-32 of what is left to read.
-pub(super) fn crc32_of(mut from: impl Read) -> io::Result<u32> {
-    let mut hasher = crc32fast::Hasher::new();
-    let mut window = vec![0; 1 << 16];
-    loop {
-        match from.read(&mut window)? {
-            0 => return Ok(hasher.finalize()),
-            count => hasher.update(&window[..count]),
-        }
-    }
-}
-
 impl Checksums {
-    /// Of two files that are there, and of the bytes of the third that is to come.
+    /// Computes the checksums of two files, and of the third from its bytes.
     pub fn of(samples: &Path, events: &Path, sessions: &[u8]) -> Result<Self, ExportError> {
-        let of_file = |path: &Path| File::open(path).and_then(crc32_of).map_err(io_error(path));
+        let of_file = |path: &Path| crc32_of_file(path).map_err(io_error(path));
         Ok(Self {
             samples_crc32: of_file(samples)?,
             events_crc32: of_file(events)?,
@@ -47,16 +35,21 @@ impl Checksums {
         })
     }
 
-    pub fn of_part(&self, part: Part) -> Option<u32> {
+    pub fn of_part(&self, part: LakePart) -> Option<u32> {
         match part {
-            Part::Samples => Some(self.samples_crc32),
-            Part::Events => Some(self.events_crc32),
-            Part::Sessions => Some(self.sessions_crc32),
-            Part::Checksums => None,
+            LakePart::Samples => Some(self.samples_crc32),
+            LakePart::Events => Some(self.events_crc32),
+            LakePart::Sessions => Some(self.sessions_crc32),
+            LakePart::Checksums => None,
         }
     }
 
-    pub fn write(&self, lake: &Path, partition: &Path, id: &str) -> Result<Kept, ExportError> {
+    pub fn write(
+        &self,
+        lake: &Path,
+        partition: &Path,
+        id: &str,
+    ) -> Result<WriteOutcome, ExportError> {
         let path = path_of(lake, partition, id);
         let failed = io_error(&path);
         if let Some(folder) = path.parent() {

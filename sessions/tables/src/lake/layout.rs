@@ -1,4 +1,4 @@
-//! Where the files of a lake are, and which part of it falls to whom.
+//! Folders of a lake, and its division into shards.
 
 use palpate_sessions::manifest::Manifest;
 use sha2::{Digest, Sha256};
@@ -11,13 +11,12 @@ use thiserror::Error;
 /// Version of the layout; its folder is `v1`.
 pub const LAKE_VERSION: u32 = 1;
 
-/// What readers of partitioned folders take for a missing value (Apache Hive).
+/// A missing value in partitioned folders (Apache Hive).
 const NO_VALUE: &str = "__HIVE_DEFAULT_PARTITION__";
 
 palpate_model::named! {
-    /// The kinds of file.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub(super) enum Part {
+    pub(super) enum LakePart {
         Samples = "samples",
         Sessions = "sessions",
         Events = "events",
@@ -29,20 +28,20 @@ pub(super) fn root(lake: &Path) -> PathBuf {
     lake.join(format!("v{LAKE_VERSION}"))
 }
 
-pub(super) fn part(lake: &Path, part: Part) -> PathBuf {
+pub(super) fn part_folder(lake: &Path, part: LakePart) -> PathBuf {
     root(lake).join(part.name())
 }
 
-/// Folder of a session's files below that of a part.
+/// Folder of a session's files below the folder of a part.
 pub(super) fn partition(manifest: &Manifest) -> PathBuf {
     let rig = manifest.rig.as_ref().map(|rig| rig.name.as_str());
     let month = manifest.started_at.format("%Y-%m");
-    Path::new(&format!("rig={}", value(rig.unwrap_or_default()))).join(format!("month={month}"))
+    Path::new(&format!("rig={}", encode_value(rig.unwrap_or_default())))
+        .join(format!("month={month}"))
 }
 
-/// A value in the name of a folder: every byte but letters, digits, `-`, `_` and `.` as `%XX`, which
-/// readers undo.
-pub(super) fn value(text: &str) -> String {
+/// Encodes a value for a folder's name: every byte except letters, digits, `-`, `_` and `.` as `%XX`, which readers decode.
+pub(super) fn encode_value(text: &str) -> String {
     if text.is_empty() {
         return NO_VALUE.into();
     }
@@ -59,39 +58,36 @@ pub(super) fn value(text: &str) -> String {
     name
 }
 
-/// Whether a session's name can be that of a file in a lake, and leads nowhere else.
+/// Whether a session's name is safe as the name of a file in a lake.
 pub(super) fn is_file_name(id: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-    // File systems take 255 bytes, and the ending and the name while writing need some.
+    // File systems allow 255 bytes, including the ending and the draft's name.
     !id.is_empty() && id.len() <= 200 && !id.starts_with('.') && id.bytes().all(is_plain)
 }
 
-/// Whether a folder is a lake.
 #[must_use]
 pub fn is_lake(folder: &Path) -> bool {
-    part(folder, Part::Samples).is_dir() && part(folder, Part::Sessions).is_dir()
+    part_folder(folder, LakePart::Samples).is_dir()
+        && part_folder(folder, LakePart::Sessions).is_dir()
 }
 
-/// One of so many parts of a lake. Which one a session is in depends on its name alone, so it is the same
-/// on every machine and whatever else the lake holds.
+/// One of several shards of a lake. A session's shard depends only on its name, so it is the same on every computer and for
+/// every content of the lake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     number: NonZeroU32,
     of: NonZeroU32,
 }
 
-/// A part cannot be understood.
 #[derive(Debug, Error)]
-#[error("{text} is no part; write i/n with i from 1 to n, as in 2/8")]
+#[error("{text} is not a part; write i/n with i from 1 to n, as in 2/8")]
 pub struct ShardError {
     text: String,
 }
 
 impl Shard {
-    /// All of it.
     pub const WHOLE: Self = Self { number: NonZeroU32::MIN, of: NonZeroU32::MIN };
 
-    /// Whether a session is in this part.
     #[must_use]
     pub fn has(self, session_id: &str) -> bool {
         let hash = Sha256::digest(session_id.as_bytes());
@@ -118,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_session_is_in_one_part_and_the_same_everywhere() {
+    fn every_session_is_in_exactly_one_shard() {
         let ids: Vec<String> = (0..1000).map(|i| format!("20260305T1415{i:02}Z")).collect();
         for of in [1u32, 2, 7] {
             let shards: Vec<Shard> =
@@ -141,12 +137,12 @@ mod tests {
     }
 
     #[test]
-    fn no_name_leads_out_of_the_lake() {
+    fn names_never_lead_out_of_the_lake() {
         for bad in ["", "..", "../x", "a/b", ".hidden", "a b", "ä", "a\0"] {
             assert!(!is_file_name(bad), "{bad}");
         }
         assert!(is_file_name("20260305T141507Z-0badcafe"));
-        assert_eq!(value("../Rig 1=ä"), "..%2FRig%201%3D%C3%A4");
-        assert_eq!(value(""), NO_VALUE);
+        assert_eq!(encode_value("../Rig 1=ä"), "..%2FRig%201%3D%C3%A4");
+        assert_eq!(encode_value(""), NO_VALUE);
     }
 }

@@ -1,16 +1,16 @@
-//! A lake: many sessions as Parquet files that other programs query as one table, and that can be made
-//! sessions again to the bit.
+//! A lake: many sessions as Parquet files, which other programs query as one table, and which convert back to sessions bit
+//! for bit.
 //!
 //! ```text
 //! v1/samples/rig=R/month=YYYY-MM/ID.parquet     one row per sample
-//! v1/sessions/rig=R/month=YYYY-MM/ID.parquet    one row: what the session says about itself
+//! v1/sessions/rig=R/month=YYYY-MM/ID.parquet    one row: the session's manifest and summary
 //! v1/events/rig=R/month=YYYY-MM/ID.parquet      one row per input, decision and fit
 //! v1/checksums/rig=R/month=YYYY-MM/ID.json      the CRC-32 of those three files
 //! v1/fits/model=M/ID.json                       one fit
 //! ```
 //!
-//! The session's name is a column and the name of the file, never a folder: there are too many. Files
-//! appear whole under their names and never change.
+//! The session's name is a column and the name of the file, not a folder, because there are too many. Files appear complete
+//! under their names and never change.
 
 mod checksums;
 mod fits;

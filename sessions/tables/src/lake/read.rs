@@ -1,13 +1,14 @@
-//! Sessions out of a lake.
+//! Reading sessions from a lake.
 
-use super::checksums::{Checksums, crc32_of};
-use super::layout::{Part, is_lake, part};
+use super::checksums::Checksums;
+use super::layout::{LakePart, is_lake, part_folder};
 use super::rows::rows;
 use super::write::kind_name;
 use palpate_model::Nanos;
 use palpate_sessions::log::Session;
 use palpate_sessions::manifest::{Manifest, RECORD_VERSION};
 use palpate_sessions::record::{Entry, EntryKind};
+use palpate_sessions::text::crc32_of;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 use polars_io::prelude::{ParquetReader, SerReader};
 use std::fs::File;
@@ -16,56 +17,31 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use walkdir::{DirEntry, WalkDir};
 
-/// A lake, or a session in it, could not be read.
 #[derive(Debug, Error)]
 pub enum LakeError {
-    /// The folder is none.
     #[error("{} is not a lake: it has no v1/samples and v1/sessions; export sessions to a lake first", path.display())]
-    NoLake {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A file holds something else than a lake's.
+    NoLake { path: PathBuf },
     #[error("{} cannot be read ({reason}); export its session again to another lake", path.display())]
-    Bad {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// It was written by a newer version.
+    Bad { path: PathBuf, reason: String },
     #[error("{} is a session of record version {version}, newer than this program; update palpate", path.display())]
-    Newer {
-        /// The file.
-        path: PathBuf,
-        /// Its version.
-        version: u32,
-    },
-    /// The system refused.
+    Newer { path: PathBuf, version: u32 },
     #[error("cannot read {} ({source}); check its permissions", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    Io { path: PathBuf, source: io::Error },
 }
 
-/// A session of a lake.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InLake {
-    /// Its name.
     pub id: String,
-    /// Its folder below that of each part.
-    place: PathBuf,
+    /// Folder below the folder of each part.
+    partition: PathBuf,
 }
 
-/// Every session of a lake, by name. Files that are being written are not listed.
+/// All sessions of a lake, by name. Files being written are not listed.
 pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
     if !is_lake(lake) {
         return Err(LakeError::NoLake { path: lake.into() });
     }
-    let top = part(lake, Part::Sessions);
+    let top = part_folder(lake, LakePart::Sessions);
     // rig=R, month=YYYY-MM, then the files.
     let files = WalkDir::new(&top).min_depth(3).max_depth(3);
     let is_hidden = |one: &DirEntry| one.file_name().to_string_lossy().starts_with('.');
@@ -78,42 +54,43 @@ pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
         })?;
         let id = file.file_name().to_str();
         let id = id.and_then(|name| name.strip_suffix(".parquet"));
-        let place = file.path().parent();
-        let place = place.and_then(|folder| folder.strip_prefix(&top).ok());
+        let partition = file.path().parent();
+        let partition = partition.and_then(|folder| folder.strip_prefix(&top).ok());
         found.extend(
-            id.zip(place).map(|(id, place)| InLake { id: id.to_owned(), place: place.to_owned() }),
+            id.zip(partition).map(|(id, partition)| InLake {
+                id: id.to_owned(),
+                partition: partition.to_owned(),
+            }),
         );
     }
     found.sort();
     Ok(found)
 }
 
-/// A session as it was put in, its edits made, and why it was rejected, if it was.
+/// A session as it was added, with its edits applied; and the reason if it was rejected.
 pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String>), LakeError> {
     let path = |of| {
-        let folder = part(lake, of).join(&one.place);
+        let folder = part_folder(lake, of).join(&one.partition);
         folder.join(format!("{}.parquet", one.id))
     };
-    let checksums = Checksums::read(lake, &one.place, &one.id)?;
-    let about = path(Part::Sessions);
-    let sum = checksums.of_part(Part::Sessions);
-    let (manifest, mut session, rejection) =
-        with(&about, sum, |frame| session_of(frame).map_err(|err| err.to_string()))?;
+    let checksums = Checksums::read(lake, &one.partition, &one.id)?;
+    let about = path(LakePart::Sessions);
+    let sum = checksums.of_part(LakePart::Sessions);
+    let (manifest, mut session, rejection) = read_table(&about, sum, session_of)?;
     if manifest.record_version > RECORD_VERSION {
         return Err(LakeError::Newer { path: about, version: manifest.record_version });
     }
-    let samples = path(Part::Samples);
-    let sum = checksums.of_part(Part::Samples);
-    let rows = with(&samples, sum, |frame| rows(frame).map_err(|err| err.to_string()))?;
+    let samples = path(LakePart::Samples);
+    let sum = checksums.of_part(LakePart::Samples);
+    let rows = read_table(&samples, sum, rows)?;
     if rows.len() as u64 != session.samples {
         return Err(LakeError::Bad {
             reason: format!("{} samples of {}", rows.len(), session.samples),
             path: samples,
         });
     }
-    let sum = checksums.of_part(Part::Events);
-    let entries =
-        with(&path(Part::Events), sum, |frame| entries(frame).map_err(|err| err.to_string()))?;
+    let sum = checksums.of_part(LakePart::Events);
+    let entries = read_table(&path(LakePart::Events), sum, entries)?;
     let session = Session {
         path: samples,
         manifest,
@@ -121,18 +98,17 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         entries,
         end: session.end.take(),
         notes: session.notes,
-        // A lake holds what was measured and decided, not what went over the wires.
+        // A lake has no raw bytes and no health messages.
         beside: palpate_sessions::log::Beside::default(),
     };
     Ok((session, rejection))
 }
 
-/// Reads a table whose file has this checksum. No other file is given to the decoder, which trusts what it
-/// reads.
-fn with<T>(
+/// Reads a table after its checksum, because the decoder trusts its input.
+fn read_table<T>(
     path: &Path,
     checksum: Option<u32>,
-    take: impl FnOnce(&DataFrame) -> Result<T, String>,
+    parse: impl FnOnce(&DataFrame) -> PolarsResult<T>,
 ) -> Result<T, LakeError> {
     let failed = |source| LakeError::Io { path: path.into(), source };
     let mut file = File::open(path).map_err(failed)?;
@@ -140,14 +116,12 @@ fn with<T>(
         return Err(LakeError::Bad { path: path.into(), reason: "its checksum is wrong".into() });
     }
     file.rewind().map_err(failed)?;
-    let frame = ParquetReader::new(file).finish().map_err(|err| err.to_string());
-    frame
-        .and_then(|frame| take(&frame))
-        .map_err(|reason| LakeError::Bad { path: path.into(), reason })
+    let parsed = ParquetReader::new(file).finish().and_then(|frame| parse(&frame));
+    parsed.map_err(|err| LakeError::Bad { path: path.into(), reason: err.to_string() })
 }
 
-/// What the sessions table tells beside the manifest.
-struct About {
+/// The row of the sessions table without the manifest.
+struct StoredOutline {
     samples: u64,
     end: Option<palpate_sessions::record::EndRecord>,
     notes: Vec<String>,
@@ -157,14 +131,14 @@ fn bad(reason: impl ToString) -> PolarsError {
     PolarsError::ComputeError(reason.to_string().into())
 }
 
-fn session_of(frame: &DataFrame) -> PolarsResult<(Manifest, About, Option<String>)> {
+fn session_of(frame: &DataFrame) -> PolarsResult<(Manifest, StoredOutline, Option<String>)> {
     if frame.height() != 1 {
         return Err(bad(format!("it has {} rows, not one", frame.height())));
     }
     let text = |name: &str| -> PolarsResult<Option<&str>> { Ok(frame.column(name)?.str()?.get(0)) };
     let needed = |name: &str| text(name)?.ok_or_else(|| bad(format!("it has no {name}")));
     let manifest = serde_json::from_str(needed("manifest")?).map_err(bad)?;
-    let about = About {
+    let about = StoredOutline {
         samples: frame.column("samples")?.u64()?.get(0).unwrap_or(0),
         end: serde_json::from_str(needed("end")?).map_err(bad)?,
         notes: serde_json::from_str(needed("notes")?).map_err(bad)?,

@@ -1,11 +1,11 @@
-//! Samples of a lake: what is kept of each, and rows made of it again.
+//! Samples of a lake: their columns, and conversion back to rows.
 
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use palpate_sessions::record::Row;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 
-/// Columns of the samples, all that a [`Row`] holds but how long the link may have taken.
+/// Columns of the samples: everything in a [`Row`] except the age.
 pub(super) const SAMPLE_COLUMNS: [&str; 12] = [
     "session_id",
     "t_s",
@@ -21,12 +21,10 @@ pub(super) const SAMPLE_COLUMNS: [&str; 12] = [
     "status",
 ];
 
-/// What a value is missing from that must have one.
 fn missing(what: &str) -> PolarsError {
     PolarsError::ComputeError(format!("a row has no {what}").into())
 }
 
-/// The rows of a table of samples.
 pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
     let column = |name: &str| frame.column(name);
     let (tick, host) = (column("tick")?.u64()?, column("host_ns")?.u64()?);

@@ -1,10 +1,10 @@
-//! A session into a lake.
+//! Adding sessions to a lake.
 
 use super::checksums::Checksums;
-use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
+use super::layout::{LAKE_VERSION, LakePart, is_file_name, part_folder, partition};
 use super::rows::SAMPLE_COLUMNS;
 use crate::export::atomic::{io_error, write_or_same};
-use crate::export::{Beside, Encoder, ExportError, Feed, Format, Kept, Selection, Table};
+use crate::export::{Beside, Encoder, ExportError, Feed, Format, Selection, Table, WriteOutcome};
 use palpate_sessions::edits::Verdict;
 use palpate_sessions::log::Outline;
 use palpate_sessions::record::{Entry, EntryKind};
@@ -15,36 +15,39 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// What is told of a session beside what it holds.
+/// The quality of a session, from its edits.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Told<'a> {
-    /// What it is worth, by whom and why.
+    /// With author and reason.
     pub verdict: Option<(Verdict, &'a str)>,
 }
 
-/// What became of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Added {
-    /// File of its samples.
     pub samples: PathBuf,
-    /// Whether every file of it was there before, and the same.
+    /// Whether all files existed with the same content.
     pub was_there: bool,
 }
 
-/// Adds a session to a lake. What is there already is the same, or the session is refused.
-pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Added, ExportError> {
+/// Adds a session to a lake. Existing files must have the same content.
+pub fn add(
+    lake: &Path,
+    outline: &Outline,
+    quality: Told,
+    feed: Feed,
+) -> Result<Added, ExportError> {
     let manifest = &outline.manifest;
     let id = &manifest.session_id;
     if !is_file_name(id) {
         return Err(ExportError::BadName { name: id.clone() });
     }
     let place = |of| -> Result<PathBuf, ExportError> {
-        let folder = part(lake, of).join(partition(manifest));
+        let folder = part_folder(lake, of).join(partition(manifest));
         fs::create_dir_all(&folder)
             .map_err(|source| ExportError::Io { path: folder.clone(), source })?;
         Ok(folder.join(format!("{id}.parquet")))
     };
-    let samples = place(Part::Samples)?;
+    let samples = place(LakePart::Samples)?;
     let table = Table {
         manifest,
         notes: &outline.notes,
@@ -57,15 +60,15 @@ pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Add
             ..Selection::default()
         },
     };
-    let mut kept = vec![table.write_to_lake(&samples, feed)?];
-    let (of_events, of_session) = (place(Part::Events)?, place(Part::Sessions)?);
-    kept.push(write_bytes(&of_events, &encode(&of_events, events(outline))?)?);
-    let last = encode(&of_session, session(outline, told))?;
+    let mut outcomes = vec![table.write_to_lake(&samples, feed)?];
+    let (of_events, of_session) = (place(LakePart::Events)?, place(LakePart::Sessions)?);
+    outcomes.push(write_bytes(&of_events, &encode(&of_events, events(outline))?)?);
+    let last = encode(&of_session, session(outline, quality))?;
     let checksums = Checksums::of(&samples, &of_events, &last)?;
-    kept.push(checksums.write(lake, &partition(manifest), id)?);
-    // The last, for it is what a reader goes by: a session that is listed is there with all its files.
-    kept.push(write_bytes(&of_session, &last)?);
-    Ok(Added { samples, was_there: kept.iter().all(|one| *one == Kept::Same) })
+    outcomes.push(checksums.write(lake, &partition(manifest), id)?);
+    // Written last, because readers list the sessions by it.
+    outcomes.push(write_bytes(&of_session, &last)?);
+    Ok(Added { samples, was_there: outcomes.iter().all(|one| *one == WriteOutcome::Unchanged) })
 }
 
 /// The bytes of a table's file.
@@ -81,7 +84,7 @@ fn encode(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Vec<u8>, Export
     Ok(bytes)
 }
 
-fn write_bytes(path: &Path, bytes: &[u8]) -> Result<Kept, ExportError> {
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<WriteOutcome, ExportError> {
     write_or_same(path, |file| file.write_all(bytes).map_err(io_error(path)))
 }
 
@@ -111,7 +114,7 @@ fn events(outline: &Outline) -> PolarsResult<DataFrame> {
     DataFrame::new(entries.len(), columns.map(Column::from).into())
 }
 
-fn session(outline: &Outline, told: Told) -> PolarsResult<DataFrame> {
+fn session(outline: &Outline, quality: Told) -> PolarsResult<DataFrame> {
     let manifest = &outline.manifest;
     let text = |name: &str, text: &str| Series::new(name.into(), [text]).into_column();
     let word = |name: &str, text: Option<&str>| Series::new(name.into(), [text]).into_column();
@@ -121,7 +124,7 @@ fn session(outline: &Outline, told: Told) -> PolarsResult<DataFrame> {
     let hash = (!calibration.is_null()).then(|| sha256(calibration.to_string().as_bytes()));
     let end = outline.end.as_ref();
     let ended = end.map(|end| end.ended_at.seconds().0);
-    let verdict = told.verdict.map(|(verdict, _)| verdict.to_string());
+    let verdict = quality.verdict.map(|(verdict, _)| verdict.to_string());
     let columns = vec![
         text("session_id", &manifest.session_id),
         text("started_at", &manifest.started_at_text()),
@@ -133,13 +136,13 @@ fn session(outline: &Outline, told: Told) -> PolarsResult<DataFrame> {
         Series::new("duration_s".into(), [ended]).into_column(),
         word("outcome", end.map(|end| end.outcome.as_str())),
         word("verdict", verdict.as_deref()),
-        word("verdict_reason", told.verdict.map(|(_, reason)| reason)),
+        word("verdict_reason", quality.verdict.map(|(_, reason)| reason)),
         word("calibration", named(calibration).as_deref()),
         word("calibration_sha256", hash.as_deref()),
         text("software_version", &manifest.software_version),
         number("record_version", manifest.record_version.into()),
         number("lake_version", LAKE_VERSION.into()),
-        // JSON, from which the session can be made again.
+        // JSON for the conversion back to a session.
         text("about", &json!(manifest.about).to_string()),
         text("notes", &json!(outline.notes).to_string()),
         text("manifest", &json!(manifest).to_string()),

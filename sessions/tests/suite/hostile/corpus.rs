@@ -243,8 +243,8 @@ pub fn make(folder: &Path) -> Vec<String> {
     add("health", "state", br#"{"now_ns":5,"kind":"state","lateness_s":0.001,"queue_share":0.5,"sync_s":1e-3,"free_bytes":7,"missed_readings":0}"#);
     add("health", "anchor", br#"{"now_ns":5,"kind":"anchor","why":"jump","wall":"2026-03-05T14:15:07.5Z","shift_s":-1.5}"#);
     add("health", "event", br#"{"now_ns":5,"kind":"event","text":"so"}"#);
-    let told = serde_json::to_vec(&manifest()).expect("JSON");
-    add("manifest", "manifest.json", &told);
+    let json = serde_json::to_vec(&manifest()).expect("JSON");
+    add("manifest", "manifest.json", &json);
     let thesis = serde_json::to_vec(&Calibration::thesis()).expect("JSON");
     add("calibration", "thesis.json", &thesis);
     let bench = serde_json::to_vec(&compliance()).expect("JSON");

@@ -207,8 +207,8 @@ fn document<D: Document + PartialEq + std::fmt::Debug + 'static>(
     written: &D,
 ) -> Kind {
     let folder = quick_folder();
-    let kept = shelf::save(folder.path(), written).expect("a sound document");
-    let bytes = fs::read(&kept.path).expect("it was stored");
+    let stored = shelf::save(folder.path(), written).expect("a sound document");
+    let bytes = fs::read(&stored.path).expect("it was stored");
     let written = written.clone();
     let read = move |folder: &Path| match shelf::read::<D>(&folder.join("one.json")) {
         Ok(read) => {
@@ -342,7 +342,7 @@ fn catalog() -> Kind {
             assert!(written.contains(entry), "a wrong entry");
             count += 1;
         }
-        // It was set aside and begun anew.
+        // The catalog was replaced.
         match (count, catalog.remarks.is_empty()) {
             (4, true) => Outcome::Whole,
             (_, true) => Outcome::Short,

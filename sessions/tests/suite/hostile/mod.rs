@@ -10,7 +10,7 @@ mod mutate;
 mod targets;
 
 use crate::support::{Random, count_from, put, quick_folder};
-use crate::worker::{command, told};
+use crate::worker::{command, reported_numbers};
 use kinds::{Kind, Outcome};
 use std::collections::BTreeMap;
 use std::fs;
@@ -113,7 +113,7 @@ pub fn fuzz(folder: &Path, name: &str, count: usize) {
     eprintln!("done {done}\nslowest {}", slowest.as_micros());
 }
 
-/// Starts a process for a task and returns what it told; its last words if it did not end well.
+/// Starts a process for a task and returns its output, or its last lines if it failed.
 fn worked(task: &str) -> std::process::Output {
     let folder = quick_folder();
     let output = command(&[], task, folder.path())
@@ -121,26 +121,26 @@ fn worked(task: &str) -> std::process::Output {
         .output()
         .expect("a test is a program");
     if !output.status.success() {
-        let kept = keep_input(folder.path(), task);
+        let stored = keep_input(folder.path(), task);
         let text = String::from_utf8_lossy(&output.stderr);
         let lines: Vec<&str> = text.lines().collect();
         let last = lines[lines.len().saturating_sub(12)..].join("\n");
-        panic!("{task} ended with {}{kept}:\n{last}", output.status);
+        panic!("{task} ended with {}{stored}:\n{last}", output.status);
     }
     output
 }
 
 /// Keeps what was read last, to become a file of the corpus.
 fn keep_input(folder: &Path, task: &str) -> String {
-    let kept = std::env::temp_dir().join(format!("palpate-{}", task.replace(' ', "-")));
-    match fs::copy(folder.join("input"), &kept) {
-        Ok(_) => format!(", input kept as {}", kept.display()),
+    let stored = std::env::temp_dir().join(format!("palpate-{}", task.replace(' ', "-")));
+    match fs::copy(folder.join("input"), &stored) {
+        Ok(_) => format!(", input stored as {}", stored.display()),
         Err(_) => String::new(),
     }
 }
 
 fn number(output: &std::process::Output, word: &str) -> u64 {
-    told(output, word).last().copied().unwrap_or(0)
+    reported_numbers(output, word).last().copied().unwrap_or(0)
 }
 
 /// Mutations of each kind of file; the soak script asks for more.
@@ -211,7 +211,7 @@ fn the_corpus_is_small_and_every_target_has_one() {
     println!("corpus: {total} bytes");
 }
 
-/// Makes the corpus anew where `PALPATE_CORPUS` names a folder.
+/// Rebuilds the corpus in the folder `PALPATE_CORPUS`.
 #[test]
 fn what_the_corpus_is_made_of_can_be_made() {
     let chosen = std::env::var_os("PALPATE_CORPUS").map(PathBuf::from);

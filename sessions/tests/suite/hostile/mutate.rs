@@ -1,4 +1,4 @@
-//! What is done to bytes: what disks and transfers do to them, and what somebody would try who looks for a
+//! Mutations of bytes: by disks and transfers, and by an attacker who looks for a
 //! parser's mistakes.
 
 use crate::support::Random;

@@ -1,5 +1,5 @@
 //! The parsers, each as a function of bytes. What is behind a checksum gets bytes whose checksum is right, for
-//! somebody who means harm knows how to make one.
+//! an attacker can make one.
 
 use super::corpus::{file_with_chunk, message, seal_document, seal_lines};
 use super::kinds::{check_foreign, check_table, check_weights};

@@ -158,6 +158,6 @@ mod tests {
         form.since = "yesterday".into();
         assert!(form.query().unwrap_err().starts_with("from: write a day"));
         form.line = "depth>=".into();
-        assert!(form.query().unwrap_err().contains("is no condition"));
+        assert!(form.query().unwrap_err().contains("is not a condition"));
     }
 }

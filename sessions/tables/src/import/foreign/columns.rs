@@ -1,30 +1,28 @@
-//! Which column is what and in which unit, from its name, from a row of units, or as told.
+//! Quantities and units of the columns: from their names, from a row of units, or from options.
 
 use super::super::header::{Quantity, Scale};
 use super::layout::Header;
-use super::said::Said;
-use super::told::Told;
+use super::options::Told;
+use super::readings::ReadingList;
 
-/// One quantity's column and how its values are read.
+/// The column of a quantity and the conversion of its values.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
     pub index: usize,
-    /// To s, mm, N or V.
     pub scale: Scale,
-    pub is_turned: bool,
-    /// What is taken off, in s, mm, N or V.
+    pub is_inverted: bool,
     pub zero: Zero,
 }
 
-/// What counts as zero.
+/// Offset that is subtracted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Zero {
-    AsItIs,
+    Unchanged,
     First,
+    /// In s, mm, N or V.
     At(f64),
 }
 
-/// The columns that are read.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Columns {
     pub time: Column,
@@ -34,59 +32,23 @@ pub(super) struct Columns {
     pub phase: Option<usize>,
 }
 
-/// Names by which testers of several makers and languages know a quantity, in small letters.
-fn words(quantity: Quantity) -> &'static [&'static str] {
+/// Lower-case names of a quantity in files of several makers and languages.
+fn names_of(quantity: Quantity) -> &'static str {
     match quantity {
-        Quantity::Time => &[
-            "t",
-            "time",
-            "test time",
-            "elapsed time",
-            "total time",
-            "step time",
-            "interval time",
-            "zeit",
-            "prüfzeit",
-            "temps",
-            "temps d'essai",
-        ],
-        Quantity::Depth => &[
-            "x",
-            "d",
-            "depth",
-            "indentation",
-            "displacement",
-            "extension",
-            "deformation",
-            "position",
-            "position (z)",
-            "travel",
-            "standard travel",
-            "crosshead travel",
-            "weg",
-            "standardweg",
-            "traversenweg",
-            "verformung",
-            "déplacement",
-            "déformation",
-            "déplacement standard",
-        ],
-        Quantity::Force => &[
-            "f",
-            "fz",
-            "force",
-            "load",
-            "standard force",
-            "normal force",
-            "axial force",
-            "kraft",
-            "standardkraft",
-            "prüfkraft",
-            "normalkraft",
-            "force standard",
-            "charge",
-        ],
-        Quantity::Signal => &["signal", "voltage", "spannung", "tension"],
+        Quantity::Time => {
+            "t, time, test time, elapsed time, total time, step time, interval time, zeit, \
+                prüfzeit, temps, temps d'essai"
+        }
+        Quantity::Depth => {
+            "x, d, depth, indentation, displacement, extension, deformation, position, \
+                position (z), travel, standard travel, crosshead travel, weg, standardweg, \
+                traversenweg, verformung, déplacement, déformation, déplacement standard"
+        }
+        Quantity::Force => {
+            "f, fz, force, load, standard force, normal force, axial force, kraft, \
+                standardkraft, prüfkraft, normalkraft, force standard, charge"
+        }
+        Quantity::Signal => "signal, voltage, spannung, tension",
     }
 }
 
@@ -94,29 +56,31 @@ fn is_known_unit(text: &str) -> bool {
     Quantity::ALL.into_iter().any(|one| one.scale(text).is_some())
 }
 
-/// Names of columns that only one layout has.
-type Words = &'static [(Quantity, &'static [&'static str])];
+/// Lower-case column names of a single layout, by quantity, separated by a comma and a space.
+pub(super) type LayoutNames = &'static [(Quantity, &'static str)];
 
-fn quantity_in(name: &str, words: Words) -> Option<Quantity> {
+fn is_listed(name: &str, names: &str) -> bool {
+    names.split(", ").any(|one| one == name)
+}
+
+fn quantity_in(name: &str, names: LayoutNames) -> Option<Quantity> {
     let name = name.trim().to_lowercase();
-    let of_name =
-        |(_, words): &&(Quantity, &'static [&'static str])| words.contains(&name.as_str());
-    words.iter().find(of_name).map(|(quantity, _)| *quantity)
+    names.iter().find(|(_, names)| is_listed(&name, names)).map(|(quantity, _)| *quantity)
 }
 
 fn quantity_of(name: &str) -> Option<Quantity> {
     let name = name.trim().replace('_', " ").to_lowercase();
-    Quantity::ALL.into_iter().find(|quantity| words(*quantity).contains(&name.as_str()))
+    Quantity::ALL.into_iter().find(|quantity| is_listed(&name, names_of(*quantity)))
 }
 
-/// A column's name and its unit, if the name ends in one: `Time, s`, `Force [mN]`, `x_mm`, `Weg in µm`.
+/// Splits a column's name from a unit at its end: `Time, s`, `Force [mN]`, `x_mm`, `Weg in µm`.
 fn split_unit(cell: &str) -> (&str, Option<&str>) {
     let cell = cell.trim();
     if let Some((name, unit)) = cell.strip_suffix(']').and_then(|cell| cell.rsplit_once('[')) {
         return (name.trim(), Some(unit.trim()));
     }
     if let Some((name, unit)) = cell.strip_suffix(')').and_then(|cell| cell.rsplit_once('(')) {
-        // `Position (z)` names an axis.
+        // `(z)` in `Position (z)` is an axis.
         let is_axis = matches!(unit.trim(), "x" | "y" | "z");
         return if is_axis { (cell, None) } else { (name.trim(), Some(unit.trim())) };
     }
@@ -134,19 +98,17 @@ fn split_unit(cell: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// Whether a cell could be a unit in a row of units.
 pub(super) fn is_unit_cell(cell: &str) -> bool {
     let bare = bare_unit(cell);
     is_known_unit(bare) || bare.chars().count() <= 8 && quantity_of(cell).is_none()
 }
 
-/// Whether a cell is a unit that is known.
 pub(super) fn is_known_unit_cell(cell: &str) -> bool {
     is_known_unit(bare_unit(cell))
 }
 
-/// Whether a cell names something that is read.
-pub(super) fn is_named(cell: &str) -> bool {
+/// Whether a cell names a quantity.
+pub(super) fn is_quantity_name(cell: &str) -> bool {
     quantity_of(split_unit(cell).0).is_some() || quantity_of(cell).is_some()
 }
 
@@ -154,27 +116,25 @@ fn bare_unit(cell: &str) -> &str {
     cell.trim().trim_matches(['[', ']', '(', ')']).trim()
 }
 
-/// Why the columns of a part are not known.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Unknown {
-    /// It has no time or no rows: it is no measurement.
+pub(super) enum ColumnError {
+    /// Without a time or rows, the part is not a measurement.
     NoMeasurement(String),
-    /// It has one, and something else is missing or unclear.
+    /// Another column is missing or ambiguous.
     Other(String),
 }
 
-/// Finds the columns of a part.
 pub(super) fn find(
     header: &Header,
-    words: Words,
-    told: &Told,
-    said: &mut Said,
-) -> Result<Columns, Unknown> {
-    let other = Unknown::Other;
-    let mut column = |quantity| column(quantity, header, words, told, said);
+    words: LayoutNames,
+    options: &Told,
+    readings: &mut ReadingList,
+) -> Result<Columns, ColumnError> {
+    let other = ColumnError::Other;
+    let mut column = |quantity| column(quantity, header, words, options, readings);
     let time = column(Quantity::Time)
         .map_err(other)?
-        .ok_or_else(|| Unknown::NoMeasurement(missing(Quantity::Time, header)))?;
+        .ok_or_else(|| ColumnError::NoMeasurement(missing(Quantity::Time, header)))?;
     let mut needed = |quantity| {
         column(quantity)
             .and_then(|found| found.ok_or_else(|| missing(quantity, header)))
@@ -197,7 +157,7 @@ fn missing(quantity: Quantity, header: &Header) -> String {
         .map(|name| format!("'{name}'"))
         .collect();
     format!(
-        "no column is known as the {0} ({1} has {2}); say which is, as in {0}=NAME, or {0}=-NAME to turn its sign",
+        "no column is known as the {0} ({1} has {2}); name it, as in {0}=NAME, or {0}=-NAME to invert its sign",
         quantity.name(),
         header.place,
         names.join(", ")
@@ -207,66 +167,66 @@ fn missing(quantity: Quantity, header: &Header) -> String {
 fn column(
     quantity: Quantity,
     header: &Header,
-    words: Words,
-    told: &Told,
-    said: &mut Said,
+    words: LayoutNames,
+    options: &Told,
+    readings: &mut ReadingList,
 ) -> Result<Option<Column>, String> {
     let what = quantity.name();
-    let choice = told.columns.iter().rfind(|one| one.quantity == quantity);
+    let choice = options.columns.iter().rfind(|one| one.quantity == quantity);
     let found = match choice {
-        Some(choice) => Some(chosen(&choice.name, header)?),
-        None => named(quantity, header, words)?.map(|index| (index, false)),
+        Some(choice) => Some(find_chosen(&choice.name, header)?),
+        None => detect(quantity, header, words)?.map(|index| (index, false)),
     };
-    let Some((index, is_turned)) = found else {
+    let Some((index, is_inverted)) = found else {
         return Ok(None);
     };
     let name = header.names.get(index).map_or("", String::as_str);
     let in_row = header.units.get(index).map(|unit| bare_unit(unit));
     let in_row = in_row.filter(|unit| !unit.is_empty());
     let in_name = split_unit(name).1;
-    let told_unit = told.units.iter().rfind(|one| one.quantity == quantity);
-    let unit = told_unit.map(|one| one.unit.as_str()).or(in_row).or(in_name);
+    let chosen_unit = options.units.iter().rfind(|one| one.quantity == quantity);
+    let unit = chosen_unit.map(|one| one.unit.as_str()).or(in_row).or(in_name);
     let (unit, is_assumed) = match unit {
         Some(unit) => (unit, false),
-        // A time by its name alone is in seconds in every instrument's table we know.
+        // All known instruments write times without a unit in seconds.
         None if quantity == Quantity::Time => ("s", true),
         None => {
             return Err(format!(
-                "the {what} '{name}' has no unit; say it, as in {what}=UNIT, one of {}",
+                "the {what} '{name}' has no unit; give it, as in {what}=UNIT, one of {}",
                 quantity.known_units()
             ));
         }
     };
     let scale = quantity.scale(unit).ok_or_else(|| {
         format!(
-            "the unit '{unit}' of the {what} '{name}' is not known; say one, as in {what}=UNIT, known are {}",
+            "the unit '{unit}' of the {what} '{name}' is unknown; give one, as in {what}=UNIT, one of {}",
             quantity.known_units()
         )
     })?;
-    let zero = told.zeros.iter().rfind(|one| one.quantity == quantity);
+    let zero = options.zeros.iter().rfind(|one| one.quantity == quantity);
     let zero = match zero.map(|one| one.value) {
-        None => Zero::AsItIs,
+        None => Zero::Unchanged,
         Some(None) => Zero::First,
         Some(Some(value)) => Zero::At(value),
     };
-    let turned = if is_turned { ", its sign turned" } else { "" };
-    let assumed = if is_assumed { ", assumed for want of a unit" } else { "" };
+    let inverted = if is_inverted { ", its sign inverted" } else { "" };
+    let assumed = if is_assumed { ", assumed because it has no unit" } else { "" };
     let from = match zero {
-        Zero::AsItIs => String::new(),
+        Zero::Unchanged => String::new(),
         Zero::First => ", counted from the first row".into(),
         Zero::At(value) => format!(", counted from {value}"),
     };
-    said.say(
+    readings.add(
         what,
-        format!("column {} '{name}' in {unit}{assumed}{turned}{from}", index + 1),
-        choice.is_some() || told_unit.is_some() || zero != Zero::AsItIs,
+        format!("column {} '{name}' in {unit}{assumed}{inverted}{from}", index + 1),
+        choice.is_some() || chosen_unit.is_some() || zero != Zero::Unchanged,
         &format!("--column {what}=NAME --unit {what}=UNIT"),
     );
-    Ok(Some(Column { index, scale, is_turned, zero }))
+    Ok(Some(Column { index, scale, is_inverted, zero }))
 }
 
-/// The column of a name or number, and whether its sign is to be turned.
-fn chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
+/// Finds a column by name or number; a minus before the name inverts its sign.
+fn find_chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
     let find = |name: &str| -> Vec<usize> {
         let is_it = |cell: &str| {
             let same = |one: &str| one.to_lowercase() == name.to_lowercase();
@@ -275,27 +235,31 @@ fn chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
         let names = header.names.iter().enumerate();
         names.filter(|(_, cell)| is_it(cell)).map(|(i, _)| i).collect()
     };
-    let (bare, is_turned) = match name.strip_prefix('-') {
+    let (bare, is_inverted) = match name.strip_prefix('-') {
         Some(bare) if find(name).is_empty() => (bare.trim(), true),
         _ => (name, false),
     };
     let number = bare.parse().ok().filter(|n| (1..=header.width).contains(n));
     match (find(bare)[..].as_ref(), number) {
-        ([index], _) => Ok((*index, is_turned)),
-        ([], Some(number)) => Ok((number - 1, is_turned)),
+        ([index], _) => Ok((*index, is_inverted)),
+        ([], Some(number)) => Ok((number - 1, is_inverted)),
         ([], None) => Err(format!(
-            "no column is called '{bare}' in {}; give a name as it stands there, or the column's number",
+            "{} has no column '{bare}'; give a name as it is written there, or the column's number",
             header.place
         )),
         ([first, second, ..], _) => Err(format!(
-            "columns {} and {} are both called '{bare}'; give the column's number instead",
+            "columns {} and {} both have the name '{bare}'; give the column's number instead",
             first + 1,
             second + 1
         )),
     }
 }
 
-fn named(quantity: Quantity, header: &Header, words: Words) -> Result<Option<usize>, String> {
+fn detect(
+    quantity: Quantity,
+    header: &Header,
+    words: LayoutNames,
+) -> Result<Option<usize>, String> {
     let is_it = |cell: &str| {
         let is_name =
             |name: &str| quantity_of(name).or_else(|| quantity_in(name, words)) == Some(quantity);
@@ -307,7 +271,7 @@ fn named(quantity: Quantity, header: &Header, words: Words) -> Result<Option<usi
         [] => Ok(None),
         [index] => Ok(Some(index)),
         [first, second, ..] => Err(format!(
-            "columns '{}' and '{}' could both be the {what}; say which, as in {what}=NAME",
+            "columns '{}' and '{}' could both be the {what}; choose one, as in {what}=NAME",
             header.names[first],
             header.names[second],
             what = quantity.name()
@@ -320,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_units_come_apart() {
+    fn names_and_units_are_separated() {
         for (cell, expected) in [
             ("Time, s", ("Time", Some("s"))),
             ("Position (z), mm", ("Position (z)", Some("mm"))),
@@ -340,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_row_of_units_is_made_of() {
+    fn unit_cells_are_recognised() {
         for (cell, is_unit, is_known) in [
             ("[s]", true, true),
             ("mm", true, true),

@@ -1,33 +1,22 @@
-//! Numbers as people write them: which sign is the decimal one, and what a cell is worth.
+//! Numbers in text: detection of the decimal sign, and parsing.
 
-/// The decimal sign of a text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Decimal {
-    /// 1.5
-    Point,
-    /// 1,5
-    Comma,
+palpate_model::named! {
+    /// The decimal sign of a text.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Decimal {
+        /// 1.5
+        Point = "point",
+        /// 1,5
+        Comma = "comma",
+    }
 }
 
 impl Decimal {
-    pub(super) fn name(self) -> &'static str {
+    /// The decimal sign, and the sign between groups of three digits.
+    fn signs(self) -> (char, char) {
         match self {
-            Self::Point => "point",
-            Self::Comma => "comma",
-        }
-    }
-
-    fn sign(self) -> char {
-        match self {
-            Self::Point => '.',
-            Self::Comma => ',',
-        }
-    }
-
-    fn other(self) -> Self {
-        match self {
-            Self::Point => Self::Comma,
-            Self::Comma => Self::Point,
+            Self::Point => ('.', ','),
+            Self::Comma => (',', '.'),
         }
     }
 }
@@ -44,18 +33,18 @@ impl std::str::FromStr for Decimal {
     }
 }
 
-/// The number in a cell. The other sign may only stand between groups of three digits.
+/// Parses a number. The other sign may only separate groups of three digits.
 pub(in crate::import) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.,eE".contains(c);
     if cell.is_empty() || !cell.chars().all(is_of_number) {
         return None;
     }
-    let grouping = decimal.other().sign();
-    let (whole, rest) = match cell.find(|c: char| c == decimal.sign() || "eE".contains(c)) {
+    let (sign, grouping) = decimal.signs();
+    let (whole, rest) = match cell.find(|c: char| c == sign || "eE".contains(c)) {
         Some(place) => cell.split_at(place),
         None => (cell, ""),
     };
-    if rest.contains(grouping) || rest.matches(decimal.sign()).count() > 1 {
+    if rest.contains(grouping) || rest.matches(sign).count() > 1 {
         return None;
     }
     let mut text = String::with_capacity(cell.len());
@@ -74,26 +63,23 @@ pub(in crate::import) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     if is_grouped && !(1..=3).contains(&digits.len()) {
         return None;
     }
-    text.extend(rest.chars().map(|c| match c {
-        ',' => '.',
-        other => other,
-    }));
+    text += &rest.replace(',', ".");
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-/// Whether a cell is a number with one decimal sign or the other.
+/// Whether a cell is a number with either decimal sign.
 pub(super) fn looks_numeric(cell: &str) -> bool {
     parse(cell, Decimal::Point).is_some() || parse(cell, Decimal::Comma).is_some()
 }
 
-/// What a cell says of the decimal sign.
+/// What a cell reveals of the decimal sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::import) enum Evidence {
-    /// Nothing: it has no such sign, or is no number.
+    /// It has no such sign or is not a number.
     None,
-    /// It can only be read with this one.
+    /// It is a number only with this sign.
     Only(Decimal),
-    /// Both readings are numbers, and different ones.
+    /// Both signs give numbers, and different ones.
     Either,
 }
 
@@ -103,7 +89,7 @@ pub(in crate::import) fn evidence(cell: &str) -> Evidence {
         [Some(_), None] => Evidence::Only(Decimal::Point),
         [None, Some(_)] => Evidence::Only(Decimal::Comma),
         [Some(point), Some(comma)] if point.to_bits() != comma.to_bits() => {
-            // Nobody groups thousands behind a zero: 0,125 is an eighth.
+            // A zero never precedes a group of thousands: 0,125 is an eighth.
             let digits = cell.trim_start_matches(['+', '-']);
             match digits.strip_prefix('0').and_then(|rest| rest.chars().next()) {
                 Some('.') => Evidence::Only(Decimal::Point),
@@ -121,7 +107,7 @@ mod tests {
     use Decimal::{Comma, Point};
 
     #[test]
-    fn numbers_are_read_as_written_or_not_at_all() {
+    fn numbers_are_parsed_exactly_or_refused() {
         for (cell, point, comma) in [
             ("1.5", Some(1.5), None),
             ("-0,25", None, Some(-0.25)),
@@ -146,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_is_what_only_one_sign_explains() {
+    fn evidence_shows_the_only_possible_sign() {
         for (cell, expected) in [
             ("12", Evidence::None),
             ("text", Evidence::None),

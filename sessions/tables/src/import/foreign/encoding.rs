@@ -1,4 +1,4 @@
-//! From the bytes of a file to its text.
+//! Text encodings.
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
@@ -18,34 +18,37 @@ impl std::str::FromStr for TextEncoding {
     }
 }
 
-/// The text, and how its encoding was told from the bytes.
-pub(super) fn decode(bytes: &[u8], told: Option<TextEncoding>) -> Result<(String, String), String> {
+/// The text, and its encoding with the reason in words.
+pub(super) fn decode(
+    bytes: &[u8],
+    chosen: Option<TextEncoding>,
+) -> Result<(String, String), String> {
     let marked = Encoding::for_bom(bytes);
     let body = marked.map_or(bytes, |(_, length)| &bytes[length..]);
-    let (encoding, why) = match (told, marked) {
-        (Some(TextEncoding(told)), _) => (told, ""),
-        (None, Some((encoding, _))) => (encoding, ", says its byte order mark"),
-        (None, None) => match without_mark(bytes) {
+    let (encoding, reason) = match (chosen, marked) {
+        (Some(TextEncoding(chosen)), _) => (chosen, ""),
+        (None, Some((encoding, _))) => (encoding, ", by its byte order mark"),
+        (None, None) => match detect_utf16(bytes) {
             Some(encoding) => (encoding, ", by the zeros in every other byte"),
             None if std::str::from_utf8(bytes).is_ok() => (UTF_8, ""),
-            None => (WINDOWS_1252, ", for it is not UTF-8; other 8-bit encodings look alike"),
+            None => (WINDOWS_1252, ", because it is not UTF-8; other 8-bit encodings look alike"),
         },
     };
     let text = encoding
         .decode_without_bom_handling_and_without_replacement(body)
-        .ok_or_else(|| format!("it is not text in {}; say another encoding", encoding.name()))?;
+        .ok_or_else(|| format!("it is not text in {}; give another encoding", encoding.name()))?;
     let is_binary = |c: char| {
         c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{c}' | '\u{80}'..='\u{9f}')
     };
     if text.contains(is_binary) {
         return Err("it holds binary data; export it as text or as a spreadsheet".into());
     }
-    Ok((text.into_owned(), format!("{}{why}", encoding.name())))
+    Ok((text.into_owned(), format!("{}{reason}", encoding.name())))
 }
 
-/// UTF-16 without a mark: of Latin letters and digits, one byte of each pair is zero.
-fn without_mark(bytes: &[u8]) -> Option<&'static Encoding> {
-    // Enough for a header; a half is far from what text in any 8-bit encoding has.
+/// Detects UTF-16 without a byte order mark: in Latin letters and digits, one byte of each pair is zero.
+fn detect_utf16(bytes: &[u8]) -> Option<&'static Encoding> {
+    // 2048 pairs include a header; text in an 8-bit encoding has far fewer zeros than half.
     let pairs: Vec<&[u8]> = bytes.chunks_exact(2).take(2048).collect();
     let zeros = |place: usize| pairs.iter().filter(|pair| pair[place] == 0).count();
     let (first, second) = (zeros(0), zeros(1));
@@ -89,10 +92,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_is_refused() {
+    fn binary_data_is_refused() {
         assert!(decode(b"a\0\x01\x02", None).unwrap_err().contains("binary"));
-        let told = "utf-16le".parse().unwrap();
-        let reason = decode(b"\x00\xd8\x00", Some(told)).unwrap_err();
+        let chosen = "utf-16le".parse().unwrap();
+        let reason = decode(b"\x00\xd8\x00", Some(chosen)).unwrap_err();
         assert!(reason.contains("UTF-16LE"), "{reason}");
         assert!("klingon".parse::<TextEncoding>().is_err());
     }

@@ -1,26 +1,26 @@
-//! Where the numbers of a part begin, what their columns are called, and which decimal sign they have.
+//! Detection of header, units, first row of numbers, and decimal sign.
 
-use super::columns::{is_known_unit_cell, is_named, is_unit_cell};
+use super::columns::{is_known_unit_cell, is_quantity_name, is_unit_cell};
 use super::decimal::{Decimal, Evidence, evidence};
 use super::formats::Head;
+use super::options::Told;
+use super::readings::ReadingList;
 use super::rows::{Cell, Rows};
-use super::said::Said;
-use super::told::Told;
 
 /// Names and units of the columns.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub names: Vec<String>,
-    /// As a row of units has them; empty without one.
+    /// From a row of units; empty without one.
     pub units: Vec<String>,
     pub width: usize,
-    /// Where the names stand, in words.
+    /// Source of the names, in words.
     pub place: String,
     /// Index of the first row of numbers.
     pub first: usize,
 }
 
-/// So many rows of numbers one after the other are the table; fewer may be a remark with numbers in it.
+/// Consecutive rows of numbers that make a table; fewer may be a remark with numbers.
 const ROWS_OF_A_TABLE: usize = 3;
 
 fn width_of(cells: &[Cell]) -> usize {
@@ -55,7 +55,7 @@ fn texts(cells: &[Cell]) -> Vec<String> {
 }
 
 /// The nearest row above that is not blank.
-fn above(rows: &Rows<'_>, index: usize) -> Option<usize> {
+fn row_above(rows: &Rows<'_>, index: usize) -> Option<usize> {
     (0..index).rev().find(|&i| width_of(&rows.words(i)) > 0)
 }
 
@@ -66,64 +66,64 @@ fn is_units(cells: &[Cell]) -> bool {
 }
 
 fn is_names(cells: &[Cell]) -> bool {
-    cells.iter().any(|cell| matches!(cell, Cell::Text(text) if is_named(text)))
+    cells.iter().any(|cell| matches!(cell, Cell::Text(text) if is_quantity_name(text)))
 }
 
-/// Finds header, units and the first row of numbers. The inner `None`: there are no numbers at all.
+/// Finds header, units and the first row of numbers; `None` without numbers.
 pub(super) fn find(
     rows: &Rows<'_>,
-    told: &Told,
+    options: &Told,
     known: Option<Head>,
-    said: &mut Said,
+    readings: &mut ReadingList,
 ) -> Result<Option<Header>, String> {
-    let row_told = |what: &str, number: usize| {
+    let find_row = |what: &str, number: usize| {
         rows.index_of(number).ok_or_else(|| {
-            format!("there is no {} {number} for the {what}, or it is blank", rows.word())
+            format!("the {} {number} for the {what} is missing or blank", rows.word())
         })
     };
-    let names = told.header_row.or(known.map(|head| head.names));
-    let header = names.map(|number| row_told("header", number)).transpose()?;
-    let units = match told.units_row.or(known.and_then(|head| head.units)) {
+    let names = options.header_row.or(known.map(|head| head.names));
+    let header = names.map(|number| find_row("header", number)).transpose()?;
+    let units = match options.units_row.or(known.and_then(|head| head.units)) {
         None | Some(0) => None,
-        Some(number) => Some(row_told("units", number)?),
+        Some(number) => Some(find_row("units", number)?),
     };
     let from = header.max(units).map_or(0, |index| index + 1);
     let Some(first) = first_numbers(rows, from) else {
         return Ok(None);
     };
-    let (header, units) = header_and_units(rows, told, first, header, units);
+    let (header, units) = header_and_units(rows, options, first, header, units);
     let is_header =
         |index: &usize| rows.words(*index).iter().any(|cell| matches!(cell, Cell::Text(_)));
     let header = header.filter(is_header);
     let word = rows.word();
     let (names, place) = match header {
-        _ if !told.names.is_empty() => (told.names.clone(), "the names told".to_owned()),
+        _ if !options.names.is_empty() => (options.names.clone(), "the given names".to_owned()),
         Some(index) => (texts(&rows.words(index)), format!("{word} {}", rows.number(index))),
         None => {
             return Err(format!(
-                "no names of columns stand above the numbers that begin in {word} {}; name every column, as in t_s,depth_mm,force_N, or say the {word} of the names",
+                "the numbers from {word} {} on have no column names above them; name every column, as in t_s,depth_mm,force_N, or give the {word} of the names",
                 rows.number(first)
             ));
         }
     };
-    said.say(
+    readings.add(
         "header",
         place.clone(),
-        !told.names.is_empty() || told.header_row.is_some(),
+        !options.names.is_empty() || options.header_row.is_some(),
         "--header-row N or --columns NAME,...",
     );
     let in_words = match units {
         Some(index) => format!("{word} {}", rows.number(index)),
         None => "no row of their own".into(),
     };
-    said.say("units", in_words, told.units_row.is_some(), "--units-row N");
+    readings.add("units", in_words, options.units_row.is_some(), "--units-row N");
     let width = names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
-    let named = told.names.len();
+    let named = options.names.len();
     if named > 0 {
         let found = width_of(&rows.words(first));
         if found != named {
             return Err(format!(
-                "{word} {} has {found} columns but {named} are named; name every one",
+                "{word} {} has {found} columns, and {named} are named; name every one",
                 rows.number(first)
             ));
         }
@@ -137,20 +137,20 @@ pub(super) fn find(
     }))
 }
 
-/// The rows of names and of units, where they are not told: above the first row of numbers.
+/// Detects the rows of names and units above the first row of numbers, unless the options give them.
 fn header_and_units(
     rows: &Rows<'_>,
-    told: &Told,
+    options: &Told,
     first: usize,
     header: Option<usize>,
     units: Option<usize>,
 ) -> (Option<usize>, Option<usize>) {
-    let may_have_units = told.units_row.is_none();
+    let may_have_units = options.units_row.is_none();
     match header {
-        None if told.names.is_empty() => {
-            let nearest = above(rows, units.unwrap_or(first));
+        None if options.names.is_empty() => {
+            let nearest = row_above(rows, units.unwrap_or(first));
             if let (Some(index), true) = (nearest, may_have_units) {
-                let next = above(rows, index).filter(|&next| is_names(&rows.words(next)));
+                let next = row_above(rows, index).filter(|&next| is_names(&rows.words(next)));
                 let cells = rows.words(index);
                 if is_units(&cells) && (next.is_some() || !is_names(&cells)) {
                     return (next, Some(index));
@@ -166,8 +166,7 @@ fn header_and_units(
     }
 }
 
-/// Rows looked at before it is believed that none will tell the decimal sign otherwise; a number that
-/// cannot be read with the sign found is refused wherever it stands.
+/// Rows that are checked for contradicting decimal signs; a later number that does not fit is refused when it is read.
 const ROWS_FOR_DECIMAL: usize = 2000;
 
 /// The decimal sign of the columns that are read.
@@ -175,12 +174,12 @@ pub(super) fn decimal(
     rows: &Rows<'_>,
     header: &Header,
     columns: &[usize],
-    told: Option<Decimal>,
-    said: &mut Said,
+    chosen: Option<Decimal>,
+    readings: &mut ReadingList,
 ) -> Result<Decimal, String> {
     let option = "--decimal point or comma";
-    if let Some(decimal) = told {
-        said.say("decimal sign", decimal.name(), true, option);
+    if let Some(decimal) = chosen {
+        readings.add("decimal sign", decimal.name(), true, option);
         return Ok(decimal);
     }
     let word = rows.word();
@@ -198,7 +197,7 @@ pub(super) fn decimal(
                 (Evidence::Only(decimal), None) => found = Some((decimal, here())),
                 (Evidence::Only(decimal), Some((before, place))) if decimal != *before => {
                     return Err(format!(
-                        "{place} has a decimal {}, {} a decimal {}; say which counts, or mend the file",
+                        "{place} has a decimal {}, {} a decimal {}; give the decimal sign, or correct the file",
                         before.name(),
                         here(),
                         decimal.name()
@@ -213,14 +212,19 @@ pub(super) fn decimal(
     }
     match (found, either) {
         (Some((decimal, place)), _) => {
-            said.say("decimal sign", format!("{}, from {place}", decimal.name()), false, option);
+            readings.add(
+                "decimal sign",
+                format!("{}, from {place}", decimal.name()),
+                false,
+                option,
+            );
             Ok(decimal)
         }
         (None, Some(place)) => Err(format!(
-            "{place} could be in thousands or have a decimal sign, and no other number tells; say which decimal sign counts, point or comma"
+            "{place} may have a separator of thousands or a decimal sign, and no other number shows which; give the decimal sign, point or comma"
         )),
         (None, None) => {
-            said.say("decimal sign", "none needed", false, option);
+            readings.add("decimal sign", "none needed", false, option);
             Ok(Decimal::Point)
         }
     }

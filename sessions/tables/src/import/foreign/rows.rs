@@ -1,14 +1,13 @@
-//! The rows of a part of a file, whether lines of text or cells of a sheet.
+//! The rows of a part: lines of text or rows of a sheet.
 
 use super::super::cells::split;
 use super::decimal::looks_numeric;
 
-/// What stands in one place of a row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Cell {
     Empty,
     Text(String),
-    /// A number that a spreadsheet keeps as one.
+    /// A number of a spreadsheet.
     Number(f64),
 }
 
@@ -25,7 +24,6 @@ impl Cell {
         }
     }
 
-    /// As it would be shown.
     pub fn text(&self) -> String {
         match self {
             Self::Empty => String::new(),
@@ -39,22 +37,19 @@ impl Cell {
     }
 }
 
-/// What stands between the cells of a line.
+/// Separator between the cells of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Delimiter(char);
 
 impl Delimiter {
-    /// In the order they are tried: what stands in numbers and words comes last.
+    const NAMES: [(&'static str, char); 4] =
+        [("tab", '\t'), ("comma", ','), ("semicolon", ';'), ("space", ' ')];
+    /// In the order of trial: characters that occur in numbers and words come last.
     const ALL: [Self; 5] = [Self('\t'), Self(';'), Self('|'), Self(','), Self(' ')];
 
     pub(super) fn name(self) -> String {
-        match self.0 {
-            '\t' => "tab".into(),
-            ';' => "semicolon".into(),
-            ',' => "comma".into(),
-            ' ' => "space".into(),
-            other => format!("'{other}'"),
-        }
+        let named = Self::NAMES.iter().find(|(_, one)| *one == self.0);
+        named.map_or_else(|| format!("'{}'", self.0), |(name, _)| (*name).to_owned())
     }
 
     pub(super) fn cells(self, line: &str, number: usize) -> Result<Vec<Cell>, String> {
@@ -65,11 +60,11 @@ impl Delimiter {
         Ok(split(line, self.0, number)?.into_iter().map(Cell::of_text).collect())
     }
 
-    /// Told from the first lines that hold numbers.
+    /// Detects the delimiter from the first lines with numbers.
     pub(super) fn detect(lines: &[(usize, &str)]) -> Option<Self> {
-        // Where numbers and a header are, however long the words before them.
-        const LINES_LOOKED_AT: usize = 4000;
-        let lines = &lines[..lines.len().min(LINES_LOOKED_AT)];
+        // Enough for a header and numbers after a long introduction.
+        const LINES_MAX: usize = 4000;
+        let lines = &lines[..lines.len().min(LINES_MAX)];
         let starts_like_number =
             |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c));
         let count = |delimiter: Self, is_strict: bool| {
@@ -78,7 +73,7 @@ impl Delimiter {
                     return false;
                 };
                 let numbers = cells.iter().filter(|cell| cell.is_number()).count();
-                // Half a number cut at the wrong sign begins like one and is none.
+                // A number that is split at the wrong sign leaves a piece that begins like a number.
                 let is_cut = |cell: &Cell| {
                     !cell.is_number()
                         && matches!(cell, Cell::Text(text) if starts_like_number(text))
@@ -100,13 +95,12 @@ impl std::str::FromStr for Delimiter {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMES.iter().find(|(name, _)| *name == text).map(|(_, one)| *one);
         let mut characters = text.chars();
-        match (text, characters.next(), characters.next()) {
-            ("tab" | "\\t", ..) => Ok(Self('\t')),
-            ("comma", ..) => Ok(Self(',')),
-            ("semicolon", ..) => Ok(Self(';')),
-            ("space", ..) => Ok(Self(' ')),
+        match (named, characters.next(), characters.next()) {
+            (Some(one), ..) => Ok(Self(one)),
             (_, Some(one), None) if one != '"' && !one.is_alphanumeric() => Ok(Self(one)),
+            _ if text == "\\t" => Ok(Self('\t')),
             _ => Err("give tab, comma, semicolon, space or one character".into()),
         }
     }
@@ -142,7 +136,7 @@ impl Rows<'_> {
         }
     }
 
-    /// The cells of a row; the error is a sentence that names it.
+    /// The cells of a row; the error is a sentence with its number.
     pub fn cells(&self, index: usize) -> Result<Vec<Cell>, String> {
         match self {
             Self::Lines { lines, delimiter } => {
@@ -153,7 +147,7 @@ impl Rows<'_> {
         }
     }
 
-    /// The cells of a row that may be words: with a quote that is never closed, it is one cell.
+    /// The cells of a row of text; a row with an unclosed quote is one cell.
     pub fn words(&self, index: usize) -> Vec<Cell> {
         self.cells(index).unwrap_or_else(|_| match self {
             Self::Lines { lines, .. } => vec![Cell::Text(lines[index].1.trim().to_owned())],
@@ -161,7 +155,6 @@ impl Rows<'_> {
         })
     }
 
-    /// The row of a number, if it is there.
     pub fn index_of(&self, number: usize) -> Option<usize> {
         (0..self.len()).find(|&index| self.number(index) == number)
     }
@@ -172,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn delimiters_are_told_from_the_numbers() {
+    fn delimiter_is_detected_from_the_numbers() {
         for (lines, expected) in [
             (&["a\tb", "1\t2"][..], "tab"),
             (&["a;b", "0,5;1,5", "1,5;2,5"], "semicolon"),

@@ -1,33 +1,27 @@
-//! The numbers of a part, checked row by row. Nothing is repaired: a row that is not as it should be is
-//! refused, or left out where that was told, and counted.
+//! The numbers of a part, checked row by row. Nothing is repaired: a faulty row is refused or, if the options say so, left
+//! out and counted.
 
 use super::super::header::Quantity;
 use super::columns::{Column, Columns, Zero};
 use super::decimal::{Decimal, parse};
 use super::layout::Header;
+use super::options::Fault;
 use super::rows::{Cell, Rows};
-use super::told::Fault;
 use palpate_model::rig::Phase;
 
 /// One row in s, mm, N and V.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// Time in s, as the file counts it.
+pub struct ForeignSample {
+    /// Time in s, from the file's origin.
     pub t: f64,
     /// Depth in mm; `None` only outside an indentation.
     pub depth: Option<f64>,
     /// Force in N; `None` only outside an indentation.
     pub force: Option<f64>,
-    /// Signal in V, where the file has one.
+    /// Signal in V; `None` in a file without one.
     pub signal: Option<f64>,
-    /// The phase that a file of ours names.
+    /// From a table that palpate exported; otherwise [`Phase::Imported`].
     pub phase: Phase,
-}
-
-/// What a cell is worth.
-enum Value {
-    Number(f64),
-    Missing,
 }
 
 struct Reader<'a> {
@@ -39,20 +33,21 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// The value of a cell in the unit of its quantity; `None` if it is missing.
     fn value(
         &self,
         cells: &[Cell],
         column: &Column,
         what: Quantity,
         number: usize,
-    ) -> Result<Value, String> {
+    ) -> Result<Option<f64>, String> {
         let raw = match cells.get(column.index) {
-            None | Some(Cell::Empty) => return Ok(Value::Missing),
+            None | Some(Cell::Empty) => return Ok(None),
             Some(Cell::Number(number)) => *number,
-            Some(Cell::Text(text)) if text.eq_ignore_ascii_case("nan") => return Ok(Value::Missing),
+            Some(Cell::Text(text)) if text.eq_ignore_ascii_case("nan") => return Ok(None),
             Some(Cell::Text(text)) => parse(text, self.decimal).ok_or_else(|| {
                 format!(
-                    "{} {number}: the {} '{}' is not a number with a decimal {}; mend or remove the {0}, or say the decimal sign",
+                    "{} {number}: the {} '{}' is not a number with a decimal {}; correct or remove the {0}, or give the decimal sign",
                     self.rows.word(),
                     what.name(),
                     text.chars().take(40).collect::<String>(),
@@ -60,9 +55,9 @@ impl Reader<'_> {
                 )
             })?,
         };
-        let sign = if column.is_turned { -1.0 } else { 1.0 };
+        let sign = if column.is_inverted { -1.0 } else { 1.0 };
         let value = sign * column.scale.apply(raw);
-        if value.is_finite() { Ok(Value::Number(value)) } else { Ok(Value::Missing) }
+        Ok(Some(value).filter(|value| value.is_finite()))
     }
 
     fn check_width(&self, cells: &[Cell], width: usize, number: usize) -> Result<(), String> {
@@ -70,26 +65,22 @@ impl Reader<'_> {
         match beyond.position(|cell| !cell.is_empty()) {
             None => Ok(()),
             Some(place) => Err(format!(
-                "{} {number} has a cell in column {} where the header has {width}; mend the {0}, or say the delimiter or decimal sign if these were taken wrongly",
+                "{} {number} has a cell in column {}, and the header has {width} columns; correct the {0}, or give the delimiter or decimal sign if it was detected wrongly",
                 self.rows.word(),
                 width + place + 1,
             )),
         }
     }
 
-    /// The sample in a row; none where the row is left out, as told. `last` is the time of the sample before in s.
+    /// The sample in a row; `None` if the row is left out. `last` is the time of the sample before in s.
     fn sample(
         &mut self,
         cells: &[Cell],
         columns: &Columns,
         number: usize,
         last: Option<f64>,
-    ) -> Result<Option<Sample>, String> {
-        let one = |column: &Column, what| match self.value(cells, column, what, number) {
-            Ok(Value::Number(number)) => Ok(Some(number)),
-            Ok(Value::Missing) => Ok(None),
-            Err(reason) => Err(reason),
-        };
+    ) -> Result<Option<ForeignSample>, String> {
+        let one = |column: &Column, what| self.value(cells, column, what, number);
         let t = one(&columns.time, Quantity::Time)?;
         let depth = one(&columns.depth, Quantity::Depth)?;
         let force = one(&columns.force, Quantity::Force)?;
@@ -99,29 +90,29 @@ impl Reader<'_> {
         let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
         let is_needed =
             matches!(phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
-        let missing = |what: &str| (Fault::Missing, format!("there is no {what}"));
+        let missing = |what: &str| (Fault::Missing, format!("the {what} is missing"));
         let (fault, what) = match (t, depth, force, last) {
             (None, ..) => missing("time"),
             (_, None, ..) if is_needed => missing("depth"),
             (_, _, None, _) if is_needed => missing("force"),
             (Some(t), .., Some(last)) if t == last => {
-                (Fault::Repeated, format!("the time {t} s is that of the row before"))
+                (Fault::Repeated, format!("the time {t} s equals that of the row before"))
             }
             (Some(t), .., Some(last)) if t < last => {
-                (Fault::Backward, format!("the time goes back from {last} to {t} s"))
+                (Fault::Backward, format!("the time decreases from {last} to {t} s"))
             }
             (Some(t), ..) => {
-                return Ok(Some(Sample { t, depth, force, signal, phase }));
+                return Ok(Some(ForeignSample { t, depth, force, signal, phase }));
             }
         };
         self.fault(fault, number, &what).map(|()| None)
     }
 
-    /// Refuses a row, or counts it among those left out.
+    /// Refuses a row, or counts it as left out.
     fn fault(&mut self, fault: Fault, number: usize, what: &str) -> Result<(), String> {
         if !self.skip.contains(&fault) {
             return Err(format!(
-                "{} {number}: {what}; mend the file, or have such rows skipped: {}",
+                "{} {number}: {what}; correct the file, or skip such rows: {}",
                 self.rows.word(),
                 fault.name()
             ));
@@ -135,16 +126,16 @@ impl Reader<'_> {
     }
 }
 
-/// Every sample of a part, and what a user of them must know.
+/// All samples of a part, and remarks.
 pub(super) fn read(
     rows: &Rows<'_>,
     header: &Header,
     columns: &Columns,
     decimal: Decimal,
     skip: &[Fault],
-) -> Result<(Vec<Sample>, Vec<String>), String> {
+) -> Result<(Vec<ForeignSample>, Vec<String>), String> {
     let mut reader = Reader { rows, decimal, skip, skipped: [(0, 0); Fault::ALL.len()] };
-    let mut samples: Vec<Sample> = Vec::new();
+    let mut samples: Vec<ForeignSample> = Vec::new();
     let mut numbers: Vec<usize> = Vec::new();
     for index in header.first..rows.len() {
         let number = rows.number(index);
@@ -163,7 +154,7 @@ pub(super) fn read(
         return Err("it has fewer than two rows of numbers".into());
     }
     let from_zero = |column: &Column, first: Option<f64>| match column.zero {
-        Zero::AsItIs => 0.0,
+        Zero::Unchanged => 0.0,
         Zero::First => first.unwrap_or(0.0),
         Zero::At(value) => value,
     };
@@ -175,7 +166,7 @@ pub(super) fn read(
     }
     let mut remarks = left_out(&reader);
     remarks.extend(gaps(rows, &samples, &numbers));
-    remarks.extend(turned(&samples));
+    remarks.extend(inverted_sign(&samples));
     Ok((samples, remarks))
 }
 
@@ -185,10 +176,10 @@ fn phase_of(name: &str) -> Phase {
 }
 
 fn left_out(reader: &Reader<'_>) -> Vec<String> {
-    let why = |fault| match fault {
+    let description = |fault| match fault {
         Fault::Missing => "without a value",
         Fault::Repeated => "with the time of the row before",
-        Fault::Backward => "whose time goes back",
+        Fault::Backward => "with decreasing time",
     };
     Fault::ALL
         .into_iter()
@@ -196,21 +187,21 @@ fn left_out(reader: &Reader<'_>) -> Vec<String> {
         .filter(|(_, (count, _))| *count > 0)
         .map(|(fault, (count, first))| {
             format!(
-                "{count} rows {} are left out, as told; the first is {} {first}",
-                why(fault),
+                "{count} rows {} are left out on request; the first is {} {first}",
+                description(fault),
                 reader.rows.word()
             )
         })
         .collect()
 }
 
-/// A step counts as even if it is within this share of the median: more than any file's rounding of times.
+/// Relative deviation from the median up to which a step counts as even: more than the rounding of times in files.
 const EVEN: f64 = 0.05;
-/// A step this many times the median is a gap: between a row that is missing and one that is late.
+/// A step above this multiple of the median is a gap: between a late row (1) and a missing one (2).
 const GAP: f64 = 1.5;
 
-/// Where rows seem to be missing, or how unevenly they are spaced.
-fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String> {
+/// A remark about gaps or uneven spacing.
+fn gaps(rows: &Rows<'_>, samples: &[ForeignSample], numbers: &[usize]) -> Option<String> {
     let steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].t - pair[0].t).collect();
     let mut sorted = steps.clone();
     let middle = sorted.len() / 2;
@@ -218,7 +209,7 @@ fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String
     let even = steps.iter().filter(|step| (*step - median).abs() <= EVEN * median).count();
     let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
     let longest = steps.iter().copied().fold(0.0, f64::max);
-    // Where a tenth of the steps differ, that is how the instrument takes its samples.
+    // With more than a tenth of uneven steps, the instrument samples unevenly.
     if 10 * even < 9 * steps.len() {
         return Some(format!(
             "the rows are not evenly spaced: {shortest:.6} to {longest:.6} s apart"
@@ -228,15 +219,15 @@ fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String
     let count = steps.iter().filter(|step| is_gap(step)).count();
     let first = steps.iter().position(is_gap)?;
     Some(format!(
-        "{count} gaps: after {} {} nothing for {:.6} s where rows are {median:.6} s apart; nothing is filled in",
+        "{count} gaps: no row follows {} {} for {:.6} s, though rows are {median:.6} s apart; nothing is filled in",
         rows.word(),
         numbers[first],
         steps[first]
     ))
 }
 
-/// Whether the force falls where the depth grows, which compression does not do here.
-fn turned(samples: &[Sample]) -> Option<String> {
+/// A remark if the force decreases with depth, which suggests an inverted sign.
+fn inverted_sign(samples: &[ForeignSample]) -> Option<String> {
     let both: Vec<(f64, f64)> =
         samples.iter().filter_map(|one| Some((one.depth?, one.force?))).collect();
     let count = both.len() as f64;
@@ -244,6 +235,6 @@ fn turned(samples: &[Sample]) -> Option<String> {
     let (depth, force) = (mean(|one| one.0), mean(|one| one.1));
     let together: f64 = both.iter().map(|(x, f)| (x - depth) * (f - force)).sum();
     (together < 0.0).then(|| {
-        "the force falls where the depth grows; if the file counts one of them the other way round, turn its sign, as in force=-NAME or depth=-NAME".into()
+        "the force decreases as the depth increases; if the file counts one of them in the opposite direction, invert its sign, as in force=-NAME or depth=-NAME".into()
     })
 }

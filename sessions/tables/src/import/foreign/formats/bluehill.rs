@@ -1,50 +1,41 @@
-//! Instron Bluehill: raw data as CSV, of one specimen or of several one after the other.
+//! Instron Bluehill: raw data as CSV, with one or several specimens in sequence.
 //!
-//! Above the numbers stand facts (`Test : Rate 1,"15.00",mm/min`) and tables of results, each of which may be absent; then
-//! the names of the columns, and their units in brackets in a line of their own (Bluehill 2 and 3) or behind each name
-//! below a line `Raw Data` (Bluehill Universal). Separators, decimal signs and names are those of the computer's language.
+//! The numbers follow optional facts (`Test : Rate 1,"15.00",mm/min`), optional tables of results, and the column names. The
+//! units are in brackets, in a line of their own (Bluehill 2 and 3) or after each name below a line `Raw Data` (Bluehill
+//! Universal). Separators, decimal signs and names depend on the computer's language.
 
 use super::super::rows::{Cell, Delimiter};
 use super::{Content, FACT_LENGTH_MAX, FACTS_MAX, Head, Layout, Line, Quantity, TextPart};
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "bluehill",
-    of: "Bluehill's raw data",
+    source: "Bluehill's raw data",
     content: Content::Text { is_it, cut },
     words: &[
-        (Quantity::Time, &["time measurement", "godzina", "时间"]),
-        (
-            Quantity::Depth,
-            &["compressive extension", "compressive displacement", "przemieszczenie", "位移"],
-        ),
+        (Quantity::Time, "time measurement, godzina, 时间"),
+        (Quantity::Depth, "compressive extension, compressive displacement, przemieszczenie, 位移"),
         (
             Quantity::Force,
-            &[
-                "compressive load",
-                "compressive force",
-                "primary load measurement",
-                "obciążenie",
-                "载荷",
-            ],
+            "compressive load, compressive force, primary load measurement, obciążenie, 载荷",
         ),
     ],
 };
 
-/// Lines in which the names of columns are looked for: a header has some dozens.
-const LINES_LOOKED_AT: usize = 1000;
-/// First cell of the line above a table of results, and of that above names with units.
+/// Lines that are searched for column names; a header has some dozens.
+const HEADER_LINES_MAX: usize = 1000;
+/// First cell of the line above a table of results, and above names with units.
 const RESULTS: &str = "results table";
 const RAW_DATA: &str = "raw data";
-/// What stands between the group and the name of a fact.
+/// Separator between group and name of a fact.
 const BETWEEN: &str = " : ";
-/// Names and units, or `Raw Data` and names with units.
+/// Lines of a head: names and units, or `Raw Data` and names with units.
 const LINES_OF_HEAD: usize = 2;
-/// Last word of the fact that names a specimen.
+/// Name of the fact that names a specimen.
 const LABEL: &str = "specimen label";
 
-/// Names with a time, below a line that only Bluehill writes or below none that it does not.
+/// Recognises a head with a time unit, if only Bluehill writes a line above it, or if every line above parses.
 fn is_it(lines: &[Line<'_>], delimiter: Delimiter) -> bool {
-    let lines = &lines[..lines.len().min(LINES_LOOKED_AT)];
+    let lines = &lines[..lines.len().min(HEADER_LINES_MAX)];
     let find = |index: usize| Some((index, head(&lines[index..], delimiter).ok()??));
     let has_time = |columns: &Columns| {
         let is_time =
@@ -65,12 +56,10 @@ fn is_it(lines: &[Line<'_>], delimiter: Delimiter) -> bool {
         || cut(lines[..index + LINES_OF_HEAD].to_vec(), delimiter).is_ok()
 }
 
-/// A specimen in the making.
 #[derive(Default)]
 struct Specimen {
     facts: Vec<(String, String)>,
     name: String,
-    /// Number of its first line.
     line: Option<usize>,
 }
 
@@ -87,7 +76,7 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
                 (Some(_), Some(strange)) => return Err(strange_line(&lines, strange)),
                 (None, _) => {
                     return Err(format!(
-                        "line {number}: numbers stand here before the names of their columns and their units; the beginning of the file is missing"
+                        "line {number}: the numbers have no column names and units above them; the beginning of the file is missing"
                     ));
                 }
             }
@@ -113,7 +102,7 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
         }
     }
     match next.line {
-        _ if parts.is_empty() => Err("it has no names of columns above a line of units, such as Time,Extension,Load above (s),(mm),(N)".into()),
+        _ if parts.is_empty() => Err("it has no column names above a line of units, such as Time,Extension,Load above (s),(mm),(N)".into()),
         Some(strange) => Err(strange_line(&lines, strange)),
         None => {
             name(&mut parts);
@@ -123,7 +112,6 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
 }
 
 impl Specimen {
-    /// What a line says that is neither names nor numbers.
     fn fact(&mut self, texts: &[String], number: usize, line: &str) -> Result<(), String> {
         let (key, values) =
             texts.split_first().map_or(("", texts), |(key, values)| (key.as_str(), values));
@@ -136,7 +124,7 @@ impl Specimen {
             self.name = key.to_owned();
         } else if key.is_empty() || texts.len() < 2 && !begins(texts, RAW_DATA) {
             return Err(format!(
-                "line {number}: '{}' is neither a name with a value, nor names of columns, nor numbers; mend or remove the line, or read the file as a table",
+                "line {number}: '{}' is neither a fact, nor column names, nor numbers; correct or remove the line, or read the file as a table",
                 short(line)
             ));
         }
@@ -154,7 +142,7 @@ impl Specimen {
         }
     }
 
-    /// A table of results, up to a blank line or the names of columns of numbers; what is behind it is given back.
+    /// Reads a table of results, up to a blank line or column names; returns the lines after it.
     fn results<'l, 'a>(
         &mut self,
         lines: &'l [Line<'a>],
@@ -191,13 +179,12 @@ impl Specimen {
     }
 }
 
-/// Where columns are named, and the cells that hold their units.
 struct Columns {
     head: Head,
     units: Vec<String>,
 }
 
-/// The columns that the first two lines name, if they do.
+/// The columns, if the first two lines name them.
 fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, String> {
     let [first, second, ..] = lines else {
         return Ok(None);
@@ -215,7 +202,7 @@ fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, Str
     let own_line = Some(second.0).filter(|units| *units > names);
     if own_line.is_some() && above.len() != units.len() {
         return Err(format!(
-            "line {}: there are {} units for the {} columns of line {names}; mend the line",
+            "line {}: it has {} units for the {} columns of line {names}; correct the line",
             second.0,
             units.len(),
             above.len(),
@@ -225,7 +212,7 @@ fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, Str
     Ok(Some(Columns { head, units }))
 }
 
-/// Numbers the specimens that have no name, and those of one name.
+/// Numbers specimens without a name, and those with the same name.
 fn name(parts: &mut [TextPart<'_>]) {
     let count = parts.len();
     for index in 0..count {
@@ -243,7 +230,7 @@ fn name(parts: &mut [TextPart<'_>]) {
 fn strange_line(lines: &[Line<'_>], number: usize) -> String {
     let text = lines.iter().find(|(one, _)| *one == number);
     format!(
-        "line {number}: '{}' stands among the numbers or behind them, and no names of columns follow it; mend or remove the line, or restore the end of the file",
+        "line {number}: '{}' is among or after the numbers, and no column names follow it; correct or remove the line, or restore the end of the file",
         short(text.map_or("", |(_, text)| text))
     )
 }
@@ -261,24 +248,24 @@ fn begins(cells: &[String], word: &str) -> bool {
     cells.first().is_some_and(|cell| cell.to_lowercase().starts_with(word))
 }
 
-/// The unit that a cell ends in, in brackets.
+/// The unit in brackets at the end of a cell.
 fn unit(cell: &str) -> Option<&str> {
     let (_, unit) = cell.strip_suffix(')')?.rsplit_once('(')?;
     Some(unit.trim())
 }
 
-/// Whether a cell is nothing but a unit in brackets.
+/// Whether a cell is only a unit in brackets.
 fn is_unit(cell: &str) -> bool {
     cell.starts_with('(') && cell.ends_with(')')
 }
 
-/// Whether these are the units of columns: two at least, and nothing that is none.
+/// Whether a line has at least two units and nothing else.
 fn is_units(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty());
     filled.clone().count() > 1 && filled.all(|cell| is_unit(cell))
 }
 
-/// Whether these are numbers; the first may be missing.
+/// Whether a line has numbers; the first may be missing.
 fn is_row(cells: &[String]) -> bool {
     let is_number = |cell: &String| Cell::Text(cell.clone()).is_number();
     match cells.first() {

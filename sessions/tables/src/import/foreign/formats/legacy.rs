@@ -1,18 +1,18 @@
-//! The records of an .xls, walked before the reader of cells sees them: it makes room for every cell
-//! between the first and the last of a sheet, and a few bytes can put the last one anywhere.
+//! Check of an .xls before `calamine` reads it, which allocates every cell between the first and the last of a sheet, and a
+//! few bytes can place the last one anywhere.
 //!
-//! Compound files are \[MS-CFB\], records \[MS-XLS\] section 2.4.
+//! Compound files are described in \[MS-CFB\], records in \[MS-XLS\] section 2.4.
 
-/// Most cells between the first and the last of all sheets together: 48 MiB in the reader of cells, which is
-/// a sheet with all its rows and 32 columns.
+/// Largest number of cells between first and last, over all sheets: 48 MiB in `calamine`, a sheet with all rows and 32
+/// columns.
 const AREA_MAX: u64 = 2 << 20;
-/// Cells that a small file may leave empty. Beyond that there may be as many as it has bytes, of which a cell
-/// that is there takes six and more.
+/// Empty cells that a small file may have. More are allowed in proportion to the file's bytes, of which a cell takes at least
+/// six.
 const EMPTY_MAX: u64 = 1 << 16;
 /// Columns and rows of a sheet in this format ([MS-XLS], 2.5.53 and 2.5.226).
 const COLUMNS: u32 = 256;
 const ROWS: u32 = 65_536;
-/// From here on sector numbers mean something else than a sector ([MS-CFB], 2.1).
+/// Sector numbers from here on are special values ([MS-CFB], 2.1).
 const NO_SECTOR: u32 = 0xffff_fffa;
 /// Streams below this size are in small sectors ([MS-CFB], 2.2).
 const SMALL_STREAM: usize = 4096;
@@ -38,11 +38,11 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     check_stream(&stream)
 }
 
-/// A chain of sectors, one after the other.
+/// Joins a chain of sectors.
 fn chain(sectors: &[u8], size: usize, table: &[u32], start: u32) -> Option<Vec<u8>> {
     let mut content = Vec::new();
     let mut at = start;
-    // A chain that comes back to itself has more sectors than there are.
+    // A circular chain would exceed the number of sectors.
     for _ in 0..=sectors.len() / size {
         if at >= NO_SECTOR {
             return Some(content);
@@ -80,7 +80,7 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
     }
     let mut table = Vec::new();
     places.retain(|place| *place < NO_SECTOR);
-    // A sector that is named twice would count twice.
+    // More entries than sectors means that sectors repeat.
     if places.len() > sectors.len() / size {
         return None;
     }
@@ -100,7 +100,7 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
         .into_iter()
         .find_map(|name| entries.iter().find(|entry| is_called(entry, name)))?;
     let (start, length) = (u32_at(entry, 116)?, u32_at(entry, 120)? as usize);
-    // The reader of cells follows these chains wherever there are small sectors, needed or not.
+    // `calamine` follows these chains if there are small sectors, needed or not.
     let has_small = u32_at(bytes, 64)? > 0;
     let small = match has_small || length < SMALL_STREAM {
         true => Some((
@@ -119,7 +119,7 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(stream)
 }
 
-/// The records from a place on: kind and content.
+/// Kind and content of the records from offset `from`.
 fn records(stream: &[u8], from: usize) -> impl Iterator<Item = (u32, &[u8])> {
     let mut at = from;
     std::iter::from_fn(move || {

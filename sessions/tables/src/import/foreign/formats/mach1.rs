@@ -1,10 +1,10 @@
 //! Biomomentum Mach-1.
 
-use super::{Content, FACTS_MAX, Head, Layout, Line, TextPart, fact};
+use super::{Content, FACTS_MAX, Head, Layout, Line, TextPart, parse_fact};
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "mach-1",
-    of: "a Mach-1's",
+    source: "a Mach-1's",
     content: Content::Text {
         is_it: |lines, _| lines.first().is_some_and(|(_, line)| line.trim() == FIRST),
         cut: |lines, _| cut(&lines),
@@ -12,12 +12,10 @@ pub(super) const LAYOUT: Layout = Layout {
     words: &[],
 };
 
-/// First line of a file.
 const FIRST: &str = "<Mach-1 File>";
 
-/// `<INFO>`, facts, `<END INFO>`, the name of a function in angle brackets, facts, `<DATA>`, a header and
-/// rows, `<END DATA>`, and again. A `<divider>` stands between the ramps of one function, whose times begin
-/// anew.
+/// A file repeats: `<INFO>`, facts, `<END INFO>`, a function's name in angle brackets, facts, `<DATA>`, a header and rows,
+/// `<END DATA>`. A `<divider>` separates ramps of one function, each with times from the start.
 fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
     let mut parts: Vec<TextPart> = Vec::new();
     let mut functions: Vec<String> = Vec::new();
@@ -39,7 +37,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
                     match rest.next() {
                         None => {
                             return Err(format!(
-                                "line {number}: <DATA> is never closed by <END DATA>; the end of the file is missing"
+                                "line {number}: <DATA> has no <END DATA>; the end of the file is missing"
                             ));
                         }
                         Some((_, line)) if line.trim() == "<END DATA>" => break,
@@ -68,7 +66,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
             name if is_begun && name.starts_with('<') && name.ends_with('>') => {
                 functions.push(name.trim_matches(['<', '>']).trim().to_owned());
             }
-            line if facts.len() < FACTS_MAX => facts.extend(fact(line)),
+            line if facts.len() < FACTS_MAX => facts.extend(parse_fact(line)),
             _ => {}
         }
     }
@@ -86,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn mach1_blocks_are_named_by_their_function() {
+    fn mach1_blocks_have_the_name_of_their_function() {
         let text = "<Mach-1 File>\r\n<INFO>\r\nTime:\t10:00:00.0\r\n<END INFO>\r\n<Zero Load>\r\n\
             <INFO>\r\nDate:\tMonday\r\n<END INFO>\r\n<Move Relative>\r\nVelocity, mm/s:\t0.1\r\n<DATA>\r\n\
             Time, s\tFz, gf\r\n0\t1\r\n1\t2\r\n<divider>\r\n0\t3\r\n<END DATA>\r\n\
@@ -100,6 +98,6 @@ mod tests {
         assert_eq!(parts[0].facts, facts.map(|(key, value)| (key.to_owned(), value.to_owned())));
         assert_eq!(parts[1].lines[0], parts[0].lines[0]);
         let reason = cut(&lines[..14]).unwrap_err();
-        assert!(reason.contains("line 11: <DATA> is never closed"), "{reason}");
+        assert!(reason.contains("line 11: <DATA> has no <END DATA>"), "{reason}");
     }
 }

@@ -1,5 +1,5 @@
-//! The layouts that are known, one file each: how a file is told to have it, and how it is cut into the measurements it
-//! holds. What the columns are, their units and their numbers is found out in the same way for all.
+//! The known layouts, one file each: how to recognise a layout, and how to divide a file into measurements. Columns, units
+//! and numbers are detected in the same way for all layouts.
 
 mod bluehill;
 mod legacy;
@@ -9,11 +9,11 @@ mod unzipped;
 mod workbook;
 
 use super::super::header::Quantity;
+use super::columns::LayoutNames;
 use super::rows::{Cell, Delimiter};
 
-/// Every layout.
 const ALL: &[Layout] = &[
-    // What a text has that no other claims.
+    // For text that no other layout claims.
     TABLE,
     mach1::LAYOUT,
     rheometer::LAYOUT,
@@ -21,19 +21,18 @@ const ALL: &[Layout] = &[
     bluehill::LAYOUT,
 ];
 
-/// What is known of a layout.
 #[derive(Debug)]
 pub(super) struct Layout {
-    /// On the command line and in a session.
+    /// Name on the command line and in a session.
     pub name: &'static str,
-    /// Whose files have it, as in `Files: a Mach-1's`.
-    of: &'static str,
+    /// Source of the files, as in `a Mach-1's`.
+    source: &'static str,
     pub content: Content,
-    /// Names of columns, in small letters, beside those that every layout may have.
-    pub words: &'static [(Quantity, &'static [&'static str])],
+    /// Lower-case column names in addition to those of every layout.
+    pub words: LayoutNames,
 }
 
-/// What a file holds, and how it is read. Errors are one sentence with the line.
+/// How a file is recognised and divided. Errors are one sentence with the line.
 #[derive(Debug)]
 pub(super) enum Content {
     Text {
@@ -48,7 +47,7 @@ pub(super) enum Content {
 
 const TABLE: Layout = Layout {
     name: "table",
-    of: "delimited text",
+    source: "delimited text",
     content: Content::Text {
         is_it: |_, _| false,
         cut: |lines, _| Ok(vec![TextPart { lines, ..TextPart::default() }]),
@@ -56,12 +55,11 @@ const TABLE: Layout = Layout {
     words: &[],
 };
 
-/// A layout that is known.
 #[derive(Clone, Copy, Debug)]
 pub struct Format(pub(super) &'static Layout);
 
 impl Format {
-    /// The layout of a file that does not hold text.
+    /// The layout of a file that is not text.
     pub(super) fn of_bytes(bytes: &[u8]) -> Option<Self> {
         let claims =
             |one: &&Layout| matches!(one.content, Content::Sheets { is_it, .. } if is_it(bytes));
@@ -73,22 +71,21 @@ impl Format {
         Self(ALL.iter().find(claims).unwrap_or(&ALL[0]))
     }
 
-    /// The name on the command line and in a session.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name
     }
 
-    /// The names of all: `table, mach-1 or workbook`.
+    /// All names, as in `table, mach-1 or workbook`.
     #[must_use]
     pub fn names() -> String {
         in_words(ALL.iter().map(|one| one.name))
     }
 
-    /// Whose files are read: `delimited text, a Mach-1's or a workbook`.
+    /// All sources, as in `delimited text, a Mach-1's or a workbook`.
     #[must_use]
     pub fn sources() -> String {
-        in_words(ALL.iter().map(|one| one.of))
+        in_words(ALL.iter().map(|one| one.source))
     }
 }
 
@@ -116,42 +113,36 @@ pub(super) type Sheet = (String, Vec<(usize, Vec<Cell>)>);
 /// One measurement, before its columns are known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct TextPart<'a> {
-    /// Empty if the file is one measurement.
+    /// Empty if the file has one measurement only.
     pub name: String,
-    /// What the file says of it.
     pub facts: Vec<(String, String)>,
-    /// Where its columns are named, if the layout tells.
+    /// Position of the column names, if the layout fixes it.
     pub head: Option<Head>,
-    /// Those of the measurement, names of columns and units included.
+    /// Includes the lines of names and units.
     pub lines: Vec<Line<'a>>,
 }
 
-/// The lines of the names and of the units of columns, by their numbers in the file.
+/// Line numbers of column names and units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Head {
     pub names: usize,
     pub units: Option<usize>,
 }
 
-/// Most lines kept of what a file says of a part; longer ones are cut.
+/// Largest number of facts about a part; longer facts are cut.
 const FACTS_MAX: usize = 64;
 const FACT_LENGTH_MAX: usize = 200;
 
-/// Lines that are not blank, with their numbers. Files of very old computers end lines with a return alone.
+/// Non-blank lines with their numbers. Files of very old computers end lines with a carriage return alone.
 pub(super) fn lines_of(text: &str) -> Vec<Line<'_>> {
-    let is_blank = |line: &str| line.trim().is_empty();
-    let with_numbers = |(i, line)| (i + 1, line);
-    if text.contains('\n') {
-        let lines = text.lines().enumerate().map(with_numbers);
-        lines.filter(|(_, line)| !is_blank(line)).collect()
-    } else {
-        let lines = text.split('\r').enumerate().map(with_numbers);
-        lines.filter(|(_, line)| !is_blank(line)).collect()
-    }
+    let ending = if text.contains('\n') { '\n' } else { '\r' };
+    let lines = text.split(ending).map(|line| line.strip_suffix('\r').unwrap_or(line));
+    let numbered = lines.enumerate().map(|(index, line)| (index + 1, line));
+    numbered.filter(|(_, line)| !line.trim().is_empty()).collect()
 }
 
-/// A line of the form `key: value` or `key<tab>value`.
-fn fact(line: &str) -> Option<(String, String)> {
+/// Parses `key: value` or `key<tab>value`.
+fn parse_fact(line: &str) -> Option<(String, String)> {
     let cut = |text: &str| text.trim().chars().take(FACT_LENGTH_MAX).collect::<String>();
     let (key, value) = line
         .split_once('\t')
@@ -165,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_return_alone_ends_a_line() {
+    fn carriage_return_alone_ends_a_line() {
         let old = lines_of("a;b\r1;2\r");
         assert_eq!(old, [(1, "a;b"), (2, "1;2")]);
     }

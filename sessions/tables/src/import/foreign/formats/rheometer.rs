@@ -1,10 +1,10 @@
 //! Rheometers: intervals of RheoCompass (Anton Paar), steps of TRIOS (TA Instruments).
 
-use super::{Content, FACTS_MAX, Layout, Line, TextPart, fact};
+use super::{Content, FACTS_MAX, Layout, Line, TextPart, parse_fact};
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "rheometer",
-    of: "a rheometer's",
+    source: "a rheometer's",
     content: Content::Text {
         is_it: |lines, _| {
             let is_head =
@@ -18,11 +18,10 @@ pub(super) const LAYOUT: Layout = Layout {
 
 /// First cell of the line above an interval.
 const INTERVAL: &str = "Interval and data points:";
-/// Line above a step.
 const STEP: &str = "[step]";
 
-/// Lines `Test:` and `Result:` above intervals that begin with [`INTERVAL`], or steps that begin with
-/// [`STEP`] and their name.
+/// A file has lines `Test:` and `Result:` and then intervals that begin with [`INTERVAL`], or steps that begin with [`STEP`]
+/// and a name.
 fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
     let mut parts: Vec<TextPart> = Vec::new();
     let mut result = String::new();
@@ -43,7 +42,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
             is_in_part = true;
         } else if bare.eq_ignore_ascii_case(STEP) {
             let (_, name) = rest.next().ok_or_else(|| {
-                format!("line {number}: a step without a name; the end of the file is missing")
+                format!("line {number}: the step has no name; the end of the file is missing")
             })?;
             parts.push(TextPart {
                 name: name.trim().to_owned(),
@@ -56,17 +55,17 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
             if bare.starts_with("Result") {
                 result = name;
             }
-            facts.extend(fact(bare).filter(|_| facts.len() < FACTS_MAX));
+            facts.extend(parse_fact(bare).filter(|_| facts.len() < FACTS_MAX));
         } else if let Some(part) = parts.last_mut().filter(|_| is_in_part) {
             part.lines.push((number, line));
         } else {
-            facts.extend(fact(bare).filter(|_| facts.len() < FACTS_MAX));
+            facts.extend(parse_fact(bare).filter(|_| facts.len() < FACTS_MAX));
         }
     }
     Ok(parts)
 }
 
-/// The value of a line that heads what follows, such as `Result:<tab>Relaxation 1`.
+/// The value of a heading such as `Result:<tab>Relaxation 1`.
 fn heading(line: &str) -> Option<String> {
     let after =
         ["Project:", "Test:", "Result:"].into_iter().find_map(|word| line.strip_prefix(word))?;
@@ -85,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn rheometer_intervals_and_steps_are_parts() {
+    fn rheometer_intervals_and_steps_become_parts() {
         let text = "Project:\tP\n\nTest:\tgel 3\n\nResult:\tSqueeze 1\n\nInterval and data points:\t1\t2\n\
             Interval data:\tPoint No.\tTime\n\t\t[s]\n\t1\t0,5\n\t2\t1,5\n\nInterval and data points:\t2\t1\n\
             Interval data:\tPoint No.\tTime\n\t\t[s]\n\t1\t2,5\nTest:\tgel 4\n";

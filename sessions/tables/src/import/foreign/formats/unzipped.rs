@@ -1,22 +1,22 @@
-//! What an .xlsx would unpack to: looked at before anything of it is kept in memory.
+//! Check of an .xlsx archive before it is read into memory.
 
 use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
-/// Most bytes that all files of the archive may unpack to: XML of twice as many cells as are kept. They pass by.
+/// Largest unpacked size of all files: XML of twice the allowed number of cells. It is not held in memory.
 const UNPACKED_MAX: u64 = 64 << 20;
-/// Most bytes of a list, such as that of texts: it is kept whole, and takes three times as much in memory.
-const KEPT_MAX: u64 = 4 << 20;
-/// Where the sheets are, which are read cell by cell (ECMA-376, part 1, 12.3.24, as every program names them).
+/// Largest unpacked size of a list, such as the table of texts, which takes three times as much in memory.
+const LIST_MAX: u64 = 4 << 20;
+/// Path of the sheets, which are read cell by cell (ECMA-376, part 1, 12.3.24).
 const SHEETS: &str = "xl/worksheets/sheet";
-/// So much is looked at together.
+/// Bytes per read.
 const BLOCK_BYTES: u64 = 1 << 16;
-/// Most files in the archive; a workbook has a dozen and one for each sheet.
+/// Largest number of files in the archive; a workbook has a dozen and one for each sheet.
 const FILES_MAX: usize = 4096;
-/// The attribute by which a table of texts tells how many there are: room is made for as many.
+/// Attribute with the number of texts, for which `calamine` allocates memory.
 const COUNT: &[u8] = b"uniqueCount";
 
-/// Refuses an archive that unpacks to too much or claims more texts than it has bytes.
+/// Refuses an archive that unpacks to too many bytes, or claims more texts than it has bytes.
 pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let damaged = |err: &dyn std::fmt::Display| {
         format!(
@@ -26,38 +26,38 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|err| damaged(&err))?;
     if archive.len() > FILES_MAX {
         return Err(format!(
-            "the workbook has {} files inside, and {FILES_MAX} are the most; it is none of a tester",
+            "the workbook contains {} files, more than {FILES_MAX}; export the measurement as text",
             archive.len()
         ));
     }
-    let mut left = UNPACKED_MAX;
+    let mut remaining = UNPACKED_MAX;
     for index in 0..archive.len() {
         let file = archive.by_index(index).map_err(|err| damaged(&err))?;
         let name = file.name().map_err(|err| damaged(&err))?.into_owned();
         let is_xml = name.ends_with(".xml") || name.ends_with(".rels");
-        let is_kept = is_xml && !name.starts_with(SHEETS);
-        let mut most = if is_kept { left.min(KEPT_MAX) } else { left };
+        let is_list = is_xml && !name.starts_with(SHEETS);
+        let mut most = if is_list { remaining.min(LIST_MAX) } else { remaining };
         let mut file = file.take(most + 1);
         let mut content = Vec::new();
         loop {
-            let room = if is_kept { most + 1 } else { BLOCK_BYTES };
+            let room = if is_list { most + 1 } else { BLOCK_BYTES };
             let read = (&mut file).take(room).read_to_end(&mut content);
             let read = read.map_err(|err| damaged(&err))? as u64;
             if read > most {
-                let (what, max) = match left > most {
-                    true => ("a list in the workbook", KEPT_MAX),
+                let (what, max) = match remaining > most {
+                    true => ("a list in the workbook", LIST_MAX),
                     false => ("the workbook", UNPACKED_MAX),
                 };
                 return Err(format!(
                     "{what} unpacks to more than {max} bytes; export the measurement as text"
                 ));
             }
-            (most, left) = (most - read, left - read);
-            if is_kept && claims_too_many(&content) {
+            (most, remaining) = (most - read, remaining - read);
+            if is_list && claims_too_many(&content) {
                 return Err(damaged(&"it claims more texts than it has bytes"));
             }
             content.clear();
-            if read == 0 || is_kept {
+            if read == 0 || is_list {
                 break;
             }
         }
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn claims_are_compared_with_what_is_there() {
+    fn claimed_number_of_texts_is_compared_with_the_size() {
         assert!(!claims_too_many(b"<sst count=\"2\" uniqueCount=\"2\"><si/><si/></sst>"));
         assert!(claims_too_many(b"<sst uniqueCount = '99999999999999999999'></sst>"));
     }

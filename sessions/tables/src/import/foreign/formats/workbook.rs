@@ -1,5 +1,4 @@
-//! The sheets of a workbook, .xlsx or .xls. What could make the reader of cells take more memory than the
-//! file deserves is looked for before it is called.
+//! The sheets of a workbook, .xlsx or .xls. Checks before reading keep a small file from taking much memory.
 
 use super::super::rows::Cell;
 use super::{Content, Layout, Sheet, legacy, unzipped};
@@ -8,7 +7,7 @@ use std::io::Cursor;
 
 pub(super) const LAYOUT: Layout = Layout {
     name: "workbook",
-    of: "a workbook (.xlsx, .xls)",
+    source: "a workbook (.xlsx, .xls)",
     content: Content::Sheets {
         is_it: |bytes| bytes.starts_with(ZIP) || bytes.starts_with(COMPOUND),
         read: sheets,
@@ -16,13 +15,13 @@ pub(super) const LAYOUT: Layout = Layout {
     words: &[],
 };
 
-/// Largest one read, in bytes: packed, as many cells as are read take about half of it. It is kept in memory.
+/// Largest size in bytes: about twice what the allowed number of cells takes when packed.
 const BYTES_MAX: usize = 8 << 20;
 
-/// Most cells kept of all sheets, so that the whole import takes less than 64 MiB: 17 MB here, and as much again
-/// for the samples made of them.
+/// Largest number of cells over all sheets, so that an import takes less than 64 MiB: 17 MB here, and as much again for the
+/// samples.
 const CELLS_MAX: usize = 1 << 19;
-/// Columns of a sheet of measurements; more is not one.
+/// Largest number of columns of a sheet of measurements.
 const COLUMNS_MAX: u32 = 256;
 
 /// First bytes of a zip archive, which an .xlsx is.
@@ -34,20 +33,20 @@ const COMPOUND: &[u8] = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1";
 fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     if bytes.len() > BYTES_MAX {
         return Err(format!(
-            "the workbook has {} bytes, and {BYTES_MAX} are the most; export the measurement as text",
+            "the workbook has {} bytes, more than {BYTES_MAX}; export the measurement as text",
             bytes.len()
         ));
     }
     if bytes.starts_with(ZIP) {
         unzipped::check(bytes)?;
-        modern(bytes)
+        read_xlsx(bytes)
     } else if bytes.starts_with(COMPOUND) {
         legacy::check(bytes)?;
-        // The reader of old cells trusts lengths that damage can change, and stops with a panic.
-        palpate_model::contained::contained(|| old(bytes))
+        // `calamine` trusts lengths in an .xls, and panics if damage has changed them.
+        palpate_model::contained::contained(|| read_xls(bytes))
             .unwrap_or_else(|_| Err(damaged("its records contradict each other")))
     } else {
-        Err("it is no workbook: it begins neither like an .xlsx nor like an .xls".into())
+        Err("it is not a workbook: it begins neither like an .xlsx nor like an .xls".into())
     }
 }
 
@@ -55,7 +54,7 @@ fn damaged(err: impl std::fmt::Display) -> String {
     format!("the workbook cannot be read ({err}); save it again from the program that made it")
 }
 
-/// Rows in the making, one cell after the other.
+/// Rows being filled, cell by cell.
 #[derive(Default)]
 struct Grid {
     rows: Vec<(usize, Vec<Cell>)>,
@@ -99,14 +98,14 @@ impl Grid {
     }
 }
 
-fn modern(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
+fn read_xlsx(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     let mut book = Xlsx::new(Cursor::new(bytes)).map_err(damaged)?;
     let mut total = 0;
     let names = book.sheet_names();
     let mut sheets = Vec::with_capacity(names.len());
     for name in names {
         let mut grid = Grid { cells: total, ..Grid::default() };
-        // A sheet that holds no cells, such as a chart, has no reader.
+        // A sheet without cells, such as a chart, has no reader.
         if let Ok(mut cells) = book.worksheet_cells_reader(&name) {
             while let Some(cell) = cells.next_cell().map_err(damaged)? {
                 let (row, column) = cell.get_position();
@@ -127,7 +126,7 @@ fn modern(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     Ok(sheets)
 }
 
-fn old(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
+fn read_xls(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     let mut book = Xls::new(Cursor::new(bytes)).map_err(damaged)?;
     let mut total = 0;
     let mut sheets = Vec::new();

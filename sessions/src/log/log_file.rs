@@ -1,4 +1,4 @@
-//! One file of a log, read frame by frame: no more of it is in memory than its longest frame.
+//! One file of a log, read frame by frame, so that at most one frame is in memory.
 
 use super::frames::{FOOTER_BYTES, FRAME_BYTES_MAX, FRAME_HEADER_BYTES, Fields};
 use mcap::records::op;
@@ -7,34 +7,33 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// Bytes looked at together where a file is searched.
+/// Bytes per read while searching a file.
 const WINDOW_BYTES: usize = 1 << 18;
 
-/// A file and its length.
 #[derive(Debug)]
-pub(crate) struct Source {
+pub(crate) struct LogFile {
     file: File,
     length: u64,
 }
 
-/// Why there is no frame at a place.
+/// Why a frame cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NoFrame {
+pub(crate) enum FrameError {
     /// The frame runs past the end.
     PastEnd,
-    /// The frame is larger than any this program writes.
+    /// The frame exceeds [`FRAME_BYTES_MAX`].
     TooLong,
 }
 
-/// What a frame is; its body is in the buffer it was read into.
+/// Header of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameHead {
     pub opcode: u8,
-    /// Place of the next frame.
+    /// Offset of the next frame.
     pub next: u64,
 }
 
-impl Source {
+impl LogFile {
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = File::open(path)?;
         let length = file.metadata()?.len();
@@ -45,26 +44,25 @@ impl Source {
         self.length
     }
 
-    /// Fills the buffer from a place, or with less where the file ends.
+    /// Fills the buffer from `offset`, with fewer bytes at the end of the file.
     fn fill(&self, buffer: &mut Vec<u8>, offset: u64, count: usize) -> io::Result<()> {
         let count = count.min(usize::try_from(self.length.saturating_sub(offset)).unwrap_or(count));
         buffer.resize(count, 0);
         self.file.read_exact_at(buffer, offset)
     }
 
-    /// Whether the file begins with these bytes.
     pub fn begins_with(&self, bytes: &[u8]) -> io::Result<bool> {
         let mut beginning = Vec::new();
         self.fill(&mut beginning, 0, bytes.len())?;
         Ok(beginning == bytes)
     }
 
-    /// Reads the frame at `offset`: header and body, together, into `bytes`.
+    /// Reads the frame at `offset`, header and body, into `bytes`.
     pub fn frame_at(
         &self,
         offset: u64,
         bytes: &mut Vec<u8>,
-    ) -> io::Result<Result<FrameHead, NoFrame>> {
+    ) -> io::Result<Result<FrameHead, FrameError>> {
         let head = match self.head_at(offset)? {
             Ok(head) => head,
             Err(reason) => return Ok(Err(reason)),
@@ -74,27 +72,25 @@ impl Source {
     }
 
     /// Reads only the header of the frame at `offset`.
-    pub fn head_at(&self, offset: u64) -> io::Result<Result<FrameHead, NoFrame>> {
+    pub fn head_at(&self, offset: u64) -> io::Result<Result<FrameHead, FrameError>> {
         let mut header = [0; FRAME_HEADER_BYTES];
         let body = offset.saturating_add(FRAME_HEADER_BYTES as u64);
         if body > self.length {
-            return Ok(Err(NoFrame::PastEnd));
+            return Ok(Err(FrameError::PastEnd));
         }
         self.file.read_exact_at(&mut header, offset)?;
-        let mut fields = Fields(&header);
-        let (Some(opcode), Some(length)) = (fields.u8(), fields.u64()) else {
-            return Ok(Err(NoFrame::PastEnd));
-        };
+        let [opcode, length @ ..] = header;
+        let length = u64::from_le_bytes(length);
         if length > self.length - body {
-            return Ok(Err(NoFrame::PastEnd));
+            return Ok(Err(FrameError::PastEnd));
         }
         if length > FRAME_BYTES_MAX as u64 {
-            return Ok(Err(NoFrame::TooLong));
+            return Ok(Err(FrameError::TooLong));
         }
         Ok(Ok(FrameHead { opcode, next: body + length }))
     }
 
-    /// Everything behind the last byte that is not zero may never have reached the disk.
+    /// Length without trailing zeros, which may be data that never reached the disk.
     pub fn written_length(&self) -> io::Result<u64> {
         let mut window = Vec::new();
         let mut stop = self.length;
@@ -109,7 +105,7 @@ impl Source {
         Ok(0)
     }
 
-    /// Whether the file was made but not even its first bytes reached the disk.
+    /// Whether not even the first bytes of the file reached the disk.
     pub fn is_barely_begun(&self) -> io::Result<bool> {
         let written = self.written_length()?;
         if written >= mcap::MAGIC.len() as u64 {
@@ -118,7 +114,7 @@ impl Source {
         self.begins_with(&mcap::MAGIC[..written as usize])
     }
 
-    /// Whether the file claims to be finished: a footer and the closing magic are in their place.
+    /// Whether the file claims to be finished: it ends in a footer and the closing magic.
     pub fn has_footer(&self) -> io::Result<bool> {
         if self.length < (mcap::MAGIC.len() + FOOTER_BYTES) as u64 {
             return Ok(false);
@@ -128,7 +124,7 @@ impl Source {
         Ok(footer.ends_with(mcap::MAGIC) && footer[0] == op::FOOTER)
     }
 
-    /// Where a finished file's index begins; its end if it has none.
+    /// Offset of a finished file's index; the file's length without an index.
     pub fn summary_start(&self) -> io::Result<u64> {
         let mut footer = Vec::new();
         self.fill(&mut footer, self.length - FOOTER_BYTES as u64, FOOTER_BYTES)?;
@@ -136,7 +132,7 @@ impl Source {
         Ok(start.filter(|&start| start > 0).unwrap_or(self.length))
     }
 
-    /// The checksum stored at the end of the file and the one of the bytes from `start` to it.
+    /// The stored checksum of the index, and the computed one of the bytes from `start`.
     pub fn index_checksums(&self, start: u64) -> io::Result<(u32, u32)> {
         let stored = self.length - mcap::MAGIC.len() as u64 - 4;
         let mut sum = crc32fast::Hasher::new();
@@ -152,9 +148,9 @@ impl Source {
         Ok((Fields(&window).u32().unwrap_or(0), sum.finalize()))
     }
 
-    /// The next place after `offset` where a chunk's frame may begin.
+    /// The next offset where a chunk's frame may begin.
     pub fn next_chunk_mark(&self, offset: u64) -> io::Result<Option<u64>> {
-        // The compression's name, and how far into a chunk's frame it stands.
+        // The compression's name, and its offset in a chunk's frame.
         const MARK: &[u8] = b"\x04\0\0\0zstd";
         const MARK_OFFSET: u64 = (FRAME_HEADER_BYTES + 8 + 8 + 8 + 4) as u64;
         let mut window = Vec::new();
@@ -165,7 +161,7 @@ impl Source {
             if let Some(found) = marks.position(|bytes| bytes == MARK) {
                 return Ok(Some(start + found as u64 - MARK_OFFSET));
             }
-            // The mark may lie across the edge of two windows.
+            // The mark may straddle two windows.
             start += (window.len().max(MARK.len()) - MARK.len() + 1) as u64;
             if window.len() < WINDOW_BYTES {
                 break;

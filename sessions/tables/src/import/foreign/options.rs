@@ -1,4 +1,4 @@
-//! What a person says of a file; everything else is detected.
+//! Options for reading a foreign file; everything else is detected.
 
 use super::super::header::Quantity;
 use super::decimal::Decimal;
@@ -6,44 +6,37 @@ use super::encoding::TextEncoding;
 use super::formats::Format;
 use super::rows::Delimiter;
 
-/// Everything that can be said. What is not said is detected.
+/// An option that is not set is detected.
 #[derive(Clone, Debug, Default)]
 pub struct Told {
-    /// Layout of the file.
     pub format: Option<Format>,
-    /// What stands between cells.
     pub delimiter: Option<Delimiter>,
-    /// Encoding of the text.
     pub encoding: Option<TextEncoding>,
-    /// Decimal sign.
     pub decimal: Option<Decimal>,
-    /// Names of all columns, in order, where the file has none.
+    /// Names of all columns, in order, for a file without names.
     pub names: Vec<String>,
-    /// Which column is what.
     pub columns: Vec<ColumnChoice>,
-    /// In which unit.
     pub units: Vec<UnitChoice>,
-    /// What counts as zero.
     pub zeros: Vec<ZeroChoice>,
     /// Line of the column names, from 1.
     pub header_row: Option<usize>,
     /// Line of the units, from 1; 0 for none.
     pub units_row: Option<usize>,
-    /// Sheets, blocks or intervals wanted, by name or number from 1; empty for all.
+    /// Sheets, blocks or intervals by name or number from 1; empty for all.
     pub parts: Vec<String>,
-    /// Rows that are left out instead of refused.
+    /// Rows to leave out instead of refusing them.
     pub skip: Vec<Fault>,
 }
 
 palpate_model::named! {
-    /// A row that is not as it should be.
+    /// A fault of a row.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Fault {
         /// A value is empty or NaN.
         Missing = "missing",
-        /// The time is that of the row before.
+        /// The time equals that of the row before.
         Repeated = "repeated",
-        /// The time is before that of a row before.
+        /// The time is less than that of the row before.
         Backward = "backward",
     }
 }
@@ -57,7 +50,7 @@ impl std::str::FromStr for Fault {
     }
 }
 
-fn quantity_and(text: &str, what: &str) -> Result<(Quantity, String), String> {
+fn split_quantity(text: &str, what: &str) -> Result<(Quantity, String), String> {
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
     let wrong = || format!("give QUANTITY={what}, the quantity one of {}", names());
     let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
@@ -69,7 +62,7 @@ fn quantity_and(text: &str, what: &str) -> Result<(Quantity, String), String> {
     }
 }
 
-/// `depth=NAME`; with a minus before the name its values are turned round.
+/// `depth=NAME`; a minus before the name inverts the sign of the values.
 #[derive(Clone, Debug)]
 pub struct ColumnChoice {
     pub(super) quantity: Quantity,
@@ -80,7 +73,7 @@ impl std::str::FromStr for ColumnChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (quantity, name) = quantity_and(text, "NAME")?;
+        let (quantity, name) = split_quantity(text, "NAME")?;
         Ok(Self { quantity, name })
     }
 }
@@ -96,10 +89,10 @@ impl std::str::FromStr for UnitChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (quantity, unit) = quantity_and(text, "UNIT")?;
+        let (quantity, unit) = split_quantity(text, "UNIT")?;
         if quantity.scale(&unit).is_none() {
             return Err(format!(
-                "the unit '{unit}' of the {} is not known; known are {}",
+                "the unit '{unit}' of the {} is unknown; give one of {}",
                 quantity.name(),
                 quantity.known_units()
             ));
@@ -112,7 +105,7 @@ impl std::str::FromStr for UnitChoice {
 #[derive(Clone, Debug)]
 pub struct ZeroChoice {
     pub(super) quantity: Quantity,
-    /// `None` for the first row's value.
+    /// `None` for the value of the first row.
     pub(super) value: Option<f64>,
 }
 
@@ -120,9 +113,9 @@ impl std::str::FromStr for ZeroChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (quantity, rest) = quantity_and(text, "first|NUMBER")?;
+        let (quantity, rest) = split_quantity(text, "first|NUMBER")?;
         if quantity == Quantity::Time {
-            return Err("time counts from the first row in any case".into());
+            return Err("time always counts from the first row; give depth or force".into());
         }
         let value = match rest.as_str() {
             "first" => None,

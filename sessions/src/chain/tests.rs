@@ -1,5 +1,3 @@
-//! Chains of lines, in memory and on disk.
-
 use super::*;
 use serde_json::json;
 use std::fs;
@@ -11,7 +9,7 @@ fn three(path: &Path) {
 }
 
 #[test]
-fn lines_come_back_and_every_change_is_noticed() {
+fn lines_read_back_and_every_change_is_noticed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("deep/lines.jsonl");
     assert!(read(&path, "session").unwrap().bodies.is_empty());
@@ -44,28 +42,28 @@ fn lines_come_back_and_every_change_is_noticed() {
 }
 
 #[test]
-fn lines_taken_off_the_end_are_noticed_wherever_the_head_is_known() {
+fn lines_cut_off_the_end_are_noticed_by_the_head() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lines.jsonl");
     three(&path);
-    let (head_file, text) = (Head::file_of(&path), fs::read_to_string(&path).unwrap());
+    let (head_file, text) = (ChainHead::file_of(&path), fs::read_to_string(&path).unwrap());
     let head = fs::read(&head_file).unwrap();
     let known = read(&path, "session").unwrap().head();
     assert_eq!(known.lines, 3);
-    for kept in 0..3 {
-        let lines: Vec<&str> = text.split_inclusive('\n').take(kept).collect();
+    for count in 0..3 {
+        let lines: Vec<&str> = text.split_inclusive('\n').take(count).collect();
         fs::write(&path, lines.concat()).unwrap();
-        let told = |read: Result<Chain, ChainError>| match read {
+        let counts = |read: Result<Chain, ChainError>| match read {
             Err(ChainError::Shortened { found, written, .. }) => Some((found, written)),
             _ => None,
         };
-        assert_eq!(told(read(&path, "session")), Some((kept as u64, 3)));
+        assert_eq!(counts(read(&path, "session")), Some((count as u64, 3)));
         // Nothing is added that would hide it.
         assert!(append(&path, "session", &json!({})).is_err());
-        // Without the file only who remembers notices.
+        // Without the head's file only a remembered head reveals it.
         fs::remove_file(&head_file).unwrap();
-        assert_eq!(read(&path, "session").unwrap().bodies.len(), kept);
-        assert_eq!(told(read_since(&path, "session", known)), Some((kept as u64, 3)));
+        assert_eq!(read(&path, "session").unwrap().bodies.len(), count);
+        assert_eq!(counts(read_since(&path, "session", known)), Some((count as u64, 3)));
         fs::write(&head_file, &head).unwrap();
     }
     fs::remove_file(&path).unwrap();
@@ -85,23 +83,23 @@ fn lines_taken_off_the_end_are_noticed_wherever_the_head_is_known() {
 }
 
 #[test]
-fn a_head_that_a_crash_left_behind_its_lines_is_no_fault() {
+fn head_behind_its_lines_is_accepted_after_a_crash() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lines.jsonl");
     let heads: Vec<Vec<u8>> = (0..3)
         .map(|number| {
             append(&path, "session", &json!(number)).unwrap();
-            fs::read(Head::file_of(&path)).unwrap()
+            fs::read(ChainHead::file_of(&path)).unwrap()
         })
         .collect();
     for head in heads {
-        fs::write(Head::file_of(&path), head).unwrap();
+        fs::write(ChainHead::file_of(&path), head).unwrap();
         assert_eq!(read(&path, "session").unwrap().bodies.len(), 3);
     }
 }
 
 #[test]
-fn every_bit_of_a_line_counts() {
+fn flipped_bit_of_a_line_never_changes_a_body() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lines.jsonl");
     three(&path);
@@ -112,29 +110,29 @@ fn every_bit_of_a_line_counts() {
         changed[at] ^= 1;
         fs::write(&path, &changed).unwrap();
         if let Ok(chain) = read(&path, "session") {
-            // A key of no meaning may differ; what is said may not.
+            // An ignored key may differ; the body may not.
             assert_eq!(chain.bodies, whole, "bit 0 of byte {at}");
         }
     }
 }
 
 #[test]
-fn what_a_crash_left_unfinished_is_moved_away_and_kept() {
+fn incomplete_line_moves_to_torn_file_before_the_next_append() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lines.jsonl");
     three(&path);
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
     // A crash comes before the head.
-    fs::remove_file(Head::file_of(&path)).unwrap();
+    fs::remove_file(ChainHead::file_of(&path)).unwrap();
     let torn = read(&path, "session").unwrap();
     assert!(torn.is_torn && torn.bodies.len() == 2);
     append(&path, "session", &json!({"word": "four"})).unwrap();
     let chain = read(&path, "session").unwrap();
     assert_eq!(chain.bodies[2], json!({"word": "four"}));
-    let kept = fs::read(folder.path().join("lines.jsonl.torn")).unwrap();
+    let torn_file = fs::read(folder.path().join("lines.jsonl.torn")).unwrap();
     let line = bytes[..bytes.len() - 1].rsplit(|byte| *byte == b'\n').next();
     let torn = &line.unwrap()[..line.unwrap().len() - 8];
-    assert_eq!(kept, [torn, b"\n"].concat());
+    assert_eq!(torn_file, [torn, b"\n"].concat());
     assert!(!chain.is_torn);
 }

@@ -1,10 +1,10 @@
-//! Text that no spreadsheet takes for a formula.
+//! Protection against text that a spreadsheet would run as a formula.
 
 use polars_core::prelude::{ChunkApply, Column, DataFrame, DataType, IntoColumn, PolarsResult};
 use std::borrow::Cow;
 
-/// A text as it may stand in a cell of a CSV file. Spreadsheets run what begins with `=`, `+`, `-`, `@`, a
-/// tab or a carriage return as a formula (OWASP, "CSV injection"); `'` before it says that it is text.
+/// Puts `'` before a text that begins with `=`, `+`, `-`, `@`, a tab or a carriage return, which spreadsheets run as a
+/// formula (OWASP, "CSV injection").
 #[must_use]
 pub fn harmless(text: &str) -> Cow<'_, str> {
     match text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
@@ -13,8 +13,8 @@ pub fn harmless(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// A frame whose names and texts are harmless; numbers stay numbers.
-pub(super) fn harmless_frame(frame: DataFrame) -> PolarsResult<DataFrame> {
+/// Escapes the names and texts of a frame; numbers stay numbers.
+pub(super) fn escape_frame(frame: DataFrame) -> PolarsResult<DataFrame> {
     let height = frame.height();
     let columns = frame.columns().iter().map(|column| {
         let mut column = match column.dtype() {

@@ -1,7 +1,7 @@
-//! The thread's part of the session writer: batches to the disk, and what to do when that fails.
+//! The writer thread: writes batches to the disk and continues in a new segment when that fails.
 
 use super::error::LogError;
-use super::news::{Notice, Shared};
+use super::notices::{Notice, WriterStatus};
 use super::sink::Sink;
 use super::thread::Batch;
 use super::writer::{LogWriter, Parts};
@@ -9,57 +9,57 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
-/// Samples that are kept in memory at most to be written again if the disk fails: 23 MB.
+/// Largest number of samples held in memory for rewriting after a disk failure: 23 MB.
 const ROWS_SINCE_SYNC_MAX: usize = 1 << 18;
-/// Raw bytes that are kept for the same.
+/// Largest number of raw bytes held for the same purpose.
 const RAW_SINCE_SYNC_MAX: usize = 8 << 20;
-/// New files begun at most because the disk failed. A disk that fails more often will not do.
+/// Largest number of new files after disk failures.
 const MOVES_MAX: u32 = 4;
-/// Wall time from the beginning of a synchronisation with the disk to when the next is due. It begins when the
-/// batch in the making is written, 100 ms later at most, and takes tens of milliseconds: so a power cut costs
-/// no more than a second.
+/// Wall time from the start of one synchronisation to the due time of the next. The next starts after the present batch, at
+/// most 100 ms later, and takes tens of milliseconds, so a power cut costs at most 1 s.
 const SYNC_EVERY: Duration = Duration::from_millis(800);
 
-/// The thread's part: the log, and what must be written again if the disk fails.
-struct Scribe<'a, S: Sink, C: Fn() -> Instant> {
+/// The log, and the batches to rewrite if the disk fails.
+struct BatchWriter<'a, S: Sink, C: Fn() -> Instant> {
     log: LogWriter<S>,
-    shared: &'a Shared,
+    status: &'a WriterStatus,
     clock: C,
     since_sync: Vec<Batch>,
-    /// When the last synchronisation began: what came after it may be lost.
+    /// Start of the last synchronisation; later batches may be lost.
     last_sync: Instant,
     moves: u32,
-    /// What another program did to the log first.
+    /// The first alteration by another program.
     altered: Option<LogError>,
 }
 
-/// The thread: writes batches until there are no more, and synchronises after events and whenever it is time.
+/// Writes batches until the channel closes; synchronises after events and at intervals.
 pub(super) fn write_batches<S: Sink>(
     log: LogWriter<S>,
     receiver: &Receiver<Batch>,
-    shared: &Shared,
+    status: &WriterStatus,
     clock: impl Fn() -> Instant,
 ) {
-    let mut scribe = Scribe {
+    let mut batch_writer = BatchWriter {
         log,
-        shared,
+        status,
         since_sync: Vec::new(),
         last_sync: clock(),
         clock,
         moves: 0,
         altered: None,
     };
-    if let Err(err) = scribe.run(receiver) {
-        shared.fail(err);
+    if let Err(err) = batch_writer.run(receiver) {
+        status.fail(err);
     }
 }
 
-impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
+impl<S: Sink, C: Fn() -> Instant> BatchWriter<'_, S, C> {
     fn run(&mut self, receiver: &Receiver<Batch>) -> Result<(), LogError> {
         let mut carried = None;
         let mut has_event = false;
         loop {
-            let next = carried.take().map_or_else(|| receiver.recv_timeout(self.patience()), Ok);
+            let next =
+                carried.take().map_or_else(|| receiver.recv_timeout(self.time_to_sync()), Ok);
             match next {
                 Ok(batch) => {
                     has_event |= batch.has_event;
@@ -68,15 +68,15 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {}
-                // No end record was asked for; what was written is still made durable.
+                // Closed without an end record; everything written is still synchronised.
                 Err(RecvTimeoutError::Disconnected) => return self.sync(),
             }
             let rows: usize = self.since_sync.iter().map(|batch| batch.rows.len()).sum();
             let raw: usize = self.since_sync.iter().map(|batch| batch.raw_bytes).sum();
             let is_much = rows >= ROWS_SINCE_SYNC_MAX || raw >= RAW_SINCE_SYNC_MAX;
-            let is_due = self.patience().is_zero();
+            let is_due = self.time_to_sync().is_zero();
             if has_event {
-                // One sync does for all events that wait.
+                // One synchronisation serves all waiting events.
                 carried = receiver.try_recv().ok();
             }
             if is_due || is_much || (has_event && carried.is_none()) {
@@ -86,8 +86,8 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         }
     }
 
-    /// How long the next synchronisation can wait.
-    fn patience(&self) -> Duration {
+    /// Time until the next synchronisation is due.
+    fn time_to_sync(&self) -> Duration {
         let since = (self.clock)().duration_since(self.last_sync);
         match self.since_sync.is_empty() {
             true => SYNC_EVERY,
@@ -95,16 +95,14 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         }
     }
 
-    /// Writes a batch; whether it was the last.
+    /// Writes a batch; returns whether it was the last.
     fn write(&mut self, mut batch: Batch) -> Result<bool, LogError> {
         let end = batch.end.take();
         let (span, through, raw_bytes) = (batch.span, batch.through, batch.raw_bytes);
         let outcome = self.log.append_parts(&batch.parts());
         self.since_sync.push(batch);
         let outcome = outcome.or_else(|err| self.go_on_elsewhere(&err));
-        self.shared.queued_ns.fetch_sub(span.0, Ordering::AcqRel);
-        let queued_raw = &self.shared.queued_raw;
-        queued_raw.fetch_sub(raw_bytes as u64, Ordering::AcqRel);
+        self.status.remove_queued(span, raw_bytes);
         outcome?;
         if let Some(end) = &end {
             while let Err(err) = self.log.finish(end.clone()) {
@@ -112,13 +110,13 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
             }
         }
         if let Some(err) = self.log.take_altered() {
-            self.note_altered(err);
+            self.report_altered(err);
         }
-        // Told last, so that the log has its end whatever became of what was before.
+        // Reported last, so that the log has its end record in any case.
         if let (Some(_), Some(err)) = (&end, &self.altered) {
             return Err(err.clone());
         }
-        let saved = &self.shared.saved_through_ns;
+        let saved = &self.status.saved_through_ns;
         saved.store(through.0, Ordering::Release);
         Ok(end.is_some())
     }
@@ -127,49 +125,49 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         let began = (self.clock)();
         if !self.since_sync.is_empty() {
             if let Err(err) = self.log.sync() {
-                // What is written again is synced, too.
+                // Rewriting includes a synchronisation.
                 self.go_on_elsewhere(&err)?;
             }
             self.since_sync.clear();
             let took = (self.clock)().duration_since(began);
-            self.shared.note_sync(took, self.log.free_bytes());
+            self.status.record_sync(took, self.log.free_bytes());
         }
         self.last_sync = began;
         Ok(())
     }
 
-    /// What another program did is a fault of the session, which nothing makes good.
-    fn note_altered(&mut self, err: LogError) {
-        self.shared.tell(Notice::Altered(err.clone()));
+    /// An alteration by another program cannot be repaired; closing the session reports it.
+    fn report_altered(&mut self, err: LogError) {
+        self.status.push_notice(Notice::Altered(err.clone()));
         self.altered.get_or_insert(err);
     }
 
-    /// After the disk has failed, or another program has changed the file: a new segment, with everything that may be lost
-    /// of the old one.
+    /// After a disk failure or an alteration, continues in a new segment and rewrites everything that the old one may have
+    /// lost.
     fn go_on_elsewhere(&mut self, err: &LogError) -> Result<(), LogError> {
         let reason = match err {
             LogError::Disk { reason, .. } => reason.clone(),
             LogError::Altered { alteration, .. } => alteration.to_string(),
             _ => return Err(err.clone()),
         };
-        let again: Vec<Parts<'_>> = self.since_sync.iter().map(Batch::parts).collect();
+        let since_sync: Vec<Parts<'_>> = self.since_sync.iter().map(Batch::parts).collect();
         let began = (self.clock)();
         let (path, is_elsewhere) = loop {
             if self.moves >= MOVES_MAX {
                 return Err(err.clone());
             }
             self.moves += 1;
-            if let Ok(place) = self.log.write_again(&again) {
-                break place;
+            if let Ok(segment) = self.log.rewrite(&since_sync) {
+                break segment;
             }
         };
         self.since_sync.clear();
         self.last_sync = began;
         if let LogError::Altered { .. } = err {
-            self.note_altered(err.clone());
+            self.report_altered(err.clone());
             return Ok(());
         }
-        self.shared.tell(Notice::Moved {
+        self.status.push_notice(Notice::Moved {
             reason,
             path,
             is_last: is_elsewhere || self.moves == MOVES_MAX,
@@ -198,7 +196,7 @@ mod tests {
     use std::sync::mpsc::sync_channel;
     use std::sync::{Arc, Mutex};
 
-    /// A disk in whose time batches come every 100 ms and a synchronisation takes a while.
+    /// A disk with its own clock: a batch takes 100 ms, a synchronisation `sync_ms`.
     #[derive(Clone)]
     struct Slow {
         now_ms: Arc<AtomicU64>,
@@ -231,15 +229,15 @@ mod tests {
         .unwrap()
     }
 
-    fn scribe<'a>(
+    fn batch_writer<'a>(
         disk: &Slow,
-        shared: &'a Shared,
-    ) -> Scribe<'a, Slow, impl Fn() -> Instant + use<>> {
+        status: &'a WriterStatus,
+    ) -> BatchWriter<'a, Slow, impl Fn() -> Instant + use<>> {
         let (start, now_ms) = (monotonic_now(), Arc::clone(&disk.now_ms));
         let clock = move || start + Duration::from_millis(now_ms.load(Ordering::Relaxed));
-        Scribe {
+        BatchWriter {
             log: LogWriter::begin(disk.clone(), "memory", &manifest()).unwrap(),
-            shared,
+            status,
             since_sync: Vec::new(),
             last_sync: clock(),
             clock,
@@ -270,11 +268,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_synchronised_is_never_older_than_a_second() {
+    fn unsynchronised_data_is_never_older_than_a_second() {
         for sync_ms in [0, 4, 19, 60, 100] {
             let disk = disk(sync_ms);
-            let shared = Shared::default();
-            let mut scribe = scribe(&disk, &shared);
+            let status = WriterStatus::default();
+            let mut batch_writer = batch_writer(&disk, &status);
             let (sender, receiver) = sync_channel(200);
             for number in 0..200 {
                 let mut batch = batch(number);
@@ -282,11 +280,11 @@ mod tests {
                 sender.send(batch).unwrap();
             }
             drop(sender);
-            scribe.run(&receiver).unwrap();
+            batch_writer.run(&receiver).unwrap();
             let syncs = disk.syncs.lock().unwrap();
             assert!(syncs.len() > 20, "{}", syncs.len());
             for two in syncs.windows(2) {
-                // What was taken since the one began is safe once the next has ended.
+                // Batches since the start of one synchronisation are safe at the end of the next.
                 let oldest_ms = two[1].1 - two[0].0;
                 assert!(oldest_ms <= 1000, "{oldest_ms} ms, {sync_ms} ms a sync");
             }
@@ -294,18 +292,18 @@ mod tests {
     }
 
     #[test]
-    fn silence_does_not_put_a_synchronisation_off() {
+    fn pause_between_batches_does_not_delay_a_synchronisation() {
         let disk = disk(10);
-        let shared = Shared::default();
-        let mut scribe = scribe(&disk, &shared);
-        assert_eq!(scribe.patience(), SYNC_EVERY);
+        let status = WriterStatus::default();
+        let mut batch_writer = batch_writer(&disk, &status);
+        assert_eq!(batch_writer.time_to_sync(), SYNC_EVERY);
         for number in 0..7 {
-            scribe.write(batch(number)).unwrap();
+            batch_writer.write(batch(number)).unwrap();
         }
-        assert_eq!(scribe.patience(), Duration::from_millis(100));
-        scribe.sync().unwrap();
+        assert_eq!(batch_writer.time_to_sync(), Duration::from_millis(100));
+        batch_writer.sync().unwrap();
         disk.now_ms.fetch_add(5000, Ordering::Relaxed);
-        // Nothing waits to be made durable.
-        assert_eq!(scribe.patience(), SYNC_EVERY);
+        // No batch waits for synchronisation.
+        assert_eq!(batch_writer.time_to_sync(), SYNC_EVERY);
     }
 }

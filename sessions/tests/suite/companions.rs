@@ -88,7 +88,7 @@ struct Counts {
 }
 
 #[test]
-fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
+fn companions_with_the_same_meaning_are_copied_and_others_reported() {
     let rows = rows(3000, 75);
     let whole = log_bytes(&rows, &contacts(&rows), Some(end(Nanos::from_millis(3000))));
     let mut counts = Counts::default();
@@ -111,24 +111,24 @@ fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
         assert_eq!(missing.entries > 0, !has_contacts, "{place}: {missing:?}");
 
         let id = &recovery.session_id;
-        let kept = Edits::read(&recovery.folder, id).unwrap().all;
-        // Without an end nobody knows how many decisions there were.
+        let remaining = Edits::read(&recovery.folder, id).unwrap().all;
+        // Without an end the number of decisions is unknown.
         let is_sure = has_contacts && !missing.is_end_lost;
         let is_kept = |edit: &Edit| is_sure || !matches!(edit.change, Change::Contact { .. });
         let expected: Vec<Edit> = edits().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}: {missing:?}");
-        let kept = Analyses::read(&recovery.folder, id).unwrap().all;
+        assert_eq!(remaining, expected, "{place}: {missing:?}");
+        let remaining = Analyses::read(&recovery.folder, id).unwrap().all;
         let is_kept = |one: &Analysis| match one.what {
             Analysed::Mask { .. } | Analysed::Withdrawal => has_first,
             Analysed::Recalibration { .. } => is_sure,
             Analysed::Fit { .. } => false,
         };
         let expected: Vec<Analysis> = analyses().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}: {missing:?}");
-        // Whoever opens the copy is told of the rest, as whoever made it was.
+        assert_eq!(remaining, expected, "{place}: {missing:?}");
+        // The notes of the copy report the rest too.
         let note = &copy.notes[0];
         assert_eq!(recovery.salvage.missing, missing);
-        for (words, is_told) in [
+        for (words, is_reported) in [
             ("fit 'kelvin'", true),
             ("mask 'stretch'", !has_first),
             ("'mistake'", false),
@@ -137,7 +137,7 @@ fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
             ("contact 2 by Ada", !is_sure),
             ("t_s counts", !has_first),
         ] {
-            assert_eq!(note.contains(words), is_told, "{place}: {words}: {note}");
+            assert_eq!(note.contains(words), is_reported, "{place}: {words}: {note}");
         }
         let original = recovery.folder.join(ORIGINAL_FOLDER).join("a.csv");
         assert_eq!(fs::read(original).unwrap(), b"t_s,F_N\n");
@@ -157,13 +157,13 @@ fn a_copy_of_an_interrupted_session_keeps_its_edits_but_those_of_contacts_it_lac
     let recovery = recover(&folder, "1.2.3", at()).unwrap();
     let copy = Session::open(&recovery.folder).unwrap();
     assert_eq!(copy.entries.len(), 1, "the cut is elsewhere");
-    let kept = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
-    assert_eq!(kept.all, edits()[..3]);
+    let remaining = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
+    assert_eq!(remaining.all, edits()[..3]);
     assert!(copy.notes[0].contains("contact 2 by Ada"), "{:?}", copy.notes);
 }
 
 #[test]
-fn edits_that_cannot_be_read_are_told() {
+fn unreadable_edits_are_reported() {
     let library = tempfile::tempdir().unwrap();
     let folder = library.path().join("a");
     let rows = rows(500, 77);
@@ -173,11 +173,11 @@ fn edits_that_cannot_be_read_are_told() {
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, text.replacen("Ada", "Eve", 1)).unwrap();
     }
-    let told = recover(&folder, "1.2.3", at()).unwrap().sentences(&folder);
+    let sentences = recover(&folder, "1.2.3", at()).unwrap().sentences(&folder);
     let copy = recovered_folder(&folder);
     assert!(!copy.join("edits.jsonl").exists());
-    for what in ["verdict", "analysis"] {
+    for what in ["edit", "analysis"] {
         let of_it = |one: &&String| one.contains(what) && one.contains("line 1");
-        assert_eq!(told.iter().filter(of_it).count(), 1, "{told:?}");
+        assert_eq!(sentences.iter().filter(of_it).count(), 1, "{sentences:?}");
     }
 }
