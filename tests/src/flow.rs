@@ -47,7 +47,6 @@ pub const FRAME: Duration = Duration::from_millis(5);
 
 /// A window on a simulated rig, driven by accessible name.
 pub struct Flow {
-    /// The window.
     pub window: Window,
     /// Where its sessions go.
     pub folder: TempDir,

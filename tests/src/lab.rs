@@ -17,13 +17,10 @@ const TICK: Nanos = Nanos::from_millis(10);
 /// A sample with what the engine made of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// The sample.
     pub reading: Reading,
-    /// Derived from it.
     pub derived: Derived,
     /// What the run was doing.
     pub phase: Phase,
-    /// Which repeat.
     pub cycle: u32,
     /// Step of the plan.
     pub step_index: usize,
@@ -43,9 +40,7 @@ pub fn retract() -> Step {
 
 /// A run under way.
 pub struct Lab<R: Rig> {
-    /// The rig.
     pub rig: R,
-    /// The engine.
     pub state: Option<State>,
     /// Time of the newest input.
     pub now: Nanos,

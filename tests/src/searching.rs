@@ -18,13 +18,11 @@ const CRUISING: f64 = 1e-9;
 
 /// A search that has ended.
 pub struct Searched {
-    /// How.
     pub outcome: Outcome,
     /// What was found.
     pub contact: Option<Contact>,
     /// True surface on the scale of the pulse counter, in mm.
     pub surface_mm: f64,
-    /// True body.
     pub body: ModifiedKelvin,
     /// Highest true force during the search, in N.
     pub force_true_max: f64,

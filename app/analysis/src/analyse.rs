@@ -11,15 +11,12 @@ use thiserror::Error;
 /// A recording shows no cycles.
 #[derive(Debug, Error)]
 pub enum AnalyseFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Nothing in it is a cycle.
     #[error(
         "no way in with at least 20 samples was found in {}; record one, or name the frequency of a sine", .0.display()
     )]
     NoCycles(PathBuf),
-    /// Nobody wants the rest.
     #[error("cancelled")]
     Cancelled,
 }

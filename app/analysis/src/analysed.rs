@@ -22,7 +22,6 @@ use std::path::Path;
 pub struct Opened {
     /// The session and its edits.
     pub edited: Edited,
-    /// Its analyses.
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
@@ -203,7 +202,6 @@ pub fn recalibrate(
 pub struct Passing {
     /// The session with its edits made; its manifest has the calibration that the forces are made with.
     pub edited: edited::Passing,
-    /// Its analyses.
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,

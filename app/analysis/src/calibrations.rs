@@ -23,7 +23,6 @@ pub struct Shelved {
 pub struct Shown {
     /// Its line in the list.
     pub entry: Entry,
-    /// The document.
     pub calibration: Calibration,
     /// What it is like and its curves, or why it makes none.
     pub told: Result<(Told, [Plot; 4]), String>,

@@ -27,25 +27,20 @@ pub const LAST: &str = "last";
 /// A session tells no compliance.
 #[derive(Debug, Error)]
 pub enum MeasureError {
-    /// The session cannot be used.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It was recorded by another program.
     #[error(
         "an imported session has no rig and no calibration, so it tells no compliance; run stiff-surface and name its session"
     )]
     Imported,
-    /// No surface was searched, or none found.
     #[error(
         "the session found no stiff surface, so what it pressed may have been tissue; run stiff-surface and name its session"
     )]
     NoSurface,
-    /// The surface was found and never pressed.
     #[error(
         "the session found a stiff surface and did not press it with a known force; run stiff-surface to its end"
     )]
     NoPress,
-    /// The forces are not those of a rig that gives way.
     #[error(transparent)]
     Line(#[from] ComplianceError),
 }
@@ -114,32 +109,24 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
 /// A compliance cannot be used on a record.
 #[derive(Debug, Error)]
 pub enum CorrectionError {
-    /// It cannot be read or found.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// None is kept for the rig.
     #[error(
         "the library has no compliance of rig {rig}; run stiff-surface on it and keep what its session tells"
     )]
     NoneInForce {
-        /// The rig.
         rig: String,
     },
-    /// A table does not say where it is from.
     #[error(
         "a table does not say which rig it is from, so there is no last compliance for it; name the compliance's file"
     )]
     NoRig,
-    /// Another rig gives way otherwise.
     #[error(
         "{id} is the compliance of rig {of}, and this was recorded on rig {rig}; name one of that rig"
     )]
     OtherRig {
-        /// The document.
         id: String,
-        /// Its rig.
         of: String,
-        /// The record's rig.
         rig: String,
     },
 }
@@ -151,7 +138,6 @@ enum Asked {
     Raw,
     /// The one in force for the rig of each record.
     InForce,
-    /// This one.
     This(Box<Kept>),
 }
 
@@ -232,7 +218,6 @@ impl Corrections {
 /// What a compliance does to the depths of a record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correction {
-    /// The document.
     pub id: String,
     /// Way of the axis per force, in mm/N.
     pub mm_per_n: f64,
@@ -274,7 +259,6 @@ impl Correction {
         }
     }
 
-    /// In a sentence.
     pub fn sentence(&self) -> String {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {

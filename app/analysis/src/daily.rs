@@ -37,7 +37,6 @@ pub struct PastCheck {
     pub check: DailyCheck,
     /// The empty cell, and the known weight; none where the session is not in the library or lacks the reading.
     pub zero: Option<Deviation>,
-    /// See [`Self::zero`].
     pub weight: Option<Deviation>,
 }
 
@@ -208,7 +207,6 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
 /// What the daily check says to a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Gate {
-    /// Nothing.
     Open,
     /// Something worth knowing.
     Note(String),

@@ -19,7 +19,6 @@ use std::path::Path;
 pub struct Edited {
     /// The session, its notes telling what was corrected and doubted.
     pub session: Session,
-    /// The edits.
     pub edits: Edits,
 }
 
@@ -59,7 +58,6 @@ fn doubts(edits: &Edits) -> Vec<String> {
 pub struct Passing {
     /// All but the samples, its notes telling what was corrected and doubted.
     pub outline: Outline,
-    /// The edits.
     pub edits: Edits,
     shifts: Vec<Shift>,
 }

@@ -22,13 +22,10 @@ pub fn author(given: Option<&str>) -> String {
 /// Nothing was said of a session.
 #[derive(Debug, Error)]
 pub enum SayFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Its analyses cannot be read.
     #[error(transparent)]
     Analyses(#[from] AnalysisError),
-    /// Its edits cannot be read or added to.
     #[error(transparent)]
     Edit(#[from] EditError),
 }
@@ -36,9 +33,7 @@ pub enum SayFailure {
 /// A session of which something is to be said.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Its folder.
     pub folder: PathBuf,
-    /// Its name.
     pub id: String,
     /// What was said of it so far.
     pub edits: Edits,
@@ -51,7 +46,6 @@ impl Subject {
         Ok(Self { edits: Edits::read(folder, &id)?, folder: folder.to_owned(), id })
     }
 
-    /// Adds an edit.
     pub fn say(&self, by: &str, reason: &str, change: Change) -> Result<Edit, SayFailure> {
         let edit = Edit {
             at: wall_now().into(),
@@ -83,7 +77,6 @@ pub enum Saying {
         /// Those they lose.
         remove: Vec<String>,
     },
-    /// A remark.
     Note(String),
     /// What they are worth, and why.
     Verdict(Verdict, String),
@@ -92,7 +85,6 @@ pub enum Saying {
 }
 
 impl Saying {
-    /// In words.
     pub fn words(&self) -> String {
         match self {
             Self::Tags { add, remove } => {

@@ -16,13 +16,10 @@ use thiserror::Error;
 /// Nothing was written of a session.
 #[derive(Debug, Error)]
 pub enum ExportFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be written.
     #[error(transparent)]
     Export(#[from] ExportError),
-    /// It is being recorded, and what is in a lake never changes.
     #[error(
         "{} is being recorded, and files of a lake never change; add it when the run has ended", .0.display()
     )]
@@ -38,10 +35,8 @@ pub enum Target {
     Messages(PathBuf),
 }
 
-/// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// The file.
     pub path: PathBuf,
     /// Rows or messages in it.
     pub rows: u64,
@@ -157,7 +152,6 @@ pub fn without_copied(
 /// Where sessions chosen in the window go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
-    /// A table each.
     Tables(Format, PathBuf),
     /// All into this lake.
     Lake(PathBuf),

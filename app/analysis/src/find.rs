@@ -8,10 +8,8 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// A search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The library.
     pub library: PathBuf,
     /// What is looked for.
     pub query: Query,

@@ -32,7 +32,6 @@ const GRIP_DAMPING: f64 = 0.002;
 /// A body and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
-    /// The body.
     pub body: ModifiedKelvin,
     /// How deep the record went that it was fitted to.
     pub deepest: Depth,
@@ -187,9 +186,7 @@ pub struct Tried {
 /// What is known of a body on a device before play.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
-    /// The body.
     pub body: ModifiedKelvin,
-    /// The margin.
     pub margin: Verdict,
     /// The margin in words.
     pub sentences: Vec<String>,
@@ -291,7 +288,6 @@ pub struct Paced {
     /// What was measured.
     #[serde(flatten)]
     pub kept: Kept,
-    /// What was recorded.
     pub recorded: Option<RecordedTicks>,
 }
 
@@ -353,7 +349,6 @@ const PART: Duration = Duration::from_millis(100);
 /// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Followed {
-    /// What was done.
     #[serde(skip)]
     pub settings: CheckSettings,
     /// What was measured; in a table of its own.
@@ -361,16 +356,13 @@ pub struct Followed {
     pub samples: Vec<CheckSample>,
     /// The body rendered.
     pub body: ModifiedKelvin,
-    /// How many.
     #[serde(rename = "samples")]
     pub count: usize,
     /// Highest force commanded and measured, in N.
     pub peak_commanded_n: f64,
-    /// See [`Self::peak_commanded_n`].
     pub peak_measured_n: f64,
     /// Mean of measured minus commanded force on the way in, and root mean square of what is left about it, in N.
     pub offset_n: f64,
-    /// See [`Self::offset_n`].
     pub scatter_n: f64,
     /// Friction of the motor at the rack that the drive does not make up for, in N.
     pub friction_n: f64,

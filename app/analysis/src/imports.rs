@@ -17,19 +17,14 @@ use thiserror::Error;
 /// No session was made.
 #[derive(Debug, Error)]
 pub enum ImportFailure {
-    /// A file cannot be read or is not understood.
     #[error(transparent)]
     Foreign(#[from] ForeignError),
-    /// A session cannot be kept.
     #[error(transparent)]
     Keep(#[from] KeepError),
-    /// There is no library.
     #[error(transparent)]
     Library(#[from] FolderError),
-    /// A folder is there already or would be made twice.
     #[error("{} is there already or would be made twice; choose another folder", .0.display())]
     Taken(PathBuf),
-    /// Nobody wants the rest.
     #[error("cancelled")]
     Cancelled,
 }
@@ -37,7 +32,6 @@ pub enum ImportFailure {
 /// Where sessions go, and what is told of them.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// The files.
     pub files: Vec<PathBuf>,
     /// What is told of their layout; all else is detected.
     pub told: Told,
@@ -51,10 +45,8 @@ pub struct Request {
     pub is_dry_run: bool,
 }
 
-/// What was made of a file.
 #[derive(Debug, Serialize)]
 pub struct FileReport {
-    /// The file.
     pub file: PathBuf,
     /// Its parts: sheets, blocks, intervals.
     pub parts: Vec<PartReport>,
@@ -67,7 +59,6 @@ pub struct FileReport {
 pub struct PartReport {
     /// The session; none of a dry run.
     pub session: Option<PathBuf>,
-    /// Samples in it.
     pub samples: usize,
     /// From the first to the last of them, in s.
     pub duration_s: f64,

@@ -40,7 +40,6 @@ pub struct PlaybackRequest {
 
 /// What opens windows. Each call returns when its window has closed.
 pub trait Windows {
-    /// The workbench.
     fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
 
     /// A recorded session.

@@ -8,7 +8,6 @@ use palpate_rheology::fit::{FitSample, Traced};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origin {
     calibration: Option<(String, ForceUncertainty)>,
-    /// In mm/N.
     compliance: Option<(String, f64)>,
 }
 

@@ -58,25 +58,17 @@ pub struct PlanRequest<'a> {
 /// There is no plan.
 #[derive(Debug, Error)]
 pub enum PlanFailure {
-    /// The rig is not as fast.
     #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]
     TooFast {
-        /// Asked for.
         wanted: MmPerS,
-        /// The rig's fastest.
         most: MmPerS,
-        /// The rig.
         rig: String,
     },
-    /// The interlock would stop the run.
     #[error("a force of {} N is more than the {most} at which the interlock stops a run", wanted.0)]
     TooStrong {
-        /// Asked for.
         wanted: Newtons,
-        /// The interlock's.
         most: Newtons,
     },
-    /// What is wanted cannot be computed or reached.
     #[error(transparent)]
     Expected(#[from] ExpectedError),
 }
@@ -84,9 +76,7 @@ pub enum PlanFailure {
 /// Body and noise, and where they are from.
 #[derive(Clone, Debug)]
 pub struct Assumed {
-    /// The body.
     pub body: ModifiedKelvin,
-    /// White noise.
     pub noise: Newtons,
     /// Where both are from, in words.
     pub source: String,

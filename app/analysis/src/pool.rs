@@ -12,7 +12,6 @@ use std::sync::mpsc::sync_channel;
 pub enum NoAnswer {
     /// It was not begun: the whole was asked to end.
     NotBegun,
-    /// It panicked.
     Died,
 }
 

@@ -17,7 +17,6 @@ pub fn ended_words((recorded, left): (Recorded, u64)) -> String {
 /// What of a run was recorded.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RecordedTicks {
-    /// Ticks written.
     pub ticks: u64,
     /// Ticks for which there was no room.
     pub lost: u64,
@@ -30,7 +29,6 @@ impl From<Recorded> for RecordedTicks {
 }
 
 impl RecordedTicks {
-    /// In words.
     pub fn words(&self) -> String {
         match self.lost {
             0 => format!("{} ticks recorded, none lost", self.ticks),
@@ -51,7 +49,6 @@ pub struct Replayed {
     pub ticks: u64,
     /// Whether every number has the recorded bits.
     pub is_identical: bool,
-    /// Where that is not so first.
     pub first: Option<Different>,
     /// Whether the recording has its end; without, it was cut off after the last tick compared.
     pub is_whole: bool,
@@ -64,18 +61,13 @@ pub struct Replayed {
 /// A number that has other bits than the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Different {
-    /// The tick.
     pub tick: u64,
-    /// Which number.
     pub column: &'static str,
-    /// As it was recorded.
     pub recorded: String,
-    /// As it was computed.
     pub computed: String,
 }
 
 impl Replayed {
-    /// In words.
     pub fn words(&self) -> String {
         let how = match (self.is_identical, self.is_whole) {
             (true, true) => "every number bit for bit as recorded",

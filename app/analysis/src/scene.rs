@@ -39,7 +39,6 @@ pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String>
 /// What a scene did in real time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Played {
-    /// Its name.
     pub name: String,
     /// The hand's path.
     pub path: &'static str,
@@ -57,7 +56,6 @@ pub struct Played {
     pub surface_hash: String,
     /// The budget of a tick in microseconds, and whether 999 ticks in a thousand kept to it.
     pub tick_us: f64,
-    /// See [`Self::tick_us`].
     pub is_within_budget: bool,
     /// How the loop kept its time.
     #[serde(flatten)]

@@ -21,7 +21,6 @@ const TIMED_S: f64 = 0.2;
 /// How fast a method moves nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MethodSpeed {
-    /// Its name.
     pub method: &'static str,
     /// Nodes along a side.
     pub nodes: usize,
@@ -32,7 +31,6 @@ pub struct MethodSpeed {
 /// Everything measured, and what follows.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bench {
-    /// The machine.
     pub machine: Machine,
     /// Whether only the short part was measured.
     pub quick: bool,

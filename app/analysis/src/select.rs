@@ -38,21 +38,15 @@ pub struct Selected {
     pub seconds: f64,
 }
 
-/// No comparison.
 #[derive(Debug, Error)]
 pub enum SelectFailure {
-    /// The recordings cannot be read.
     #[error(transparent)]
     Sources(#[from] SourcesError),
-    /// There is not a specimen's name for each of them.
     #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
     Specimens {
-        /// Names that are not empty.
         names: usize,
-        /// Recordings.
         sources: usize,
     },
-    /// The records cannot be compared.
     #[error(transparent)]
     Select(#[from] SelectError),
 }

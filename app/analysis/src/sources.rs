@@ -25,35 +25,24 @@ const LOG: &str = "mcap";
 /// Recordings cannot be looked at together.
 #[derive(Debug, Error)]
 pub enum SourcesError {
-    /// There is nothing of this name.
     #[error(transparent)]
     Missing(ReadError),
-    /// A folder cannot be looked into.
     #[error("cannot look into {} ({reason}); check its permissions", path.display())]
     Folder {
-        /// The folder.
         path: PathBuf,
-        /// The operating system's words.
         reason: String,
     },
-    /// A folder has no recording in it.
     #[error("{} holds no session and no table (.csv or .tsv); name the folder that does", .0.display())]
     Nothing(PathBuf),
-    /// A table stands where a session is needed.
     #[error("{} is a table and no session", .0.display())]
     Table(PathBuf),
-    /// A recording is named twice.
     #[error("{} is given twice; taken together it would count as two recordings", .0.display())]
     Twice(PathBuf),
-    /// A recording cannot be read.
     #[error("{}: {reason}", path.display())]
     Source {
-        /// The recording.
         path: PathBuf,
-        /// Why not.
         reason: Box<SourceError>,
     },
-    /// Every session was rejected.
     #[error("{0} sources, all of them rejected: nothing is left")]
     Rejected(usize),
 }

@@ -38,7 +38,6 @@ pub struct BundleRequest {
     pub to: PathBuf,
     /// The library whose log and settings are meant.
     pub library: PathBuf,
-    /// Rig files.
     pub rigs: Vec<PathBuf>,
     /// What the doctor says of the library, in words.
     pub findings: String,
@@ -61,26 +60,18 @@ pub struct Bundled {
     pub what: &'static str,
 }
 
-/// A bundle was not made.
 #[derive(Debug, Error)]
 pub enum BundleError {
-    /// Something to go in cannot be read.
     #[error("cannot read {path} ({source}); check its path and permissions")]
     Read {
-        /// What.
         path: String,
-        /// What the system says.
         source: io::Error,
     },
-    /// A session to go in is none.
     #[error("{0}")]
     Session(String),
-    /// The bundle cannot be written.
     #[error("cannot write the bundle {path} ({source}); choose a folder that may be written")]
     Write {
-        /// The bundle.
         path: String,
-        /// What the system says.
         source: io::Error,
     },
 }

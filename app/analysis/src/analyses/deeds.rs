@@ -24,48 +24,34 @@ use thiserror::Error;
 /// Nothing was written beside a session.
 #[derive(Debug, Error)]
 pub enum DeedFailure {
-    /// The session, its edits or its analyses cannot be read or added to.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Nothing can be said of it.
     #[error(transparent)]
     Say(#[from] SayFailure),
-    /// The calibration cannot be read.
     #[error(transparent)]
     Calibration(#[from] LibraryError),
-    /// A mask that leaves out nothing.
     #[error("the session has no force in these stretches, so nothing would be left out")]
     NothingLeftOut,
-    /// No contact was found.
     #[error(
         "the session found no contact, so no depth counts from one; there is nothing to correct"
     )]
     NoContact,
-    /// Several were found and none is named.
     #[error("the session found contact {0} times; say which")]
     WhichContact(usize),
-    /// The one named was not found.
     #[error("there is no contact {number}; the session found {found}")]
     NoSuchContact {
-        /// Which, from 1.
         number: u32,
-        /// How many there are.
         found: usize,
     },
-    /// No probe was ever there.
     #[error(
         "contact at {position} is outside the rig's travel of {travel}; give the position from home"
     )]
     OutsideTravel {
-        /// From home.
         position: Position,
-        /// How far the rig goes.
         travel: Position,
     },
-    /// There is no fit to keep.
     #[error("{0}")]
     Fit(String),
-    /// Nobody wants it any more.
     #[error("cancelled; nothing was kept")]
     Cancelled,
 }
@@ -85,7 +71,6 @@ impl From<ReadError> for DeedFailure {
 /// Who does it, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Who {
-    /// By name.
     pub by: String,
     /// In a few words; some deeds need it.
     pub reason: String,
@@ -94,18 +79,15 @@ pub struct Who {
 /// What is done to a session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Deed {
-    /// A fit is made and kept.
     Fit {
         /// What it is called.
         name: String,
-        /// How.
         how: FitWanted,
     },
     /// Forces are made anew.
     Recalibrate {
         /// What it is called.
         name: String,
-        /// With this calibration.
         calibration: Box<Calibration>,
     },
     /// The same with the calibration of a file.
@@ -124,7 +106,6 @@ pub enum Deed {
     },
     /// An analysis does not count any more.
     Withdraw {
-        /// Which.
         name: String,
     },
     /// The session is worth that.
@@ -133,7 +114,6 @@ pub enum Deed {
     Correct {
         /// Which of the contacts, from 1.
         number: u32,
-        /// From home.
         position: Position,
     },
 }
@@ -249,7 +229,6 @@ fn fit(
     Ok(made(session, name, kept::deed(&analysis.what)))
 }
 
-/// A fit that was made and is to be kept.
 #[derive(Clone, Debug)]
 pub struct KeptFit<'a> {
     /// The analysis that the session was read by.
@@ -258,7 +237,6 @@ pub struct KeptFit<'a> {
     pub together_with: &'a [Wanted],
     /// How it was asked for.
     pub settings: Value,
-    /// What it found.
     pub results: Value,
 }
 
@@ -327,7 +305,6 @@ fn recalibrated(
 /// Forces that do not count any more.
 #[derive(Clone, Debug)]
 pub struct Masked {
-    /// The record.
     pub analysis: Analysis,
     /// Forces left out.
     pub left_out: usize,
@@ -390,7 +367,6 @@ pub struct Corrected {
     pub position: Position,
     /// Where the session found it.
     pub was: Position,
-    /// The record.
     pub edit: Edit,
 }
 
@@ -400,7 +376,6 @@ impl Corrected {
         self.was.depth_from(self.position).0
     }
 
-    /// In words.
     pub fn sentence(&self) -> String {
         format!(
             "contact {} at {:.3} mm instead of {:.3} mm; its depths change by {:+.3} mm",

@@ -47,7 +47,6 @@ pub struct FitSettings {
     pub profile: bool,
     /// Fits of a bootstrap.
     pub bootstrap: Option<usize>,
-    /// Its seed.
     pub seed: Option<u64>,
     /// What was taken from the depths.
     pub compliance: Option<String>,

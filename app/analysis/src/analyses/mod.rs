@@ -23,9 +23,7 @@ use std::path::{Path, PathBuf};
 /// What is known of a session for making analyses of it.
 #[derive(Clone, Debug)]
 pub struct Known {
-    /// Its folder.
     pub session: PathBuf,
-    /// Its id.
     pub session_id: String,
     /// Its analyses, withdrawn ones among them.
     pub analyses: Analyses,
@@ -59,7 +57,6 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
 /// What came of some work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Done {
-    /// One sentence.
     pub sentence: String,
     /// The session beside which something was written, if it was.
     pub changed: Option<PathBuf>,

@@ -12,16 +12,12 @@ use thiserror::Error;
 /// A source among many has no fit.
 #[derive(Debug, Error)]
 pub enum NotFitted {
-    /// It cannot be read, or was rejected.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// The whole was asked to end before.
     #[error("not begun; the batch was asked to end")]
     NotBegun,
-    /// Its thread ended without an answer.
     #[error("the fit ended unexpectedly; report this with the source")]
     Died,
 }

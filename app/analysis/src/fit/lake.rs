@@ -26,7 +26,6 @@ const MODEL: &str = "modified-kelvin";
 /// Which sessions of which lake are fitted how.
 #[derive(Debug)]
 pub struct LakeRequest<'a> {
-    /// The lake.
     pub lake: &'a Path,
     /// The part of its sessions.
     pub shard: Shard,
@@ -49,23 +48,18 @@ pub enum Outcome {
     Made,
     /// Its fit was there already.
     There,
-    /// It was rejected.
     Rejected,
 }
 
 /// A session of a lake has no fit.
 #[derive(Debug, Error)]
 pub enum LakeFailure {
-    /// The lake cannot be read.
     #[error(transparent)]
     Lake(#[from] LakeError),
-    /// The fit cannot be written.
     #[error(transparent)]
     Keep(#[from] ExportError),
-    /// The session cannot be read or fitted.
     #[error(transparent)]
     NotFitted(#[from] NotFitted),
-    /// No thread can be started.
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
 }
@@ -94,9 +88,7 @@ pub struct LakeTally {
     pub model: String,
     /// In the part of the lake that was looked at.
     pub sessions: usize,
-    /// Fitted now.
     pub made: usize,
-    /// Fitted before.
     pub were_there: usize,
     /// Not fitted because they were rejected.
     pub rejected: usize,

@@ -33,29 +33,20 @@ struct Remembered<'a> {
 /// A fit in a file cannot be used.
 #[derive(Debug, Error)]
 pub enum KnownFitError {
-    /// It is none.
     #[error("this is not a fit: {reason}, {}", path.display())]
     NotAFit {
-        /// The file.
         path: PathBuf,
-        /// What is wrong with it.
         reason: String,
     },
-    /// Its checksum says that it was changed or damaged.
     #[error("the remembered fit is not as it was written; fit again, {}", .0.display())]
     Changed(PathBuf),
-    /// It is a fit of another body.
     #[error("the fit has no parameter {0}")]
     Parameter(&'static str),
-    /// What is to be fitted cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be fitted.
     #[error("{} cannot be fitted: {reason}", path.display())]
     Fit {
-        /// The recording.
         path: PathBuf,
-        /// Why not.
         reason: FitError,
     },
 }

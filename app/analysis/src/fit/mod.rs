@@ -62,7 +62,6 @@ impl Recipe {
         self.fit_read(source::read_analysed(path, columns, self.wanted, name)?)
     }
 
-    /// Fits what was read.
     pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
         let fitted = Fitted { compliance, ..Fitted::of(source, &self.options) };
@@ -205,7 +204,6 @@ pub struct Intervals {
     /// From the profile likelihood; ends are null where they are open.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<ProfileInterval>,
-    /// Seed of the bootstrap.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap_seed: Option<u64>,
     /// From fits to residuals shuffled in blocks.

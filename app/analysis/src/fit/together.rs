@@ -27,7 +27,6 @@ pub struct TogetherRequest<'a> {
 /// A fit of several recordings, with what is told of each beside its report.
 #[derive(Clone, Debug)]
 pub struct Together {
-    /// The fit.
     pub report: JointReport,
     /// The modelled force along each recording.
     pub overlays: Vec<Overlay>,

@@ -15,9 +15,7 @@ use std::path::Path;
 /// One line of a list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entry {
-    /// Its id.
     pub id: String,
-    /// Its name.
     pub name: String,
     /// The rig whose cell it is.
     pub rig: String,
@@ -27,7 +25,6 @@ pub struct Entry {
     pub taken_at: Option<String>,
     /// Days since then.
     pub age_days: Option<i64>,
-    /// Days for which it is valid.
     pub valid_days: u32,
     /// Whether it is the one in force for its rig.
     pub is_in_force: bool,
@@ -99,7 +96,6 @@ pub fn list(entries: &[Entry], folder: &Path) -> String {
 /// The uncertainty of one force and where it comes from, in N.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Budget {
-    /// The force.
     pub force_n: f64,
     /// All terms together; null where nothing is stated.
     pub uncertainty_n: Option<f64>,
@@ -107,7 +103,6 @@ pub struct Budget {
     pub terms: Vec<BudgetTerm>,
 }
 
-/// One term of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BudgetTerm {
     /// Where it comes from.

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 /// One group of cases in numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSummary {
-    /// The group.
     pub group: &'static str,
     /// Rows of each of [`Verdict::ALL`].
     pub counts: [usize; 4],

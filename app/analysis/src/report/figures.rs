@@ -21,14 +21,11 @@ const LEGEND: f64 = 20.0;
 /// A stretch of time in s since the first sample, as the column `t_s` of an export has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// From here.
     pub from: f64,
-    /// To here.
     pub until: f64,
 }
 
 impl Window {
-    /// All of it.
     pub const WHOLE: Self = Self { from: f64::NEG_INFINITY, until: f64::INFINITY };
 
     fn holds(self, at: f64) -> bool {

@@ -3,7 +3,6 @@
 use palpate_figures::figure::{Axis, Ink, Labels, Level, Plot, Series};
 use palpate_rheology::trade::front;
 
-/// One point.
 #[derive(Clone, Debug)]
 pub struct Mark {
     /// Along both axes, above zero.
@@ -12,12 +11,10 @@ pub struct Mark {
     pub label: [String; 2],
 }
 
-/// What is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Scatter<'a> {
     /// Names of both axes with their units.
     pub axes: [&'a str; 2],
-    /// All points.
     pub marks: &'a [Mark],
     /// Whether those that no other undercuts in both are joined: only where all stand for the same.
     pub has_front: bool,
@@ -28,7 +25,6 @@ pub struct Scatter<'a> {
 }
 
 impl Scatter<'_> {
-    /// As a plot.
     pub fn plot(&self) -> Plot {
         let best: Vec<usize> = match self.has_front {
             true => front(&self.marks.iter().map(|mark| mark.at).collect::<Vec<_>>()),

@@ -10,7 +10,6 @@ use palpate_rheology::fit::{FitReport, NamedReport, Parameter};
 /// One parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterText {
-    /// Its name.
     pub name: String,
     /// `value ± standard error`, or the value and why it has no error.
     pub value: String,

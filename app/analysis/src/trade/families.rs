@@ -20,7 +20,6 @@ pub(super) const THESIS: &str = "thesis body";
 
 /// What rows of one target stand for, and how.
 struct Target {
-    /// In words.
     name: &'static str,
     /// The body: family, outer parameters, coefficients.
     body: (&'static str, &'static [f64], &'static [f64]),

@@ -14,36 +14,24 @@ use thiserror::Error;
 /// Curves could not be stored or read.
 #[derive(Debug, Error)]
 pub enum TradeFileError {
-    /// The disk refused.
     #[error("the curves cannot be {what}: {source}, {}", path.display())]
     Io {
-        /// `stored` or `read`.
         what: &'static str,
-        /// The file.
         path: PathBuf,
-        /// What the system said.
         source: io::Error,
     },
-    /// Something else than curves.
     #[error("this file holds no curves ({reason}); measure again, {}", path.display())]
     NotCurves {
-        /// The file.
         path: PathBuf,
-        /// What is missing or wrong.
         reason: String,
     },
-    /// Other content than was written.
     #[error("these curves were changed after they were measured; measure again, {}", path.display())]
     Checksum {
-        /// The file.
         path: PathBuf,
     },
-    /// Curves that cannot have been measured.
     #[error("{source}, {}", path.display())]
     Curves {
-        /// The file.
         path: PathBuf,
-        /// Why.
         source: CurveError,
     },
 }

@@ -13,7 +13,6 @@ use std::ops::ControlFlow;
 pub(super) struct Job<'a> {
     /// Evaluations in one call.
     pub per_call: f64,
-    /// The call.
     pub call: Box<dyn FnMut() + 'a>,
 }
 

@@ -36,7 +36,6 @@ pub struct Question {
 pub struct CycleReport {
     /// What was analysed.
     pub name: String,
-    /// Its samples.
     pub source: CycleSource,
     /// Every way in with what belongs to it.
     pub cycles: Vec<CycleAnalysis>,

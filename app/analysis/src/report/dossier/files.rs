@@ -16,11 +16,9 @@ const SEAL_END: &str = " -->\n";
 /// A file that a page says it describes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// The session.
     pub session_id: String,
     /// Name of its folder.
     pub folder: String,
-    /// The file in it.
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,

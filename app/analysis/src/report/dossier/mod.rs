@@ -32,7 +32,6 @@ use std::path::{Path, PathBuf};
 /// A session, and which of its analyses it is read by.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Its folder.
     pub session: PathBuf,
     /// The analysis; none for the session as its edits leave it.
     pub analysis: Option<String>,
@@ -199,7 +198,6 @@ pub fn figure(
 pub enum Ending {
     /// Lines and text, at any size.
     Svg,
-    /// Pixels.
     Png,
 }
 
@@ -236,7 +234,6 @@ pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
 /// Nobody wants the report any more, or a session cannot be read.
 #[derive(Debug)]
 pub enum ReportError {
-    /// It was cancelled.
     Cancelled,
     /// This session cannot be read.
     Source(PathBuf, Box<SourceError>),

@@ -10,7 +10,6 @@ use std::path::Path;
 /// One run in the table of the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunLine {
-    /// Its task.
     pub task: String,
     /// Which repeat, from 1.
     pub repeat: u32,
@@ -75,7 +74,6 @@ impl Lost {
 /// What sessions tell of one specimen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpecimenPart {
-    /// Its name.
     pub specimen: String,
     /// With which probe it was indented.
     pub indenter: String,

@@ -24,10 +24,8 @@ use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What one task told.
 #[derive(Clone, Debug, Serialize)]
 pub struct TaskPart {
-    /// Its name.
     pub task: String,
     /// Its protocol in words.
     pub title: String,
@@ -45,7 +43,6 @@ pub struct TaskPart {
 /// The fit of one session.
 #[derive(Clone, Debug, Serialize)]
 pub struct FitLine {
-    /// Its folder.
     pub session: String,
     /// Names, values and standard errors.
     pub parameters: Vec<palpate_rheology::fit::Parameter>,
@@ -66,7 +63,6 @@ pub struct PredictionLine {
     pub rms_percent: f64,
     /// At the turning point, in N and percent of the peak.
     pub at_peak_n: f64,
-    /// In percent of the peak.
     pub at_peak_percent: f64,
 }
 
@@ -77,11 +73,9 @@ pub struct Page {
     pub title: String,
     /// What it is for.
     pub purpose: String,
-    /// Every run.
     pub runs: Vec<RunLine>,
     /// Every specimen, in the order in which it was met.
     pub specimens: Vec<SpecimenPart>,
-    /// Every task.
     pub tasks: Vec<TaskPart>,
 }
 
