@@ -14,7 +14,7 @@ pub enum AnalyseFailure {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "no way in with at least 20 samples was found in {}; record one, or name the frequency of a sine", .0.display()
+        "no loading with at least 20 samples is in {}; record a cycle, or name the frequency of a sine", .0.display()
     )]
     NoCycles(PathBuf),
     #[error("cancelled")]

@@ -19,7 +19,7 @@ pub struct Shelved {
     pub kept: Option<Result<String, String>>,
 }
 
-/// One calibration with all that is told of it.
+/// One calibration with its details.
 pub struct Shown {
     /// Its line in the list.
     pub entry: Entry,
@@ -32,12 +32,12 @@ pub struct Shown {
 
 impl Shown {
     fn of(entry: Entry, calibration: Calibration, rig: &str) -> Self {
-        let told = Told::of(&calibration).and_then(|told| {
-            let plots = plots(&calibration, &told)?;
-            Ok((told, plots))
+        let details = Told::of(&calibration).and_then(|details| {
+            let plots = plots(&calibration, &details)?;
+            Ok((details, plots))
         });
         Self {
-            told: told.map_err(|err| err.to_string()),
+            told: details.map_err(|err| err.to_string()),
             doubts: calibration.doubts(&Bench {
                 rig,
                 age_days: entry.age_days,

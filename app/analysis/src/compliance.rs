@@ -3,13 +3,13 @@
 //! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
 
 use crate::source::{
-    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, trusted_samples,
+    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
 };
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
 use palpate_model::units::{Depth, Newtons, Position};
-use palpate_protocols::engine::{Effect, Record};
+use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
 use palpate_rheology::fit::FitSample;
 use palpate_sessions::compliances::{Kept, Shelf};
@@ -30,7 +30,7 @@ pub enum MeasureError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "an imported session has no rig and no calibration, so it tells no compliance; run stiff-surface and name its session"
+        "an imported session has no rig and no calibration, so it gives no compliance; run stiff-surface and name its session"
     )]
     Imported,
     #[error(
@@ -78,8 +78,8 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
-    let found = decisions.iter().rev().find_map(|(after, effect)| match effect {
-        Effect::Record(Record::BaseFound { position, .. }) => Some((*after as usize, *position)),
+    let found = records(&decisions).rev().find_map(|(after, record)| match record {
+        Record::BaseFound { position, .. } => Some((after as usize, *position)),
         _ => None,
     });
     let (after, surface) = found.ok_or(MeasureError::NoSurface)?;
@@ -87,9 +87,7 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
     let rows = session.rows.iter().enumerate().take(trusted).skip(after);
     for (_, row) in rows {
-        let (Some(force), Some(depth)) = (row.force, row.depth) else {
-            continue;
-        };
+        let (Some(force), Some(depth)) = (row.force, row.depth) else { continue };
         if row.phase != Phase::Ramp || is_saturated(session, row) {
             continue;
         }
@@ -112,11 +110,9 @@ pub enum CorrectionError {
     #[error(transparent)]
     Library(#[from] LibraryError),
     #[error(
-        "the library has no compliance of rig {rig}; run stiff-surface on it and keep what its session tells"
+        "the library has no compliance of rig {rig}; run stiff-surface on it and store the compliance of that session"
     )]
-    NoneInForce {
-        rig: String,
-    },
+    NoneInForce { rig: String },
     #[error(
         "a table does not say which rig it is from, so there is no last compliance for it; name the compliance's file"
     )]
@@ -124,16 +120,12 @@ pub enum CorrectionError {
     #[error(
         "{id} is the compliance of rig {of}, and this was recorded on rig {rig}; name one of that rig"
     )]
-    OtherRig {
-        id: String,
-        of: String,
-        rig: String,
-    },
+    OtherRig { id: String, of: String, rig: String },
 }
 
-/// What is asked about compliance.
+/// What is choice about compliance.
 #[derive(Debug)]
-enum Asked {
+enum CorrectionChoice {
     /// Depths stay raw.
     Raw,
     /// The one in force for the rig of each record.
@@ -144,74 +136,72 @@ enum Asked {
 /// Which compliance goes with which record.
 #[derive(Debug)]
 pub struct Corrections {
-    asked: Asked,
+    choice: CorrectionChoice,
     shelf: Shelf,
 }
 
 impl Corrections {
-    /// Depths stay raw; with a library, what the compliance in force would change is told.
+    /// Depths stay raw; with a library, [`Self::apply`] computes what the compliance in force would change.
     #[must_use]
     pub fn none(library: Option<&Path>) -> Self {
-        Self { asked: Asked::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
+        Self { choice: CorrectionChoice::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
     }
 
     /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
     pub fn named(name: &str, library: Option<&Path>) -> Result<Self, CorrectionError> {
         let shelf = library.map(Shelf::open).unwrap_or_default();
         let path = Path::new(name);
-        let asked = if name == LAST {
-            Asked::InForce
+        let choice = if name == LAST {
+            CorrectionChoice::InForce
         } else if path.is_file() {
             let stem = path.file_stem().unwrap_or_default();
-            Asked::This(Box::new(Kept {
+            CorrectionChoice::This(Box::new(Kept {
                 id: stem.to_string_lossy().into_owned(),
                 path: path.into(),
                 document: palpate_sessions::shelf::read(path)?,
             }))
         } else {
-            Asked::This(Box::new(shelf.find(name)?.clone()))
+            CorrectionChoice::This(Box::new(shelf.find(name)?.clone()))
         };
-        Ok(Self { asked, shelf })
+        Ok(Self { choice, shelf })
     }
 
     /// The document for a record of a rig, and whether depths are corrected with it; a table has no rig.
     pub fn of_rig(&self, rig: Option<&str>) -> Result<Option<(&Kept, bool)>, CorrectionError> {
         let in_force = |rig: &str| self.shelf.in_force(rig);
-        match (&self.asked, rig) {
-            (Asked::Raw, rig) => Ok(rig.and_then(in_force).map(|kept| (kept, false))),
-            (Asked::InForce, None) => Err(CorrectionError::NoRig),
-            (Asked::InForce, Some(rig)) => match in_force(rig) {
+        match (&self.choice, rig) {
+            (CorrectionChoice::Raw, rig) => Ok(rig.and_then(in_force).map(|kept| (kept, false))),
+            (CorrectionChoice::InForce, None) => Err(CorrectionError::NoRig),
+            (CorrectionChoice::InForce, Some(rig)) => match in_force(rig) {
                 Some(kept) => Ok(Some((kept, true))),
                 None => Err(CorrectionError::NoneInForce { rig: rig.into() }),
             },
-            (Asked::This(kept), Some(rig)) if kept.document.rig != rig => {
+            (CorrectionChoice::This(kept), Some(rig)) if kept.document.rig != rig => {
                 Err(CorrectionError::OtherRig {
                     id: kept.id.clone(),
                     of: kept.document.rig.clone(),
                     rig: rig.into(),
                 })
             }
-            (Asked::This(kept), _) => Ok(Some((kept, true))),
+            (CorrectionChoice::This(kept), _) => Ok(Some((kept, true))),
         }
     }
 
-    /// Corrects what is to be fitted, where that is asked, and tells what the compliance does to it; `None`
-    /// where none is asked and none is kept.
+    /// Corrects what is to be fitted, where that is choice, and tells what the compliance does to it; `None`
+    /// where none is choice and none is kept.
     pub fn apply(&self, source: &mut FitSource) -> Result<Option<Correction>, CorrectionError> {
-        let Some((kept, is_applied)) = self.of_rig(source.rig.as_deref())? else {
-            return Ok(None);
-        };
-        let told = Correction::of(kept, is_applied, &source.samples);
+        let Some((kept, is_applied)) = self.of_rig(source.rig.as_deref())? else { return Ok(None) };
+        let correction = Correction::of(kept, is_applied, &source.samples);
         if is_applied {
             correct_samples(&mut source.samples, &kept.document.compliance());
-            source.notes.extend(told.doubt.clone());
+            source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
-            if let Asked::InForce = self.asked {
+            if let CorrectionChoice::InForce = self.choice {
                 let unreadable = self.shelf.unreadable.iter();
                 source.notes.extend(unreadable.map(ToString::to_string));
             }
         }
-        Ok(Some(told))
+        Ok(Some(correction))
     }
 }
 
@@ -243,7 +233,7 @@ impl Correction {
         let document = &kept.document;
         let doubt = (peak > document.force_max_n).then(|| {
             format!(
-                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond, it is taken as a straight line",
+                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond that the compliance is extrapolated as a straight line",
                 document.force_max_n
             )
         });
@@ -263,12 +253,12 @@ impl Correction {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {
             format!(
-                "depths are corrected for the rig's compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
+                "depths are corrected for machine compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
                 self.at_peak_std_error_um
             )
         } else {
             format!(
-                "depths are raw; the rig's compliance {id} would make them {um:.0} um less at {peak:.2} N"
+                "depths are not corrected; machine compliance {id} would make them {um:.0} um less at {peak:.2} N"
             )
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::edited;
 use crate::source::{
-    SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
+    SourceError, calibration_of, decisions, is_saturated, records, table_of_imported,
+    trusted_samples,
 };
 use crate::sources::is_session;
 use palpate_model::calibration::Calibration;
@@ -52,7 +53,7 @@ pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, S
 
 /// What an analysis takes of a table or an imported session.
 fn of_table(table: &Table, mut notes: Vec<String>) -> CycleSource {
-    notes.push("a table: its cycles, holds and ways back are told from the depth".into());
+    notes.push("a table: its cycles, holds and unloading are found from the depth".into());
     CycleSource {
         samples: by_depth(&table.t, &table.depth, &table.force),
         notes,
@@ -83,9 +84,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let mut places = Vec::with_capacity(session.rows.len());
     for (index, row) in session.rows.iter().enumerate() {
         places.push(source.samples.len());
-        let (Some(force), Some(depth)) = (row.force, row.depth) else {
-            continue;
-        };
+        let (Some(force), Some(depth)) = (row.force, row.depth) else { continue };
         if index >= trusted || is_saturated(session, row) {
             left_out += 1;
             continue;
@@ -129,13 +128,11 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
 
 /// Contacts found, each after so many samples.
 fn contacts(decisions: &[(u64, Effect)]) -> Vec<(u64, Position)> {
-    decisions
-        .iter()
-        .filter_map(|(after, effect)| match effect {
-            Effect::Record(Record::ContactFound { position, .. }) => Some((*after, *position)),
-            _ => None,
-        })
-        .collect()
+    let found = records(decisions).filter_map(|(after, record)| match record {
+        Record::ContactFound { position, .. } => Some((after, *position)),
+        _ => None,
+    });
+    found.collect()
 }
 
 /// How far the contact that held at a sample was from the first one.
@@ -149,15 +146,13 @@ fn offset_at(contacts: &[(u64, Position)], index: usize) -> Depth {
 
 /// Steps of the plan, each from the sample that it began with: the one that led to it.
 fn steps(decisions: &[(u64, Effect)]) -> Vec<(u64, u32)> {
-    decisions
-        .iter()
-        .filter_map(|(after, effect)| match effect {
-            Effect::Record(Record::PhaseStarted { step_index, .. }) => {
-                Some((after.saturating_sub(1), u32::try_from(*step_index).ok()?))
-            }
-            _ => None,
-        })
-        .collect()
+    let begun = records(decisions).filter_map(|(after, record)| match record {
+        Record::PhaseStarted { step_index, .. } => {
+            Some((after.saturating_sub(1), u32::try_from(*step_index).ok()?))
+        }
+        _ => None,
+    });
+    begun.collect()
 }
 
 /// The step a sample belongs to; the first one before any began.

@@ -1,9 +1,9 @@
 //! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
-//! tissue unless somebody takes the responsibility.
+//! tissue unless the operator acknowledges it.
 
 use crate::find::session_folders;
 use crate::progress::Progress;
-use crate::source::{SourceError, calibration_of, decisions};
+use crate::source::{SourceError, calibration_of, decisions, records};
 use palpate_model::calibration::{Calibration, CheckResult, KnownWeight};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
@@ -56,8 +56,7 @@ pub fn past_checks(
     let count = checks.len();
     let mut past = Vec::with_capacity(count);
     for (done, check) in checks.into_iter().enumerate() {
-        let told = progress.tell(done, count, "the sessions of the checks");
-        if told.is_break() {
+        if progress.tell(done, count, "the sessions of the checks").is_break() {
             break;
         }
         let folder = folders.get(&check.session_id);
@@ -73,9 +72,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
         let session = Session::open(session).ok()?;
         Some((calibration_of(&session).ok()?, decisions(&session).ok()?))
     };
-    let Some((calibration, decisions)) = read() else {
-        return [None; 2];
-    };
+    let Some((calibration, decisions)) = read() else { return [None; 2] };
     let records = records_of(&decisions);
     let weight = weight_of(&calibration, &records).ok();
     [
@@ -85,13 +82,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
 }
 
 fn records_of(decisions: &[(u64, Effect)]) -> Vec<&Record> {
-    let effects = decisions.iter().map(|(_, effect)| effect);
-    effects
-        .filter_map(|effect| match effect {
-            Effect::Record(record) => Some(record),
-            _ => None,
-        })
-        .collect()
+    records(decisions).map(|(_, record)| record).collect()
 }
 
 /// Judges a session of the daily check. What was not done has not passed.
@@ -149,7 +140,7 @@ fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String)
     let is_passed = newtons.abs() <= limit;
     let advice = match is_passed {
         true => "",
-        false => "; look what touches the probe, then take a new calibration",
+        false => "; check what touches the probe, then take a new calibration",
     };
     Ok((
         is_passed,
@@ -210,7 +201,7 @@ pub enum Gate {
     Open,
     /// Something worth knowing.
     Note(String),
-    /// Somebody must take the responsibility; it is recorded.
+    /// The operator must acknowledge it, which is recorded.
     Acknowledge(String),
 }
 
@@ -328,8 +319,8 @@ mod tests {
         assert!(weight(&calibration, &[&weighed(200.0, 1.7)]).is_err());
         // On the flat stretch even a right reading tells nothing.
         let right = weighed(500.0, volts(0.5 * 9.80665));
-        let told = weight(&calibration, &[&weighed(0.0, volts(0.0)), &right]).unwrap_err();
-        assert!(told.contains("500 g to 0.501 N only"), "{told}");
+        let refusal = weight(&calibration, &[&weighed(0.0, volts(0.0)), &right]).unwrap_err();
+        assert!(refusal.contains("500 g to 0.501 N only"), "{refusal}");
         assert!(home(&[]).is_err());
     }
 
@@ -343,7 +334,7 @@ mod tests {
         });
         let calibration = Calibration::thesis();
         let curve = calibration.curve().unwrap();
-        let mut told = Vec::new();
+        let mut results = Vec::new();
         for mass_g in masses {
             let weight = palpate_model::units::Newtons(mass_g * 9.80665e-3);
             let records = [
@@ -351,10 +342,10 @@ mod tests {
                 weighed(mass_g, curve.volts_from_newtons(weight).0),
             ];
             let records: Vec<&Record> = records.iter().collect();
-            told.push(super::weight(&calibration, &records).unwrap());
+            results.push(super::weight(&calibration, &records).unwrap());
         }
-        let [(true, sentence)] = &told[..] else {
-            panic!("one known weight that reads right: {told:?}");
+        let [(true, sentence)] = &results[..] else {
+            panic!("one known weight that reads right: {results:?}");
         };
         assert!(sentence.ends_with("within the limit of 1 %"), "{sentence}");
     }

@@ -137,9 +137,7 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
     let (mut shifts, mut notes) = (Vec::new(), Vec::new());
     for (index, found) in contacts.iter().enumerate() {
         let number = index as u32 + 1;
-        let Some((position, edit)) = edits.contact(number) else {
-            continue;
-        };
+        let Some((position, edit)) = edits.contact(number) else { continue };
         let next = contacts.get(index + 1).map(|next| next.after_sample);
         let deeper = found.position.depth_from(position);
         let base = entries.iter_mut().find(|entry| {
@@ -218,10 +216,7 @@ mod tests {
         };
         correct(&mut session, &edits);
         for (index, (old, new)) in before.rows.iter().zip(&session.rows).enumerate() {
-            let expected = match index >= second && index < third {
-                true => -0.5,
-                false => 0.0,
-            };
+            let expected = if index >= second && index < third { -0.5 } else { 0.0 };
             let moved = new.depth.unwrap_or(0.0) - old.depth.unwrap_or(0.0);
             assert!((moved - expected).abs() < 1e-12 || old.depth.is_none(), "{index}: {moved}");
         }

@@ -2,6 +2,7 @@
 //! the log, never over anything.
 
 use crate::progress::Progress;
+use crate::report::said::tags;
 use chrono::{DateTime, Utc};
 use palpate_runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
@@ -16,7 +17,7 @@ use thiserror::Error;
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
     let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    given.map_or_else(|| login().unwrap_or_else(|_| "somebody".into()), str::to_owned)
+    given.map_or_else(|| login().unwrap_or_else(|_| "unknown".into()), str::to_owned)
 }
 
 /// Nothing was said of a session.
@@ -60,7 +61,7 @@ impl Subject {
     /// A review of the session as it is now: with the hash of every file of the log and of the analyses.
     pub fn review(&self, decision: Decision) -> Result<Change, SayFailure> {
         let mut seen = inputs_of(&self.folder)?;
-        // What was said before is told by the order of the edits; the review itself is among them.
+        // The order of the edits shows which came before; the review itself is among them.
         seen.retain(|one| one.what != EDITS_FILE);
         seen.extend(Analyses::read(&self.folder, &self.id)?.input());
         Ok(Change::Review { decision, seen })
@@ -80,18 +81,14 @@ pub enum Saying {
     Note(String),
     /// What they are worth, and why.
     Verdict(Verdict, String),
-    /// What somebody who looked decided, and why.
+    /// A reviewer's decision, and why.
     Review(Decision, String),
 }
 
 impl Saying {
     pub fn words(&self) -> String {
         match self {
-            Self::Tags { add, remove } => {
-                let added = add.iter().map(|tag| format!("+{tag}"));
-                let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
-                format!("tags {}", signs.collect::<Vec<_>>().join(" "))
-            }
+            Self::Tags { add, remove } => tags(add, remove),
             Self::Note(_) => "note".into(),
             Self::Verdict(verdict, _) => format!("verdict {verdict}"),
             Self::Review(decision, _) => format!("review, {}", decision.name()),
@@ -155,7 +152,7 @@ fn each<T>(
         let name = folder(item).file_name().unwrap_or_default();
         if progress.tell(done, of.len(), &name.to_string_lossy()).is_break() {
             let left = sessions(of.len() - done);
-            failed.push(format!("nothing was said of {left}: cancelled"));
+            failed.push(format!("{left} not changed: cancelled"));
             break;
         }
         match one(item) {
@@ -191,17 +188,14 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
         Saying::Tags { add, remove } => {
             let has = subject.edits.tags();
             // Only what changes is written, so that only that is taken back.
-            let add: Vec<String> =
-                add.iter().filter(|tag| !has.contains(tag.as_str())).cloned().collect();
-            let remove: Vec<String> =
-                remove.iter().filter(|tag| has.contains(tag.as_str())).cloned().collect();
+            let (mut add, mut remove) = (add.clone(), remove.clone());
+            add.retain(|tag| !has.contains(tag.as_str()));
+            remove.retain(|tag| has.contains(tag.as_str()));
             if add.is_empty() && remove.is_empty() {
                 return Ok((None, false));
             }
-            let (written, opposite) = (
-                Part::Tags { add: add.clone(), remove: remove.clone() },
-                Part::Tags { add: remove.clone(), remove: add.clone() },
-            );
+            let written = Part::Tags { add: add.clone(), remove: remove.clone() };
+            let opposite = Part::Tags { add: remove.clone(), remove: add.clone() };
             let edit = subject.say(by, "", Change::Tags { add, remove })?;
             Ok((Some(step(edit, written, opposite)), true))
         }
@@ -243,13 +237,12 @@ fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
     let subject = Subject::read(&step.folder).map_err(|err| err.to_string())?;
     let (reason, change) = match &step.opposite {
         Part::Tags { add, remove } => {
-            let (add, remove) = (add.clone(), remove.clone());
-            (String::new(), Change::Tags { add, remove })
+            (String::new(), Change::Tags { add: add.clone(), remove: remove.clone() })
         }
         Part::Verdict(verdict, reason) => {
             let now = subject.edits.verdict();
             if now.is_none_or(|(_, edit)| edit.at != step.wrote) {
-                return Err("its verdict was given again since, so it is not taken back".into());
+                return Err("its verdict was given again since, so it is not undone".into());
             }
             (reason.clone(), Change::Verdict { verdict: *verdict })
         }

@@ -121,9 +121,9 @@ pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
         return Err(ExportFailure::BeingRecorded(session.into()));
     }
     let verdict = passing.edits.verdict();
-    let told = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
+    let quality = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
     let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
-    Ok(lake::add(lake, &passing.outline, told, &mut feed)?)
+    Ok(lake::add(lake, &passing.outline, quality, &mut feed)?)
 }
 
 /// The sessions and tables without those sessions whose recovered copy is among them, so that samples count once; then
@@ -166,34 +166,35 @@ pub struct Exported {
     pub remarks: Vec<String>,
 }
 
-/// Writes every session, one after the other. A file that is there is never written over: it is told.
+/// Writes every session, one after the other. An existing file is never overwritten; a remark names it.
 pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progress) -> Exported {
     let of = sessions.len();
     let (sessions, copied) = match to {
         Destination::Tables(..) => (sessions, Vec::new()),
         Destination::Lake(_) => without_copied(sessions, |_| true),
     };
-    let mut remarks: Vec<String> = copied
-        .iter()
-        .map(|path| format!("{}: left out, its recovered copy is chosen too", name(path)))
-        .collect();
-    if let Destination::Tables(_, folder) = to
-        && let Err(err) = std::fs::create_dir_all(folder)
-    {
-        let sentence = format!("{} cannot be made ({err}); nothing was written", folder.display());
-        return Exported { sentence, remarks };
-    }
+    let left_out =
+        |path: &PathBuf| format!("{}: left out, its recovered copy is chosen too", name(path));
+    let mut remarks: Vec<String> = copied.iter().map(left_out).collect();
     match to {
         Destination::Lake(lake) => sweep_lake(lake),
-        Destination::Tables(format, folder) => Target::Table(*format, folder.clone()).sweep(),
+        Destination::Tables(format, folder) => {
+            if let Err(err) = std::fs::create_dir_all(folder) {
+                let folder = folder.display();
+                let sentence = format!("{folder} cannot be made ({err}); nothing was written");
+                return Exported { sentence, remarks };
+            }
+            Target::Table(*format, folder.clone()).sweep();
+        }
     }
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {
-        if progress.tell(done, of, &name(session)).is_break() {
+        let name = name(session);
+        if progress.tell(done, of, &name).is_break() {
             remarks.push(format!("cancelled: {} were not begun", sessions.len() - done));
             break;
         }
-        let one = match to {
+        let notes = match to {
             Destination::Lake(lake) => into_lake(lake, session).map(|added| {
                 were_there += usize::from(added.was_there);
                 Vec::new()
@@ -201,21 +202,16 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
             Destination::Tables(format, folder) => {
                 let target = Target::Table(*format, folder.clone());
                 let mut tell = |rows, all| {
-                    let words = format!("{}: {rows} of {all} samples", name(session));
                     // One session is written whole once it is begun.
-                    let _ = progress.tell(done, of, &words);
+                    let _ = progress.tell(done, of, &format!("{name}: {rows} of {all} samples"));
                 };
-                export(session, &Selection::default(), &target, &mut tell)
-                    .map(|written| written.notes)
+                let exported = export(session, &Selection::default(), &target, &mut tell);
+                exported.map(|written| written.notes)
             }
         };
-        match one {
-            Ok(notes) => {
-                written += 1;
-                remarks.extend(notes.iter().map(|note| format!("{}: {note}", name(session))));
-            }
-            Err(err) => remarks.push(format!("{}: {err}", name(session))),
-        }
+        written += usize::from(notes.is_ok());
+        let notes = notes.unwrap_or_else(|err| vec![err.to_string()]);
+        remarks.extend(notes.iter().map(|note| format!("{name}: {note}")));
     }
     let sentence = match to {
         Destination::Tables(format, folder) => format!(

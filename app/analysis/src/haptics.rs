@@ -51,24 +51,13 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
     let options = FitOptions::default();
     let fitted = Fitted::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
-    let value = |name: &str| {
-        let parameter = report.parameter(name);
-        parameter
-            .map(|one| one.value)
-            .ok_or_else(|| format!("the fit of {} has no {name}", source.display()))
-    };
+    let body = report.kelvin().ok_or_else(|| {
+        format!("the fit of {} is not of the modified Kelvin model", source.display())
+    })?;
     let depths = fitted.samples.iter().map(|sample| sample.depth.0);
     let mut notes = fitted.notes;
     notes.extend(report.warnings.iter().cloned());
-    Ok(Source {
-        body: ModifiedKelvin {
-            tau_eps: value("tau_eps")?,
-            mu: [value("mu1")?, value("mu2")?, value("mu3")?],
-            tau_sig: value("tau_sig")?,
-        },
-        deepest: Depth(depths.fold(0.0, f64::max)),
-        notes,
-    })
+    Ok(Source { body, deepest: Depth(depths.fold(0.0, f64::max)), notes })
 }
 
 impl Source {
@@ -76,7 +65,7 @@ impl Source {
     pub fn beyond(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
-                "the record went to {:.3}; from there to {deepest:.3} the model is extrapolated, and nothing says that it holds",
+                "the record goes to {:.3}; from there to {deepest:.3} the model is extrapolated without any evidence",
                 self.deepest
             )
         })

@@ -1,7 +1,6 @@
 //! Files of other programs made into sessions, as the command line and the window both do it.
 
 use crate::progress::Progress;
-use crate::report::imported;
 use palpate_model::about::Labels;
 use palpate_runner::wall_now;
 use palpate_sessions::{FolderError, Imported, library_folder};
@@ -29,11 +28,11 @@ pub enum ImportFailure {
     Cancelled,
 }
 
-/// Where sessions go, and what is told of them.
+/// Files to import, and where their sessions go.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
     pub files: Vec<PathBuf>,
-    /// What is told of their layout; all else is detected.
+    /// Layout that the user states; all else is detected.
     pub told: Told,
     /// Who, what, with which probe.
     pub labels: Labels,
@@ -82,7 +81,7 @@ pub fn import(
         }
         let foreign = read(path)?;
         check_folders(request.into.as_deref(), &foreign, &mut taken)?;
-        reports.push(told_of(path, foreign));
+        reports.push(report_of(path, foreign));
     }
     if !request.is_dry_run {
         for (done, (path, file)) in request.files.iter().zip(&mut reports).enumerate() {
@@ -90,8 +89,8 @@ pub fn import(
             let name = path.display().to_string();
             let _ = progress.tell(request.files.len() + done, of, &name);
             let foreign = read(path)?;
-            for (part, told) in foreign.parts.iter().zip(&mut file.parts) {
-                told.session = Some(make(part, &foreign.bytes, request)?);
+            for (part, report) in foreign.parts.iter().zip(&mut file.parts) {
+                report.session = Some(make(part, &foreign.bytes, request)?);
             }
         }
     }
@@ -137,7 +136,7 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
     Ok(folder)
 }
 
-fn told_of(path: &Path, foreign: Foreign) -> FileReport {
+fn report_of(path: &Path, foreign: Foreign) -> FileReport {
     let parts = foreign.parts.into_iter().map(|part| {
         let ends = [part.samples.first(), part.samples.last()];
         let [first, last] = ends.map(|one| one.map_or(0.0, |one| one.t));
@@ -157,7 +156,7 @@ pub fn text(file: &FileReport) -> String {
     let mut lines = vec![file.file.display().to_string()];
     for part in &file.parts {
         let rows = format!("{} over {:.3} s", part.samples, part.duration_s);
-        lines.extend(imported::lines(&part.imported, &rows));
+        lines.extend(import_lines(&part.imported, &rows));
         lines.push(match &part.session {
             Some(session) => format!("  session       {}", session.display()),
             None => "  session       none made: a dry run".into(),
@@ -172,4 +171,24 @@ pub fn text(file: &FileReport) -> String {
 pub fn import_and_tell(request: &Request, progress: &dyn Progress) -> Result<Vec<String>, String> {
     let reports = import(request, progress).map_err(|err| err.to_string())?;
     Ok(reports.iter().map(text).collect())
+}
+
+/// One line for each thing that was taken for something, with the option that says it otherwise.
+fn import_lines(imported: &Imported, rows: &str) -> Vec<String> {
+    let line = |what: &str, text: &str| format!("  {what:<13} {text}");
+    let mut lines =
+        vec![line("file", &format!("{} bytes, CRC-32 {}", imported.bytes, imported.checksum))];
+    if !imported.part.is_empty() {
+        lines.push(line("part", &format!("{} (--part NAME)", imported.part)));
+    }
+    let readings = imported.readings.iter();
+    lines.extend(readings.map(|one| {
+        // The record keeps this word for what the user stated.
+        let stated = if one.how == "told" { ", as stated" } else { "" };
+        line(&one.what, &format!("{}{stated} ({})", one.found, one.option))
+    }));
+    lines.push(line("rows", rows));
+    let remarks = imported.remarks.iter();
+    lines.extend(remarks.map(|remark| line("remark", remark)));
+    lines
 }

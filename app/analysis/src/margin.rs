@@ -13,9 +13,9 @@ pub struct MarginPoint {
     pub depth: f64,
     /// What the body's own lag asks for.
     pub lag: f64,
-    /// With what the tick asks for besides.
+    /// With what the tick adds.
     pub tick: f64,
-    /// With what the delay asks for besides: all that is needed.
+    /// With what the delay adds: all that is needed.
     pub delay: f64,
 }
 

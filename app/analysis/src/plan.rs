@@ -59,23 +59,16 @@ pub struct PlanRequest<'a> {
 #[derive(Debug, Error)]
 pub enum PlanFailure {
     #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]
-    TooFast {
-        wanted: MmPerS,
-        most: MmPerS,
-        rig: String,
-    },
+    TooFast { wanted: MmPerS, most: MmPerS, rig: String },
     #[error("a force of {} N is more than the {most} at which the interlock stops a run", wanted.0)]
-    TooStrong {
-        wanted: Newtons,
-        most: Newtons,
-    },
+    TooStrong { wanted: Newtons, most: Newtons },
     #[error(transparent)]
     Expected(#[from] ExpectedError),
 }
 
 /// Body and noise, and where they are from.
 #[derive(Clone, Debug)]
-pub struct Assumed {
+pub struct PlanAssumptions {
     pub body: ModifiedKelvin,
     pub noise: Newtons,
     /// Where both are from, in words.
@@ -87,7 +80,7 @@ pub struct Assumed {
 }
 
 /// What a plan assumes: a recording or a fit; without one the last fit, and without that the source thesis.
-pub fn assumed(like: Option<&Path>) -> Result<Assumed, KnownFitError> {
+pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
     let (known, source, notes) = match like {
         Some(like) => {
             let (known, notes) = KnownFit::of(like, None)?;
@@ -100,7 +93,7 @@ pub fn assumed(like: Option<&Path>) -> Result<Assumed, KnownFitError> {
                 (known, source, Vec::new())
             }
             None => {
-                return Ok(Assumed {
+                return Ok(PlanAssumptions {
                     body: ModifiedKelvin::THESIS,
                     noise: NOISE_ASSUMED,
                     source: "pig stomach of the source thesis, since no fit is remembered".into(),
@@ -110,7 +103,7 @@ pub fn assumed(like: Option<&Path>) -> Result<Assumed, KnownFitError> {
             }
         },
     };
-    Ok(Assumed {
+    Ok(PlanAssumptions {
         body: known.body()?,
         noise: Newtons(known.rmse_n),
         is_hardly_known: is_hardly_known(&known.parameters),
@@ -157,7 +150,7 @@ pub struct Offer {
 /// Plans for what is assumed.
 pub fn plan(
     request: PlanRequest<'_>,
-    assumed: Assumed,
+    assumed: PlanAssumptions,
     bench: Bench<'_>,
 ) -> Result<PlanReport, PlanFailure> {
     let rig = request.rig(bench)?;
@@ -232,8 +225,8 @@ fn offer(
         .into_iter()
         .map(|(speed, hold)| {
             let press = RampHold { speed, depth, hold, ..RampHold::default() };
-            let told = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
-            (told.refusals.is_empty()).then(|| (command(&press), told))
+            let preview = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
+            preview.refusals.is_empty().then(|| (command(&press), preview))
         })
         .collect();
     let (commands, previews): (Vec<String>, Vec<Preview>) =

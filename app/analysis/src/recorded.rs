@@ -49,7 +49,7 @@ pub struct Replayed {
     pub ticks: u64,
     /// Whether every number has the recorded bits.
     pub is_identical: bool,
-    pub first: Option<Different>,
+    pub first: Option<ReplayDifference>,
     /// Whether the recording has its end; without, it was cut off after the last tick compared.
     pub is_whole: bool,
     /// Ticks that were lost while it was recorded.
@@ -60,7 +60,7 @@ pub struct Replayed {
 
 /// A number that has other bits than the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Different {
+pub struct ReplayDifference {
     pub tick: u64,
     pub column: &'static str,
     pub recorded: String,
@@ -105,33 +105,33 @@ impl Replayed {
 }
 
 /// A loop that can be computed again.
-pub trait Again<const W: usize, const R: usize> {
+pub trait Replayable<const W: usize, const R: usize> {
     /// The tick of the recorded inputs of `row`.
     fn tick(&mut self, row: &Row<W, R>) -> Row<W, R>;
 
     /// Hash of what is left.
-    fn left(&self) -> u64;
+    fn state_hash(&self) -> u64;
 }
 
 /// Computes every tick of a recording again, to the first that differs. `is_going` hears the share done and ends it early.
-pub fn computed_again<const W: usize, const R: usize>(
+pub fn replay_ticks<const W: usize, const R: usize>(
     name: &str,
     found: &Recording<W, R>,
     (whole, real): ([&'static str; W], [&'static str; R]),
-    again: &mut impl Again<W, R>,
+    replay: &mut impl Replayable<W, R>,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Replayed, String> {
     let mut first = None;
     let mut ticks = 0;
     for (index, row) in found.rows.iter().enumerate() {
-        let computed = again.tick(row);
+        let computed = replay.tick(row);
         ticks = row.whole[0];
         if let Some(column) = row.differs(&computed) {
             let text = |row: &Row<W, R>| match column.checked_sub(W) {
                 None => row.whole[column].to_string(),
                 Some(real) => format!("{:?}", row.real[real]),
             };
-            first = Some(Different {
+            first = Some(ReplayDifference {
                 tick: ticks,
                 column: whole.iter().chain(&real).copied().nth(column).unwrap_or(""),
                 recorded: text(row),
@@ -143,12 +143,12 @@ pub fn computed_again<const W: usize, const R: usize>(
             return Err("ended before it was done".to_owned());
         }
     }
-    let hash = again.left();
+    let hash = replay.state_hash();
     let (is_whole, lost) = match found.end {
         End::CutOff => (false, 0),
         End::Whole { lost, left } => {
             if first.is_none() && left != hash {
-                first = Some(Different {
+                first = Some(ReplayDifference {
                     tick: ticks,
                     column: "hash at the end",
                     recorded: format!("{left:016x}"),

@@ -1,7 +1,7 @@
 //! A scene in real time, its recording, and the recording computed again.
 
 use super::haptics::{Paced, body_of};
-use super::recorded::{Again, Ended, RecordedTicks, Replayed, computed_again};
+use super::recorded::{Ended, RecordedTicks, Replayable, Replayed, replay_ticks};
 use palpate_haptics::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
 use palpate_runner::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
@@ -18,9 +18,7 @@ const LOOK: Duration = Duration::from_millis(8);
 
 /// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
 pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
-    let Some(path) = file else {
-        return Ok((SceneFile::default(), Vec::new()));
-    };
+    let Some(path) = file else { return Ok((SceneFile::default(), Vec::new())) };
     let called = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|err| format!("cannot read {called} ({err}); give a scene file"))?;
@@ -117,14 +115,14 @@ pub fn play(
     })
 }
 
-impl Again<3, 10> for LedScene {
+impl Replayable<3, 10> for LedScene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (hand, elapsed) = scene_input(row);
-        let told = self.tick_after(hand, elapsed);
-        scene_row(hand, elapsed, &told)
+        let tick = self.tick_after(hand, elapsed);
+        scene_row(hand, elapsed, &tick)
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.scene.hash()
     }
 }
@@ -132,21 +130,20 @@ impl Again<3, 10> for LedScene {
 /// What became of the recording of a scene that was ended, if it has one.
 #[must_use]
 pub fn recorded(end: SceneEnd) -> Ended {
-    let left = end.scene.hash();
-    let told = end.recorded?;
-    Some(told.map(|told| (told, left)))
+    let hash = end.scene.hash();
+    Some(end.recorded?.map(|counts| (counts, hash)))
 }
 
 /// On a device that was sensed.
-impl Again<3, 10> for Scene {
+impl Replayable<3, 10> for Scene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (sensed, elapsed) = scene_input(row);
         let Hand6 { at, turn } = sensed;
-        let told = self.feel(Pose { at, turn }, elapsed);
-        scene_row(sensed, elapsed, &told)
+        let tick = self.feel(Pose { at, turn }, elapsed);
+        scene_row(sensed, elapsed, &tick)
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.hash()
     }
 }
@@ -171,8 +168,8 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
     let mut scene = file.scene(nodes)?;
     let name = format!("scene '{}'", file.name);
     if is_sensed {
-        return computed_again(&name, &found, columns, &mut scene, is_going);
+        return replay_ticks(&name, &found, columns, &mut scene, is_going);
     }
     let mut led = LedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
-    computed_again(&name, &found, columns, &mut led, is_going)
+    replay_ticks(&name, &found, columns, &mut led, is_going)
 }

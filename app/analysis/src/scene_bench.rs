@@ -54,9 +54,7 @@ pub fn bench(
     extent: Extent,
     progress: &dyn Progress,
 ) -> Result<Option<Bench>, String> {
-    let Some(curves) = measure_scene(extent, progress)? else {
-        return Ok(None);
-    };
+    let Some(curves) = measure_scene(extent, progress)? else { return Ok(None) };
     let methods = [201, 401]
         .into_iter()
         .flat_map(|nodes| [Method::Envelope, Method::Chain].map(|method| (nodes, method)))
@@ -130,7 +128,7 @@ pub fn planned_again(
     planned(file, curves, slower(before, 1.0, measured_us))
 }
 
-/// A poke that reaches half of the way to the border, made anew in every tick.
+/// A poke that reaches half of the way to the border, repeated in every tick.
 fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
     let grid = Grid::new(nodes, nodes, 1.0).map_err(|err| err.to_string())?;
     let middle = 0.5 * (nodes - 1) as f64;

@@ -43,10 +43,7 @@ pub enum SelectFailure {
     #[error(transparent)]
     Sources(#[from] SourcesError),
     #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
-    Specimens {
-        names: usize,
-        sources: usize,
-    },
+    Specimens { names: usize, sources: usize },
     #[error(transparent)]
     Select(#[from] SelectError),
 }
@@ -81,8 +78,7 @@ fn specimens(
     records: &Recordings,
 ) -> Result<Vec<Option<String>>, SelectFailure> {
     let Some(names) = names else {
-        let told = records.all.iter().map(|one| one.specimen.clone());
-        return Ok(told.collect());
+        return Ok(records.all.iter().map(|one| one.specimen.clone()).collect());
     };
     let known = names.iter().filter(|name| !name.is_empty()).count();
     if known != names.len() || known != records.all.len() {

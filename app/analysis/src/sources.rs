@@ -2,7 +2,7 @@
 //!
 //! Decided here, once for every front end: a folder with a segment of a log is a session and any other folder a
 //! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
-//! refused; a rejected session is left out and told of.
+//! refused; a rejected session is left out with a note.
 
 use crate::compliance::{Correction, Corrections};
 use crate::exports::without_copied;
@@ -28,10 +28,7 @@ pub enum SourcesError {
     #[error(transparent)]
     Missing(ReadError),
     #[error("cannot look into {} ({reason}); check its permissions", path.display())]
-    Folder {
-        path: PathBuf,
-        reason: String,
-    },
+    Folder { path: PathBuf, reason: String },
     #[error("{} holds no session and no table (.csv or .tsv); name the folder that does", .0.display())]
     Nothing(PathBuf),
     #[error("{} is a table and no session", .0.display())]
@@ -39,10 +36,7 @@ pub enum SourcesError {
     #[error("{} is given twice; taken together it would count as two recordings", .0.display())]
     Twice(PathBuf),
     #[error("{}: {reason}", path.display())]
-    Source {
-        path: PathBuf,
-        reason: Box<SourceError>,
-    },
+    Source { path: PathBuf, reason: Box<SourceError> },
     #[error("{0} sources, all of them rejected: nothing is left")]
     Rejected(usize),
 }
@@ -61,10 +55,7 @@ pub struct Found {
 pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String> {
     let names: Vec<String> = names.into_iter().collect();
     (!names.is_empty()).then(|| {
-        format!(
-            "left out, because the copy that was recovered from it is there too: {}",
-            names.join(", ")
-        )
+        format!("left out, because their recovered copies are included: {}", names.join(", "))
     })
 }
 

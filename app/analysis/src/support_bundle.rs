@@ -1,4 +1,4 @@
-//! What somebody who helps from afar needs to see, in one zip file: the program's log, versions, settings, rig files
+//! What remote support needs, in one zip file: the program's log, versions, settings, rig files
 //! without secrets and what the doctor says. Nothing that was measured, unless a session is named.
 
 use crate::opening::SETTINGS_FILE;
@@ -16,18 +16,8 @@ use walkdir::WalkDir;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Words in the name of a value that is nobody else's business.
-const SECRET: [&str; 9] = [
-    "password",
-    "passwd",
-    "passphrase",
-    "secret",
-    "token",
-    "credential",
-    "login",
-    "api_key",
-    "private_key",
-];
+/// Words in the name of a secret value.
+const SECRET: &str = "password passwd passphrase secret token credential login api_key private_key";
 /// What stands in the place of a secret.
 const REMOVED: &str = "removed";
 
@@ -63,17 +53,11 @@ pub struct Bundled {
 #[derive(Debug, Error)]
 pub enum BundleError {
     #[error("cannot read {path} ({source}); check its path and permissions")]
-    Read {
-        path: String,
-        source: io::Error,
-    },
+    Read { path: String, source: io::Error },
     #[error("{0}")]
     Session(String),
     #[error("cannot write the bundle {path} ({source}); choose a folder that may be written")]
-    Write {
-        path: String,
-        source: io::Error,
-    },
+    Write { path: String, source: io::Error },
 }
 
 /// Makes a bundle, and tells what is in it.
@@ -92,7 +76,7 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
         to: request.to.display().to_string(),
     };
     bundle.text("versions.txt", "versions and parts of the program", &versions(request))?;
-    bundle.text("findings.txt", "what the doctor says of the sessions", &request.findings)?;
+    bundle.text("findings.txt", "findings of the doctor on the sessions", &request.findings)?;
     for log in log_files(&log_folder(&request.library)) {
         let name = format!("log/{}", file_name(&log));
         bundle.file(&name, "the program's log", &log)?;
@@ -157,9 +141,7 @@ impl Bundle<'_> {
         let folders = WalkDir::new(&sessions).min_depth(1).max_depth(1);
         for folder in folders.sort_by_file_name().into_iter().flatten() {
             // One that cannot be read has its line among the findings.
-            let Ok(summary) = Summary::read(folder.path()) else {
-                continue;
-            };
+            let Ok(summary) = Summary::read(folder.path()) else { continue };
             let text = serde_json::to_string_pretty(&summary.manifest).unwrap_or_default();
             let name = format!("manifests/{}.json", file_name(folder.path()));
             self.text(&name, "a session's manifest", &text)?;
@@ -215,7 +197,7 @@ fn versions(request: &BundleRequest) -> String {
 pub fn without_secrets(text: &str) -> String {
     let lines = text.lines().map(|line| {
         let small = line.to_lowercase();
-        if SECRET.iter().any(|word| small.contains(word)) {
+        if SECRET.split(' ').any(|word| small.contains(word)) {
             // Without a key the line may be the secret.
             return match line.split_once(['=', ':']) {
                 Some((key, _)) => format!("{} = \"{REMOVED}\"\n", key.trim_end()),
@@ -231,9 +213,7 @@ pub fn without_secrets(text: &str) -> String {
 
 /// `user:password@host` without what stands before the host.
 fn without_login(word: &str) -> String {
-    let Some((login, host)) = word.rsplit_once('@') else {
-        return word.to_owned();
-    };
+    let Some((login, host)) = word.rsplit_once('@') else { return word.to_owned() };
     let scheme = login.find("://").map_or("", |end| &login[..end + 3]);
     format!("{scheme}{REMOVED}@{host}")
 }

@@ -41,7 +41,7 @@ pub struct FitSettings {
     pub fixed: Vec<String>,
     /// Parameters found that are held by default.
     pub free: Vec<String>,
-    /// Whether what the calibration's errors do was told.
+    /// Whether the systematic uncertainty was estimated.
     pub systematic: bool,
     /// Whether intervals from the profile likelihood were found.
     pub profile: bool,
@@ -128,7 +128,7 @@ impl FitWanted {
         progress: &dyn Progress,
     ) -> Result<Value, String> {
         let fitted = Fitted::of(source, options);
-        step(progress, 2, 4, "moving the calibration by its errors")?;
+        step(progress, 2, 4, "estimating the systematic uncertainty")?;
         let fitted = fitted.with_systematic(options);
         let report = fitted.result.as_ref().map_err(ToString::to_string)?;
         if self.with_profile {
@@ -136,7 +136,7 @@ impl FitWanted {
         }
         let intervals = fitted.intervals(options, self.intervals(), |_| ());
         let intervals = intervals.map_err(|err| err.to_string())?;
-        step(progress, 4, 4, "keeping it")?;
+        step(progress, 4, 4, "storing the analysis")?;
         let overlay = Overlay::of(report, &fitted.samples);
         let beside = fitted.beside(&overlay, &intervals);
         let object = FitObject::of(options.family(), report, beside, fitted.seconds);
@@ -162,7 +162,7 @@ impl FitWanted {
         if let Some(reason) = fitted.notes.pop() {
             return Err(reason);
         }
-        step(progress, 4, 4, "keeping it")?;
+        step(progress, 4, 4, "storing the analysis")?;
         let beside = Beside {
             systematic: fitted.systematic.as_ref().and_then(|found| found.first()),
             ..fitted.beside(records).remove(0)

@@ -1,20 +1,21 @@
 //! What is made of a session afterwards, away from the window's thread: analyses, verdicts, corrections.
 
-mod deeds;
+mod actions;
 mod fits;
-mod papers;
 
-pub use deeds::{
-    Corrected, Deed, DeedFailure, KeptFit, Masked, Recalibrated, Who, correct, judge, keep_fit,
-    mask, recalibrate, withdraw,
+pub use actions::{
+    ContactCorrection, Deed, DeedFailure, KeptFit, MaskResult, RecalibrationResult, Who, correct,
+    judge, keep_fit, mask, recalibrate, withdraw,
 };
 pub use fits::{FitSettings, FitWanted, own};
-pub use papers::{Paper, paper};
 
 use crate::edited;
 use crate::progress::Progress;
+use crate::report::dossier::{self, Ending, Figure, Wanted};
+use crate::report::figures::{Align, Window};
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
+use palpate_runner::wall_now;
 use palpate_sessions::analyses::Analyses;
 use palpate_sessions::edits::Verdict;
 use palpate_sessions::{Shelf, contacts};
@@ -66,16 +67,54 @@ pub struct Done {
     pub made: Option<String>,
 }
 
-impl Done {
-    fn told(sentence: String) -> Self {
-        Self { sentence, changed: None, is_edit: false, made: None }
-    }
-}
-
-/// Tells how far the work is; an error if nobody wants the rest.
+/// Reports progress; an error if the work is cancelled.
 fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(), String> {
     match progress.tell(done, of, what).is_break() {
         true => Err("cancelled; nothing was kept".to_owned()),
         false => Ok(()),
     }
+}
+
+/// What is written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Paper {
+    /// A page on these sessions.
+    Page(Vec<Wanted>),
+    /// One figure of a session.
+    Figure(Wanted, Figure, Window),
+}
+
+/// Writes it as a new file, or says why not.
+pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, String> {
+    if to.exists() {
+        return Err(format!("{} exists already; choose another name", to.display()));
+    }
+    let bytes = match paper {
+        Paper::Page(wanted) => {
+            let made = dossier::made(wall_now().into());
+            let page = dossier::write(wanted, Align::default(), &made, progress);
+            page.map_err(|err| err.to_string())?.into_bytes()
+        }
+        Paper::Figure(wanted, figure, window) => {
+            let ending = Ending::of(to)?;
+            step(progress, 0, 1, "drawing")?;
+            let drawing = dossier::figure(wanted, *figure, *window);
+            let drawing = drawing.map_err(|err| err.to_string())?;
+            ending.bytes(&drawing?)?
+        }
+    };
+    write_new(to, &bytes)?;
+    Ok(Done {
+        sentence: format!("written: {}", to.display()),
+        changed: None,
+        is_edit: false,
+        made: None,
+    })
+}
+
+/// Writes a file that was not there.
+fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {
+    palpate_sessions::atomic::create(to, bytes).map_err(|err| {
+        format!("cannot write {} ({err}); choose a folder that may be written", to.display())
+    })
 }

@@ -1,7 +1,7 @@
 //! Many sources, each read and fitted by itself on one of several threads; the answers in the sources' order.
 
 use super::{Fitted, Recipe};
-use crate::pool::{News, NoAnswer, in_order};
+use crate::pool::{News, WorkFailure, in_order};
 use crate::source::SourceError;
 use palpate_rheology::fit::FitError;
 use std::io;
@@ -22,11 +22,11 @@ pub enum NotFitted {
     Died,
 }
 
-impl From<NoAnswer> for NotFitted {
-    fn from(none: NoAnswer) -> Self {
-        match none {
-            NoAnswer::NotBegun => Self::NotBegun,
-            NoAnswer::Died => Self::Died,
+impl From<WorkFailure> for NotFitted {
+    fn from(failure: WorkFailure) -> Self {
+        match failure {
+            WorkFailure::NotBegun => Self::NotBegun,
+            WorkFailure::Died => Self::Died,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::{Fitted, NotFitted, Recipe};
 use crate::compliance::Correction;
 use crate::exports::sweep_lake;
-use crate::pool::{News, NoAnswer, in_order};
+use crate::pool::{News, WorkFailure, in_order};
 use crate::source;
 use crate::sources::copied_sentence;
 use palpate_rheology::fit::{FitReport, Systematic};
@@ -70,7 +70,7 @@ impl From<source::SourceError> for LakeFailure {
     }
 }
 
-/// What `hear` is told of the fits of a lake.
+/// An event in the fitting of a lake.
 #[derive(Debug)]
 pub enum LakeFit<'a> {
     /// What a user must know.
@@ -96,7 +96,7 @@ pub struct LakeTally {
 
 /// What is kept of a fit: nothing that depends on when or where it was made.
 #[derive(Serialize)]
-struct Kept<'a> {
+struct StoredFit<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,7 +136,8 @@ pub fn fit_lake(
     in_order(request.jobs, &found, is_ending, work, |news| match news {
         News::Done(count) => hear(LakeFit::Done(count, found.len())),
         News::Next(answer) => {
-            let came = answer.unwrap_or_else(|none: NoAnswer| Err(NotFitted::from(none).into()));
+            let came =
+                answer.unwrap_or_else(|failure: WorkFailure| Err(NotFitted::from(failure).into()));
             match &came {
                 Ok(Outcome::Made) => tally.made += 1,
                 Ok(Outcome::There) => tally.were_there += 1,
@@ -164,7 +165,7 @@ impl LakeRequest<'_> {
         let source = source::of_session(session, wanted.stretch, &[])?;
         let fitted: Fitted = self.recipe.fit_read(source)?;
         let report = fitted.result.map_err(NotFitted::Fit)?;
-        let kept = Kept {
+        let kept = StoredFit {
             report: &report,
             systematic: fitted.systematic.as_ref(),
             compliance: fitted.compliance.as_ref(),

@@ -3,7 +3,7 @@
 //! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
 //! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
-use crate::source::{self, SourceError};
+use crate::source::{self, SourceError, Stretch};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{FitError, FitOptions, FitReport, Parameter, fit};
 use palpate_sessions::atomic;
@@ -24,7 +24,7 @@ const VERSION: u64 = 2;
 const DEFAULT_FAMILY: &str = "series-3";
 
 #[derive(Serialize)]
-struct Remembered<'a> {
+struct RememberedFit<'a> {
     source: String,
     #[serde(flatten)]
     report: &'a FitReport,
@@ -34,10 +34,7 @@ struct Remembered<'a> {
 #[derive(Debug, Error)]
 pub enum KnownFitError {
     #[error("this is not a fit: {reason}, {}", path.display())]
-    NotAFit {
-        path: PathBuf,
-        reason: String,
-    },
+    NotAFit { path: PathBuf, reason: String },
     #[error("the remembered fit is not as it was written; fit again, {}", .0.display())]
     Changed(PathBuf),
     #[error("the fit has no parameter {0}")]
@@ -45,10 +42,7 @@ pub enum KnownFitError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error("{} cannot be fitted: {reason}", path.display())]
-    Fit {
-        path: PathBuf,
-        reason: FitError,
-    },
+    Fit { path: PathBuf, reason: FitError },
 }
 
 /// What is needed of a fit that was written as JSON, remembered or as the answer of a command.
@@ -101,7 +95,7 @@ impl KnownFit {
         if path.extension().is_some_and(|ending| ending == "json") {
             return Ok((Self::read(path)?, Vec::new()));
         }
-        let source = source::read_named(path, columns)?;
+        let source = source::read_stretch(path, columns, Stretch::RampHold)?;
         let report = fit(&source.samples, &FitOptions::default());
         let report =
             report.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
@@ -147,11 +141,11 @@ pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::E
         return Ok(());
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let remembered = Remembered { source: source.display().to_string(), report };
+    let remembered = RememberedFit { source: source.display().to_string(), report };
     write(&file, &remembered).map_err(|err| (file, err))
 }
 
-fn write(file: &Path, remembered: &Remembered<'_>) -> io::Result<()> {
+fn write(file: &Path, remembered: &RememberedFit<'_>) -> io::Result<()> {
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder)?;
     }

@@ -32,7 +32,7 @@ pub struct Recipe {
     pub options: FitOptions,
     /// Names of the columns of tables without a header.
     pub columns: Option<ColumnNames>,
-    /// Whether what the errors of calibration and compliance do is told.
+    /// Whether the systematic uncertainty from calibration and compliance is estimated.
     pub is_systematic: bool,
     /// Which part of a source, and whether rejected ones are taken.
     pub wanted: Wanted,
@@ -65,10 +65,7 @@ impl Recipe {
     pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
         let fitted = Fitted { compliance, ..Fitted::of(source, &self.options) };
-        Ok(match self.is_systematic {
-            true => fitted.with_systematic(&self.options),
-            false => fitted,
-        })
+        Ok(if self.is_systematic { fitted.with_systematic(&self.options) } else { fitted })
     }
 }
 
@@ -115,9 +112,7 @@ impl Fitted {
     /// a note. `options` are those of the fit.
     #[must_use]
     pub fn with_systematic(mut self, options: &FitOptions) -> Self {
-        let Ok(report) = &self.result else {
-            return self;
-        };
+        let Ok(report) = &self.result else { return self };
         let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
         let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
             let record = origin.traced("", &self.samples);
@@ -135,7 +130,6 @@ impl Fitted {
         self
     }
 
-    /// What is told of the fit beside its report.
     #[must_use]
     pub fn beside<'a>(&'a self, overlay: &'a Overlay, intervals: &'a Intervals) -> Beside<'a> {
         Beside {
@@ -161,10 +155,9 @@ impl Fitted {
     }
 }
 
-/// That systematic errors are not told, and why.
 #[must_use]
 pub fn no_systematic(reason: &str) -> String {
-    format!("what calibration and compliance add to the uncertainty cannot be told: {reason}")
+    format!("the systematic uncertainty from calibration and compliance is unknown: {reason}")
 }
 
 /// Which intervals that take more than one pass are asked for.
@@ -185,10 +178,7 @@ impl IntervalsWanted {
         progress: impl FnMut(usize),
     ) -> Result<Intervals, FitError> {
         Ok(Intervals {
-            profile: match self.with_profile {
-                true => fitted.profile(record)?,
-                false => Vec::new(),
-            },
+            profile: if self.with_profile { fitted.profile(record)? } else { Vec::new() },
             bootstrap_seed: self.bootstrap.map(|choice| choice.seed),
             bootstrap: match self.bootstrap {
                 Some(choice) => fitted.bootstrap(record, choice, progress)?,

@@ -18,13 +18,13 @@ pub struct TogetherRequest<'a> {
     pub options: &'a FitOptions,
     /// Names of the parameters that are the same in all, `body` for all of the specimen.
     pub shared: Vec<&'a str>,
-    /// Whether what the errors of calibrations and compliances do is told.
+    /// Whether the systematic uncertainty from calibrations and compliances is estimated.
     pub is_systematic: bool,
     /// Intervals that take more than one pass.
     pub intervals: IntervalsWanted,
 }
 
-/// A fit of several recordings, with what is told of each beside its report.
+/// A fit of several recordings, with the details of each beside its report.
 #[derive(Clone, Debug)]
 pub struct Together {
     pub report: JointReport,
@@ -89,7 +89,6 @@ pub fn fit_together(
 }
 
 impl Together {
-    /// What is told of each recording beside its report.
     #[must_use]
     pub fn beside<'a>(&'a self, records: &'a Recordings) -> Vec<Beside<'a>> {
         let all = self.overlays.iter().zip(&self.intervals);

@@ -2,7 +2,7 @@
 //! [`super::calibration_plot`].
 
 pub use super::calibration_plot::picture;
-use super::text::in_columns;
+use super::text::table;
 use palpate_model::calibration::{
     Calibration, CalibrationError, Candidate, CheckResult, CurveKind, ForceUncertainty, Quality,
     Term, candidates, judge_kind,
@@ -40,14 +40,10 @@ impl Entry {
         let in_force = shelf.in_force(&document.rig);
         Self {
             id: kept.id.clone(),
-            name: document.name.clone(),
-            rig: document.rig.clone(),
-            cell: document.cell.clone(),
-            taken_at: document.taken_at.clone(),
             age_days,
-            valid_days: document.valid_days(),
             is_in_force: in_force.is_some_and(|one| one.id == kept.id),
             superseded_by: shelf.successor(&kept.id).map(str::to_owned),
+            ..Self::built_in(document)
         }
     }
 
@@ -85,12 +81,11 @@ pub fn list(entries: &[Entry], folder: &Path) -> String {
     if entries.is_empty() {
         return format!("no calibration in {}", folder.display());
     }
-    let mut lines = vec![["id", "name", "rig", "cell", "age", "state"].map(String::from).to_vec()];
-    lines.extend(entries.iter().map(|one| {
+    let row = |one: &Entry| {
         let age = one.age_days.map_or("not stated".to_owned(), |age| format!("{age} d"));
         vec![one.id.clone(), one.name.clone(), one.rig.clone(), one.cell.clone(), age, one.state()]
-    }));
-    in_columns(&lines)
+    };
+    table("id | name | rig | cell | age | state", entries.iter().map(row))
 }
 
 /// The uncertainty of one force and where it comes from, in N.
@@ -111,7 +106,7 @@ pub struct BudgetTerm {
     pub uncertainty_n: Option<f64>,
 }
 
-/// All that is told of a calibration.
+/// Quality, candidate curves and uncertainty of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct Told {
     /// What it is like.
@@ -162,18 +157,19 @@ impl Told {
 pub fn whole(
     calibration: &Calibration,
     id: Option<&str>,
-    told: &Told,
+    details: &Told,
     doubts: &[String],
 ) -> String {
-    let mut parts = vec![head(calibration, id)];
-    parts.push(points(&told.quality));
-    parts.push(curves(calibration, told));
-    parts.push(spread(&told.quality));
-    if told.uncertainty.is_stated() {
-        parts.push(budget(told));
-    }
-    let sentences = told.quality.findings.iter().chain(doubts);
-    parts.push(sentences.map(|one| format!("- {one}")).collect::<Vec<_>>().join("\n"));
+    let sentences = details.quality.findings.iter().chain(doubts);
+    let sentences: Vec<String> = sentences.map(|one| format!("- {one}")).collect();
+    let mut parts = vec![
+        head(calibration, id),
+        points(&details.quality),
+        curves(calibration, details),
+        spread(&details.quality),
+        budget(details),
+        sentences.join("\n"),
+    ];
     parts.retain(|part| !part.is_empty());
     parts.join("\n\n")
 }
@@ -201,18 +197,7 @@ fn points(quality: &Quality) -> String {
     let some = |value: Option<f64>, digits: usize| {
         value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
     };
-    let heads = [
-        "mass (g)",
-        "force (N)",
-        "signal (V)",
-        "readings",
-        "residual (mN)",
-        "V/N",
-        "load - unload (mV)",
-        "u (N)",
-    ];
-    let mut lines = vec![heads.map(String::from).to_vec()];
-    lines.extend(quality.points.iter().map(|one| {
+    let rows = quality.points.iter().map(|one| {
         vec![
             format!("{:.1}", one.mass_g),
             format!("{:.3}", one.force_n),
@@ -224,24 +209,21 @@ fn points(quality: &Quality) -> String {
             some(one.hysteresis_v.map(|volts| volts * 1e3), 2),
             some(one.uncertainty_n, 3),
         ]
-    }));
-    in_columns(&lines)
+    });
+    let head = "mass (g) | force (N) | signal (V) | readings | residual (mN) | V/N | load - unload (mV) | u (N)";
+    table(head, rows)
 }
 
-fn curves(calibration: &Calibration, told: &Told) -> String {
+fn curves(calibration: &Calibration, details: &Told) -> String {
     let newtons = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let heads =
-        ["curve", "left out, rms (N)", "worst (N)", "ends, rms (N)", "residuals, rms (mN)", ""];
-    let mut lines = vec![heads.map(String::from).to_vec()];
     let is_chosen = |one: &Candidate| one.curve == calibration.curve;
-    let own = told.chosen.iter().filter(|_| !told.candidates.iter().any(is_chosen));
-    for one in told.candidates.iter().chain(own) {
+    let own = details.chosen.iter().filter(|_| !details.candidates.iter().any(is_chosen));
+    let rows = details.candidates.iter().chain(own).map(|one| {
+        if let Some(reason) = &one.refused {
+            return vec![one.name.clone(), reason.clone()];
+        }
         let square: f64 = one.residuals_n.iter().map(|residual| residual * residual).sum();
         let count = one.residuals_n.len().max(1) as f64;
-        if let Some(reason) = &one.refused {
-            lines.push(vec![one.name.clone(), reason.clone()]);
-            continue;
-        }
         let through = match &one.curve {
             CurveKind::Segments { through_g } => {
                 let masses: Vec<String> = through_g.iter().map(|mass| mass.to_string()).collect();
@@ -250,21 +232,20 @@ fn curves(calibration: &Calibration, told: &Told) -> String {
             _ => String::new(),
         };
         let mark = if is_chosen(one) { "in use " } else { "" };
-        lines.push(vec![
+        vec![
             one.name.clone(),
             newtons(one.left_out_rms_n),
             newtons(one.left_out_worst_n),
             newtons(one.left_out_ends_rms_n),
             format!("{:.1}", (square / count).sqrt() * 1e3),
             format!("{mark}{through}"),
-        ]);
-    }
-    in_columns(&lines)
+        ]
+    });
+    table("curve | left out, rms (N) | worst (N) | ends, rms (N) | residuals, rms (mN) | ", rows)
 }
 
 fn spread(quality: &Quality) -> String {
-    let mut lines = Vec::new();
-    lines.push(match &quality.hysteresis {
+    let hysteresis = match &quality.hysteresis {
         Some(one) => format!(
             "hysteresis: at most {:.2} mV or {:.3} N, rms {:.2} mV or {:.3} N",
             one.max_v * 1e3,
@@ -272,38 +253,39 @@ fn spread(quality: &Quality) -> String {
             one.rms_v * 1e3,
             one.rms_n
         ),
-        None => "hysteresis: not taken; go down again weight by weight".to_owned(),
-    });
-    lines.push(match quality.repeatability_v {
+        None => "hysteresis: not measured; unload weight by weight".to_owned(),
+    };
+    let repeatability = match quality.repeatability_v {
         Some(volts) => format!("repeatability: {:.2} mV from reading to reading", volts * 1e3),
-        None => "repeatability: not taken; repeat the series".to_owned(),
-    });
-    lines.push(match (quality.zero_shift_v, quality.zero_shift_n) {
+        None => "repeatability: not measured; repeat the series".to_owned(),
+    };
+    let zero_shift = match (quality.zero_shift_v, quality.zero_shift_n) {
         (Some(volts), Some(newtons)) => {
             format!("zero shift: {:+.2} mV or {newtons:+.3} N", volts * 1e3)
         }
-        _ => "zero shift: not taken; read the empty cell before and after".to_owned(),
-    });
-    lines.join("\n")
+        _ => "zero shift: not measured; read the empty cell before and after".to_owned(),
+    };
+    [hysteresis, repeatability, zero_shift].join("\n")
 }
 
-/// The uncertainty by its terms, those that are stated.
-fn budget(told: &Told) -> String {
+/// The uncertainty by its terms, as far as they are stated; empty without any.
+fn budget(details: &Told) -> String {
     let stated: Vec<Term> = Term::ALL
         .into_iter()
-        .filter(|term| !told.uncertainty.not_stated().contains(term))
+        .filter(|term| !details.uncertainty.not_stated().contains(term))
         .collect();
-    let mut heads = vec!["force (N)".to_owned(), "u (N)".to_owned()];
-    heads.extend(stated.iter().map(|term| term.name().to_owned()));
-    let mut lines = vec![heads];
-    lines.extend(told.budget.iter().map(|one| {
+    if !details.uncertainty.is_stated() {
+        return String::new();
+    }
+    let names: String = stated.iter().map(|term| format!(" | {}", term.name())).collect();
+    let rows = details.budget.iter().map(|one| {
         let number = |value: Option<f64>| format!("{:.4}", value.unwrap_or_default());
         let mut line = vec![format!("{:.3}", one.force_n), number(one.uncertainty_n)];
         let own = one.terms.iter().filter(|own| stated.contains(&own.term));
         line.extend(own.map(|own| number(own.uncertainty_n)));
         line
-    }));
-    in_columns(&lines)
+    });
+    table(&format!("force (N) | u (N){names}"), rows)
 }
 
 /// The answer of a check.
@@ -330,18 +312,18 @@ mod tests {
     #[test]
     fn the_page_tells_every_weight_every_curve_and_every_finding() {
         let thesis = Calibration::thesis();
-        let told = Told::of(&thesis).unwrap();
-        let page = whole(&thesis, Some("id-1"), &told, &["a doubt".into()]);
-        for weight in &told.quality.points {
+        let details = Told::of(&thesis).unwrap();
+        let page = whole(&thesis, Some("id-1"), &details, &["a doubt".into()]);
+        for weight in &details.quality.points {
             assert!(page.contains(&format!("{:.1} ", weight.mass_g)), "{}", weight.mass_g);
         }
-        for one in &told.candidates {
+        for one in &details.candidates {
             assert!(page.contains(&one.name), "{}", one.name);
         }
-        for sentence in &told.quality.findings {
+        for sentence in &details.quality.findings {
             assert!(page.contains(sentence), "{sentence}");
         }
-        assert!(page.contains("hysteresis: not taken") && page.contains("- a doubt"));
+        assert!(page.contains("hysteresis: not measured") && page.contains("- a doubt"));
         assert!(page.contains("digits of the readings") && !page.contains("NaN"));
         assert_eq!(page.matches("in use").count(), 1);
     }
@@ -349,10 +331,10 @@ mod tests {
     #[test]
     fn a_straight_line_of_two_points_has_a_page_too() {
         let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
-        let told = Told::of(&line).unwrap();
-        let page = whole(&line, None, &told, &[]);
+        let details = Told::of(&line).unwrap();
+        let page = whole(&line, None, &details, &[]);
         assert!(page.contains("monotone interpolation") && !page.contains("NaN"), "{page}");
-        assert!(!picture(&line, &told).contains("NaN"));
+        assert!(!picture(&line, &details).contains("NaN"));
     }
 
     #[test]

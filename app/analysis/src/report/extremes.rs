@@ -17,7 +17,7 @@ pub struct GroupSummary {
 /// Every group in numbers, in the order they were run.
 #[must_use]
 pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
-    groups(rows)
+    grouped(rows, |row| row.group)
         .into_iter()
         .map(|(group, rows)| GroupSummary {
             group,
@@ -30,13 +30,17 @@ pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
         .collect()
 }
 
-/// Groups in the order they were run, with their rows.
-fn groups(rows: &[Row]) -> Vec<(&'static str, Vec<&Row>)> {
-    let mut groups: Vec<(&'static str, Vec<&Row>)> = Vec::new();
+/// Rows by a word of theirs, in the order in which the words come first.
+fn grouped<'a, K: PartialEq>(
+    rows: impl IntoIterator<Item = &'a Row>,
+    word: impl Fn(&'a Row) -> K,
+) -> Vec<(K, Vec<&'a Row>)> {
+    let mut groups: Vec<(K, Vec<&Row>)> = Vec::new();
     for row in rows {
-        match groups.iter_mut().find(|(group, _)| *group == row.group) {
+        let key = word(row);
+        match groups.iter_mut().find(|(group, _)| *group == key) {
             Some((_, own)) => own.push(row),
-            None => groups.push((row.group, vec![row])),
+            None => groups.push((key, vec![row])),
         }
     }
     groups
@@ -81,7 +85,7 @@ pub fn page(rows: &[Row]) -> String {
         let (group, tightest) = (one.group, one.tightest.unwrap_or_default());
         page += &format!("| {group} | {right} | {refused} | {flagged} | {wrong} | {tightest} |\n");
     }
-    for (group, rows) in groups(rows) {
+    for (group, rows) in grouped(rows, |row| row.group) {
         page += &format!("\n## {}\n\n", capital(group));
         page += &match group {
             "relaxation time and step" => by_time_and_step(&rows),
@@ -161,39 +165,29 @@ fn by_time_and_step(rows: &[&Row]) -> String {
 }
 
 fn by_ratio(rows: &[&Row]) -> String {
-    let mut subjects: Vec<&str> = Vec::new();
+    let of_ratio = |row: &&&Row| exponents(&row.case).is_some();
+    let subjects = grouped(rows.iter().filter(of_ratio).copied(), |row| row.subject.as_str());
     let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
     for row in rows {
-        let Some((tau, step)) = exponents(&row.case) else {
-            continue;
-        };
-        if !subjects.contains(&row.subject.as_str()) {
-            subjects.push(&row.subject);
+        if let Some((tau, step)) = exponents(&row.case) {
+            let of_ratio = cells.entry(step - tau).or_default();
+            of_ratio.entry(&row.subject).or_default().push(row);
         }
-        let of_ratio = cells.entry(step - tau).or_default();
-        of_ratio.entry(&row.subject).or_default().push(row);
     }
     let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();
-    table += &header("step / tau", subjects.iter().map(|&name| name.to_owned()));
+    table += &header("step / tau", subjects.iter().map(|(name, _)| (*name).to_owned()));
     for (ratio, row) in &cells {
-        let line =
-            subjects.iter().map(|name| row.get(name).map_or(String::new(), |rows| cell(rows)));
+        let own = |name: &&str| row.get(name).map_or(String::new(), |rows| cell(rows));
+        let line = subjects.iter().map(|(name, _)| own(name));
         table += &line_of(&format!("1e{ratio}"), line.collect());
     }
     table
 }
 
 fn by_case(rows: &[&Row]) -> String {
-    let mut cases: Vec<(&str, Vec<&Row>)> = Vec::new();
-    for row in rows {
-        match cases.iter_mut().find(|(case, _)| *case == row.case) {
-            Some((_, own)) => own.push(row),
-            None => cases.push((&row.case, vec![row])),
-        }
-    }
     let names = ["what", "worst error", "the first sentence"];
     let mut table = header("case", names.into_iter().map(str::to_owned));
-    for (case, rows) in cases {
+    for (case, rows) in grouped(rows.iter().copied(), |row| row.case.as_str()) {
         let error = tightest(&rows).map_or(String::new(), |(_, error)| format!("{error:.0e}"));
         let sentence = rows.iter().find(|row| !row.sentence.is_empty());
         let sentence = sentence.map_or(String::new(), |row| row.sentence.replace('|', "/"));
@@ -218,10 +212,9 @@ fn verdicts(rows: &[&Row]) -> String {
         .map(|(verdict, subjects)| format!("{}: {}", verdict.name(), subjects.join(" + ")))
         .collect();
     let most = named[0].0.name();
-    if others.is_empty() {
-        format!("all {most}")
-    } else {
-        format!("{most} but for {}", others.join("; "))
+    match others.as_slice() {
+        [] => format!("all {most}"),
+        others => format!("{most} but for {}", others.join("; ")),
     }
 }
 

@@ -268,7 +268,7 @@ fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = Seri
 }
 
 fn force_plot(x: Axis, series: Vec<Series>) -> Plot {
-    let remark = series.is_empty().then(|| "nothing is known here".to_owned());
+    let remark = series.is_empty().then(|| "no force is known here".to_owned());
     Plot { remark, ..Plot::new("", x, Axis::linear("force (N)")).with(series) }
 }
 
@@ -295,9 +295,7 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
     for (index, one) in all.iter().enumerate() {
         let (ink, dash) = look_of(index);
         over_depth.extend(lines(&one.force_depth, ink, dash));
-        let Some(origin) = one.origin(align) else {
-            continue;
-        };
+        let Some(origin) = one.origin(align) else { continue };
         over_time.extend(lines(&one.force_time, ink, dash).map(|mut line| {
             line.points.iter_mut().for_each(|point| point[0] -= origin);
             line.points.retain(|point| point[0] >= -LEAD_S);

@@ -39,7 +39,7 @@ fn a_window_leaves_the_rest_out() {
     assert!(part.ends[0] >= ramp && part.ends[1] <= ramp + 1.0);
     assert!(part.samples[0] > 900 && part.samples[0] < 1100, "{:?}", part.samples);
     let none = Traces::of("one", &session, Window { from: 1e9, until: 2e9 });
-    assert!(none.is_empty() && force_time(&none).svg().contains("nothing is known"));
+    assert!(none.is_empty() && force_time(&none).svg().contains("no force is known"));
 }
 
 #[test]

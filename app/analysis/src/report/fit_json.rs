@@ -41,12 +41,12 @@ impl Overlay {
 
 /// What a family is, in words.
 #[derive(Serialize)]
-struct Words {
+struct FamilyText {
     equation: &'static str,
     cannot_represent: &'static str,
 }
 
-impl Words {
+impl FamilyText {
     fn of(family: &dyn Family) -> Self {
         Self { equation: family.equation(), cannot_represent: family.cannot_represent() }
     }
@@ -58,27 +58,25 @@ pub struct FitObject<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     #[serde(flatten)]
-    words: Words,
+    family_text: FamilyText,
     #[serde(flatten)]
-    overlay: &'a Overlay,
-    #[serde(flatten)]
-    intervals: &'a Intervals,
-    /// What calibration and compliance add; absent for tables and where it was not asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    systematic: Option<&'a Systematic>,
-    /// What the rig's compliance did to the depths, or would; absent where none is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    compliance: Option<&'a Correction>,
+    beside: Beside<'a>,
     /// The fit alone, without reading.
     seconds: f64,
 }
 
-/// What is told of a fit beside its report.
-#[derive(Clone, Copy)]
+/// Parts of a fit beside its report.
+#[derive(Clone, Copy, Serialize)]
 pub struct Beside<'a> {
+    #[serde(flatten)]
     pub overlay: &'a Overlay,
+    #[serde(flatten)]
     pub intervals: &'a Intervals,
+    /// What calibration and compliance add; absent for tables and where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<&'a Systematic>,
+    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub compliance: Option<&'a Correction>,
 }
 
@@ -89,15 +87,7 @@ impl<'a> FitObject<'a> {
         beside: Beside<'a>,
         seconds: f64,
     ) -> Self {
-        Self {
-            report,
-            words: Words::of(family),
-            overlay: beside.overlay,
-            intervals: beside.intervals,
-            systematic: beside.systematic,
-            compliance: beside.compliance,
-            seconds,
-        }
+        Self { report, family_text: FamilyText::of(family), beside, seconds }
     }
 }
 
@@ -106,7 +96,7 @@ impl<'a> FitObject<'a> {
 pub struct JointObject<'a> {
     family: String,
     #[serde(flatten)]
-    words: Words,
+    family_text: FamilyText,
     shared: &'a [String],
     records: Vec<RecordObject<'a>>,
     samples: usize,
@@ -126,9 +116,7 @@ struct RecordObject<'a> {
     record: &'a str,
     report: &'a FitReport,
     #[serde(flatten)]
-    overlay: &'a Overlay,
-    #[serde(flatten)]
-    intervals: &'a Intervals,
+    beside: Beside<'a>,
 }
 
 impl<'a> JointObject<'a> {
@@ -143,14 +131,13 @@ impl<'a> JointObject<'a> {
         let records = report.records.iter().zip(beside);
         Self {
             family: family.key(),
-            words: Words::of(family),
+            family_text: FamilyText::of(family),
             shared: &report.shared,
             records: records
                 .map(|(named, beside)| RecordObject {
                     record: &named.record,
                     report: &named.report,
-                    overlay: beside.overlay,
-                    intervals: beside.intervals,
+                    beside: Beside { systematic: None, compliance: None, ..*beside },
                 })
                 .collect(),
             samples: report.samples,

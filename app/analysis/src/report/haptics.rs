@@ -1,7 +1,7 @@
 //! What is said of a body on a device, and of a loop's time.
 
 use super::picture::{COLUMNS, LEFT, RIGHT, WIDTH, title};
-use super::text::{ParameterText, in_columns};
+use super::text::{ParameterText, table};
 use crate::haptics::{Checked, Followed, Paced, Tried};
 use palpate_figures::drawing::Svg;
 use palpate_figures::figure::{self, Axis, AxisNames, Ink, Plot, Series};
@@ -94,7 +94,7 @@ pub fn margin_text(margin: &Margin) -> String {
 #[must_use]
 pub fn run_text(paced: &Paced) -> String {
     let mut lines = vec![format!("priority: {}", paced.priority)];
-    lines.extend(table(std::slice::from_ref(paced)));
+    lines.extend(loop_table(std::slice::from_ref(paced)));
     lines.extend(paced.recorded.map(|recorded| recorded.words()));
     lines.join("\n")
 }
@@ -154,11 +154,11 @@ pub fn bench_text(loops: &[Paced]) -> String {
     if let Some(first) = loops.first() {
         lines.push(format!("priority: {}", first.priority));
     }
-    lines.extend(table(loops));
+    lines.extend(loop_table(loops));
     lines.join("\n")
 }
 
-fn table(loops: &[Paced]) -> Vec<String> {
+fn loop_table(loops: &[Paced]) -> Vec<String> {
     let mut lines = vec![format!(
         "{:>6} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
         "rate", "busy", "late (us)", "period (us)", "work (us)", "overruns", "missed"
@@ -239,18 +239,17 @@ fn fits_beside_the_body(followed: &Followed) -> String {
     let row = |name: &str, value: f64, unit: &str| {
         let measured = cell(&followed.fit, name);
         let commanded = cell(&followed.fit_commanded, name);
-        [name, &plain(value), &commanded, &measured, unit].map(str::to_owned).into()
+        [name, &plain(value), &commanded, &measured, unit].map(str::to_owned).to_vec()
     };
-    let heads = ["", "body", "fit of the commanded", "fit of the measured force", ""];
-    in_columns(&[
-        heads.map(str::to_owned).into(),
+    let rows = [
         row("tau_eps", body.tau_eps, "s"),
         row("mu1", mu1, "N/mm"),
         row("mu2", mu2, "N/mm²"),
         row("mu3", mu3, "N/mm³"),
         row("tau_sig", body.tau_sig, "N·s/mm²"),
         row("f_offset", 0.0, "N"),
-    ])
+    ];
+    table(" | body | fit of the commanded | fit of the measured force | ", rows)
 }
 
 /// A check of the feedback as a picture: forces over time, and one over the other.
@@ -303,9 +302,9 @@ mod tests {
     use palpate_model::units::{Depth, Newtons};
 
     #[test]
-    fn what_takes_force_away_is_told_and_nothing_else() {
+    fn only_flags_that_take_force_away_are_listed() {
         assert!(why_less(Flags::NONE, 0).is_empty());
-        // These are told elsewhere: they take no force.
+        // These appear elsewhere: they take no force.
         assert!(why_less(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
         let all = why_less(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
         assert_eq!(all.len(), 4);

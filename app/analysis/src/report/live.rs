@@ -1,7 +1,7 @@
 //! The plots of a run in progress (force over time and over depth, contact search, weight readings) and of daily checks.
 //! A painter converts a plot's points once and again only when the trace has changed.
 
-use super::band;
+use super::picture::band;
 use crate::daily::Deviation;
 use palpate_figures::figure::{Axis, Ink, Level, Plot, Series, Stretch};
 use palpate_model::calibration::{Curve, Direction, ForceUncertainty, newtons_of};
@@ -60,7 +60,7 @@ impl RunPlots {
         let (over_time, is_time_cut) = known(&points, |point| [point.t, point.force]);
         let (over_depth, is_depth_cut) = known(&points, over_depth);
         let banded = |title: &str, x: &str, lines: Vec<Vec<[f64; 2]>>| Plot {
-            bands: lines.iter().flat_map(|line| band::around(line, uncertainty)).collect(),
+            bands: lines.iter().flat_map(|line| band(line, uncertainty)).collect(),
             ..Plot::new(title, Axis::linear(x), Axis::linear(FORCE))
                 .with(lines.into_iter().map(|line| Series::line("force", Ink::Series, WIDTH, line)))
         };
@@ -77,7 +77,7 @@ impl RunPlots {
         let of_each = trace.samples_per_bucket();
         let remark = match () {
             () if is_time_cut || is_depth_cut => {
-                Some("too many gaps to draw; the session holds everything".to_owned())
+                Some("too many gaps to draw; the session has all samples".to_owned())
             }
             () if cycles.len() > LOOPS_MAX => {
                 Some(format!("over depth the newest {LOOPS_MAX} cycles are drawn"))
@@ -213,7 +213,7 @@ pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
         )
         .with([
             Series::dots("loading", Ink::Series, 3.6, deviations(Direction::Loading)),
-            // Hollow, so that the two are told apart without colours.
+            // Hollow, so that colour is not needed to distinguish the two.
             Series::rings("unloading", Ink::Limit, 4.6, deviations(Direction::Unloading)),
         ])
     }

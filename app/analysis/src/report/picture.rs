@@ -1,11 +1,10 @@
 //! A fit as one picture: measured and fitted force over time, what is left over beneath, the
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
-use super::band;
 use super::fit_json::Overlay;
 use super::text::{ParameterText, energy, equation, limit, quality};
 use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink as TextInk, Look, Svg};
-use palpate_figures::figure::{self, Axis, AxisNames, Ink, Level, Plot, Series};
+use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Level, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
@@ -23,6 +22,26 @@ pub(super) const COLUMNS: usize = (RIGHT - LEFT) as usize;
 pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
 const LETTERS: usize = 120;
+
+/// The band of a calibration around a force reaches so many standard uncertainties either way: about 95 % where errors
+/// are normal (JCGM 100:2008, 6.2).
+const SIGMAS: f64 = 2.0;
+
+const BAND_NAME: &str = "calibration, ± 2u";
+
+/// The band around points whose ordinates are forces in N; `None` where no uncertainty is stated.
+pub(super) fn band(forces: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) -> Option<Band> {
+    let edge = |sigmas: f64| {
+        let at = |&[x, force]: &[f64; 2]| {
+            let sigma = uncertainty?.sigma(Newtons(force))?;
+            Some([x, force + sigmas * sigma.0])
+        };
+        forces.iter().filter_map(at).collect::<Vec<_>>()
+    };
+    let edges = [edge(-SIGMAS), edge(SIGMAS)];
+    let is_stated = !edges[0].is_empty();
+    is_stated.then(|| Band { name: BAND_NAME.to_owned(), ink: Ink::Series, edges })
+}
 
 /// The picture of a fit that was made: force over time, what is left over, force over depth, parameters and sentences.
 /// `source` is what was fitted, for the title; around the force lies the band of twice its calibration's standard
@@ -132,7 +151,7 @@ pub(super) fn force_plot(
     uncertainty: Option<&ForceUncertainty>,
 ) -> Plot {
     Plot {
-        bands: band::around(&fitted, uncertainty).into_iter().collect(),
+        bands: band(&fitted, uncertainty).into_iter().collect(),
         ..Plot::new("", x, Axis::linear("force (N)")).with([
             // Wide under narrow, so that both are seen where they agree.
             Series::line("measured", Ink::Series, 2.6, measured),

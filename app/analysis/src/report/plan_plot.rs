@@ -41,7 +41,7 @@ fn heading(report: &PlanReport) -> String {
         format!(" and {sd} mN over {} s", plain(memory.time.0))
     });
     format!(
-        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep; dashed: wanted, dot: proposed",
+        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep; dashed: target, dot: proposed",
         report.targets[0].parameter,
         digits(report.noise.white.0 * 1e3, 3),
         plain(report.rig.depth.0)
@@ -113,8 +113,8 @@ fn plot(title: &str, x: &str, curves: &[Curve], k: usize, mark: Option<[f64; 2]>
     let mark = mark.map(|at| Series::dots("proposed", Ink::Limit, 6.0, vec![at]));
     let y = Axis::logarithmic("95 % interval (%)");
     let plot = Plot::new(title, Axis::logarithmic(x), y).with(lines.chain(mark));
-    let is_told = plot.series.iter().any(|one| !one.points.is_empty());
-    Plot { remark: (!is_told).then(|| "cannot be told".to_owned()), ..plot }
+    let is_known = plot.series.iter().any(|one| !one.points.is_empty());
+    Plot { remark: (!is_known).then(|| "not identifiable".to_owned()), ..plot }
 }
 
 fn points(curve: &Curve, k: usize) -> Vec<[f64; 2]> {

@@ -16,16 +16,19 @@ pub fn change(change: &Change) -> String {
     match change {
         Change::Verdict { verdict } => verdict.to_string(),
         Change::Note => "note".to_owned(),
-        Change::Tags { add, remove } => {
-            let added = add.iter().map(|tag| format!("+{tag}"));
-            let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
-            format!("tags {}", signs.collect::<Vec<_>>().join(" "))
-        }
+        Change::Tags { add, remove } => tags(add, remove),
         Change::Review { decision, .. } => format!("review, {}", decision.name()),
         Change::Contact { number, position_mm, was_mm } => {
             format!("contact {number} at {:.3} mm instead of {:.3} mm", position_mm.0, was_mm.0)
         }
     }
+}
+
+/// Tags that are added and removed.
+pub(crate) fn tags(add: &[String], remove: &[String]) -> String {
+    let added = add.iter().map(|tag| format!("+{tag}"));
+    let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
+    format!("tags {}", signs.collect::<Vec<_>>().join(" "))
 }
 
 /// Whether a review still stands.
@@ -39,7 +42,7 @@ pub fn review(review: &Review) -> String {
     format!("{decision} by {}, {stands}", review.by)
 }
 
-/// The worst that is told of the computer, each with its name.
+/// The worst readings of the computer, each with its name.
 #[must_use]
 pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();

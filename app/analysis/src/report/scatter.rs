@@ -7,7 +7,7 @@ use palpate_rheology::trade::front;
 pub struct Mark {
     /// Along both axes, above zero.
     pub at: [f64; 2],
-    /// A short name beside it, and what is told of it on demand.
+    /// A short name beside it, and the text of its tooltip.
     pub label: [String; 2],
 }
 

@@ -1,6 +1,6 @@
 //! A selection in words: the table, the ladder and the verdict.
 
-use super::text::in_columns;
+use super::text::{head, in_columns};
 use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
 
 /// Everything, the verdict last.
@@ -26,7 +26,7 @@ pub fn whole(selection: &Selection) -> String {
     }
     let ladder = ladder(selection);
     if ladder.len() > 1 {
-        parts.push(format!("What each extra term buys:\n{}", in_columns(&ladder)));
+        parts.push(format!("Effect of each extra term:\n{}", in_columns(&ladder)));
     }
     parts.push(tested(selection));
     parts.push(selection.verdict.sentences.join("\n"));
@@ -48,24 +48,11 @@ pub fn records(selection: &Selection) -> String {
 /// Rows of the comparison, the head first.
 #[must_use]
 pub fn table(selection: &Selection) -> Vec<Vec<String>> {
-    let mut head = vec![
-        "family",
-        "free",
-        "rms mN",
-        "worst mN",
-        "dAICc",
-        "dBIC",
-        "predicted mN",
-        "scaled mN",
-        "states",
-        "ops",
-    ];
-    if selection.tolerance_n.is_some() {
-        head.push("within");
-    }
-    let mut rows = vec![head.into_iter().map(String::from).collect()];
-    rows.extend(selection.candidates.iter().map(row));
-    rows
+    let mut names = head(
+        "family | free | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | states | ops",
+    );
+    names.extend(selection.tolerance_n.map(|_| "within".to_owned()));
+    std::iter::once(names).chain(selection.candidates.iter().map(row)).collect()
 }
 
 fn row(one: &Candidate) -> Vec<String> {
@@ -94,8 +81,7 @@ fn row(one: &Candidate) -> Vec<String> {
 /// Rows of the ladder, the head first.
 #[must_use]
 pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
-    let head = ["step", "adds", "rms mN", "predicted mN", "dBIC", "ops"];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | ops")];
     let change =
         |[before, after]: [f64; 2]| format!("{} > {}", digits(1e3 * before), digits(1e3 * after));
     rows.extend(selection.steps.iter().map(|step| {

@@ -75,11 +75,11 @@ pub fn quality(report: &FitReport) -> String {
     format!("R² {:.6}, rmse {:.3} mN, {} samples", report.r2, report.rmse_n * 1e3, report.samples)
 }
 
-/// What energy went in and how far the fit is off at worst.
+/// Work along the path and the largest residual.
 #[must_use]
 pub fn energy(overlay: &Overlay) -> String {
     format!(
-        "energy {:.3} N·mm measured, {:.3} fitted; at worst {:.1} mN off",
+        "energy {:.3} N·mm measured, {:.3} fitted; largest residual {:.1} mN",
         overlay.work_measured_n_mm,
         overlay.work_fitted_n_mm,
         overlay.worst_n * 1e3
@@ -190,6 +190,16 @@ pub fn capital(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
+/// The cells of a table's head, given in one text with `|` between them.
+pub(super) fn head(names: &str) -> Vec<String> {
+    names.split('|').map(|name| name.trim().to_owned()).collect()
+}
+
+/// A table in columns under its head.
+pub(super) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    in_columns(&std::iter::once(head(names)).chain(rows).collect::<Vec<_>>())
+}
+
 /// Cells in columns as wide as their widest; a sentence at the end of a short line widens none.
 #[must_use]
 pub fn in_columns(lines: &[Vec<String>]) -> String {
@@ -278,7 +288,7 @@ mod tests {
             "  tau_sig    1.50 ± 0.10  N·s/mm²  95 % [1.30, 1.70]",
             "  tau_sig    1.500 fixed  N·s/mm²",
             "R² 0.999123, rmse 3.450 mN, 900 samples",
-            "energy 0.000 N·mm measured, 0.000 fitted; at worst 0.0 mN off",
+            "energy 0.000 N·mm measured, 0.000 fitted; largest residual 0.0 mN",
             "- beware",
             "- found",
             "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",

@@ -17,51 +17,37 @@ pub enum SourceError {
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     #[error("the session was rejected ({reason}) and is not used")]
-    Rejected {
-        reason: String,
-    },
+    Rejected { reason: String },
     #[error("a table has no analyses, so there is no '{name}'; name a session")]
-    TableAnalysis {
-        name: String,
-    },
+    TableAnalysis { name: String },
     #[error(transparent)]
     Table(#[from] TableError),
     #[error(
         "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report"
     )]
-    Imported {
-        file: String,
-    },
+    Imported { file: String },
     #[error(
-        "the session was imported from {file} and has no raw signal, so its forces cannot be made anew; import the file again with other units if they are wrong"
+        "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; import the file again with other units if they are wrong"
     )]
-    NoSignal {
-        file: String,
-    },
+    NoSignal { file: String },
     #[error(
         "the session has no ramp and hold with known force and depth, so there is nothing to fit"
     )]
     Empty,
     #[error(
-        "the session has no way in and no sine with known force and depth, so there are no cycles to analyse"
+        "the session has no loading and no sine with known force and depth, so there are no cycles to analyse"
     )]
     NoCycles,
     #[error(
         "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"
     )]
-    Decision {
-        detail: String,
-    },
+    Decision { detail: String },
     #[error(
         "the session's plan cannot be understood ({detail}); read the session with the version that wrote it"
     )]
-    Plan {
-        detail: String,
-    },
+    Plan { detail: String },
     #[error(transparent)]
     Correction(#[from] CorrectionError),
     #[error("the session's calibration cannot be understood ({detail})")]
-    Calibration {
-        detail: String,
-    },
+    Calibration { detail: String },
 }

@@ -27,8 +27,8 @@ struct Target {
     is_fitted: bool,
     /// Whether the probe comes back after the hold.
     comes_back: bool,
-    /// Families; the first of them alone with `--quick`.
-    families: &'static [&'static str],
+    /// Keys of families; a quick measurement takes the first `quick` of them.
+    families: &'static str,
     quick: usize,
 }
 
@@ -40,17 +40,7 @@ const TARGETS: [Target; 5] = [
         body: ("series-3", &[1.023], &[0.05333, -0.0086, 0.000_434_5, 0.06]),
         is_fitted: true,
         comes_back: false,
-        families: &[
-            "series-1",
-            "series-2",
-            "series-3",
-            "series-4",
-            "series-5",
-            "voigt",
-            "maxwell",
-            "kelvin",
-            "exponential",
-        ],
+        families: "series-1 series-2 series-3 series-4 series-5 voigt maxwell kelvin exponential",
         quick: 3,
     },
     Target {
@@ -62,7 +52,7 @@ const TARGETS: [Target; 5] = [
         ),
         is_fitted: true,
         comes_back: true,
-        families: &["series-3", "unloading-3"],
+        families: "series-3 unloading-3",
         quick: 2,
     },
     Target {
@@ -70,7 +60,7 @@ const TARGETS: [Target; 5] = [
         body: ("fractional-12", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: true,
         comes_back: false,
-        families: &["prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6"],
+        families: "prony-1 prony-2 prony-3 prony-4 prony-5 prony-6",
         quick: 2,
     },
     Target {
@@ -78,15 +68,7 @@ const TARGETS: [Target; 5] = [
         body: ("fractional-14", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: false,
         comes_back: false,
-        families: &[
-            "fractional-1",
-            "fractional-2",
-            "fractional-4",
-            "fractional-6",
-            "fractional-8",
-            "fractional-10",
-            "fractional-12",
-        ],
+        families: "fractional-1 fractional-2 fractional-4 fractional-6 fractional-8 fractional-10 fractional-12",
         quick: 2,
     },
     Target {
@@ -94,7 +76,7 @@ const TARGETS: [Target; 5] = [
         body: ("fung-64", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
         is_fitted: false,
         comes_back: false,
-        families: &["fung-2", "fung-4", "fung-8", "fung-16", "fung", "fung-32"],
+        families: "fung-2 fung-4 fung-8 fung-16 fung fung-32",
         quick: 2,
     },
 ];
@@ -127,18 +109,14 @@ pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, Stri
         }
         let (key, outer, linear) = target.body;
         let exact = along(&model(key, outer, linear)?, &path)?;
-        let count = match extent {
-            Extent::Full => target.families.len(),
-            Extent::Quick => target.quick,
-        };
-        for key in &target.families[..count] {
-            let found = if target.is_fitted {
-                fitted(key, &path, &exact)?
-            } else {
-                model(key, outer, linear)?
+        let count = extent.choose(usize::MAX, target.quick);
+        for key in target.families.split(' ').take(count) {
+            let found = match target.is_fitted {
+                true => fitted(key, &path, &exact)?,
+                false => model(key, outer, linear)?,
             };
             rows.push(FamilyRow {
-                family: (*key).to_owned(),
+                family: key.to_owned(),
                 target: target.name.to_owned(),
                 peak_n: peak(&exact),
                 error_n: difference(&along(&found, &path)?, &exact),

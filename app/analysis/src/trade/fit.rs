@@ -24,10 +24,7 @@ pub(super) fn rows(
     [first, count]: [u64; 2],
     paths: &Paths,
 ) -> Result<Vec<FitRow>, String> {
-    let thinned = match extent {
-        Extent::Full => &THINNED[..],
-        Extent::Quick => &THINNED_QUICK,
-    };
+    let thinned = extent.choose(&THINNED[..], &THINNED_QUICK);
     let recordings: Result<Vec<_>, String> =
         (first..first + count).map(|seed| recording(seed, NOISE, paths)).collect();
     let recordings = recordings?;

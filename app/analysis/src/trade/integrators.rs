@@ -17,10 +17,7 @@ const RUN: usize = 1024;
 pub(super) const JOBS: usize = 2 * Scheme::ALL.len();
 
 pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<IntegratorRow>, String> {
-    let steps = match extent {
-        Extent::Full => &STEPS[..],
-        Extent::Quick => &STEPS_QUICK,
-    };
+    let steps = extent.choose(&STEPS[..], &STEPS_QUICK);
     let mut rows = Vec::new();
     for scheme in Scheme::ALL {
         for precision in Precision::ALL {

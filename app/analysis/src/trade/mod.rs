@@ -38,11 +38,15 @@ pub enum Extent {
     Quick,
 }
 
+impl Extent {
+    /// One of two settings.
+    fn choose<T>(self, full: T, quick: T) -> T {
+        if self == Self::Full { full } else { quick }
+    }
+}
+
 /// Tables whose errors [`errors`] computes.
 const TABLES: usize = 4;
-/// Seeds of the noise in the fits: the first, and how many.
-const SEEDS_FULL: [u64; 2] = [1, 8];
-const SEEDS_QUICK: [u64; 2] = [1, 2];
 /// What stands for a time that is not measured yet.
 const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
 
@@ -50,9 +54,7 @@ const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
 pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let total = TABLES + timing::rounds(extent);
     let of_errors = |done: usize, _: usize, what: &str| progress.tell(done, total, what);
-    let Some(curves) = errors(extent, &of_errors)? else {
-        return Ok(None);
-    };
+    let Some(curves) = errors(extent, &of_errors)? else { return Ok(None) };
     let mut done = TABLES;
     times(curves, extent, &mut || {
         done += 1;
@@ -64,10 +66,8 @@ pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCu
 /// `progress` ended it.
 pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let paths = paths::Paths::new()?;
-    let seeds = match extent {
-        Extent::Full => SEEDS_FULL,
-        Extent::Quick => SEEDS_QUICK,
-    };
+    // Seeds of the noise in the fits: the first, and how many.
+    let seeds = extent.choose([1, 8], [1, 2]);
     let ends = |done: usize, what: &str| progress.tell(done, TABLES, what).is_break();
     if ends(0, "errors of the integrators") {
         return Ok(None);
@@ -101,7 +101,7 @@ pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCur
     }))
 }
 
-/// Measures the times of all rows; `step` is told of each round done and may end the whole.
+/// Measures the times of all rows; `step` hears of each round done and may end the whole.
 fn times(
     mut curves: TradeCurves,
     extent: Extent,
@@ -113,9 +113,7 @@ fn times(
     jobs.extend(families::jobs(&curves.families)?);
     jobs.extend(fit::jobs(&curves.fit, curves.seeds[0], &paths)?);
     jobs.extend(live::jobs(&curves.live, &paths)?);
-    let Some(costs) = timing::measure(&mut jobs, extent, step) else {
-        return Ok(None);
-    };
+    let Some(costs) = timing::measure(&mut jobs, extent, step) else { return Ok(None) };
     let mut costs = costs.into_iter();
     let by_scheme: Vec<Cost> = costs.by_ref().take(integrators::JOBS).collect();
     for row in &mut curves.integrators {

@@ -52,10 +52,7 @@ impl Group {
             points
         };
         let front = points(&|one| one.front);
-        let labels = match self.name.is_empty() {
-            true => Labels::None,
-            false => Labels::AtEnd,
-        };
+        let labels = if self.name.is_empty() { Labels::None } else { Labels::AtEnd };
         [
             Series::line(&self.name, Ink::Line, 1.0, points(&|_| true)).labelled(labels),
             Series::line("", self.ink, 2.0, front.clone()),

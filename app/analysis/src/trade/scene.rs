@@ -88,10 +88,8 @@ pub fn measure_scene(
     extent: Extent,
     progress: &dyn Progress,
 ) -> Result<Option<SceneCurves>, String> {
-    let (meshes, reference) = match extent {
-        Extent::Full => (&MESHES[..], REFERENCE_NODES),
-        Extent::Quick => (&MESHES_QUICK[..], REFERENCE_QUICK),
-    };
+    let meshes = extent.choose(&MESHES[..], &MESHES_QUICK);
+    let reference = extent.choose(REFERENCE_NODES, REFERENCE_QUICK);
     let total = meshes.len() + 2 + timing::rounds(extent);
     let mut done = 0;
     let mut goes_on = |what: &str| {
@@ -147,9 +145,7 @@ pub fn measure_scene(
         done += 1;
         progress.tell(done - 1, total, "times")
     });
-    let Some(costs) = costs else {
-        return Ok(None);
-    };
+    let Some(costs) = costs else { return Ok(None) };
     with_times(&mut curves, &costs, &rows);
     Ok(Some(curves))
 }

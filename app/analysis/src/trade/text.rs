@@ -88,9 +88,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
             let rows: Vec<_> = rows
                 .filter(|row| row.scheme == scheme && row.precision.name() == precision)
                 .collect();
-            let Some(first) = rows.first() else {
-                continue;
-            };
+            let Some(first) = rows.first() else { continue };
             let name = format!("{}, {precision}", scheme.name());
             let _ = write!(out, "{name:34}{} ", cost(&first.cost));
             for row in &rows {

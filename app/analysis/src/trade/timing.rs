@@ -22,10 +22,7 @@ const BATCH_QUICK: f64 = 1e-3;
 
 /// Rounds, even in number.
 pub(super) fn rounds(extent: Extent) -> usize {
-    match extent {
-        Extent::Full => 24,
-        Extent::Quick => 4,
-    }
+    extent.choose(24, 4)
 }
 
 /// The cost of an evaluation of each job; none if a step breaks it off.
@@ -34,10 +31,7 @@ pub(super) fn measure(
     extent: Extent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Vec<Cost>> {
-    let batch = match extent {
-        Extent::Full => BATCH,
-        Extent::Quick => BATCH_QUICK,
-    };
+    let batch = extent.choose(BATCH, BATCH_QUICK);
     let timed = |job: &mut Job, calls: usize| {
         let watch = Stopwatch::start();
         for _ in 0..calls {

@@ -1,8 +1,7 @@
 //! The picture of an analysis of cycles: loops, how peak and place change, and how the force relaxes.
 
 use super::CycleReport;
-use crate::report::band;
-use crate::report::picture::{LEFT, RIGHT, WIDTH, title};
+use crate::report::picture::{LEFT, RIGHT, WIDTH, band, title};
 use palpate_figures::drawing::Svg;
 use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Plot, Series};
 use palpate_figures::thin::thin;
@@ -87,7 +86,7 @@ fn faded(
     let banded = curves.iter().filter(|(index, _)| ends.contains(&Some(*index)));
     let parts = banded.flat_map(|(index, parts)| parts.iter().map(move |part| (index, part)));
     let bands = parts.filter_map(|(index, part)| {
-        Some(Band { ink: ink(*index, count), ..band::around(part, uncertainty)? })
+        Some(Band { ink: ink(*index, count), ..band(part, uncertainty)? })
     });
     let bands = bands.collect();
     let lines = curves.iter().map(|(index, parts)| {
@@ -146,7 +145,7 @@ fn by_cycle(
     });
     let dots: Vec<Series> = dots.collect();
     Plot {
-        bands: band::around(&points, uncertainty).into_iter().collect(),
+        bands: band(&points, uncertainty).into_iter().collect(),
         ..Plot::new("", Axis::linear("cycle").over(range), Axis::linear(name))
             .with(std::iter::once(Series::line("", Ink::Line, 1.0, points)).chain(dots))
     }

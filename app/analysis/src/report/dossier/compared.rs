@@ -8,7 +8,7 @@ use palpate_figures::page::Body;
 
 /// Table of the sessions, figures over each other, and a table of parameters.
 pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
-    body.heading(2, "Beside each other");
+    body.heading(2, "Comparison");
     let row = |one: &Subject| {
         let verdict = one.edits.verdict();
         vec![
@@ -29,7 +29,7 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
     let ([time, depth], lost) = overlays(&traces, align);
     let left_out = match lost.as_slice() {
         [] => String::new(),
-        lost => format!(" Left out, for want of that beginning: {}.", lost.join(", ")),
+        lost => format!(" Left out, because they have no such start: {}.", lost.join(", ")),
     };
     body.figure(
         &time.svg(),

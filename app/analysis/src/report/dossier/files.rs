@@ -49,15 +49,13 @@ fn own_hash(page: &str) -> String {
 
 /// What a page says it describes, and whether the page itself is as it was made.
 pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
-    let no_page = "this is not the page of a report; name one";
+    let no_page = "the file is not the page of a report; name a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
-    let told = seal.strip_suffix(SEAL_END).unwrap_or_default();
+    let stated = seal.strip_suffix(SEAL_END).unwrap_or_default();
     let rows = page.split(ROW).skip(1).map(|row| {
         let (row, _) = row.split_once('>')?;
         let parts: Vec<&str> = row.split('"').collect();
-        let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else {
-            return None;
-        };
+        let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else { return None };
         let names = [*f, *w, *h].map(str::trim);
         (names == ["data-folder=", "data-file=", "data-sha256="]).then(|| Claim {
             session_id: unescape(session),
@@ -68,7 +66,7 @@ pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
     });
     let claims: Option<Vec<Claim>> = rows.collect();
     let claims = claims.filter(|claims| !claims.is_empty()).ok_or(no_page)?;
-    Ok((claims, own_hash(page) == told))
+    Ok((claims, own_hash(page) == stated))
 }
 
 fn unescape(text: &str) -> String {
@@ -104,12 +102,12 @@ pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisEr
             Some(_) => {
                 compared.differences.push(format!("{} is not as the page describes it", claim.file))
             }
-            None => compared.differences.push(format!("{} is gone", claim.file)),
+            None => compared.differences.push(format!("{} is missing", claim.file)),
         }
     }
     for one in &now {
         if claims.iter().all(|claim| claim.file != one.what) {
-            let sentence = format!("{} has come since", one.what);
+            let sentence = format!("{} is newer than the page", one.what);
             compared.differences.push(sentence);
         }
     }

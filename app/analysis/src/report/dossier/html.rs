@@ -70,7 +70,7 @@ fn session(body: &mut Body, subject: &Subject, level: u8) {
 
 fn summary(body: &mut Body, subject: &Subject, level: u8) {
     let manifest = &subject.manifest;
-    body.heading(level, "What was measured");
+    body.heading(level, "Measurement");
     let plan = &manifest.plan;
     let protocol = plan["name"].as_str().map(|name| {
         let version = plan["version"].as_u64().unwrap_or_default();
@@ -112,22 +112,22 @@ fn ending(subject: &Subject) -> String {
 }
 
 fn worth(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "What it is worth");
+    body.heading(level, "Data quality");
     let verdict = match subject.edits.verdict() {
         Some((verdict, edit)) => format!("{verdict}, says {}: {}", edit.by, edit.reason),
-        None => "nobody gave a verdict".to_owned(),
+        None => "none".to_owned(),
     };
     let review = match &subject.review {
         Some(review) => format!("{}; {}", said::review(review), review.reason),
-        None => "nobody reviewed it".to_owned(),
+        None => "not reviewed".to_owned(),
     };
     let tags: Vec<&str> = subject.edits.tags().into_iter().collect();
     body.facts(
-        "Verdict and review",
+        "Data quality and review",
         &[("verdict", verdict), ("review", review), ("tags", tags.join(", "))],
     );
     if !subject.notes.is_empty() {
-        body.paragraph("What a reader of the data must know:");
+        body.paragraph("Notes on the data:");
         body.list(subject.notes.iter().map(String::as_str));
     }
 }
@@ -188,10 +188,10 @@ fn calibration(body: &mut Body, subject: &Subject, level: u8) {
         Some((calibration, Err(reason))) => {
             body.paragraph(&format!("{}: {reason}.", calibration.name));
         }
-        Some((calibration, Ok(told))) => {
-            body.pre(&calibrations::whole(calibration, None, told, &[]));
+        Some((calibration, Ok(details))) => {
+            body.pre(&calibrations::whole(calibration, None, details, &[]));
             let caption = "The curve with its readings, what it misses of them, its slope, and the standard uncertainty of a force with every term that is stated.";
-            body.figure(&calibration_plot::picture(calibration, told), caption);
+            body.figure(&calibration_plot::picture(calibration, details), caption);
         }
     }
 }

@@ -28,6 +28,7 @@ use palpate_sessions::analyses::{Analyses, Input, inputs_of};
 use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
 use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// A session, and which of its analyses it is read by.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +40,7 @@ pub struct Wanted {
 
 /// One session with all that a page tells of it. Its samples are not in memory any more.
 pub struct Subject {
-    /// The name of its folder: where that is, is nobody else's business.
+    /// The name of its folder. The path is private and stays out of the page.
     pub name: String,
     pub(super) analysis: Option<String>,
     pub(super) manifest: Manifest,
@@ -77,20 +78,19 @@ pub(super) struct FitPart {
 }
 
 impl Subject {
-    /// Reads a session and works out what is told of it.
     pub fn of(wanted: &Wanted) -> Result<Self, SourceError> {
         let path = &wanted.session;
         let files = inputs_of(path)?;
         let opened = analysed::open(path, wanted.analysis.as_deref())?;
         let Opened { edited, analyses, left_out_s } = opened;
         let (session, edits) = (edited.session, edited.edits);
-        // The review itself is among the edits; what came after it is told by their order.
+        // The review itself is among the edits; their order shows what came after it.
         let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
         let seen: Vec<Input> = seen.chain(analyses.input()).collect();
         let name = name_of(path);
         let calibration = source::calibration_of(&session).ok().map(|calibration| {
-            let told = Told::of(&calibration).map_err(|err| err.to_string());
-            (calibration, told)
+            let details = Told::of(&calibration).map_err(|err| err.to_string());
+            (calibration, details)
         });
         let traces = Traces::of(&name, &session, Window::WHOLE).leaving_out(&left_out_s);
         Ok(Self {
@@ -138,7 +138,7 @@ fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
 fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart, String> {
     let source = source::of_session(session, Stretch::RampHold, left_out_s);
     let mut source = source.map_err(|err| err.to_string())?;
-    // What the reader remarked is told beside the session.
+    // The page has the notes of the reader beside the session.
     source.notes.clear();
     let options = FitOptions::default();
     let fitted = Fitted::of(source, &options).with_systematic(&options);
@@ -186,7 +186,7 @@ pub fn figure(
         Figure::Calibration => {
             let calibration = source::calibration_of(&session)?;
             match Told::of(&calibration) {
-                Ok(told) => Ok(calibration_plot::drawing(&calibration, &told)),
+                Ok(details) => Ok(calibration_plot::drawing(&calibration, &details)),
                 Err(err) => Err(err.to_string()),
             }
         }
@@ -209,7 +209,7 @@ impl Ending {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
             _ => Err(format!(
-                "{} is no name of a figure; let it end in .svg or .png",
+                "the figure {} has no known file type; end its name in .svg or .png",
                 file.display()
             )),
         }
@@ -231,21 +231,12 @@ pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
     format!("Made {} by palpate {version}", super::said::at(&now))
 }
 
-/// Nobody wants the report any more, or a session cannot be read.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum ReportError {
+    #[error("the report was cancelled")]
     Cancelled,
-    /// This session cannot be read.
+    #[error("{}: {}", .0.display(), .1)]
     Source(PathBuf, Box<SourceError>),
-}
-
-impl std::fmt::Display for ReportError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Cancelled => f.write_str("the report was cancelled"),
-            Self::Source(path, reason) => write!(f, "{}: {reason}", path.display()),
-        }
-    }
 }
 
 /// Reads every session and makes the page. `made` is when and with which version, in words; `progress` hears
@@ -261,10 +252,8 @@ pub fn write(
         if progress.tell(index, wanted.len(), &name_of(&one.session)).is_break() {
             return Err(ReportError::Cancelled);
         }
-        let subject = Subject::of(one);
-        let subject =
-            subject.map_err(|err| ReportError::Source(one.session.clone(), Box::new(err)));
-        subjects.push(subject?);
+        let failed = |err| ReportError::Source(one.session.clone(), Box::new(err));
+        subjects.push(Subject::of(one).map_err(failed)?);
     }
     Ok(html::page(&subjects, align, made))
 }

@@ -20,12 +20,12 @@ pub struct RunLine {
     /// How it ended; none if it broke off.
     pub ending: Option<String>,
     /// Whether its session is no longer what the journal says it was; none if it is.
-    pub lost: Option<Lost>,
+    pub lost: Option<SessionLoss>,
     /// Who ran it, as its session says.
     pub operator: String,
     /// What was indented, as its session says.
     pub specimen: String,
-    /// What it is worth, with the reason where it is not valid; none if nobody said.
+    /// Its data quality, with the reason where it is not valid.
     pub verdict: Option<String>,
     /// Session time in s, where the session could be read.
     pub duration_s: Option<f64>,
@@ -36,19 +36,16 @@ pub struct RunLine {
 /// What became of a session that was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Lost {
+pub enum SessionLoss {
     /// It is not there.
     Missing,
     /// It is there and not as it was written.
     Damaged,
 }
 
-impl Lost {
+impl SessionLoss {
     pub(super) const fn word(self) -> &'static str {
-        match self {
-            Self::Missing => "missing",
-            Self::Damaged => "damaged",
-        }
+        if matches!(self, Self::Missing) { "missing" } else { "damaged" }
     }
 
     /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
@@ -77,8 +74,9 @@ pub struct SpecimenPart {
     pub specimen: String,
     /// With which probe it was indented.
     pub indenter: String,
-    /// What else is told of it, by key; not its place in the series.
-    pub told: Vec<(String, String)>,
+    /// Other metadata by key, without its place in the series.
+    #[serde(rename = "told")]
+    pub metadata: Vec<(String, String)>,
 }
 
 impl SpecimenPart {
@@ -87,7 +85,7 @@ impl SpecimenPart {
         Self {
             specimen: manifest.specimen.clone(),
             indenter: manifest.indenter.clone(),
-            told: lines
+            metadata: lines
                 .filter(|(key, _)| !key.starts_with("series."))
                 .map(|(key, value)| (key.to_owned(), value))
                 .collect(),
@@ -95,13 +93,13 @@ impl SpecimenPart {
     }
 
     pub(super) fn text(&self) -> String {
-        let told = self.told.iter();
-        let told: Vec<String> = told.map(|(key, value)| format!("  {key}: {value}")).collect();
+        let line = |(key, value): &(String, String)| format!("  {key}: {value}");
+        let metadata: Vec<String> = self.metadata.iter().map(line).collect();
         let probe = match self.indenter.as_str() {
             "" => String::new(),
             indenter => format!(", with the {indenter}"),
         };
-        format!("{}{probe}\n{}", self.specimen, told.join("\n"))
+        format!("{}{probe}\n{}", self.specimen, metadata.join("\n"))
     }
 }
 

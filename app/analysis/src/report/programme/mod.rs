@@ -1,21 +1,20 @@
-//! The page that a programme leaves: what was run, what it told, with figures, in one file that any browser shows.
+//! The page of a programme: its runs, their results and figures, in one file for any browser.
 
 mod lines;
 
-pub use lines::{Lost, RunLine, SpecimenPart};
+pub use lines::{RunLine, SessionLoss, SpecimenPart};
 
 use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
 use super::fit_json::Overlay;
 use super::picture;
-use super::text::{in_columns, parameter_lines};
+use super::text::{parameter_lines, table};
 use crate::cycles::of_session;
 use crate::edited;
 use crate::fit::Fitted;
 use crate::source::{self, FitSource, Stretch};
 use palpate_figures::page::{Body, document};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
-use palpate_model::units::Seconds;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::cycles::predict;
 use palpate_rheology::fit::{FitOptions, FitReport, Systematic};
@@ -124,7 +123,7 @@ impl Page {
         let name = session.display().to_string();
         let path = folder.join(session);
         let opened = edited::open(&path);
-        let lost = Lost::of(&opened, &path, ending.as_deref());
+        let lost = SessionLoss::of(&opened, &path, ending.as_deref());
         // What was said of a session holds for it as it was.
         let whole = opened.as_ref().ok().filter(|_| lost.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
@@ -178,12 +177,7 @@ impl Page {
 
     /// The table of runs as text.
     pub fn table(&self) -> String {
-        let head = [
-            "task", "repeat", "ended by", "s", "peak N", "session", "operator", "specimen",
-            "verdict",
-        ];
-        let mut lines = vec![head.map(str::to_owned).to_vec()];
-        lines.extend(self.runs.iter().map(|run| {
+        let row = |run: &RunLine| {
             let attempt = match run.attempt {
                 1 => String::new(),
                 attempt => format!(" ({attempt}. attempt)"),
@@ -199,8 +193,10 @@ impl Page {
                 run.specimen.clone(),
                 run.verdict.clone().unwrap_or_default(),
             ]
-        }));
-        in_columns(&lines)
+        };
+        let head =
+            "task | repeat | ended by | s | peak N | session | operator | specimen | verdict";
+        table(head, self.runs.iter().map(row))
     }
 
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
@@ -212,7 +208,7 @@ impl Page {
             .collect();
         (!lost.is_empty()).then(|| {
             format!(
-                "of the finished sessions {}, so the page tells nothing of it; restore it from a backup and run the same command, or begin in a new folder",
+                "of the finished sessions {}, so the page leaves it out; restore it from a backup and run the same command, or begin in a new folder",
                 lost.join(", ")
             )
         })
@@ -270,14 +266,8 @@ impl TaskPart {
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
-            let source = FitSource {
-                samples,
-                start: Seconds(0.0),
-                notes: Vec::new(),
-                specimen: None,
-                rig: None,
-                calibration: source::calibration_of(session).ok(),
-            };
+            let calibration = source::calibration_of(session).ok();
+            let source = FitSource { samples, calibration, ..FitSource::default() };
             let fitted = Fitted::of(source, &options).with_systematic(&options);
             match &fitted.result {
                 Ok(report) => self.fit(task, name, (&fitted, report), bodies),
@@ -292,9 +282,9 @@ impl TaskPart {
 
     fn calibration(&mut self, calibration: &Calibration) {
         match Told::of(calibration) {
-            Ok(told) => {
-                self.line(&calibration_text(calibration, None, &told, &[]));
-                self.figures.push(super::calibration_plot::picture(calibration, &told));
+            Ok(details) => {
+                self.line(&calibration_text(calibration, None, &details, &[]));
+                self.figures.push(super::calibration_plot::picture(calibration, &details));
             }
             Err(err) => self.line(&err.to_string()),
         }

@@ -30,26 +30,20 @@ pub enum DeedFailure {
     Say(#[from] SayFailure),
     #[error(transparent)]
     Calibration(#[from] LibraryError),
-    #[error("the session has no force in these stretches, so nothing would be left out")]
+    #[error("the session has no force in these intervals, so the mask would leave out nothing")]
     NothingLeftOut,
     #[error(
         "the session found no contact, so no depth counts from one; there is nothing to correct"
     )]
     NoContact,
-    #[error("the session found contact {0} times; say which")]
+    #[error("the session found contact {0} times; give the number of one")]
     WhichContact(usize),
-    #[error("there is no contact {number}; the session found {found}")]
-    NoSuchContact {
-        number: u32,
-        found: usize,
-    },
+    #[error("the session has no contact {number}; it found contact {found} times")]
+    NoSuchContact { number: u32, found: usize },
     #[error(
         "contact at {position} is outside the rig's travel of {travel}; give the position from home"
     )]
-    OutsideTravel {
-        position: Position,
-        travel: Position,
-    },
+    OutsideTravel { position: Position, travel: Position },
     #[error("{0}")]
     Fit(String),
     #[error("cancelled; nothing was kept")]
@@ -84,7 +78,6 @@ pub enum Deed {
         name: String,
         how: FitWanted,
     },
-    /// Forces are made anew.
     Recalibrate {
         /// What it is called.
         name: String,
@@ -105,9 +98,7 @@ pub enum Deed {
         left_out_s: Vec<[f64; 2]>,
     },
     /// An analysis does not count any more.
-    Withdraw {
-        name: String,
-    },
+    Withdraw { name: String },
     /// The session is worth that.
     Judge(Verdict),
     /// Contact was elsewhere.
@@ -126,55 +117,42 @@ impl Deed {
         who: &Who,
         progress: &dyn Progress,
     ) -> Result<Done, DeedFailure> {
-        match self {
-            Self::Fit { name, how } => fit(session, &name, &how, who, progress),
-            Self::Recalibrate { name, calibration } => {
-                recalibrated(session, &name, &calibration, who, progress)
+        let (sentence, name, is_edit) = match self {
+            Self::Fit { name, how } => {
+                (fit(session, &name, &how, who, progress)?, Some(name), false)
             }
             Self::RecalibrateFrom { name, file } => {
-                let calibration = read_calibration(&file)?;
-                recalibrated(session, &name, &calibration, who, progress)
+                let calibration = Box::new(read_calibration(&file)?);
+                return Self::Recalibrate { name, calibration }.run(session, who, progress);
+            }
+            Self::Recalibrate { name, calibration } => {
+                step(progress, 0, 1, "recalculating the forces")?;
+                let found = recalibrate(session, &name, &calibration, who)?;
+                (kept::change(&found.change), Some(name), false)
             }
             Self::Mask { name, left_out_s } => {
                 let masked = mask(session, &name, left_out_s, who, progress)?;
-                let (left_out, before) = (masked.left_out, masked.of);
-                let sentence = format!("{left_out} of {before} forces are left out");
-                Ok(made(session, &name, sentence))
+                let sentence = format!("{} of {} forces are left out", masked.left_out, masked.of);
+                (sentence, Some(name), false)
             }
             Self::Withdraw { name } => {
                 withdraw(session, &name, who)?;
-                let sentence = format!("analysis '{name}' does not count any more");
-                Ok(done(session, sentence, Kind::Analysis))
+                (format!("analysis '{name}' is withdrawn"), None, false)
             }
             Self::Judge(verdict) => {
                 judge(session, verdict, who)?;
-                let sentence = format!("the session is {verdict}");
-                Ok(done(session, sentence, Kind::Edit))
+                (format!("the session is {verdict}"), None, true)
             }
             Self::Correct { number, position } => {
-                let corrected = correct(session, Some(number), position, who)?;
-                Ok(done(session, corrected.sentence(), Kind::Edit))
+                (correct(session, Some(number), position, who)?.sentence(), None, true)
             }
-        }
-    }
-}
-
-/// What was written beside a session.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Analysis,
-    Edit,
-}
-
-fn done(session: &Path, sentence: String, kind: Kind) -> Done {
-    Done { sentence, changed: Some(session.to_path_buf()), is_edit: kind == Kind::Edit, made: None }
-}
-
-fn made(session: &Path, name: &str, sentence: String) -> Done {
-    let name = name.trim();
-    Done {
-        made: Some(name.to_owned()),
-        ..done(session, format!("kept as '{name}': {sentence}"), Kind::Analysis)
+        };
+        let made = name.map(|name| name.trim().to_owned());
+        let sentence = match &made {
+            Some(name) => format!("kept as '{name}': {sentence}"),
+            None => sentence,
+        };
+        Ok(Done { sentence, changed: Some(session.to_path_buf()), is_edit, made })
     }
 }
 
@@ -185,8 +163,7 @@ fn id_of(session: &Path) -> Result<String, ReadError> {
 /// Refuses before hours of work a name that is taken.
 fn check_name(session: &Path, name: &str) -> Result<String, DeedFailure> {
     let (id, name) = (id_of(session)?, name.trim());
-    let there = Analyses::read(session, &id)?;
-    if there.all.iter().any(|one| one.name == name) {
+    if Analyses::read(session, &id)?.all.iter().any(|one| one.name == name) {
         let name = name.to_owned();
         return Err(AnalysisError::Taken { name }.into());
     }
@@ -216,7 +193,7 @@ fn fit(
     how: &FitWanted,
     who: &Who,
     progress: &dyn Progress,
-) -> Result<Done, DeedFailure> {
+) -> Result<String, DeedFailure> {
     check_name(session, name)?;
     let results = how.results(session, progress).map_err(DeedFailure::Fit)?;
     let fit = KeptFit {
@@ -225,8 +202,7 @@ fn fit(
         settings: how.settings(),
         results,
     };
-    let analysis = keep_fit(session, name, fit, who)?;
-    Ok(made(session, name, kept::deed(&analysis.what)))
+    Ok(kept::deed(&keep_fit(session, name, fit, who)?.what))
 }
 
 #[derive(Clone, Debug)]
@@ -251,12 +227,8 @@ pub fn keep_fit(
     let mut inputs = opened.inputs(session, fit.based_on)?;
     for one in fit.together_with {
         let id = id_of(&one.session)?;
-        let theirs = inputs_of(&one.session)?;
-        inputs.extend(
-            theirs
-                .into_iter()
-                .map(|file| Input { what: format!("{id}/{}", file.what), sha256: file.sha256 }),
-        );
+        let theirs = inputs_of(&one.session)?.into_iter();
+        inputs.extend(theirs.map(|file| Input { what: format!("{id}/{}", file.what), ..file }));
     }
     let what = Analysed::Fit {
         based_on: fit.based_on.map(str::to_owned),
@@ -269,42 +241,30 @@ pub fn keep_fit(
 
 /// What another calibration made of a session.
 #[derive(Clone, Debug)]
-pub struct Recalibrated {
+pub struct RecalibrationResult {
     /// What it did to the forces.
     pub change: ForceChange,
     /// The session's rig; empty where there is none.
     pub rig: String,
 }
 
-/// Makes the forces of a session anew with another calibration, as an analysis beside it.
+/// Recalculates the forces of a session with another calibration, as an analysis beside it.
 pub fn recalibrate(
     session: &Path,
     name: &str,
     calibration: &Calibration,
     who: &Who,
-) -> Result<Recalibrated, DeedFailure> {
+) -> Result<RecalibrationResult, DeedFailure> {
     let id = check_name(session, name)?;
     let (opened, inputs, what, change) = analysed::recalibration(session, calibration)?;
     keep(session, &id, name, inputs, what, who)?;
     let rig = opened.edited.session.manifest.rig;
-    Ok(Recalibrated { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
-}
-
-fn recalibrated(
-    session: &Path,
-    name: &str,
-    calibration: &Calibration,
-    who: &Who,
-    progress: &dyn Progress,
-) -> Result<Done, DeedFailure> {
-    step(progress, 0, 1, "making the forces anew")?;
-    let found = recalibrate(session, name, calibration, who)?;
-    Ok(made(session, name, kept::change(&found.change)))
+    Ok(RecalibrationResult { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
 }
 
 /// Forces that do not count any more.
 #[derive(Clone, Debug)]
-pub struct Masked {
+pub struct MaskResult {
     pub analysis: Analysis,
     /// Forces left out.
     pub left_out: usize,
@@ -319,9 +279,9 @@ pub fn mask(
     left_out_s: Vec<[f64; 2]>,
     who: &Who,
     progress: &dyn Progress,
-) -> Result<Masked, DeedFailure> {
+) -> Result<MaskResult, DeedFailure> {
     let id = check_name(session, name)?;
-    step(progress, 0, 1, "looking what is left out")?;
+    step(progress, 0, 1, "applying the mask")?;
     let mut opened = analysed::open(session, None)?;
     let inputs = opened.inputs(session, None)?;
     let forces = |opened: &analysed::Opened| {
@@ -335,9 +295,9 @@ pub fn mask(
     if left_out == 0 {
         return Err(DeedFailure::NothingLeftOut);
     }
-    step(progress, 1, 1, "keeping it")?;
+    step(progress, 1, 1, "storing the analysis")?;
     let what = Analysed::Mask { left_out_s };
-    Ok(Masked { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
+    Ok(MaskResult { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
 }
 
 /// Lets an analysis count no more.
@@ -360,7 +320,7 @@ pub fn judge(
 
 /// A contact that was found elsewhere.
 #[derive(Clone, Debug)]
-pub struct Corrected {
+pub struct ContactCorrection {
     /// Which of the contacts, from 1.
     pub number: u32,
     /// Where it really was, from home.
@@ -370,7 +330,7 @@ pub struct Corrected {
     pub edit: Edit,
 }
 
-impl Corrected {
+impl ContactCorrection {
     /// By how much its depths are more, in mm.
     pub fn deeper_mm(&self) -> f64 {
         self.was.depth_from(self.position).0
@@ -393,7 +353,7 @@ pub fn correct(
     number: Option<u32>,
     position: Position,
     who: &Who,
-) -> Result<Corrected, DeedFailure> {
+) -> Result<ContactCorrection, DeedFailure> {
     let passing = edited::outline(session)?;
     let outline = &passing.outline;
     let found = edited::contacts(&outline.entries);
@@ -417,5 +377,5 @@ pub fn correct(
     let was = was.position;
     let change = Change::Contact { number, position_mm: position, was_mm: was };
     let edit = Subject::read(session)?.say(&who.by, &who.reason, change)?;
-    Ok(Corrected { number, position, was, edit })
+    Ok(ContactCorrection { number, position, was, edit })
 }
