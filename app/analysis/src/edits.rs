@@ -1,5 +1,4 @@
-//! What people say of sessions afterwards, as the command line and the window both write it: every time a record beside
-//! the log, never over anything.
+//! Edits of sessions: tags, notes, data quality and reviews. Each is a record beside the log and overwrites nothing.
 
 use crate::progress::Progress;
 use crate::report::said::tags;
@@ -20,7 +19,6 @@ pub fn author(given: Option<&str>) -> String {
     given.map_or_else(|| login().unwrap_or_else(|_| "unknown".into()), str::to_owned)
 }
 
-/// Nothing was said of a session.
 #[derive(Debug, Error)]
 pub enum SayFailure {
     #[error(transparent)]
@@ -31,17 +29,15 @@ pub enum SayFailure {
     Edit(#[from] EditError),
 }
 
-/// A session of which something is to be said.
+/// A session to be edited.
 #[derive(Clone, Debug)]
 pub struct Subject {
     pub folder: PathBuf,
     pub id: String,
-    /// What was said of it so far.
     pub edits: Edits,
 }
 
 impl Subject {
-    /// Reads what the session says of itself, and its edits.
     pub fn read(folder: &Path) -> Result<Self, SayFailure> {
         let id = Summary::read(folder)?.manifest.session_id;
         Ok(Self { edits: Edits::read(folder, &id)?, folder: folder.to_owned(), id })
@@ -68,20 +64,17 @@ impl Subject {
     }
 }
 
-/// What is to be said of sessions.
+/// An edit of one or several sessions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Saying {
-    /// Words by which they are found.
     Tags {
-        /// Those they get.
         add: Vec<String>,
-        /// Those they lose.
         remove: Vec<String>,
     },
     Note(String),
-    /// What they are worth, and why.
+    /// Data quality, and the reason.
     Verdict(Verdict, String),
-    /// A reviewer's decision, and why.
+    /// A reviewer's decision, and the reason.
     Review(Decision, String),
 }
 
@@ -96,38 +89,28 @@ impl Saying {
     }
 }
 
-/// One edit that can be taken back: what was written, and what says the opposite.
+/// One edit that can be undone: the change that was written, and its opposite, each with its reason.
 #[derive(Clone, Debug, PartialEq)]
 struct Step {
     folder: PathBuf,
     wrote: DateTime<Utc>,
-    written: Part,
-    opposite: Part,
+    written: (Change, String),
+    opposite: (Change, String),
 }
 
-/// The part of an edit that an opposite has.
-#[derive(Clone, Debug, PartialEq)]
-enum Part {
-    Tags { add: Vec<String>, remove: Vec<String> },
-    Verdict(Verdict, String),
-}
-
-/// Edits made together, which are taken back together.
+/// Edits made together, which are undone together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Act {
-    /// What was done, in words.
     pub words: String,
     steps: Vec<Step>,
 }
 
-/// What came of saying something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Said {
-    /// What was done, in words.
     pub words: String,
-    /// What can be taken back of it.
+    /// The part that can be undone.
     pub act: Option<Act>,
-    /// Why nothing was said of some of the sessions, a sentence each.
+    /// A sentence for each session that could not be edited.
     pub failed: Vec<String>,
 }
 
@@ -138,8 +121,7 @@ fn sessions(count: usize) -> String {
     }
 }
 
-/// Does `one` to every session and tells what came of it; `one` gives what can be taken back, and whether anything was
-/// written.
+/// Does `one` to every session; `one` returns the step that can be undone, and whether anything was written.
 fn each<T>(
     words: &str,
     of: &[T],
@@ -167,58 +149,45 @@ fn each<T>(
     Said { act: (!steps.is_empty()).then(|| Act { words: words.clone(), steps }), words, failed }
 }
 
-/// Says something of sessions. Notes and reviews stay: only tags and verdicts can be taken back.
+/// Edits sessions. Notes and reviews stay: only tags and data quality can be undone.
 #[must_use]
 pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &dyn Progress) -> Said {
-    let folder = |folder: &PathBuf| -> Result<_, String> {
-        say_one(saying, folder, by).map_err(|err| err.to_string())
-    };
-    each(&saying.words(), folders, progress, |it| it.as_path(), folder)
+    let one = |folder: &PathBuf| say_one(saying, folder, by).map_err(|err| err.to_string());
+    each(&saying.words(), folders, progress, |it| it.as_path(), one)
 }
 
 fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bool), SayFailure> {
     let subject = Subject::read(folder)?;
-    let step = |edit: Edit, written, opposite| Step {
-        folder: folder.to_owned(),
-        wrote: edit.at,
-        written,
-        opposite,
-    };
-    match saying {
+    let (change, reason, opposite) = match saying {
         Saying::Tags { add, remove } => {
             let has = subject.edits.tags();
-            // Only what changes is written, so that only that is taken back.
+            // Only what changes is written, so that only that is undone.
             let (mut add, mut remove) = (add.clone(), remove.clone());
             add.retain(|tag| !has.contains(tag.as_str()));
             remove.retain(|tag| has.contains(tag.as_str()));
             if add.is_empty() && remove.is_empty() {
                 return Ok((None, false));
             }
-            let written = Part::Tags { add: add.clone(), remove: remove.clone() };
-            let opposite = Part::Tags { add: remove.clone(), remove: add.clone() };
-            let edit = subject.say(by, "", Change::Tags { add, remove })?;
-            Ok((Some(step(edit, written, opposite)), true))
+            let opposite = Change::Tags { add: remove.clone(), remove: add.clone() };
+            (Change::Tags { add, remove }, "", Some((opposite, String::new())))
         }
-        Saying::Note(text) => {
-            subject.say(by, text, Change::Note)?;
-            Ok((None, true))
-        }
-        Saying::Review(decision, reason) => {
-            subject.say(by, reason, subject.review(*decision)?)?;
-            Ok((None, true))
-        }
+        Saying::Note(text) => (Change::Note, text.as_str(), None),
+        Saying::Review(decision, reason) => (subject.review(*decision)?, reason.as_str(), None),
         Saying::Verdict(verdict, reason) => {
-            let before = subject.edits.verdict();
-            let opposite =
-                before.map(|(verdict, edit)| Part::Verdict(verdict, edit.reason.clone()));
-            let edit = subject.say(by, reason, Change::Verdict { verdict: *verdict })?;
-            let written = Part::Verdict(*verdict, reason.clone());
-            Ok((opposite.map(|opposite| step(edit, written, opposite)), true))
+            let opposite = subject
+                .edits
+                .verdict()
+                .map(|(verdict, edit)| (Change::Verdict { verdict }, edit.reason.clone()));
+            (Change::Verdict { verdict: *verdict }, reason.as_str(), opposite)
         }
-    }
+    };
+    let wrote = subject.say(by, reason, change.clone())?.at;
+    let written = (change, reason.to_owned());
+    let folder = folder.to_owned();
+    Ok((opposite.map(|opposite| Step { folder, wrote, written, opposite }), true))
 }
 
-/// Writes the opposite of edits, as records of their own. What can be taken back of that is the way to do them again.
+/// Writes the opposite of edits, as records of their own. Undoing the result repeats the edits.
 #[must_use]
 pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
@@ -235,19 +204,12 @@ pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
 
 fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
     let subject = Subject::read(&step.folder).map_err(|err| err.to_string())?;
-    let (reason, change) = match &step.opposite {
-        Part::Tags { add, remove } => {
-            (String::new(), Change::Tags { add: add.clone(), remove: remove.clone() })
-        }
-        Part::Verdict(verdict, reason) => {
-            let now = subject.edits.verdict();
-            if now.is_none_or(|(_, edit)| edit.at != step.wrote) {
-                return Err("its verdict was given again since, so it is not undone".into());
-            }
-            (reason.clone(), Change::Verdict { verdict: *verdict })
-        }
-    };
-    let edit = subject.say(by, &reason, change).map_err(|err| err.to_string())?;
+    let (change, reason) = &step.opposite;
+    let is_newest = subject.edits.verdict().is_some_and(|(_, edit)| edit.at == step.wrote);
+    if matches!(change, Change::Verdict { .. }) && !is_newest {
+        return Err("its verdict was given again since, so it is not undone".into());
+    }
+    let edit = subject.say(by, reason, change.clone()).map_err(|err| err.to_string())?;
     Ok(Step {
         folder: step.folder.clone(),
         wrote: edit.at,

@@ -1,4 +1,4 @@
-//! The shortest protocol that will tell what is wanted of a body like one that is known.
+//! The shortest protocol that determines given parameters to given precision, for a body like a known one.
 
 use crate::fit::{KnownFit, KnownFitError, is_hardly_known};
 use palpate_model::calibration::Curve;
@@ -23,19 +23,16 @@ const NOISE_ASSUMED: Newtons = Newtons(0.02);
 /// The rig on which a plan will run.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench<'a> {
-    /// What it can do.
     pub rig: &'a RigDescription,
-    /// Its interlock's thresholds.
     pub limits: &'a Limits,
     /// Volts to newtons of its load cell.
     pub curve: &'a Curve,
 }
 
-/// What is wanted, and how far the rig may go for it.
+/// The precision to reach, and the limits of the rig.
 pub struct PlanRequest<'a> {
-    /// How well which parameters shall be known.
     pub targets: Vec<Target>,
-    /// What is found beside them.
+    /// Offsets that are fitted as well.
     pub unknowns: Unknowns,
     /// Noise that is independent from sample to sample; without it that of the fit.
     pub white: Option<Newtons>,
@@ -51,11 +48,10 @@ pub struct PlanRequest<'a> {
     pub speed_max: Option<MmPerS>,
     /// Longest protocol.
     pub duration_max: Seconds,
-    /// How one press is asked for, in the words of the front end.
+    /// The command for one press, in the words of the front end.
     pub command: &'a dyn Fn(&RampHold) -> String,
 }
 
-/// There is no plan.
 #[derive(Debug, Error)]
 pub enum PlanFailure {
     #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]
@@ -66,42 +62,35 @@ pub enum PlanFailure {
     Expected(#[from] ExpectedError),
 }
 
-/// Body and noise, and where they are from.
+/// Body and noise that a plan assumes.
 #[derive(Clone, Debug)]
 pub struct PlanAssumptions {
     pub body: ModifiedKelvin,
     pub noise: Newtons,
-    /// Where both are from, in words.
+    /// Origin of both, in words.
     pub source: String,
-    /// Whether the body is a poor ground for a plan.
+    /// Whether the relaxation time is too uncertain for a plan.
     pub is_hardly_known: bool,
-    /// What the reader of a recording remarked.
     pub notes: Vec<String>,
 }
 
 /// What a plan assumes: a recording or a fit; without one the last fit, and without that the source thesis.
 pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
-    let (known, source, notes) = match like {
-        Some(like) => {
-            let (known, notes) = KnownFit::of(like, None)?;
-            (known, like.display().to_string(), notes)
-        }
-        None => match KnownFit::last()? {
-            Some(known) => {
-                let of = known.source.as_deref().unwrap_or("an unnamed record");
-                let source = format!("the last fit, of {of}");
-                (known, source, Vec::new())
-            }
-            None => {
-                return Ok(PlanAssumptions {
-                    body: ModifiedKelvin::THESIS,
-                    noise: NOISE_ASSUMED,
-                    source: "pig stomach of the source thesis, since no fit is remembered".into(),
-                    is_hardly_known: false,
-                    notes: Vec::new(),
-                });
-            }
-        },
+    let (known, source, notes) = if let Some(like) = like {
+        let (known, notes) = KnownFit::of(like, None)?;
+        (known, like.display().to_string(), notes)
+    } else if let Some(known) = KnownFit::last()? {
+        let of = known.source.as_deref().unwrap_or("an unnamed record");
+        let source = format!("the last fit, of {of}");
+        (known, source, Vec::new())
+    } else {
+        return Ok(PlanAssumptions {
+            body: ModifiedKelvin::THESIS,
+            noise: NOISE_ASSUMED,
+            source: "pig stomach of the source thesis, since no fit is remembered".into(),
+            is_hardly_known: false,
+            notes: Vec::new(),
+        });
     };
     Ok(PlanAssumptions {
         body: known.body()?,
@@ -112,20 +101,14 @@ pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
     })
 }
 
-/// A plan: what was assumed, what is proposed, and how well else it would be known.
+/// A plan: its assumptions, the proposals, and the precision of other protocols.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlanReport {
-    /// The body assumed.
     pub body: ModifiedKelvin,
-    /// Where it is from.
     pub body_source: String,
-    /// The noise assumed.
     pub noise: Noise,
-    /// What is found beside the targets.
     pub unknowns: Unknowns,
-    /// How far the rig may go.
     pub rig: Rig,
-    /// What is wanted.
     pub targets: Vec<Target>,
     /// The shortest first.
     pub proposals: Vec<Offer>,
@@ -136,18 +119,15 @@ pub struct PlanReport {
 /// A proposal, and whether and how this program can run it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Offer {
-    /// What is proposed.
     #[serde(flatten)]
     pub proposal: Proposal,
     /// One for every press; none where no plan exists.
     pub commands: Vec<String>,
-    /// What the runs will ask to be acknowledged.
     pub acknowledgements: Vec<String>,
     /// With homing, finding contact and leaving the tissue, in s; none where no plan exists.
     pub run_s: Option<f64>,
 }
 
-/// Plans for what is assumed.
 pub fn plan(
     request: PlanRequest<'_>,
     assumed: PlanAssumptions,
