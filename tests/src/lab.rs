@@ -19,26 +19,24 @@ const TICK: Nanos = Nanos::from_millis(10);
 pub struct Seen {
     pub reading: Reading,
     pub derived: Derived,
-    /// What the run was doing.
     pub phase: Phase,
     pub cycle: u32,
-    /// Step of the plan.
     pub step_index: usize,
 }
 
-/// What most plans begin with: self-test, home, tare, contact.
+/// The usual first steps of a plan: self-test, home, tare, contact.
 #[must_use]
 pub fn set_up(tare: Seconds, contact: FindContact) -> Vec<Step> {
     approach(tare, contact)
 }
 
-/// What they end with.
+/// The usual last step of a plan.
 #[must_use]
 pub fn retract() -> Step {
     LEAVE
 }
 
-/// A run under way.
+/// A run of the engine without a runner.
 pub struct Lab<R: Rig> {
     pub rig: R,
     pub state: Option<State>,
@@ -55,7 +53,6 @@ pub struct Lab<R: Rig> {
     is_keeping: bool,
     /// Whether prompts are answered at once.
     pub is_answering: bool,
-    /// How the run ended.
     pub outcome: Option<Outcome>,
 }
 
@@ -143,7 +140,6 @@ impl<R: Rig> Lab<R> {
         }
     }
 
-    /// The operator asks for something.
     pub fn operator(&mut self, choice: Operator) {
         self.give(Input::Operator { choice });
     }

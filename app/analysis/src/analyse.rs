@@ -8,7 +8,6 @@ use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// A recording shows no cycles.
 #[derive(Debug, Error)]
 pub enum AnalyseFailure {
     #[error(transparent)]
@@ -21,7 +20,6 @@ pub enum AnalyseFailure {
     Cancelled,
 }
 
-/// Analyses every recording by itself, in order.
 pub fn analyse(
     paths: &[PathBuf],
     columns: Option<&ColumnNames>,

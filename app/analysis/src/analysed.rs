@@ -17,17 +17,16 @@ use palpate_sessions::record::{Entry, Row};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A session with its edits made, read as an analysis has it.
+/// A session with its edits applied, as one of its analyses reads it.
 #[derive(Clone, Debug)]
 pub struct Opened {
-    /// The session and its edits.
     pub edited: Edited,
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
 }
 
-/// What another calibration does to the forces of a session.
+/// Effect of another calibration on the forces of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ForceChange {
     /// Samples with a force.
@@ -55,14 +54,13 @@ pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
     Ok(Opened { edited, analyses, left_out_s: reading.left_out_s })
 }
 
-/// What an analysis reads a session with.
+/// Calibration and mask of an analysis and of the analyses it is based on.
 #[derive(Default)]
 struct AnalysisReading {
-    /// What is to be said of that.
     notes: Vec<String>,
     /// The calibration that forces are recalculated with, as it was written and as it is.
     calibration: Option<(serde_json::Value, Calibration)>,
-    /// Stretches whose forces do not count.
+    /// Intervals whose forces do not count, in s since the first sample.
     left_out_s: Vec<[f64; 2]>,
 }
 
@@ -216,7 +214,6 @@ pub fn passing(path: &Path, name: Option<&str>) -> Result<Passing, SourceError> 
     of_outline(path, Session::scan(path, &mut |_block| {})?, name)
 }
 
-/// The same of a session that was read through.
 pub fn of_outline(
     path: &Path,
     outline: Outline,
@@ -279,7 +276,7 @@ pub fn recalibration(
     Ok((opened, inputs, what, change))
 }
 
-/// A record that is made now by this program.
+/// A record of this version of the program, dated now.
 #[must_use]
 pub fn record(name: &str, by: &str, reason: &str, inputs: Vec<Input>, what: Analysed) -> Analysis {
     Analysis {

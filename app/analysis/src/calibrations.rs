@@ -9,24 +9,23 @@ use palpate_runner::wall_now;
 use palpate_sessions::{Session, Shelf, age_days, save, supersede};
 use std::path::Path;
 
-/// What the library holds, judged, and what was just added to it.
+/// Calibrations of the library with their assessment, and the one just stored.
 pub struct Shelved {
-    /// The rig's own first, then those of the library by id.
+    /// The rig's own first, then those of the library by identifier.
     pub shown: Vec<Shown>,
-    /// Why others cannot be read.
+    /// Reasons for each calibration that cannot be read.
     pub unreadable: Vec<String>,
-    /// Id of the one just stored, or why it was not.
+    /// Identifier of the one just stored, or the reason it was not.
     pub kept: Option<Result<String, String>>,
 }
 
 /// One calibration with its details.
 pub struct Shown {
-    /// Its line in the list.
     pub entry: Entry,
     pub calibration: Calibration,
-    /// What it is like and its curves, or why it makes none.
+    /// Details and plots, or the reason there are none.
     pub told: Result<(Told, [Plot; 4]), String>,
-    /// What speaks against using it on the rig it is said to be of.
+    /// Reasons against using it on its rig.
     pub doubts: Vec<String>,
 }
 

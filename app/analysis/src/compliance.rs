@@ -21,10 +21,9 @@ use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
 
-/// What asks for the compliance in force for a session's rig.
+/// Name that stands for the compliance in force for a session's rig.
 pub const LAST: &str = "last";
 
-/// A session tells no compliance.
 #[derive(Debug, Error)]
 pub enum MeasureError {
     #[error(transparent)]
@@ -73,7 +72,7 @@ pub fn measured(
     })
 }
 
-/// The ways in after a stiff surface was found, press by press.
+/// Loading samples after a stiff surface was found, press by press.
 fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
@@ -104,7 +103,6 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     Ok(presses)
 }
 
-/// A compliance cannot be used on a record.
 #[derive(Debug, Error)]
 pub enum CorrectionError {
     #[error(transparent)]
@@ -123,17 +121,16 @@ pub enum CorrectionError {
     OtherRig { id: String, of: String, rig: String },
 }
 
-/// What is choice about compliance.
+/// Which compliance corrects depths.
 #[derive(Debug)]
 enum CorrectionChoice {
-    /// Depths stay raw.
     Raw,
     /// The one in force for the rig of each record.
     InForce,
     This(Box<Kept>),
 }
 
-/// Which compliance goes with which record.
+/// Compliance for each record.
 #[derive(Debug)]
 pub struct Corrections {
     choice: CorrectionChoice,
@@ -205,23 +202,22 @@ impl Corrections {
     }
 }
 
-/// What a compliance does to the depths of a record.
+/// Effect of a compliance on the depths of a record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correction {
     pub id: String,
-    /// Way of the axis per force, in mm/N.
+    /// Machine compliance in mm/N.
     pub mm_per_n: f64,
-    /// Its standard uncertainty.
     pub std_error_mm_per_n: f64,
     /// Whether depths were corrected; if not, this is what would be.
     pub is_applied: bool,
     /// Highest force of the record, in N.
     pub force_peak_n: f64,
-    /// By how much the depth is less there, in um.
+    /// Decrease of the depth at that force, in um.
     pub at_peak_um: f64,
     /// The standard uncertainty of that in um, from that of the compliance.
     pub at_peak_std_error_um: f64,
-    /// What speaks against it.
+    /// Reason to doubt the correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doubt: Option<String>,
 }

@@ -16,7 +16,7 @@ use palpate_sessions::record::Row;
 use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 
-/// A record in cycles, and what a reader should know about it.
+/// Samples of a record in cycles, with remarks on them.
 #[derive(Clone, Debug, Default)]
 pub struct CycleSource {
     /// Every sample with known force and depth, in order of time. Depths count from the first contact found.
@@ -51,7 +51,6 @@ pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, S
     Ok(of_table(&table, notes))
 }
 
-/// What an analysis takes of a table or an imported session.
 fn of_table(table: &Table, mut notes: Vec<String>) -> CycleSource {
     notes.push("a table: its cycles, holds and unloading are found from the depth".into());
     CycleSource {
@@ -155,7 +154,7 @@ fn steps(decisions: &[(u64, Effect)]) -> Vec<(u64, u32)> {
     begun.collect()
 }
 
-/// The step a sample belongs to; the first one before any began.
+/// Step of a sample; the first one before any step began.
 fn step_at(steps: &[(u64, u32)], index: usize) -> u32 {
     let begun = steps.partition_point(|(from, _)| *from <= index as u64);
     begun.checked_sub(1).map_or(0, |latest| steps[latest].1)

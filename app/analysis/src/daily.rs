@@ -15,7 +15,6 @@ use palpate_sessions::log::Session;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Name of the built-in protocol.
 pub const DAILY_CHECK: &str = "daily-check";
 /// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
 const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
@@ -24,16 +23,14 @@ const ZERO_SHARE: f64 = 0.01;
 /// Two homings may differ by so many pulses: the switch closes between two of them.
 const HOME_PULSES: i64 = 1;
 
-/// A part and what was found.
 fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
     let (is_passed, sentence) = found.unwrap_or_else(|missing| (false, missing));
     CheckPart { what: what.into(), is_passed, sentence }
 }
 
-/// A daily check with what its session measured.
+/// A daily check with the deviations its session measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PastCheck {
-    /// The check as it was judged then.
     pub check: DailyCheck,
     /// The empty cell, and the known weight; none where the session is not in the library or lacks the reading.
     pub zero: Option<Deviation>,
@@ -95,14 +92,12 @@ pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
         part("weight", weight(&calibration, &records)),
         part("home", home(&records)),
     ];
-    let finished = EndingKind::Finish.name();
-    match &session.end {
-        Some(end) if end.outcome == finished => {}
-        Some(end) => {
-            parts.push(part("run", Err(format!("the check did not finish: {}", end.reason))))
-        }
-        None => parts.push(part("run", Err("the check was interrupted; make it again".into()))),
-    }
+    let unfinished = match &session.end {
+        Some(end) if end.outcome == EndingKind::Finish.name() => None,
+        Some(end) => Some(format!("the check did not finish: {}", end.reason)),
+        None => Some("the check was interrupted; make it again".to_owned()),
+    };
+    parts.extend(unfinished.map(|reason| part("run", Err(reason))));
     Ok(parts)
 }
 
@@ -118,7 +113,7 @@ fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
 pub struct Deviation {
     /// Measured less expected.
     pub newtons: f64,
-    /// The most that passes, either way.
+    /// Largest magnitude that passes.
     pub limit: f64,
 }
 
@@ -138,20 +133,19 @@ fn zero_of(calibration: &Calibration, records: &[&Record]) -> Result<(Volts, Dev
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let (volts, Deviation { newtons, limit }) = zero_of(calibration, records)?;
     let is_passed = newtons.abs() <= limit;
-    let advice = match is_passed {
-        true => "",
-        false => "; check what touches the probe, then take a new calibration",
-    };
-    Ok((
-        is_passed,
-        format!(
-            "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {} the limit of {limit:.3} N{advice}",
-            if is_passed { "within" } else { "beyond" }
-        ),
-    ))
+    let side = if is_passed { "within" } else { "beyond" };
+    let sentence = format!(
+        "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {side} the limit of {limit:.3} N"
+    );
+    let advice = "check what touches the probe, then take a new calibration";
+    Ok(advised(is_passed, sentence, advice))
 }
 
-/// What the known weight reads.
+/// Adds advice to the sentence of a part that failed.
+fn advised(is_passed: bool, sentence: String, advice: &str) -> (bool, String) {
+    (is_passed, if is_passed { sentence } else { format!("{sentence}; {advice}") })
+}
+
 fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<CheckResult, String> {
     let mut tare = None;
     let known = readings(records).into_iter().find(|(mass_g, volts)| {
@@ -184,22 +178,16 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
         _ => None,
     });
     let missed = missed.ok_or("the home switch was not touched twice; make the check again")?;
-    let is_passed = missed.abs() <= HOME_PULSES;
-    let advice = match is_passed {
-        true => "",
-        false => "; check the switch, its cable and whether the slider moves freely",
-    };
-    Ok((
-        is_passed,
-        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed{advice}"),
-    ))
+    let sentence =
+        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed");
+    let advice = "check the switch, its cable and whether the slider moves freely";
+    Ok(advised(missed.abs() <= HOME_PULSES, sentence, advice))
 }
 
-/// What the daily check says to a run.
+/// Effect of the daily check on a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Gate {
     Open,
-    /// Something worth knowing.
     Note(String),
     /// The operator must acknowledge it, which is recorded.
     Acknowledge(String),
@@ -227,15 +215,18 @@ impl Gate {
             return Ok(Self::Open);
         }
         let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;
+        let none = format!("rig {rig} had no daily check today");
         Ok(match last_of_day(&checks, now.into()) {
             Some(check) if check.is_passed => Self::Open,
-            Some(check) => Self::Acknowledge(failed(check)),
-            None if is_virtual => Self::Note(format!("{}; '{HOW}' makes one", none_today(rig))),
-            None => Self::Acknowledge(format!("{}; make one with '{HOW}' first", none_today(rig))),
+            Some(check) => Self::Acknowledge(format!(
+                "rig {rig} failed its daily check today ({}); mend it and repeat '{HOW}'",
+                check.failures()
+            )),
+            None if is_virtual => Self::Note(format!("{none}; '{HOW}' makes one")),
+            None => Self::Acknowledge(format!("{none}; make one with '{HOW}' first")),
         })
     }
 
-    /// What has to be acknowledged.
     pub fn to_acknowledge(&self) -> Vec<String> {
         match self {
             Self::Acknowledge(sentence) => vec![sentence.clone()],
@@ -244,20 +235,7 @@ impl Gate {
     }
 }
 
-/// The command that makes a check.
 pub const HOW: &str = "palpate daily-check";
-
-fn none_today(rig: &str) -> String {
-    format!("rig {rig} had no daily check today")
-}
-
-fn failed(check: &DailyCheck) -> String {
-    format!(
-        "rig {} failed its daily check today ({}); mend it and repeat '{HOW}'",
-        check.rig,
-        check.failures()
-    )
-}
 
 #[cfg(test)]
 mod tests {

@@ -14,16 +14,15 @@ use palpate_sessions::record::{Entry, Row};
 use std::ops::Range;
 use std::path::Path;
 
-/// A session with its edits made.
+/// A session with its edits applied.
 #[derive(Clone, Debug)]
 pub struct Edited {
-    /// The session, its notes telling what was corrected and doubted.
+    /// The session; its notes name corrections and doubts.
     pub session: Session,
     pub edits: Edits,
 }
 
 impl Edited {
-    /// Why the session was rejected, if it was.
     pub fn rejection(&self) -> Option<&str> {
         match self.edits.verdict() {
             Some((Verdict::Rejected, edit)) => Some(&edit.reason),
@@ -68,7 +67,6 @@ pub fn outline(path: &Path) -> Result<Passing, SourceError> {
     of_outline(path, outline)
 }
 
-/// Makes the edits of a session that was read through.
 pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceError> {
     let edits = Edits::read(path, &outline.manifest.session_id)?;
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
@@ -105,7 +103,7 @@ impl Passing {
     }
 }
 
-/// By how much the depths of some samples move.
+/// Shift of the depths of a range of samples.
 #[derive(Clone, Debug)]
 struct Shift {
     samples: Range<u64>,

@@ -12,7 +12,7 @@ use palpate_sessions::log::{ReadError, Summary};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// The name given, or that of the login.
+/// The given name, else the login name.
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
     let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));

@@ -13,7 +13,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Nothing was written of a session.
 #[derive(Debug, Error)]
 pub enum ExportFailure {
     #[error(transparent)]
@@ -26,7 +25,6 @@ pub enum ExportFailure {
     BeingRecorded(PathBuf),
 }
 
-/// What a session is written as.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A table in this folder that takes the session folder's name.
@@ -40,12 +38,11 @@ pub struct Written {
     pub path: PathBuf,
     /// Rows or messages in it.
     pub rows: u64,
-    /// What a user of the data must know.
     pub notes: Vec<String>,
 }
 
 impl Target {
-    /// Takes away what killed exports left where this one goes.
+    /// Removes leftovers of killed exports from the target folder.
     pub fn sweep(&self) {
         let folder = match self {
             Self::Table(_, folder) => Some(folder.as_path()),
@@ -96,7 +93,7 @@ pub fn export(
     Ok(target.write(session, &table, &mut feed)?)
 }
 
-/// A file takes the session folder's name.
+/// The name of the session's folder, for its export.
 fn stem(session: &Path, manifest: &Manifest) -> String {
     let whole = session.canonicalize().ok();
     // A folder's name may have dots in it; the ending of a file's does not count.
@@ -107,12 +104,11 @@ fn stem(session: &Path, manifest: &Manifest) -> String {
     stem.map_or_else(|| manifest.session_id.clone(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Takes away what killed exports left in a lake.
+/// Removes leftovers of killed exports from a lake.
 pub fn sweep_lake(lake: &Path) {
     atomic::sweep(lake, usize::MAX);
 }
 
-/// Adds a session to a lake.
 pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
     // Looked at before it is read: a run that ends in between would be there without its end.
     let is_in_use = is_in_use(session);
@@ -149,18 +145,14 @@ pub fn without_copied(
     (paths(rest), paths(originals))
 }
 
-/// Where sessions chosen in the window go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
     Tables(Format, PathBuf),
-    /// All into this lake.
     Lake(PathBuf),
 }
 
-/// What became of sessions chosen in the window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exported {
-    /// What was written and where, in one sentence.
     pub sentence: String,
     /// What was not, and why, a sentence each; and what a user of the data must know.
     pub remarks: Vec<String>,

@@ -5,13 +5,11 @@ use palpate_protocols::plans::Plan;
 use palpate_runner::fidelity::{Fidelity, FidelityMeter};
 use palpate_sessions::log::Session;
 
-/// The fidelity of a recorded session.
 pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
     let rig = match (&session.manifest.imported, &session.manifest.rig) {
         (None, Some(rig)) => rig,
         (imported, _) => {
-            let file = imported.as_ref().map(|from| from.file.clone());
-            let file = file.unwrap_or_default();
+            let file = imported.as_ref().map(|from| from.file.clone()).unwrap_or_default();
             return Err(SourceError::Imported { file });
         }
     };

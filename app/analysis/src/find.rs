@@ -97,8 +97,7 @@ pub fn session_folders(
 ) -> Result<BTreeMap<String, String>, String> {
     update(library, progress)?;
     let all = with(library, &mut Vec::new(), |catalog| catalog.all())?;
-    let pairs = all.into_iter().map(|entry| (entry.session_id, entry.folder));
-    Ok(pairs.collect())
+    Ok(all.into_iter().map(|entry| (entry.session_id, entry.folder)).collect())
 }
 
 /// Edits and analyses of a session.

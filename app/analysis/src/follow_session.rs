@@ -43,7 +43,7 @@ fn provenance(followed: &Followed, source: &str) -> String {
     )
 }
 
-/// What makes the same session again.
+/// Settings that reproduce the session.
 fn facts(followed: &Followed, source: &str) -> Vec<(String, String)> {
     let settings = &followed.settings;
     let body = &followed.body;

@@ -23,19 +23,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The name of the body that needs no session.
+/// Name of the source thesis's body, which needs no session.
 pub const THESIS: &str = "thesis";
 
 /// Damping of the hand in N s/mm: a firm grip has more, which would calm what is to be seen.
 const GRIP_DAMPING: f64 = 0.002;
 
-/// A body and where it comes from.
+/// A body to render, from a fit or the source thesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
     pub body: ModifiedKelvin,
-    /// How deep the record went that it was fitted to.
+    /// Largest depth of the fitted record.
     pub deepest: Depth,
-    /// What is to be known of it, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -72,22 +71,18 @@ impl Source {
     }
 }
 
-/// A device, a loop and a hand.
+/// Settings of a device, its loop and the simulated hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// The loop's tick.
     pub period: Period,
-    /// The motor's drive.
     pub drive: DriveKind,
     /// Damping of the device without its motor, in N s/mm.
     pub damping: f64,
     /// Its Coulomb friction; that of the source's motor without it.
     pub friction: Option<Newtons>,
-    /// Whole ticks from a count to the force made of it.
+    /// Whole ticks from an encoder count to its force.
     pub delay: usize,
-    /// End of the stroke.
     pub deepest: Depth,
-    /// Speed of the hand.
     pub speed: MmPerS,
 }
 
@@ -146,10 +141,9 @@ const BEFORE: f64 = 0.5;
 /// Columns that a trace is thinned for: more than half a screen is wide.
 const COLUMNS: usize = 1000;
 
-/// What the simulated device did.
+/// Result of a simulated stroke.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// Whether guards and controller were at work.
     pub is_guarded: bool,
     /// Share of the ticks of the hold in which it buzzed.
     pub buzz_share: f64,
@@ -165,19 +159,17 @@ pub struct Tried {
     pub energy_min_mj: f64,
     /// Most damping that the controller added, in N s/m.
     pub damping_added_max: f64,
-    /// What was special on the way, one sentence each.
     pub flags: Vec<&'static str>,
     /// Place of the device in mm over time in s from when the hand arrived, thinned; for pictures.
     #[serde(skip)]
     pub trace: Vec<[f64; 2]>,
 }
 
-/// What is known of a body on a device before play.
+/// Stability margin of a body on a device, and its simulation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
     pub body: ModifiedKelvin,
     pub margin: Verdict,
-    /// The margin in words.
     pub sentences: Vec<String>,
     /// Without guards, then with them.
     pub tried: [Tried; 2],
@@ -265,16 +257,13 @@ fn try_out(
     })
 }
 
-/// The loop's time at one rate.
+/// Timing of a loop at one rate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Paced {
-    /// Ticks a second.
     pub rate_hz: f64,
     /// Threads that did nothing but keep the processors busy meanwhile.
     pub busy_threads: usize,
-    /// The priority that the system gave.
     pub priority: String,
-    /// What was measured.
     #[serde(flatten)]
     pub kept: Kept,
     pub recorded: Option<RecordedTicks>,
@@ -332,7 +321,7 @@ pub fn pace(
     })
 }
 
-/// Between two looks at a loop that runs.
+/// Interval between two looks at a running loop.
 const PART: Duration = Duration::from_millis(100);
 
 /// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
@@ -343,7 +332,6 @@ pub struct Followed {
     /// What was measured; in a table of its own.
     #[serde(skip)]
     pub samples: Vec<CheckSample>,
-    /// The body rendered.
     pub body: ModifiedKelvin,
     #[serde(rename = "samples")]
     pub count: usize,
@@ -363,15 +351,13 @@ pub struct Followed {
     pub fit: Option<FitReport>,
     /// The body that a fit of the commanded force finds.
     pub fit_commanded: Option<FitReport>,
-    /// Why one of these is not there, one sentence each.
+    /// A sentence for each result that is missing.
     pub refusals: Vec<String>,
 }
 
-/// Makes the check.
 pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result<Followed, String> {
     let mut samples = Vec::new();
-    let made = run_check(settings, |one| samples.push(*one), progress);
-    made.map_err(|err| err.to_string())?;
+    run_check(settings, |one| samples.push(*one), progress).map_err(|err| err.to_string())?;
     let until = settings.ramp();
     let ramp = || samples.iter().filter(|one| one.t <= until);
     let count = ramp().count().max(1) as f64;

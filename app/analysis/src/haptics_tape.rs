@@ -14,10 +14,8 @@ use palpate_runner::haptics::{Led, Simulated, Ticking};
 use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use std::path::Path;
 
-/// Drives by name.
 const DRIVES: [(&str, bool); 2] = [("voltage", false), ("current", true)];
 
-/// Begins a recording in a new folder.
 pub fn recorder(
     folder: &Path,
     body: ModifiedKelvin,
@@ -26,7 +24,7 @@ pub fn recorder(
     TapeRecorder::start(folder, &text(body, setting, true), COLUMNS)
 }
 
-/// The same of a run whose hand is led from outside.
+/// For a run whose hand is led from outside.
 pub fn led_recorder(
     folder: &Path,
     body: ModifiedKelvin,

@@ -13,7 +13,6 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// No session was made.
 #[derive(Debug, Error)]
 pub enum ImportFailure {
     #[error(transparent)]
@@ -34,34 +33,30 @@ pub struct Request {
     pub files: Vec<PathBuf>,
     /// Layout that the user states; all else is detected.
     pub told: Told,
-    /// Who, what, with which probe.
     pub labels: Labels,
     /// Folder for the new session folders, each named after its file.
     pub into: Option<PathBuf>,
     /// The library, where no folder is given; the user's own without it.
     pub library: Option<PathBuf>,
-    /// Only tell how the files would be read.
+    /// Report how the files would be read, and import nothing.
     pub is_dry_run: bool,
 }
 
 #[derive(Debug, Serialize)]
 pub struct FileReport {
     pub file: PathBuf,
-    /// Its parts: sheets, blocks, intervals.
+    /// Sheets, blocks or intervals of the file.
     pub parts: Vec<PartReport>,
-    /// What was left out of it, in sentences.
     pub left_out: Vec<String>,
 }
 
-/// What was made of a part of a file.
 #[derive(Debug, Serialize)]
 pub struct PartReport {
-    /// The session; none of a dry run.
+    /// `None` in a dry run.
     pub session: Option<PathBuf>,
     pub samples: usize,
     /// From the first to the last of them, in s.
     pub duration_s: f64,
-    /// How it was read.
     #[serde(flatten)]
     pub imported: Imported,
 }
@@ -150,7 +145,6 @@ fn report_of(path: &Path, foreign: Foreign) -> FileReport {
     FileReport { file: path.into(), parts: parts.collect(), left_out: foreign.left_out }
 }
 
-/// What was made of a file, in lines.
 #[must_use]
 pub fn text(file: &FileReport) -> String {
     let mut lines = vec![file.file.display().to_string()];
@@ -169,8 +163,7 @@ pub fn text(file: &FileReport) -> String {
 
 /// Makes sessions of files and tells what was made of each, in lines; for the window.
 pub fn import_and_tell(request: &Request, progress: &dyn Progress) -> Result<Vec<String>, String> {
-    let reports = import(request, progress).map_err(|err| err.to_string())?;
-    Ok(reports.iter().map(text).collect())
+    Ok(import(request, progress).map_err(|err| err.to_string())?.iter().map(text).collect())
 }
 
 /// One line for each thing that was taken for something, with the option that says it otherwise.

@@ -31,7 +31,6 @@ pub mod imports;
 #[cfg(feature = "haptics")]
 pub mod margin;
 pub mod opening;
-pub mod origin;
 pub mod plan;
 pub mod pool;
 pub mod progress;

@@ -10,13 +10,10 @@ use palpate_runner::replay::Player;
 /// Name of the file in the library that holds what the window remembers of its user.
 pub const SETTINGS_FILE: &str = "window.json";
 
-/// A rig to work on.
 pub struct WorkbenchRequest {
-    /// The rig, opened.
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
-    /// Interlock thresholds.
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
@@ -24,17 +21,13 @@ pub struct WorkbenchRequest {
     pub scale: TimeScale,
 }
 
-/// A recorded session to show moment by moment.
+/// A recorded session to play back.
 pub struct PlaybackRequest {
-    /// The session, at its beginning.
     pub player: Player,
-    /// What its forces were read with.
     pub calibration: Calibration,
-    /// The force at which its interlock trips.
     pub force_max: Newtons,
-    /// What it is called in the head of the window.
+    /// Name in the head of the window.
     pub name: String,
-    /// Pace at which it begins.
     pub scale: TimeScale,
 }
 
@@ -42,6 +35,5 @@ pub struct PlaybackRequest {
 pub trait Windows {
     fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
 
-    /// A recorded session.
     fn playback(&self, request: PlaybackRequest) -> Result<(), String>;
 }

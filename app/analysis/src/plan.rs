@@ -20,7 +20,6 @@ const STIFFER: f64 = 1.35;
 /// The white noise of the simulated rig's straight cell, in N.
 const NOISE_ASSUMED: Newtons = Newtons(0.02);
 
-/// The rig on which a plan will run.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench<'a> {
     pub rig: &'a RigDescription,
@@ -36,17 +35,13 @@ pub struct PlanRequest<'a> {
     pub unknowns: Unknowns,
     /// Noise that is independent from sample to sample; without it that of the fit.
     pub white: Option<Newtons>,
-    /// Slow noise on top.
     pub memory: Option<Memory>,
-    /// Samples per second.
     pub sample_rate_hz: f64,
-    /// Depth from contact.
     pub depth: Depth,
     /// Highest force; without it what leaves a specimen a third stiffer below the interlock.
     pub force_max: Option<Newtons>,
     /// Fastest speed; without it the rig's.
     pub speed_max: Option<MmPerS>,
-    /// Longest protocol.
     pub duration_max: Seconds,
     /// The command for one press, in the words of the front end.
     pub command: &'a dyn Fn(&RampHold) -> String,
@@ -110,18 +105,17 @@ pub struct PlanReport {
     pub unknowns: Unknowns,
     pub rig: Rig,
     pub targets: Vec<Target>,
-    /// The shortest first.
     pub proposals: Vec<Offer>,
     /// Intervals against hold, cycles and sampling rate.
     pub curves: Curves,
 }
 
-/// A proposal, and whether and how this program can run it.
+/// A proposal with the commands that run it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Offer {
     #[serde(flatten)]
     pub proposal: Proposal,
-    /// One for every press; none where no plan exists.
+    /// One for every press; empty where no plan exists.
     pub commands: Vec<String>,
     pub acknowledgements: Vec<String>,
     /// With homing, finding contact and leaving the tissue, in s; none where no plan exists.
@@ -153,7 +147,6 @@ pub fn plan(
 }
 
 impl PlanRequest<'_> {
-    /// How far the rig may go.
     fn rig(&self, bench: Bench<'_>) -> Result<Rig, PlanFailure> {
         let (fastest, interlock) = (bench.rig.speed_max, bench.limits.force_max);
         let third = Newtons(interlock.0 / STIFFER);

@@ -7,17 +7,15 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 
-/// What happened to one piece of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkFailure {
-    /// It was not begun: the whole was asked to end.
     NotBegun,
     Died,
 }
 
 /// An event of the work, on the calling thread.
 pub enum News<R> {
-    /// So many pieces are done.
+    /// Number of pieces done.
     Done(usize),
     /// The answer to the next piece, in order.
     Next(Result<R, WorkFailure>),

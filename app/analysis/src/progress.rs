@@ -1,7 +1,7 @@
 //! Progress of long work, and its cancellation.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Receives the progress of work: a bar, a window, a test.
@@ -38,19 +38,13 @@ impl Progress for Unwatched {
 /// The progress of a task on another thread, which may be cancelled from here.
 #[derive(Debug, Default)]
 pub struct TaskProgress {
-    done: AtomicUsize,
-    of: AtomicUsize,
-    what: Mutex<String>,
+    state: Mutex<(usize, usize, String)>,
     is_cancelled: AtomicBool,
 }
 
 impl Progress for TaskProgress {
     fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
-        self.done.store(done, Ordering::Relaxed);
-        self.of.store(of, Ordering::Relaxed);
-        let mut text = self.what.lock().unwrap_or_else(PoisonError::into_inner);
-        text.clear();
-        text.push_str(what);
+        *self.state.lock().unwrap_or_else(PoisonError::into_inner) = (done, of, what.to_owned());
         if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
@@ -61,15 +55,12 @@ impl TaskProgress {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work was asked to end.
     pub fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
     /// Pieces done, pieces in all, and what comes next.
     pub fn read(&self) -> (usize, usize, String) {
-        let what = self.what.lock().unwrap_or_else(PoisonError::into_inner);
-        let count = |pieces: &AtomicUsize| pieces.load(Ordering::Relaxed);
-        (count(&self.done), count(&self.of), what.clone())
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

@@ -7,18 +7,16 @@ use serde::Serialize;
 /// where the loop failed and cut it off.
 pub type Ended = Option<Result<(Recorded, u64), String>>;
 
-/// A recording that was ended, in words.
 #[must_use]
 pub fn ended_words((recorded, left): (Recorded, u64)) -> String {
     let words = RecordedTicks::from(recorded).words();
     format!("{words}; hash at the end {left:016x}")
 }
 
-/// What of a run was recorded.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RecordedTicks {
     pub ticks: u64,
-    /// Ticks for which there was no room.
+    /// Ticks that were dropped because the disk was too slow.
     pub lost: u64,
 }
 
@@ -40,21 +38,19 @@ impl RecordedTicks {
     }
 }
 
-/// What a recording gives when it is computed again.
+/// Result of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct Replayed {
-    /// What the recording is of.
     pub name: String,
-    /// Ticks computed.
     pub ticks: u64,
-    /// Whether every number has the recorded bits.
+    /// Whether every computed number has the recorded bits.
     pub is_identical: bool,
     pub first: Option<ReplayDifference>,
     /// Whether the recording has its end; without, it was cut off after the last tick compared.
     pub is_whole: bool,
-    /// Ticks that were lost while it was recorded.
+    /// Ticks dropped while recording.
     pub lost: u64,
-    /// Hash of what is left at the end.
+    /// Hash of the state at the end.
     pub end_hash: String,
 }
 
@@ -84,7 +80,7 @@ impl Replayed {
         lines.join("\n")
     }
 
-    /// Why it is not as recorded, or not all of it, if so.
+    /// Difference from the recording, or that it was cut off.
     pub fn failure(&self) -> Option<String> {
         let Some(first) = &self.first else {
             let cut_off = format!(
@@ -104,12 +100,12 @@ impl Replayed {
     }
 }
 
-/// A loop that can be computed again.
+/// A loop that can be replayed.
 pub trait Replayable<const W: usize, const R: usize> {
     /// The tick of the recorded inputs of `row`.
     fn tick(&mut self, row: &Row<W, R>) -> Row<W, R>;
 
-    /// Hash of what is left.
+    /// Hash of the state.
     fn state_hash(&self) -> u64;
 }
 

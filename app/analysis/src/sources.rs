@@ -6,7 +6,7 @@
 
 use crate::compliance::{Correction, Corrections};
 use crate::exports::without_copied;
-use crate::origin::Origin;
+use crate::fit::Origin;
 use crate::source::{self, FitSource, SourceError, Wanted};
 use palpate_model::calibration::{Calibration, CalibrationError};
 use palpate_rheology::fit::{FitError, FitSample, Traced};
@@ -41,10 +41,8 @@ pub enum SourcesError {
     Rejected(usize),
 }
 
-/// Recordings that were found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Those that count, in order.
     pub paths: Vec<PathBuf>,
     /// Sessions that are left out, because what was recovered from them is there too.
     pub copied: Vec<PathBuf>,
@@ -60,7 +58,6 @@ pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String
 }
 
 impl Found {
-    /// What a user must know of what was left out.
     pub fn note(&self) -> Option<String> {
         copied_sentence(self.copied.iter().map(|path| path.display().to_string()))
     }
@@ -179,7 +176,6 @@ pub struct Reading<'a> {
 /// A recording that is looked at together with others.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What it is called.
     pub name: String,
     /// What is fitted.
     pub samples: Vec<FitSample>,
@@ -192,7 +188,6 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// What was read of a source.
     #[must_use]
     pub fn of(name: String, source: FitSource, compliance: Option<Correction>) -> Self {
         Self {
@@ -204,16 +199,13 @@ impl Recording {
         }
     }
 
-    /// As fits take it.
     pub fn borrowed(&self) -> (&str, &[FitSample]) {
         (&self.name, &self.samples)
     }
 }
 
-/// Recordings that were read, and what a user must know of them.
 #[derive(Clone, Debug, Default)]
 pub struct Recordings {
-    /// Those that count, in order.
     pub all: Vec<Recording>,
     /// Remarks, each with the name of its recording.
     pub notes: Vec<String>,
@@ -248,8 +240,7 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
             }
             source => source.map_err(failed)?,
         };
-        let compliance = how.corrections.apply(&mut source);
-        let compliance = compliance.map_err(|err| failed(err.into()))?;
+        let compliance = how.corrections.apply(&mut source).map_err(|err| failed(err.into()))?;
         let applied = compliance.as_ref().filter(|one| one.is_applied);
         source.notes.extend(applied.map(Correction::sentence));
         let notes = source.notes.iter().map(|note| format!("{name}: {note}"));
@@ -267,7 +258,6 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
 }
 
 impl Recordings {
-    /// As fits take them.
     pub fn borrowed(&self) -> Vec<(&str, &[FitSample])> {
         self.all.iter().map(Recording::borrowed).collect()
     }

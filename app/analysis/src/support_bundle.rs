@@ -18,10 +18,8 @@ use zip::write::SimpleFileOptions;
 
 /// Words in the name of a secret value.
 const SECRET: &str = "password passwd passphrase secret token credential login api_key private_key";
-/// What stands in the place of a secret.
 const REMOVED: &str = "removed";
 
-/// What goes into a bundle.
 #[derive(Clone, Debug, Default)]
 pub struct BundleRequest {
     /// The file to make. One that is there already is refused.
@@ -29,7 +27,7 @@ pub struct BundleRequest {
     /// The library whose log and settings are meant.
     pub library: PathBuf,
     pub rigs: Vec<PathBuf>,
-    /// What the doctor says of the library, in words.
+    /// Findings of the doctor on the library.
     pub findings: String,
     /// Parts that the program was built with.
     pub features: Vec<&'static str>,
@@ -39,14 +37,12 @@ pub struct BundleRequest {
     pub sessions: Vec<PathBuf>,
 }
 
-/// One file of a bundle.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Bundled {
     /// Its name in the bundle.
     pub name: String,
     /// Its size before it is compressed.
     pub bytes: u64,
-    /// What it is, in words.
     pub what: &'static str,
 }
 
@@ -60,7 +56,7 @@ pub enum BundleError {
     Write { path: String, source: io::Error },
 }
 
-/// Makes a bundle, and tells what is in it.
+/// Writes a bundle and lists its files.
 pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError> {
     let unwritable = |source| BundleError::Write { path: request.to.display().to_string(), source };
     let draft = Draft::new(&request.to).map_err(unwritable)?;
@@ -174,8 +170,7 @@ fn read(path: &Path) -> Result<String, BundleError> {
 }
 
 fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn versions(request: &BundleRequest) -> String {

@@ -21,7 +21,6 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Nothing was written beside a session.
 #[derive(Debug, Error)]
 pub enum DeedFailure {
     #[error(transparent)]
@@ -62,55 +61,47 @@ impl From<ReadError> for DeedFailure {
     }
 }
 
-/// Who does it, and why.
+/// Author of a record, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Who {
     pub by: String,
-    /// In a few words; some deeds need it.
+    /// In a few words; some actions require it.
     pub reason: String,
 }
 
-/// What is done to a session.
+/// An action on a session that adds a record beside it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Deed {
     Fit {
-        /// What it is called.
         name: String,
         how: FitWanted,
     },
     Recalibrate {
-        /// What it is called.
         name: String,
         calibration: Box<Calibration>,
     },
-    /// The same with the calibration of a file.
     RecalibrateFrom {
-        /// What it is called.
         name: String,
-        /// A calibration's document.
         file: PathBuf,
     },
-    /// Forces in stretches of time do not count.
     Mask {
-        /// What it is called.
         name: String,
         /// From and to in s since the first sample.
         left_out_s: Vec<[f64; 2]>,
     },
-    /// An analysis does not count any more.
-    Withdraw { name: String },
-    /// The session is worth that.
+    Withdraw {
+        name: String,
+    },
     Judge(Verdict),
-    /// Contact was elsewhere.
     Correct {
-        /// Which of the contacts, from 1.
+        /// Number of the contact, from 1.
         number: u32,
         position: Position,
     },
 }
 
 impl Deed {
-    /// Does it to a session and keeps the record, or says why not.
+    /// Adds the record of this action to a session.
     pub fn run(
         self,
         session: &Path,
@@ -160,7 +151,7 @@ fn id_of(session: &Path) -> Result<String, ReadError> {
     Ok(Summary::read(session)?.manifest.session_id)
 }
 
-/// Refuses before hours of work a name that is taken.
+/// Refuses a taken name before hours of work.
 fn check_name(session: &Path, name: &str) -> Result<String, DeedFailure> {
     let (id, name) = (id_of(session)?, name.trim());
     if Analyses::read(session, &id)?.all.iter().any(|one| one.name == name) {
@@ -207,16 +198,14 @@ fn fit(
 
 #[derive(Clone, Debug)]
 pub struct KeptFit<'a> {
-    /// The analysis that the session was read by.
+    /// Analysis through which the session was read.
     pub based_on: Option<&'a str>,
-    /// Sessions fitted together with it.
     pub together_with: &'a [Wanted],
-    /// How it was asked for.
     pub settings: Value,
     pub results: Value,
 }
 
-/// Keeps a fit of a session as an analysis beside it.
+/// Stores a fit of a session as an analysis beside it.
 pub fn keep_fit(
     session: &Path,
     name: &str,
@@ -239,10 +228,8 @@ pub fn keep_fit(
     keep(session, id, name, inputs, what, who)
 }
 
-/// What another calibration made of a session.
 #[derive(Clone, Debug)]
 pub struct RecalibrationResult {
-    /// What it did to the forces.
     pub change: ForceChange,
     /// The session's rig; empty where there is none.
     pub rig: String,
@@ -262,13 +249,11 @@ pub fn recalibrate(
     Ok(RecalibrationResult { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
 }
 
-/// Forces that do not count any more.
 #[derive(Clone, Debug)]
 pub struct MaskResult {
     pub analysis: Analysis,
-    /// Forces left out.
     pub left_out: usize,
-    /// Forces there were.
+    /// Number of forces before the mask.
     pub of: usize,
 }
 
@@ -285,8 +270,7 @@ pub fn mask(
     let mut opened = analysed::open(session, None)?;
     let inputs = opened.inputs(session, None)?;
     let forces = |opened: &analysed::Opened| {
-        let rows = opened.edited.session.rows.iter();
-        rows.filter(|row| row.force.is_some()).count()
+        opened.edited.session.rows.iter().filter(|row| row.force.is_some()).count()
     };
     let of = forces(&opened);
     opened.left_out_s.clone_from(&left_out_s);
@@ -300,7 +284,7 @@ pub fn mask(
     Ok(MaskResult { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
 }
 
-/// Lets an analysis count no more.
+/// Withdraws an analysis: its record stays and does not count.
 pub fn withdraw(session: &Path, name: &str, who: &Who) -> Result<Analysis, DeedFailure> {
     let id = id_of(session)?;
     keep(session, &id, name, Vec::new(), Analysed::Withdrawal, who)
@@ -318,20 +302,20 @@ pub fn judge(
     Ok((was, edit))
 }
 
-/// A contact that was found elsewhere.
+/// A corrected contact point.
 #[derive(Clone, Debug)]
 pub struct ContactCorrection {
-    /// Which of the contacts, from 1.
+    /// Number of the contact, from 1.
     pub number: u32,
-    /// Where it really was, from home.
+    /// Corrected position from home.
     pub position: Position,
-    /// Where the session found it.
+    /// Position that the session found, from home.
     pub was: Position,
     pub edit: Edit,
 }
 
 impl ContactCorrection {
-    /// By how much its depths are more, in mm.
+    /// Increase of all depths from this contact in mm.
     pub fn deeper_mm(&self) -> f64 {
         self.was.depth_from(self.position).0
     }
@@ -369,8 +353,7 @@ pub fn correct(
         return Err(DeedFailure::NoSuchContact { number, found });
     };
     // A session that found a contact has a rig.
-    let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel);
-    let travel = travel.unwrap_or(Position(0.0));
+    let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel).unwrap_or(Position(0.0));
     if !(0.0..=travel.0).contains(&position.0) {
         return Err(DeedFailure::OutsideTravel { position, travel });
     }

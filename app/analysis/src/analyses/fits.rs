@@ -13,29 +13,25 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// How a session is fitted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FitWanted {
-    /// Key of a family; none for the modified Kelvin body.
+    /// Key of a model family; `None` is the modified Kelvin model.
     pub family: Option<String>,
-    /// The way back too, where the family knows it.
+    /// Fit the unloading too, where the family describes it.
     pub with_unload: bool,
-    /// Take sessions though they were rejected.
     pub is_rejected_included: bool,
-    /// Intervals from the profile likelihood as well.
     pub with_profile: bool,
-    /// The analysis that the session is read by.
+    /// Analysis through which the session is read.
     pub based_on: Option<String>,
-    /// Sessions fitted together with it, one body for all.
+    /// Sessions fitted together with it, with one body for all.
     pub together_with: Vec<Wanted>,
 }
 
 /// What is kept of how a fit was asked for, so that it can be asked for again.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FitSettings {
-    /// Key of a family; none for the modified Kelvin body.
+    /// Key of a model family; `None` is the modified Kelvin model.
     pub family: Option<String>,
-    /// Whether the way back was fitted too.
     pub unload: bool,
     /// Parameters held, as name=value.
     pub fixed: Vec<String>,
@@ -45,17 +41,15 @@ pub struct FitSettings {
     pub systematic: bool,
     /// Whether intervals from the profile likelihood were found.
     pub profile: bool,
-    /// Fits of a bootstrap.
+    /// Number of bootstrap fits.
     pub bootstrap: Option<usize>,
     pub seed: Option<u64>,
-    /// What was taken from the depths.
+    /// Identifier of the compliance that was subtracted from the depths.
     pub compliance: Option<String>,
-    /// Whether a rejected session was fitted all the same.
     pub include_rejected: bool,
 }
 
 impl FitWanted {
-    /// The family, all its parameters free.
     fn options(&self) -> Result<FitOptions, String> {
         match &self.family {
             Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
@@ -63,7 +57,7 @@ impl FitWanted {
         }
     }
 
-    /// What is kept of the question.
+    /// Settings that are stored with the fit.
     pub(super) fn settings(&self) -> Value {
         let settings = FitSettings {
             family: self.family.clone(),
@@ -157,8 +151,8 @@ impl FitWanted {
             is_systematic: true,
             intervals: self.intervals(),
         };
-        let fitted = fit_together(records, &request, |_, _| ());
-        let mut fitted = fitted.map_err(|err| err.to_string())?;
+        let mut fitted =
+            fit_together(records, &request, |_, _| ()).map_err(|err| err.to_string())?;
         if let Some(reason) = fitted.notes.pop() {
             return Err(reason);
         }

@@ -21,14 +21,14 @@ use palpate_sessions::edits::Verdict;
 use palpate_sessions::{Shelf, contacts};
 use std::path::{Path, PathBuf};
 
-/// What is known of a session for making analyses of it.
+/// State of a session before an action on it.
 #[derive(Clone, Debug)]
 pub struct Known {
     pub session: PathBuf,
     pub session_id: String,
-    /// Its analyses, withdrawn ones among them.
+    /// Analyses, including withdrawn ones.
     pub analyses: Analyses,
-    /// Its verdict, by whom and why.
+    /// Data quality, its author and reason.
     pub verdict: Option<(Verdict, String, String)>,
     /// The contacts it found, corrected ones as they are now, from home.
     pub contacts: Vec<Position>,
@@ -55,15 +55,13 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
     })
 }
 
-/// What came of some work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Done {
     pub sentence: String,
-    /// The session beside which something was written, if it was.
+    /// Session that got a new record.
     pub changed: Option<PathBuf>,
     /// Whether that was an edit, so that all who show the session read it again.
     pub is_edit: bool,
-    /// The analysis that was made.
     pub made: Option<String>,
 }
 
@@ -75,16 +73,13 @@ fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(
     }
 }
 
-/// What is written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Paper {
-    /// A page on these sessions.
     Page(Vec<Wanted>),
-    /// One figure of a session.
     Figure(Wanted, Figure, Window),
 }
 
-/// Writes it as a new file, or says why not.
+/// Writes a page or figure as a new file.
 pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, String> {
     if to.exists() {
         return Err(format!("{} exists already; choose another name", to.display()));
@@ -98,8 +93,8 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
         Paper::Figure(wanted, figure, window) => {
             let ending = Ending::of(to)?;
             step(progress, 0, 1, "drawing")?;
-            let drawing = dossier::figure(wanted, *figure, *window);
-            let drawing = drawing.map_err(|err| err.to_string())?;
+            let drawing =
+                dossier::figure(wanted, *figure, *window).map_err(|err| err.to_string())?;
             ending.bytes(&drawing?)?
         }
     };
@@ -112,7 +107,6 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
     })
 }
 
-/// Writes a file that was not there.
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {
     palpate_sessions::atomic::create(to, bytes).map_err(|err| {
         format!("cannot write {} ({err}); choose a folder that may be written", to.display())

@@ -23,13 +23,10 @@ use thiserror::Error;
 /// The folder of fits of the body that is fitted where no family is named.
 const MODEL: &str = "modified-kelvin";
 
-/// Which sessions of which lake are fitted how.
 #[derive(Debug)]
 pub struct LakeRequest<'a> {
     pub lake: &'a Path,
-    /// The part of its sessions.
     pub shard: Shard,
-    /// How each is fitted.
     pub recipe: &'a Recipe,
     /// Parameters held, as name=value.
     pub fixed: &'a [String],
@@ -37,21 +34,17 @@ pub struct LakeRequest<'a> {
     pub free: &'a [String],
     /// SHA-256 of the compliance's file, if depths are corrected.
     pub compliance_sha256: Option<String>,
-    /// Fits at a time.
+    /// Number of concurrent fits.
     pub jobs: usize,
 }
 
-/// What came of one session of a lake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Its fit was made.
     Made,
-    /// Its fit was there already.
     There,
     Rejected,
 }
 
-/// A session of a lake has no fit.
 #[derive(Debug, Error)]
 pub enum LakeFailure {
     #[error(transparent)]
@@ -73,24 +66,20 @@ impl From<source::SourceError> for LakeFailure {
 /// An event in the fitting of a lake.
 #[derive(Debug)]
 pub enum LakeFit<'a> {
-    /// What a user must know.
     Note(String),
-    /// So many of so many sessions are done.
+    /// Number of sessions done, and of all.
     Done(usize, usize),
-    /// What came of a session, in the sessions' order.
+    /// Outcome of a session, in the sessions' order.
     Next(&'a str, Result<Outcome, LakeFailure>),
 }
 
-/// How many sessions came to what.
+/// Counts of outcomes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LakeTally {
-    /// The folder of their fits.
     pub model: String,
-    /// In the part of the lake that was looked at.
     pub sessions: usize,
     pub made: usize,
     pub were_there: usize,
-    /// Not fitted because they were rejected.
     pub rejected: usize,
 }
 
@@ -175,7 +164,7 @@ impl LakeRequest<'_> {
         Ok(Outcome::Made)
     }
 
-    /// All that decides about a fit beside its session.
+    /// Everything that determines a fit besides its session.
     fn settings(&self, model: &str) -> Value {
         let sorted = |words: &[String]| {
             let mut words: Vec<&str> = words.iter().map(|word| word.trim()).collect();

@@ -17,10 +17,8 @@ use std::{fs, io};
 use thiserror::Error;
 
 const FILE: &str = "last-fit.json";
-/// Version of the file.
 const VERSION: u64 = 2;
 
-/// The body that a plan assumes.
 const DEFAULT_FAMILY: &str = "series-3";
 
 #[derive(Serialize)]
@@ -30,7 +28,6 @@ struct RememberedFit<'a> {
     report: &'a FitReport,
 }
 
-/// A fit in a file cannot be used.
 #[derive(Debug, Error)]
 pub enum KnownFitError {
     #[error("this is not a fit: {reason}, {}", path.display())]
@@ -48,11 +45,9 @@ pub enum KnownFitError {
 /// What is needed of a fit that was written as JSON, remembered or as the answer of a command.
 #[derive(Debug, Deserialize)]
 pub struct KnownFit {
-    /// What was fitted, if that was written.
     pub source: Option<String>,
     /// Root mean square of the residuals in N.
     pub rmse_n: f64,
-    /// What was found.
     pub parameters: Vec<Parameter>,
 }
 
@@ -107,7 +102,7 @@ impl KnownFit {
         Ok((known, source.notes))
     }
 
-    /// The body found; a name that is missing is named.
+    /// The modified Kelvin body; an error names a missing parameter.
     pub fn body(&self) -> Result<ModifiedKelvin, KnownFitError> {
         let value = |name: &'static str| {
             let mut all = self.parameters.iter();

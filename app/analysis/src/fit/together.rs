@@ -11,7 +11,6 @@ use palpate_runner::Stopwatch;
 /// Stands for all parameters of the specimen.
 const BODY: &str = "body";
 
-/// What is fitted together, and how.
 #[derive(Clone, Debug)]
 pub struct TogetherRequest<'a> {
     /// The family, and which of its parameters are found.
@@ -36,7 +35,6 @@ pub struct Together {
     pub systematic: Option<Vec<Systematic>>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
-    /// What a user must know of it.
     pub notes: Vec<String>,
 }
 
@@ -74,10 +72,8 @@ pub fn fit_together(
     }
     let overlays = report.records.iter().zip(&borrowed);
     let overlays = overlays.map(|(one, (_, samples))| Overlay::of(&one.report, samples));
-    let intervals = (0..borrowed.len()).map(|record| {
-        let wanted = request.intervals;
-        wanted.find(&fitted, record, |done| progress(record, done))
-    });
+    let intervals = (0..borrowed.len())
+        .map(|record| request.intervals.find(&fitted, record, |done| progress(record, done)));
     Ok(Together {
         overlays: overlays.collect(),
         intervals: intervals.collect::<Result<_, _>>()?,
@@ -91,8 +87,10 @@ pub fn fit_together(
 impl Together {
     #[must_use]
     pub fn beside<'a>(&'a self, records: &'a Recordings) -> Vec<Beside<'a>> {
-        let all = self.overlays.iter().zip(&self.intervals);
-        all.zip(&records.all)
+        self.overlays
+            .iter()
+            .zip(&self.intervals)
+            .zip(&records.all)
             .map(|((overlay, intervals), record)| Beside {
                 overlay,
                 intervals,
@@ -102,7 +100,6 @@ impl Together {
             .collect()
     }
 
-    /// As machines read it.
     #[must_use]
     pub fn object<'a>(&'a self, options: &FitOptions, beside: &[Beside<'a>]) -> JointObject<'a> {
         let systematic = self.systematic.as_deref();

@@ -12,28 +12,22 @@ use palpate_sessions::calibrations::{Kept, Shelf};
 use serde::Serialize;
 use std::path::Path;
 
-/// One line of a list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entry {
     pub id: String,
     pub name: String,
-    /// The rig whose cell it is.
     pub rig: String,
-    /// The cell's serial number.
+    /// Serial number.
     pub cell: String,
-    /// When it was taken.
     pub taken_at: Option<String>,
-    /// Days since then.
     pub age_days: Option<i64>,
     pub valid_days: u32,
-    /// Whether it is the one in force for its rig.
     pub is_in_force: bool,
-    /// The one that took its place.
     pub superseded_by: Option<String>,
 }
 
 impl Entry {
-    /// The line of one that is kept.
+    /// Of a stored calibration.
     #[must_use]
     pub fn of(shelf: &Shelf, kept: &Kept, age_days: Option<i64>) -> Self {
         let document = &kept.document;
@@ -47,7 +41,7 @@ impl Entry {
         }
     }
 
-    /// The line of one that comes with its rig and is in no library.
+    /// Of the calibration that comes with a rig and is in no library.
     #[must_use]
     pub fn built_in(document: &Calibration) -> Self {
         Self {
@@ -75,7 +69,6 @@ impl Entry {
     }
 }
 
-/// The list of a library.
 #[must_use]
 pub fn list(entries: &[Entry], folder: &Path) -> String {
     if entries.is_empty() {
@@ -88,7 +81,7 @@ pub fn list(entries: &[Entry], folder: &Path) -> String {
     table("id | name | rig | cell | age | state", entries.iter().map(row))
 }
 
-/// The uncertainty of one force and where it comes from, in N.
+/// Uncertainty budget of one force.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Budget {
     pub force_n: f64,
@@ -100,7 +93,6 @@ pub struct Budget {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BudgetTerm {
-    /// Where it comes from.
     pub term: Term,
     /// Its standard uncertainty in N; null where it is not stated.
     pub uncertainty_n: Option<f64>,
@@ -109,21 +101,17 @@ pub struct BudgetTerm {
 /// Quality, candidate curves and uncertainty of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct Told {
-    /// What it is like.
     pub quality: Quality,
     /// Every curve tried, the best first.
     pub candidates: Vec<Candidate>,
-    /// The curve in use.
     pub chosen: Option<Candidate>,
     /// Uncertainty at each weight and half-way to the next.
     pub budget: Vec<Budget>,
-    /// The same as a function.
     #[serde(skip)]
     pub uncertainty: ForceUncertainty,
 }
 
 impl Told {
-    /// Finds all of it.
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
         let points = calibration.points()?;
         let uncertainty = ForceUncertainty::of(calibration)?;
@@ -152,7 +140,6 @@ impl Told {
     }
 }
 
-/// The page of a calibration.
 #[must_use]
 pub fn whole(
     calibration: &Calibration,
@@ -288,7 +275,6 @@ fn budget(details: &Told) -> String {
     table(&format!("force (N) | u (N){names}"), rows)
 }
 
-/// The answer of a check.
 #[must_use]
 pub fn check(result: &CheckResult) -> String {
     let verdict = if result.is_passed { "passed" } else { "FAILED" };

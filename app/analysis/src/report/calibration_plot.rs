@@ -127,7 +127,6 @@ pub fn picture(calibration: &Calibration, details: &Told) -> String {
 /// Upper and lower edges of the plots in px.
 const PLACES_PX: [[f64; 2]; 4] = [[84.0, 320.0], [356.0, 450.0], [486.0, 600.0], [654.0, 820.0]];
 
-/// The same, not yet in any format.
 #[must_use]
 pub fn drawing(calibration: &Calibration, details: &Told) -> Drawing {
     let mut svg = Svg::new(WIDTH);

@@ -81,6 +81,5 @@ pub fn history(events: &[Event]) -> String {
 
 /// A text without anything that would end its line or move the cursor.
 pub fn one_line(text: &str) -> String {
-    let plain = text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter });
-    plain.collect()
+    text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }

@@ -4,7 +4,6 @@ use super::text::capital;
 use palpate_rheology::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
-/// One group of cases in numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSummary {
     pub group: &'static str,
@@ -75,7 +74,6 @@ pub fn text(rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-/// The Markdown page.
 #[must_use]
 pub fn page(rows: &[Row]) -> String {
     let mut page = format!("{PAGE_HEAD}{INTRODUCTION}");
@@ -96,33 +94,13 @@ pub fn page(rows: &[Row]) -> String {
     page
 }
 
-/// How every page begins.
 pub const PAGE_HEAD: &str = "\
 # Extremes
 
 Written by `palpate extremes --page docs/guide/extremes.md`; do not edit.
 ";
 
-const INTRODUCTION: &str = "
-What happens where numbers end: relaxation times of a nanosecond and of thirty years, depths of a metre,
-a hundred million samples, records of one sample, NaN. Every family of force models, every integrator and
-every fit is put to the same cases, and each row is
-
-* **right**: the error is within the tolerance. For a force it is relative to the largest force of
-  the path, against a reference in 75 digits or more; for the exact step and the families the
-  tolerance is 1e-13 and in single precision 3e-6. An approximate integrator is held to the same against its
-  own textbook step in as many digits: how near that step is to the exact force, the trade says. For a fit of a record without noise it is that of the worst
-  parameter, tolerance 1e-6 (1e-3 with an offset of a million times the signal, or times since 1970).
-* **refused**: no number, and one sentence that names the reason and what to do.
-* **flagged**: numbers of a fit with a warning not to rely on them.
-* **wrong**: anything else, NaN, infinity, or a refusal of what has an answer. The command then ends
-  with exit code 1.
-
-Forces below 1e-180 N count as none, and forces beyond 1e300 N are refused. The two longest records, 1e8
-samples and 24 h at 1 kHz, are put to the exact step; families take 1e7 samples, those of more than twelve
-terms 1e6, and all of them all with `palpate extremes --soak`.
-
-";
+const INTRODUCTION: &str = include_str!("extremes.md");
 
 /// What became of several rows in one short cell: the worst error, or the worst verdict.
 fn cell(rows: &[&Row]) -> String {
@@ -170,8 +148,7 @@ fn by_ratio(rows: &[&Row]) -> String {
     let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
     for row in rows {
         if let Some((tau, step)) = exponents(&row.case) {
-            let of_ratio = cells.entry(step - tau).or_default();
-            of_ratio.entry(&row.subject).or_default().push(row);
+            cells.entry(step - tau).or_default().entry(&row.subject).or_default().push(row);
         }
     }
     let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();

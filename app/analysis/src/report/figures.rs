@@ -33,7 +33,7 @@ impl Window {
     }
 }
 
-/// Where several sessions are laid over each other.
+/// Origin of time in an overlay of several sessions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Align {
     /// The first sample of the first ramp.
@@ -65,7 +65,6 @@ struct Span {
 /// What of a session is drawn: a few thousand points, whatever its length.
 #[derive(Clone, Debug)]
 pub struct Traces {
-    /// What it is called.
     pub name: String,
     /// Force in N over time in s, a line for every stretch in which it is known.
     force_time: Vec<Vec<[f64; 2]>>,
@@ -86,7 +85,7 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// The same, stretches marked whose forces do not count.
+    /// With intervals marked whose forces do not count.
     #[must_use]
     pub fn leaving_out(self, left_out_s: &[[f64; 2]]) -> Self {
         Self { left_out_s: left_out_s.to_vec(), ..self }
@@ -133,8 +132,7 @@ impl Traces {
         let force_time: Vec<_> = force_time.collect();
         let known = within.iter().filter(|index| force(index).is_some()).count();
         let ramp = session.rows.iter().position(|row| row.phase == Phase::Ramp);
-        let found = contacts(&session.entries);
-        let contact = found.iter().map(|one| one.after_sample as usize);
+        let contact = contacts(&session.entries).into_iter().map(|one| one.after_sample as usize);
         let mut contact =
             contact.filter(|at| ramp.is_none_or(|ramp| *at <= ramp) && *at < session.rows.len());
         Self {
@@ -151,12 +149,11 @@ impl Traces {
         }
     }
 
-    /// Whether nothing is drawn.
     pub fn is_empty(&self) -> bool {
         self.samples[1] == 0
     }
 
-    /// What a reader must know of how points were left out.
+    /// How many samples are drawn, and how they are thinned.
     pub fn thinning(&self) -> String {
         let [samples, known] = self.samples;
         let force = match known == samples {
@@ -255,7 +252,6 @@ pub fn force_time(traces: &Traces) -> Drawing {
     drawing([&traces.name, "force over time"], &plot, &[])
 }
 
-/// Force over depth.
 #[must_use]
 pub fn force_depth(traces: &Traces) -> Drawing {
     let lines = lines(&traces.force_depth, Ink::Series, 0.0).collect();
@@ -273,8 +269,7 @@ fn force_plot(x: Axis, series: Vec<Series>) -> Plot {
 }
 
 fn depth_axis(all: &[&Traces]) -> Axis {
-    let points = all.iter().flat_map(|one| one.force_depth.iter().flatten());
-    let depths = points.map(|point| point[0]);
+    let depths = all.iter().flat_map(|one| one.force_depth.iter().flatten()).map(|point| point[0]);
     let low = depths.clone().fold(0.0f64, f64::min);
     let high = depths.fold(low, f64::max);
     Axis::linear("depth (mm)").over(if high > low { [low, high] } else { [0.0, 1.0] })

@@ -32,8 +32,7 @@ fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
 #[test]
 fn a_window_leaves_the_rest_out() {
     let session = recorded();
-    let whole = Traces::of("one", &session, Window::WHOLE);
-    let ramp = whole.ramp.unwrap();
+    let ramp = Traces::of("one", &session, Window::WHOLE).ramp.unwrap();
     let window = Window { from: ramp, until: ramp + 1.0 };
     let part = Traces::of("one", &session, window);
     assert!(part.ends[0] >= ramp && part.ends[1] <= ramp + 1.0);

@@ -39,7 +39,6 @@ impl Overlay {
     }
 }
 
-/// What a family is, in words.
 #[derive(Serialize)]
 struct FamilyText {
     equation: &'static str,
@@ -52,7 +51,6 @@ impl FamilyText {
     }
 }
 
-/// A fit of one record.
 #[derive(Serialize)]
 pub struct FitObject<'a> {
     #[serde(flatten)]
@@ -91,7 +89,6 @@ impl<'a> FitObject<'a> {
     }
 }
 
-/// A fit of several records together.
 #[derive(Serialize)]
 pub struct JointObject<'a> {
     family: String,

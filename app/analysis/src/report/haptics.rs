@@ -17,7 +17,6 @@ use palpate_rheology::fit::FitReport;
 use palpate_runner::haptics::slave::{Difference, MasterLoop, Slaved};
 use palpate_runner::haptics::timing::Spread;
 
-/// A check in words.
 #[must_use]
 pub fn check_text(checked: &Checked) -> String {
     let body = &checked.body;
@@ -38,7 +37,6 @@ pub fn check_text(checked: &Checked) -> String {
     lines.join("\n")
 }
 
-/// What the simulated device did, in words.
 #[must_use]
 pub fn tried_text(tried: &Tried) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
@@ -90,7 +88,6 @@ pub fn margin_text(margin: &Margin) -> String {
     }
 }
 
-/// A run of the loop in words.
 #[must_use]
 pub fn run_text(paced: &Paced) -> String {
     let mut lines = vec![format!("priority: {}", paced.priority)];
@@ -99,7 +96,6 @@ pub fn run_text(paced: &Paced) -> String {
     lines.join("\n")
 }
 
-/// A slave that followed, in words.
 #[must_use]
 pub fn slave_text(slaved: &Slaved) -> String {
     let less = |one: &Difference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
@@ -187,7 +183,6 @@ fn spread(spread: &Spread) -> String {
     format!("{p50:<6} {p99:<5} {p99_9:<6} {max:<8}")
 }
 
-/// A check of the feedback in words.
 #[must_use]
 pub fn follow_text(followed: &Followed) -> String {
     let mut lines = vec![

@@ -19,15 +19,13 @@ pub fn parameters(results: &Value) -> Vec<Parameter> {
     results["parameters"].as_array().into_iter().flatten().filter_map(parameter).collect()
 }
 
-/// What a kept fit said, one sentence each.
+/// Warnings and findings of a stored fit.
 #[must_use]
 pub fn sentences(results: &Value) -> Vec<String> {
     let lists = ["warnings", "findings"].map(|name| results[name].as_array());
-    let all = lists.into_iter().flatten().flatten();
-    all.filter_map(Value::as_str).map(str::to_owned).collect()
+    lists.into_iter().flatten().flatten().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
-/// What another calibration did to the forces.
 #[must_use]
 pub fn change(change: &ForceChange) -> String {
     let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
@@ -41,7 +39,6 @@ pub fn change(change: &ForceChange) -> String {
     )
 }
 
-/// What an analysis did, in one sentence.
 #[must_use]
 pub fn deed(what: &Analysed) -> String {
     match what {
@@ -78,7 +75,7 @@ pub fn fit_lines(one: &Analysis) -> Vec<String> {
     lines
 }
 
-/// Who withdrew an analysis, and why; none while it counts.
+/// Author and reason of a withdrawal; `None` while the analysis counts.
 #[must_use]
 pub fn withdrawn(analyses: &Analyses, name: &str) -> Option<String> {
     let by = analyses.withdrawal(name)?;

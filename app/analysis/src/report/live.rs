@@ -25,7 +25,6 @@ const LEAD_MM: f64 = 3.0;
 const DEPTH: &str = "depth from contact (mm)";
 const FORCE: &str = "force above tare (N)";
 
-/// One repeat of a series.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycle {
     /// Its number, from 1.

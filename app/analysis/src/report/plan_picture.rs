@@ -14,7 +14,6 @@ const SECONDS_MAX: f64 = 600.0;
 /// A limit is in the picture where the plan comes to half of it; a further one would flatten the curve.
 const LIMIT_IN_SIGHT: f64 = 0.5;
 
-/// What ends or bounds a run on this rig.
 #[derive(Clone, Copy, Debug)]
 pub struct CourseLimits {
     /// Force above tare that ends a run, as tight as the plan has it.
@@ -30,8 +29,7 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
     let end = outline.last().map_or(1.0, |point| point.t.0.max(1e-3));
     let (unit, axis) = unit_of(end);
     let series = |value: &dyn Fn(&OutlinePoint) -> f64| -> Vec<[f64; 2]> {
-        let points = outline.iter();
-        points.map(|point| [point.t.0 / unit, value(point)]).collect()
+        outline.iter().map(|point| [point.t.0 / unit, value(point)]).collect()
     };
     let speed: Vec<[f64; 2]> = speeds(outline).into_iter().map(|[t, v]| [t / unit, v]).collect();
     let edges = [0, 1].map(|edge: usize| series(&|point| point.force_band()[edge].0));

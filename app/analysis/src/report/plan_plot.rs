@@ -53,8 +53,7 @@ fn heading(report: &PlanReport) -> String {
 pub fn plots(report: &PlanReport) -> [Plot; 3] {
     let target = &report.targets[0];
     let mut names = PARAMETER_NAMES.iter();
-    let k = names.position(|name| *name == target.parameter);
-    let k = k.unwrap_or(0);
+    let k = names.position(|name| *name == target.parameter).unwrap_or(0);
     let curves = &report.curves;
     let proposed = report.proposals.iter().find_map(|offer| {
         let percent = offer.proposal.expected.parameters[k].percent?;
@@ -83,8 +82,7 @@ pub fn plots(report: &PlanReport) -> [Plot; 3] {
         ),
     ];
     let percents = |start: f64, of: fn(f64, f64) -> f64| {
-        let series = plots.iter().flat_map(|plot| &plot.series);
-        let points = series.flat_map(|one| &one.points);
+        let points = plots.iter().flat_map(|plot| &plot.series).flat_map(|one| &one.points);
         points.map(|point| point[1]).fold(start, of)
     };
     let lowest = percents(target.percent, f64::min);

@@ -168,8 +168,7 @@ fn interval_lines(found: &Intervals, report: &FitReport) -> Vec<String> {
 #[must_use]
 pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
     let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
-    let widest = texts.iter().map(|text| text.value.chars().count()).max();
-    let width = widest.unwrap_or(0);
+    let width = texts.iter().map(|text| text.value.chars().count()).max().unwrap_or(0);
     let line = |text: &ParameterText| {
         let interval = match text.interval.as_str() {
             "" => String::new(),
@@ -215,8 +214,7 @@ pub fn in_columns(lines: &[Vec<String>]) -> String {
             // Counted by letters: `±` is two bytes and one letter.
             format!("{cell:<width$}")
         });
-        let joined = padded.collect::<Vec<_>>().join("  ");
-        joined.trim_end().to_owned()
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
     lines.iter().map(line).collect::<Vec<_>>().join("\n")
 }

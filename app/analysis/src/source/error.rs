@@ -23,20 +23,16 @@ pub enum SourceError {
     #[error(transparent)]
     Table(#[from] TableError),
     #[error(
-        "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report"
+        "the session was imported from {file} and has no decisions; there is nothing to report"
     )]
     Imported { file: String },
     #[error(
         "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; import the file again with other units if they are wrong"
     )]
     NoSignal { file: String },
-    #[error(
-        "the session has no ramp and hold with known force and depth, so there is nothing to fit"
-    )]
+    #[error("the session has no ramp and hold with known force and depth to fit")]
     Empty,
-    #[error(
-        "the session has no loading and no sine with known force and depth, so there are no cycles to analyse"
-    )]
+    #[error("the session has no loading and no sine with known force and depth to analyse")]
     NoCycles,
     #[error(
         "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"

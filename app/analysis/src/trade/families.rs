@@ -18,7 +18,7 @@ const THESIS_SPEED: f64 = 0.75;
 /// Name of the first target.
 pub(super) const THESIS: &str = "thesis body";
 
-/// What rows of one target stand for, and how.
+/// A body that the families of one table approximate.
 struct Target {
     name: &'static str,
     /// The body: family, outer parameters, coefficients.
@@ -96,8 +96,7 @@ fn come_back(path: &mut Vec<(Seconds, Depth)>) {
 }
 
 fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
-    let family = by_key(key).map_err(|err| err.to_string())?;
-    family.model(outer, linear).map_err(|err| err.to_string())
+    by_key(key).map_err(|err| err.to_string())?.model(outer, linear).map_err(|err| err.to_string())
 }
 
 pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, String> {
@@ -145,8 +144,7 @@ fn fitted(key: &str, path: &[(Seconds, Depth)], forces: &[f64]) -> Result<Model,
             sigma: Newtons(0.02),
         })
         .collect();
-    let options = FitOptions::by_key(key).map_err(|err| err.to_string())?;
-    let mut options = options.at_rest();
+    let mut options = FitOptions::by_key(key).map_err(|err| err.to_string())?.at_rest();
     let found = options.fix("f_offset", 0.0).and_then(|()| fit(&samples, &options));
     found.map(|report| report.body).map_err(|err| format!("{key}: {err}"))
 }

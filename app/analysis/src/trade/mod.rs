@@ -7,7 +7,6 @@ mod families;
 mod fit;
 mod integrators;
 mod live;
-mod machine;
 mod paths;
 mod picture;
 #[cfg(feature = "haptics")]
@@ -16,7 +15,6 @@ pub mod stored;
 pub mod text;
 mod timing;
 
-pub use machine::{age_days, this_machine, version};
 pub use picture::svg;
 #[cfg(feature = "haptics")]
 pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
@@ -24,12 +22,11 @@ pub use text::text;
 
 use crate::progress::Progress;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_rheology::trade::{Cost, TRADE_FORMAT, TradeCurves};
+use palpate_rheology::trade::{Cost, Machine, TRADE_FORMAT, TradeCurves};
 use palpate_runner::wall_now;
 use std::ops::ControlFlow;
 use timing::Job;
 
-/// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Every row, long enough for times that can be repeated.
@@ -39,7 +36,6 @@ pub enum Extent {
 }
 
 impl Extent {
-    /// One of two settings.
     fn choose<T>(self, full: T, quick: T) -> T {
         if self == Self::Full { full } else { quick }
     }
@@ -126,4 +122,52 @@ fn times(
     rest.zip(costs).for_each(|(slot, cost)| *slot = cost);
     curves.mark_fronts();
     Ok(Some(curves))
+}
+
+/// Version of this program.
+#[must_use]
+pub fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// What is known of the machine this program runs on.
+#[must_use]
+pub fn this_machine() -> Machine {
+    let described = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    Machine {
+        cpu: cpu_name(&described).unwrap_or(std::env::consts::ARCH).into(),
+        os: std::env::consts::OS.into(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        profile: if cfg!(debug_assertions) { "debug".into() } else { "release".into() },
+    }
+}
+
+/// The processor's name as Linux tells it; elsewhere there is no such text.
+fn cpu_name(described: &str) -> Option<&str> {
+    let line = described.lines().find(|line| line.starts_with("model name"))?;
+    let name = line.split_once(':')?.1.trim();
+    (!name.is_empty()).then_some(name)
+}
+
+/// Days since curves were measured; endless if their date cannot be read.
+#[must_use]
+pub fn age_days(curves: &TradeCurves) -> f64 {
+    let now: DateTime<Utc> = wall_now().into();
+    DateTime::parse_from_rfc3339(&curves.measured_at).map_or(f64::INFINITY, |then| {
+        (now - then.with_timezone(&Utc)).num_seconds() as f64 / 86_400.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_the_processor_is_found_where_there_is_one() {
+        let text = "processor\t: 0\nmodel name\t: Example(R) CPU\nflags\t: fpu\n";
+        assert_eq!(cpu_name(text), Some("Example(R) CPU"));
+        assert_eq!(cpu_name("processor\t: 0\n"), None);
+        assert_eq!(cpu_name(""), None);
+        assert!(this_machine().cores >= 1);
+    }
 }

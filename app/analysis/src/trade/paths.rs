@@ -52,7 +52,7 @@ impl Paths {
     }
 }
 
-/// The largest size.
+/// Largest magnitude.
 pub(super) fn peak(forces: &[f64]) -> f64 {
     forces.iter().fold(0.0, |peak, force| peak.max(force.abs()))
 }
@@ -63,10 +63,10 @@ impl Path {
         let mut reference =
             Reference::new(&[body().term()], Depth(0.0)).map_err(|err| err.to_string())?;
         let dt = Seconds(every as f64 / TICKS as f64);
-        let forces = path.checkpoints().skip(1).map(|(_, depth)| {
-            let force = reference.step(depth, dt).map_err(|err| err.to_string())?;
-            Ok(force.0)
-        });
+        let forces = path
+            .checkpoints()
+            .skip(1)
+            .map(|(_, depth)| Ok(reference.step(depth, dt).map_err(|err| err.to_string())?.0));
         let forces: Result<Vec<f64>, String> = std::iter::once(Ok(0.0)).chain(forces).collect();
         path.exact = forces?;
         Ok(path)
@@ -115,8 +115,7 @@ impl Path {
     /// Largest error in N of forces along [`Path::depths`], where they meet moments of comparison.
     pub fn error_of(&self, step: u64, forces: impl Iterator<Item = f64>) -> f64 {
         let every = self.every as i64;
-        let met = self.ticks(step).zip(forces);
-        let met = met.filter(|(tick, _)| *tick >= 0 && tick % every == 0);
+        let met = self.ticks(step).zip(forces).filter(|(tick, _)| *tick >= 0 && tick % every == 0);
         met.fold(0.0, |worst: f64, (tick, force)| {
             worst.max((force - self.exact[(tick / every) as usize]).abs())
         })

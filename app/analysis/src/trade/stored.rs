@@ -11,7 +11,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Curves could not be stored or read.
 #[derive(Debug, Error)]
 pub enum TradeFileError {
     #[error("the curves cannot be {what}: {source}, {}", path.display())]

@@ -4,7 +4,6 @@ use palpate_rheology::integrators::Scheme;
 use palpate_rheology::trade::{Advice, Cost, Recommendation, TradeCurves};
 use std::fmt::Write;
 
-/// Everything, in words and tables.
 #[must_use]
 pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
     let mut out = String::new();
@@ -166,7 +165,6 @@ fn recommended(out: &mut String, recommendation: &Recommendation) {
     }
 }
 
-/// What was asked for.
 pub fn terms(recommendation: &Recommendation) -> String {
     format!(
         "{} and {} updates a second, using at most {} of each period",

@@ -9,7 +9,6 @@ use palpate_rheology::trade::Cost;
 use palpate_runner::Stopwatch;
 use std::ops::ControlFlow;
 
-/// Something to be timed.
 pub(super) struct Job<'a> {
     /// Evaluations in one call.
     pub per_call: f64,
@@ -64,10 +63,8 @@ pub(super) fn measure(
 
 /// The cost that rounds of measured ns amount to.
 fn cost(rounds: &[f64]) -> Cost {
-    let least_of = |first: usize| {
-        let half = rounds.iter().skip(first).step_by(2);
-        half.copied().fold(f64::INFINITY, f64::min)
-    };
+    let least_of =
+        |first: usize| rounds.iter().skip(first).step_by(2).copied().fold(f64::INFINITY, f64::min);
     let (even, odd) = (least_of(0), least_of(1));
     let ns = even.min(odd);
     let mut sorted = rounds.to_vec();

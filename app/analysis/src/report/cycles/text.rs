@@ -105,8 +105,7 @@ fn relaxation(report: &CycleReport) -> Option<String> {
 }
 
 fn creep(report: &CycleReport) -> Option<String> {
-    let all = report.cycles.iter();
-    let all = all.flat_map(|one| one.creep.iter().map(|creep| (one.cycle, creep)));
+    let all = report.cycles.iter().flat_map(|one| one.creep.iter().map(|creep| (one.cycle, creep)));
     let rows = all.map(|(cycle, creep)| {
         vec![
             cycle.to_string(),

@@ -5,7 +5,6 @@ use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of}
 use palpate_sessions::text::{sha256, sha256_of_file};
 use std::path::Path;
 
-/// How the row of a file begins.
 const ROW: &str = "<tr data-session=\"";
 /// How the line of the date begins: all else is the same whenever the page is made.
 pub(super) const MADE: &str = "<p class=\"made\">";
@@ -13,18 +12,16 @@ pub(super) const MADE: &str = "<p class=\"made\">";
 const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
 const SEAL_END: &str = " -->\n";
 
-/// A file that a page says it describes.
+/// A file that a page lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
     pub session_id: String,
-    /// Name of its folder.
     pub folder: String,
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
 }
 
-/// The attributes of a file's row.
 pub(super) fn attributes(session_id: &str, folder: &str, file: &Input) -> String {
     format!(
         "{}{}\" data-folder=\"{}\" data-file=\"{}\" data-sha256=\"{}\"",
@@ -75,16 +72,15 @@ fn unescape(text: &str) -> String {
     text.replace("&amp;", "&")
 }
 
-/// What became of the files of a session since a page was made.
+/// Comparison of a session's files with those that a page lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// Files that are as they were.
+    /// Number of unchanged files.
     pub same: usize,
-    /// One sentence for each that is not.
+    /// A sentence for each other file.
     pub differences: Vec<String>,
 }
 
-/// Compares what is claimed of one session with a folder.
 pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisError> {
     let mut now = inputs_of(session)?;
     let analyses = session.join(ANALYSES_FILE);

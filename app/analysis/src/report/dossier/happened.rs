@@ -56,8 +56,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
 }
 
 pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
-    let entries = subject.entries.iter();
-    let decided = entries.filter(|entry| entry.kind == EntryKind::Decision);
+    let decided = subject.entries.iter().filter(|entry| entry.kind == EntryKind::Decision);
     let records = decided.filter_map(|entry| {
         let Ok(Effect::Record(record)) = serde_json::from_value(entry.body.clone()) else {
             return None;
@@ -113,8 +112,7 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
         body.table("Edits, in the order made", &heads, &rows);
     }
     let analyses = &subject.analyses;
-    let made = analyses.all.iter();
-    let made: Vec<_> = made.filter(|one| one.what != Analysed::Withdrawal).collect();
+    let made: Vec<_> = analyses.all.iter().filter(|one| one.what != Analysed::Withdrawal).collect();
     if made.is_empty() {
         body.paragraph("The session has no analyses.");
         return;

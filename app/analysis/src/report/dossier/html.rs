@@ -11,7 +11,6 @@ use palpate_figures::page::{Body, document};
 use palpate_figures::uncertain::{error_alone, interval};
 use palpate_rheology::fit::Parameter;
 
-/// The whole page.
 pub(super) fn page(subjects: &[Subject], align: Align, made: &str) -> String {
     let (title, level) = match subjects {
         [one] => (title_of(one), 2),
@@ -86,8 +85,7 @@ fn summary(body: &mut Body, subject: &Subject, level: u8) {
         ("indenter", manifest.indenter.clone()),
         ("protocol", protocol.unwrap_or_default()),
     ];
-    let values = plan["source"]["values"].as_object();
-    let values = values.into_iter().flatten();
+    let values = plan["source"]["values"].as_object().into_iter().flatten();
     facts.extend(
         values.map(|(name, value)| (name.as_str(), value.as_str().unwrap_or_default().to_owned())),
     );

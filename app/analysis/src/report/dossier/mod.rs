@@ -30,11 +30,11 @@ use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A session, and which of its analyses it is read by.
+/// A session, and the analysis through which it is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
     pub session: PathBuf,
-    /// The analysis; none for the session as its edits leave it.
+    /// `None` reads the session with its edits only.
     pub analysis: Option<String>,
 }
 
@@ -59,17 +59,15 @@ pub struct Subject {
     pub(super) traces: Traces,
     pub(super) cycles: Option<CyclePart>,
     pub(super) fit: Result<FitPart, String>,
-    /// Every file it is made of, with its SHA-256.
+    /// Every file of the session with its SHA-256.
     pub(super) files: Vec<Input>,
 }
 
-/// What the cycles of a session show.
 pub(super) struct CyclePart {
     pub text: String,
     pub figure: String,
 }
 
-/// What the fit of a session found.
 pub(super) struct FitPart {
     pub report: FitReport,
     pub figure: Drawing,
@@ -120,10 +118,8 @@ impl Subject {
 /// The name of a session's folder, or of its file.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
-    let whole = path.canonicalize();
-    let named = whole.as_deref().unwrap_or(path);
-    let name = named.file_name().unwrap_or(named.as_os_str());
-    name.to_string_lossy().into_owned()
+    let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    named.file_name().unwrap_or(named.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// The cycles of a session that has several, or sines.
@@ -143,8 +139,7 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
     let options = FitOptions::default();
     let fitted = Fitted::of(source, &options).with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;
-    let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
-    let uncertainty = uncertainty.and_then(Result::ok);
+    let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of).and_then(Result::ok);
     Ok(FitPart {
         figure: picture::of_fit(name, &fitted.samples, &report, uncertainty.as_ref()),
         remarks: fitted.notes,
@@ -153,17 +148,13 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
 }
 
 palpate_model::named! {
-    /// The figures of a session, each by itself.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Figure {
-        /// Force over time.
         #[default]
         ForceTime = "force-time",
-        /// Force over depth.
         ForceDepth = "force-depth",
-        /// The fit and what it leaves over.
+        /// The fit and its residual.
         Residual = "residual",
-        /// The calibration with its uncertainty.
         Calibration = "calibration",
     }
 }
@@ -193,16 +184,13 @@ pub fn figure(
     })
 }
 
-/// What a figure is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// Lines and text, at any size.
     Svg,
     Png,
 }
 
 impl Ending {
-    /// By the name of the file.
     pub fn of(file: &Path) -> Result<Self, String> {
         let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
@@ -215,7 +203,6 @@ impl Ending {
         }
     }
 
-    /// The bytes of the file.
     pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
         match self {
             Self::Svg => Ok(drawing.svg().into_bytes()),
@@ -224,7 +211,7 @@ impl Ending {
     }
 }
 
-/// When and with which version a page is made, in words.
+/// Date and program version of a page.
 #[must_use]
 pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
     let version = env!("CARGO_PKG_VERSION");

@@ -62,6 +62,7 @@ pub struct PredictionLine {
     pub rms_percent: f64,
     /// At the turning point, in N and percent of the peak.
     pub at_peak_n: f64,
+    /// In percent of the peak.
     pub at_peak_percent: f64,
 }
 
@@ -127,8 +128,7 @@ impl Page {
         // What was said of a session holds for it as it was.
         let whole = opened.as_ref().ok().filter(|_| lost.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
-        let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
-        let is_rejected = rejection.is_some();
+        let is_rejected = opened.as_ref().ok().and_then(|one| one.rejection()).is_some();
         let verdict = verdict.map(|(verdict, edit)| match verdict {
             Verdict::Valid => verdict.to_string(),
             _ => format!("{verdict}: {}", edit.reason),
@@ -138,8 +138,7 @@ impl Page {
         let peak = forces.filter_map(|row| row.force).reduce(f64::max);
         let end = opened.as_ref().ok().and_then(|session| session.rows.last());
         let manifest = opened.as_ref().ok().map(|session| &session.manifest);
-        let specimen = manifest.map(SpecimenPart::of);
-        let specimen = specimen.filter(|one| !one.specimen.is_empty());
+        let specimen = manifest.map(SpecimenPart::of).filter(|one| !one.specimen.is_empty());
         self.specimens.extend(specimen.filter(|one| !self.specimens.contains(one)));
         let word =
             |of: fn(&Manifest) -> &String| manifest.map_or(String::new(), |one| of(one).clone());
@@ -201,8 +200,7 @@ impl Page {
 
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
     pub fn loss(&self) -> Option<String> {
-        let finished = self.runs.iter();
-        let finished = finished.filter(|run| run.ending.as_deref() == Some(FINISHED));
+        let finished = self.runs.iter().filter(|run| run.ending.as_deref() == Some(FINISHED));
         let lost: Vec<String> = finished
             .filter_map(|run| Some(format!("{} is {}", run.session, run.lost?.word())))
             .collect();
@@ -337,8 +335,7 @@ impl TaskPart {
             }
         }
         if self.figures.is_empty() {
-            let calibration = fitted.calibration.as_ref();
-            let band = calibration.and_then(|one| ForceUncertainty::of(one).ok());
+            let band = fitted.calibration.as_ref().and_then(|one| ForceUncertainty::of(one).ok());
             let overlay = Overlay::of(report, samples);
             let drawn = picture::of_report(name, (samples, &overlay), report, band.as_ref());
             self.figures.push(drawn);
