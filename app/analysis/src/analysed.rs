@@ -12,8 +12,7 @@ use palpate_runner::wall_now;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };
-use palpate_sessions::log::{Outline, ReadError, Session};
-use palpate_sessions::record::{Entry, Row};
+use palpate_sessions::{Entry, Outline, ReadError, Row, Session};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -11,8 +11,7 @@ use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_rheology::cycles::{CycleSample, by_depth};
-use palpate_sessions::log::Session;
-use palpate_sessions::record::Row;
+use palpate_sessions::{Row, Session};
 use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 

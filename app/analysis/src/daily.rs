@@ -9,9 +9,8 @@ use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
 use palpate_protocols::weighed::{Readings, Weighed};
-use palpate_sessions::ChainError;
 use palpate_sessions::checks::{CheckPart, DailyCheck, last_of_day, read_checks};
-use palpate_sessions::log::Session;
+use palpate_sessions::{ChainError, Session};
 use std::path::Path;
 use std::time::SystemTime;
 

@@ -5,12 +5,9 @@
 
 use crate::source::SourceError;
 use palpate_model::units::Depth;
-use palpate_sessions::block::Block;
 pub use palpate_sessions::contacts::{FoundContact, contacts};
 use palpate_sessions::contacts::{contact_position, is_record};
-use palpate_sessions::edits::{Edits, Verdict};
-use palpate_sessions::log::{Outline, ReadError, Session};
-use palpate_sessions::record::{Entry, Row};
+use palpate_sessions::{Block, Edits, Entry, Outline, ReadError, Row, Session, Verdict};
 use std::ops::Range;
 use std::path::Path;
 

@@ -5,10 +5,9 @@ use crate::report::said::tags;
 use chrono::{DateTime, Utc};
 use palpate_runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
-use palpate_sessions::edits::{
-    Change, Decision, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit,
+use palpate_sessions::{
+    Change, Decision, EDITS_FILE, Edit, EditError, Edits, ReadError, Summary, Verdict, add_edit,
 };
-use palpate_sessions::log::{ReadError, Summary};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 

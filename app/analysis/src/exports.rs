@@ -3,10 +3,8 @@
 use crate::edited;
 use crate::progress::Progress;
 use crate::source::SourceError;
-use palpate_sessions::atomic;
-use palpate_sessions::log::Summary;
-use palpate_sessions::manifest::Manifest;
 use palpate_sessions::recover::is_in_use;
+use palpate_sessions::{Manifest, Summary, atomic};
 use palpate_tables::export::{Beside, ExportError, Feed, Format, Selection, Table};
 use palpate_tables::lake::{self, Added, Told};
 use std::collections::BTreeSet;

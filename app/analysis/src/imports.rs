@@ -3,8 +3,7 @@
 use crate::progress::Progress;
 use palpate_model::about::Labels;
 use palpate_runner::wall_now;
-use palpate_sessions::{FolderError, Imported, library_folder};
-use palpate_sessions::{new_session_folder, new_session_id};
+use palpate_sessions::{FolderError, Imported, library_folder, new_session_folder, new_session_id};
 use palpate_tables::import::{
     Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
 };

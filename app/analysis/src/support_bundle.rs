@@ -3,10 +3,9 @@
 
 use crate::opening::SETTINGS_FILE;
 use palpate_protocols::engine::ENGINE_VERSION;
-use palpate_sessions::RECORD_VERSION;
 use palpate_sessions::atomic::{Draft, Existing};
-use palpate_sessions::log::Summary;
 use palpate_sessions::rotating::{log_files, log_folder};
+use palpate_sessions::{RECORD_VERSION, Summary};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -13,10 +13,7 @@ use palpate_model::units::Position;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, add_analysis, inputs_of,
 };
-use palpate_sessions::calibrations::read_calibration;
-use palpate_sessions::edits::{Change, Edit, Verdict};
-use palpate_sessions::log::{ReadError, Summary};
-use palpate_sessions::shelf::LibraryError;
+use palpate_sessions::{Change, Edit, LibraryError, ReadError, Summary, Verdict, read_calibration};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use thiserror::Error;

@@ -16,9 +16,7 @@ use crate::report::figures::{Align, Window};
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
 use palpate_runner::wall_now;
-use palpate_sessions::analyses::Analyses;
-use palpate_sessions::edits::Verdict;
-use palpate_sessions::{Shelf, contacts};
+use palpate_sessions::{Analyses, Shelf, Verdict, contacts};
 use std::path::{Path, PathBuf};
 
 /// State of a session before an action on it.

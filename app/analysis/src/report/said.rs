@@ -1,8 +1,7 @@
 //! What is said of a session beside its samples, in the words that command line, window and page share.
 
 use palpate_model::rig::SignalFacts;
-use palpate_sessions::HealthSummary;
-use palpate_sessions::edits::{Change, Review};
+use palpate_sessions::{Change, HealthSummary, Review};
 
 /// A time to the second, UTC.
 #[must_use]

@@ -1,9 +1,7 @@
 //! Why there is nothing to fit or to analyse.
 
 use crate::compliance::CorrectionError;
-use palpate_sessions::analyses::AnalysisError;
-use palpate_sessions::edits::EditError;
-use palpate_sessions::log::ReadError;
+use palpate_sessions::{AnalysisError, EditError, ReadError};
 use palpate_tables::import::TableError;
 use thiserror::Error;
 

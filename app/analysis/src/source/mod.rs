@@ -8,8 +8,7 @@ use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 use palpate_rheology::fit::FitSample;
-use palpate_sessions::log::Session;
-use palpate_sessions::record::{Entry, EntryKind, Row};
+use palpate_sessions::{Entry, EntryKind, Row, Session};
 use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 

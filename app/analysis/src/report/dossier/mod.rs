@@ -25,8 +25,7 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::base::FoundBase;
 use palpate_runner::fidelity::Fidelity;
 use palpate_sessions::analyses::{Analyses, Input, inputs_of};
-use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
-use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
+use palpate_sessions::{Beside, EDITS_FILE, Edits, EndRecord, Entry, Manifest, Review, Session};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
