@@ -1,4 +1,4 @@
-//! From recordings on disk to what their cycles show.
+//! Cycle analysis of recordings on disk.
 
 use crate::cycles;
 use crate::progress::Progress;

@@ -1,4 +1,4 @@
-//! The library's calibrations read, judged and added to, away from the window's thread.
+//! Reading, assessing and storing the library's calibrations, away from the window's thread.
 
 use crate::report::calibration::{Entry, Told};
 use crate::report::calibration_plot::plots;
@@ -63,9 +63,9 @@ pub fn read(
         doubts: Vec::new(),
         ..Shown::of(entry, own, &rig)
     }];
-    shown.extend(shelf.kept.iter().map(|kept| {
-        let age = age_days(&kept.document, now.into());
-        Shown::of(Entry::of(&shelf, kept, age), kept.document.clone(), &rig)
+    shown.extend(shelf.kept.iter().map(|stored| {
+        let age = age_days(&stored.document, now.into());
+        Shown::of(Entry::of(&shelf, stored, age), stored.document.clone(), &rig)
     }));
     Shelved { shown, unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(), kept }
 }
@@ -75,9 +75,9 @@ pub fn keep(library: &Path, session: &Path, name: &str) -> Result<String, String
     let session = Session::open(session).map_err(|err| err.to_string())?;
     let calibration = calibration_of(&session, name).map_err(|err| err.to_string())?;
     let shelf = Shelf::open(library);
-    let kept = match shelf.in_force(&calibration.rig) {
+    let stored = match shelf.in_force(&calibration.rig) {
         Some(old) => supersede(library, &old.id, &calibration),
         None => save(library, &calibration),
     };
-    kept.map(|kept| kept.id).map_err(|err| err.to_string())
+    stored.map(|stored| stored.id).map_err(|err| err.to_string())
 }

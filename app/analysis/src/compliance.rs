@@ -1,6 +1,6 @@
-//! How far a rig gives way: found from a session against a stiff surface, and taken from the depths of other
-//! sessions. The axis goes as far as the probe sinks in and the rig gives way, so the probe's own depth is
-//! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
+//! Machine compliance: measured from a session against a stiff surface, and subtracted from the depths of other
+//! sessions. The axis travels as far as the probe sinks in and the rig yields, so the probe's own depth is
+//! `depth - compliance * force`. Raw depths stay as they are; corrected ones stand beside them.
 
 use crate::source::{
     FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
@@ -165,30 +165,34 @@ impl Corrections {
     pub fn of_rig(&self, rig: Option<&str>) -> Result<Option<(&Kept, bool)>, CorrectionError> {
         let in_force = |rig: &str| self.shelf.in_force(rig);
         match (&self.choice, rig) {
-            (CorrectionChoice::Raw, rig) => Ok(rig.and_then(in_force).map(|kept| (kept, false))),
+            (CorrectionChoice::Raw, rig) => {
+                Ok(rig.and_then(in_force).map(|stored| (stored, false)))
+            }
             (CorrectionChoice::InForce, None) => Err(CorrectionError::NoRig),
             (CorrectionChoice::InForce, Some(rig)) => match in_force(rig) {
-                Some(kept) => Ok(Some((kept, true))),
+                Some(stored) => Ok(Some((stored, true))),
                 None => Err(CorrectionError::NoneInForce { rig: rig.into() }),
             },
-            (CorrectionChoice::This(kept), Some(rig)) if kept.document.rig != rig => {
+            (CorrectionChoice::This(stored), Some(rig)) if stored.document.rig != rig => {
                 Err(CorrectionError::OtherRig {
-                    id: kept.id.clone(),
-                    of: kept.document.rig.clone(),
+                    id: stored.id.clone(),
+                    of: stored.document.rig.clone(),
                     rig: rig.into(),
                 })
             }
-            (CorrectionChoice::This(kept), _) => Ok(Some((kept, true))),
+            (CorrectionChoice::This(stored), _) => Ok(Some((stored, true))),
         }
     }
 
     /// Corrects what is to be fitted, where that is choice, and tells what the compliance does to it; `None`
     /// where none is choice and none is kept.
     pub fn apply(&self, source: &mut FitSource) -> Result<Option<Correction>, CorrectionError> {
-        let Some((kept, is_applied)) = self.of_rig(source.rig.as_deref())? else { return Ok(None) };
-        let correction = Correction::of(kept, is_applied, &source.samples);
+        let Some((stored, is_applied)) = self.of_rig(source.rig.as_deref())? else {
+            return Ok(None);
+        };
+        let correction = Correction::of(stored, is_applied, &source.samples);
         if is_applied {
-            correct_samples(&mut source.samples, &kept.document.compliance());
+            correct_samples(&mut source.samples, &stored.document.compliance());
             source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
             if let CorrectionChoice::InForce = self.choice {
@@ -221,10 +225,10 @@ pub struct Correction {
 }
 
 impl Correction {
-    fn of(kept: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
+    fn of(stored: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
         let known = samples.iter().filter(|sample| sample.is_measured());
         let peak = known.map(|sample| sample.force.0).fold(0.0, f64::max);
-        let document = &kept.document;
+        let document = &stored.document;
         let doubt = (peak > document.force_max_n).then(|| {
             format!(
                 "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond that the compliance is extrapolated as a straight line",
@@ -232,7 +236,7 @@ impl Correction {
             )
         });
         Self {
-            id: kept.id.clone(),
+            id: stored.id.clone(),
             mm_per_n: document.mm_per_n,
             std_error_mm_per_n: document.std_error_mm_per_n,
             is_applied,
@@ -293,12 +297,12 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
 
 /// The corrected depths of a session as columns beside its own: empty before contact, and where the converter
 /// was at an end of its range or an interlock had tripped, for there the force is not known.
-pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
+pub fn columns(session: &Session, stored: &Kept) -> Result<Beside, SourceError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let noise = noise_of(&decisions);
-    let compliance = kept.document.compliance();
+    let compliance = stored.document.compliance();
     let one = |(index, row): (usize, &Row)| -> Option<CorrectedDepth> {
         let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
         if index >= trusted || is_saturated(session, row) {
@@ -309,14 +313,14 @@ pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
     let corrected: Vec<Option<CorrectedDepth>> = session.rows.iter().enumerate().map(one).collect();
     let column = |of: fn(CorrectedDepth) -> f64| corrected.iter().map(|one| one.map(of)).collect();
     let document = serde_json::json!({
-        "id": kept.id,
-        "rig": kept.document.rig,
-        "taken_at": kept.document.taken_at,
-        "session_id": kept.document.session_id,
-        "session_checksum": kept.document.session_checksum,
-        "checksum": kept.checksum(),
-        "mm_per_n": kept.document.mm_per_n,
-        "std_error_mm_per_n": kept.document.std_error_mm_per_n,
+        "id": stored.id,
+        "rig": stored.document.rig,
+        "taken_at": stored.document.taken_at,
+        "session_id": stored.document.session_id,
+        "session_checksum": stored.document.session_checksum,
+        "checksum": stored.checksum(),
+        "mm_per_n": stored.document.mm_per_n,
+        "std_error_mm_per_n": stored.document.std_error_mm_per_n,
     });
     Ok(Beside {
         columns: vec![

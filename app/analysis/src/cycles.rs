@@ -1,4 +1,4 @@
-//! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
+//! Reads sessions and foreign tables for a cycle analysis.
 
 use crate::edited;
 use crate::source::{

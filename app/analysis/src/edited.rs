@@ -86,8 +86,8 @@ impl Passing {
             rows.clear();
             rows.extend(block.rows());
             // One that is being recorded may have grown.
-            let left = self.outline.samples.saturating_sub(index);
-            rows.truncate(usize::try_from(left).unwrap_or(usize::MAX));
+            let remaining = self.outline.samples.saturating_sub(index);
+            rows.truncate(usize::try_from(remaining).unwrap_or(usize::MAX));
             for (number, row) in (index..).zip(&mut rows) {
                 for shift in &self.shifts {
                     shift.apply(number, row);

@@ -132,8 +132,8 @@ fn each<T>(
     for (done, item) in of.iter().enumerate() {
         let name = folder(item).file_name().unwrap_or_default();
         if progress.tell(done, of.len(), &name.to_string_lossy()).is_break() {
-            let left = sessions(of.len() - done);
-            failed.push(format!("{left} not changed: cancelled"));
+            let remaining = sessions(of.len() - done);
+            failed.push(format!("{remaining} not changed: cancelled"));
             break;
         }
         match one(item) {
@@ -190,15 +190,15 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
 #[must_use]
 pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
-    let mut said = each("", &act.steps, progress, |step| &step.folder, one);
-    said.words = match said.act {
+    let mut outcome = each("", &act.steps, progress, |step| &step.folder, one);
+    outcome.words = match outcome.act {
         Some(_) => act.words.clone(),
         None => "nothing was written".into(),
     };
-    if let Some(opposite) = &mut said.act {
+    if let Some(opposite) = &mut outcome.act {
         opposite.words.clone_from(&act.words);
     }
-    said
+    outcome
 }
 
 fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {

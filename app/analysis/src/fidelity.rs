@@ -1,4 +1,4 @@
-//! What a recorded session was to do against what it did.
+//! Targets of a recorded session, and the values it achieved.
 
 use crate::source::{SourceError, decisions};
 use palpate_protocols::plans::Plan;

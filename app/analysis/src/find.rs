@@ -112,9 +112,9 @@ pub struct Told {
 pub fn told((library, entry): &(PathBuf, Entry)) -> Result<Told, String> {
     let folder = library.join(&entry.folder);
     let edits = Edits::read(&folder, &entry.session_id).map_err(|err| err.to_string())?;
-    let said = edits.all.iter().map(|edit| Event::said("", edit));
-    let made = entry.analyses.iter().map(|one| Event::made("", one));
-    let mut events: Vec<Event> = said.chain(made).collect();
+    let edited = edits.all.iter().map(|edit| Event::said("", edit));
+    let analysed = entry.analyses.iter().map(|one| Event::made("", one));
+    let mut events: Vec<Event> = edited.chain(analysed).collect();
     // Times of one form sort as they are written.
     events.sort_by(|a, b| a.at.cmp(&b.at));
     Ok(Told { notes: edits.notes().cloned().collect(), events })

@@ -310,8 +310,8 @@ pub fn pace(
         let _ = thread.join();
     }
     let taped = taped.ok_or("the loop failed; this is a mistake in palpate")?;
-    let left = taped.device.last().snapshot.sum();
-    let recorded = taped.recorder.map(|recorder| recorder.finish(left));
+    let hash = taped.device.last().snapshot.sum();
+    let recorded = taped.recorder.map(|recorder| recorder.finish(hash));
     Ok(Paced {
         recorded: recorded.transpose()?.map(RecordedTicks::from),
         rate_hz: 1.0 / period.seconds().0,
@@ -370,13 +370,13 @@ pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result
     let calibration = BiasCalibration::fit(&points);
     let calibration = calibration.map_err(|err| refusals.push(format!("no calibration: {err}")));
     let mut fitted = |force: fn(&CheckSample) -> Newtons, which: &str| {
-        let felt = samples.iter().map(|one| FitSample {
+        let record = samples.iter().map(|one| FitSample {
             t: one.t,
             depth: one.depth,
             force: force(one),
             sigma: Newtons(1.0),
         });
-        let found = fit(&felt.collect::<Vec<_>>(), &FitOptions::default());
+        let found = fit(&record.collect::<Vec<_>>(), &FitOptions::default());
         let found =
             found.map_err(|err| refusals.push(format!("no fit of the {which} force: {err}")));
         found.ok()

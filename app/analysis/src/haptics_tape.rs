@@ -1,4 +1,4 @@
-//! A run of the master-slave system recorded, and the recording computed again.
+//! Recordings of the master-slave system, and their replay.
 
 use super::haptics::Setting;
 use super::recorded::{Ended, Replayable, Replayed, replay_ticks};

@@ -118,7 +118,7 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
             new_session_folder(&library, &session_id)
         }
     };
-    let kept = Kept {
+    let target = Kept {
         folder: &folder,
         original,
         session_id,
@@ -126,7 +126,7 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
         software_version: env!("CARGO_PKG_VERSION"),
         labels: request.labels.clone(),
     };
-    keep(part, kept).map_err(ImportFailure::Keep)?;
+    keep(part, target).map_err(ImportFailure::Keep)?;
     Ok(folder)
 }
 

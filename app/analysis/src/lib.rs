@@ -1,4 +1,4 @@
-//! What is done with recorded sessions, once for every front end: read, fit, compare, report, export.
+//! Use cases for recorded sessions, once for every front end: read, fit, compare, report, export.
 //!
 //! A use case takes a typed request and gives a typed result or error; it names no command-line flag
 //! and no button, prints nothing and draws in no window. It never commands a rig.

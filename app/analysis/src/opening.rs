@@ -1,4 +1,4 @@
-//! What a window opens with: the front end that parsed the request need not know any window.
+//! Requests that open a window: the front end that parses them need not know any window.
 
 use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;

@@ -204,8 +204,8 @@ fn offer(
         .collect();
     let (commands, previews): (Vec<String>, Vec<Preview>) =
         runs.unwrap_or_default().into_iter().unzip();
-    let asked = previews.iter().flat_map(|one| one.acknowledgements.clone());
-    let mut acknowledgements: Vec<String> = asked.collect();
+    let all = previews.iter().flat_map(|one| one.acknowledgements.clone());
+    let mut acknowledgements: Vec<String> = all.collect();
     acknowledgements.dedup();
     let secs = previews.iter().map(|preview| preview.expected.0);
     Offer {

@@ -1,4 +1,4 @@
-//! Recordings of a loop computed again, of whichever loop.
+//! Replay of the recording of any loop.
 
 use palpate_sessions::ticks::{End, Recorded, Recording, Row};
 use serde::Serialize;

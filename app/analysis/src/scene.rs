@@ -1,4 +1,4 @@
-//! A scene in real time, its recording, and the recording computed again.
+//! A scene in real time, its recording and its replay.
 
 use super::haptics::{Paced, body_of};
 use super::recorded::{Ended, RecordedTicks, Replayable, Replayed, replay_ticks};
@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
 
-/// Between two looks at a scene that runs: half a frame.
+/// Interval between two looks at a running scene: half a frame.
 const LOOK: Duration = Duration::from_millis(8);
 
 /// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
@@ -34,7 +34,7 @@ pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String>
     Ok((scene, notes))
 }
 
-/// What a scene did in real time.
+/// Result of a scene that ran in real time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Played {
     pub name: String,
@@ -42,20 +42,18 @@ pub struct Played {
     pub path: &'static str,
     /// Nodes along a side.
     pub nodes: usize,
-    /// Ticks that the scene made.
     pub ticks: u64,
     /// Greatest depth of a frame in mm.
     pub depth_max_mm: f64,
     /// Largest force of a frame in N.
     pub force_max_n: f64,
-    /// What took force away, with its share of the frames.
+    /// Reasons for reduced force, with their share of the frames.
     pub why: Vec<(&'static str, f64)>,
     /// Hash of the surface at the end.
     pub surface_hash: String,
     /// The budget of a tick in microseconds, and whether 999 ticks in a thousand kept to it.
     pub tick_us: f64,
     pub is_within_budget: bool,
-    /// How the loop kept its time.
     #[serde(flatten)]
     pub paced: Paced,
 }
@@ -148,7 +146,7 @@ impl Replayable<3, 10> for Scene {
     }
 }
 
-/// Computes every tick of a recording again from its inputs.
+/// Replays every tick of a recording from its inputs.
 pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
     let (whole, sensed) = SENSED_COLUMNS;
     let is_sensed = has_columns(folder, &whole, &sensed)?;

@@ -1,4 +1,4 @@
-//! What exactness costs in a scene on this computer, and the cheapest way that a scene's tolerances allow.
+//! The cost of accuracy in a scene on this computer, and the cheapest settings that a scene's tolerances allow.
 
 use crate::progress::Progress;
 use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
@@ -18,7 +18,6 @@ const FAMILY: &str = "series-3";
 /// For how long one method is timed, in s.
 const TIMED_S: f64 = 0.2;
 
-/// How fast a method moves nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MethodSpeed {
     pub method: &'static str,
@@ -28,11 +27,10 @@ pub struct MethodSpeed {
     pub nodes_per_ms: f64,
 }
 
-/// Everything measured, and what follows.
+/// Measured curves of a scene, and the plan from them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bench {
     pub machine: Machine,
-    /// Whether only the short part was measured.
     pub quick: bool,
     /// Errors against times.
     pub curves: SceneCurves,
@@ -42,13 +40,12 @@ pub struct Bench {
     pub steps_on_front: Vec<bool>,
     /// The closed form beside the chain as it was published, in this run.
     pub methods: Vec<MethodSpeed>,
-    /// What the scene is to be played with.
     pub plan: Option<ScenePlan>,
     /// Why there is no plan that holds everything.
     pub no_plan: Option<NoPlan>,
 }
 
-/// Measures; none if `progress` ended it.
+/// `None` if `progress` cancelled it.
 pub fn bench(
     file: &SceneFile,
     extent: Extent,
@@ -106,7 +103,6 @@ pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<Sc
     plan(&needs, &own, slower)
 }
 
-/// A scene made after a plan.
 #[must_use]
 pub fn made_after(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
     SceneFile {

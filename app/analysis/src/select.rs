@@ -1,4 +1,4 @@
-//! From recordings on disk to a comparison of models.
+//! Comparison of models on recordings on disk.
 
 use crate::compliance::Corrections;
 use crate::progress::Progress;
@@ -10,7 +10,6 @@ use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// What is compared on what.
 #[derive(Debug, Default)]
 pub struct SelectRequest {
     /// Recordings, or folders of them.
@@ -23,14 +22,11 @@ pub struct SelectRequest {
     pub options: SelectOptions,
     /// The specimen of each recording in turn; without it what they say of themselves.
     pub specimens: Option<Vec<String>>,
-    /// What the recordings are called.
     pub naming: Naming,
 }
 
-/// A comparison and what it was made of.
 #[derive(Clone, Debug)]
 pub struct Selected {
-    /// The comparison.
     pub selection: Selection,
     /// Remarks about the recordings, each with the name of its own.
     pub notes: Vec<String>,

@@ -22,7 +22,6 @@ const TABLES: [&str; 2] = ["csv", "tsv"];
 /// Ending of a session's log.
 const LOG: &str = "mcap";
 
-/// Recordings cannot be looked at together.
 #[derive(Debug, Error)]
 pub enum SourcesError {
     #[error(transparent)]
@@ -90,7 +89,7 @@ pub fn find(paths: &[PathBuf]) -> Result<Found, SourcesError> {
     Ok(Found { paths, copied })
 }
 
-/// The same of sessions alone.
+/// Sessions alone; a table is an error.
 pub fn find_sessions(paths: &[PathBuf]) -> Result<Found, SourcesError> {
     if let Some(table) = paths.iter().find(|path| !is_session(path)) {
         return Err(SourcesError::Table(table.clone()));
@@ -143,13 +142,12 @@ fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), walkdir::Error> 
     Ok(())
 }
 
-/// How recordings are called that are looked at together.
+/// Names of recordings that are analysed together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Naming {
-    /// By their paths as given.
     #[default]
     Path,
-    /// By the name of the folder or file alone.
+    /// Name of the folder or file alone.
     Stem,
 }
 
@@ -160,24 +158,20 @@ impl Naming {
     }
 }
 
-/// How recordings are read.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
     /// Names of the columns of tables without a header.
     pub columns: Option<&'a ColumnNames>,
     /// Which part of each, and whether rejected ones are taken.
     pub wanted: Wanted,
-    /// What is taken from their depths.
     pub corrections: &'a Corrections,
-    /// What they are called.
     pub naming: Naming,
 }
 
-/// A recording that is looked at together with others.
+/// A recording that is analysed together with others.
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub name: String,
-    /// What is fitted.
     pub samples: Vec<FitSample>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
@@ -222,7 +216,7 @@ pub fn check_once<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<()
     }
 }
 
-/// Reads recordings that are looked at together, each once.
+/// Reads recordings that are analysed together, each once.
 pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesError> {
     check_once(paths)?;
     let mut read = Recordings::default();

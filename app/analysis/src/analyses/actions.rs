@@ -1,4 +1,4 @@
-//! Records beside a session: each is added, none is ever written over.
+//! Actions that add a record beside a session. Records are never overwritten.
 
 use super::super::edits::{SayFailure, Subject};
 use super::{Done, FitWanted};

@@ -1,4 +1,4 @@
-//! A session fitted once more, and what of it is kept.
+//! A further fit of a session, and its stored form.
 
 use super::step;
 use crate::fit::{Fitted, IntervalsWanted, TogetherRequest, fit_together};
@@ -132,8 +132,8 @@ impl FitWanted {
         let intervals = intervals.map_err(|err| err.to_string())?;
         step(progress, 4, 4, "storing the analysis")?;
         let overlay = Overlay::of(report, &fitted.samples);
-        let beside = fitted.beside(&overlay, &intervals);
-        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        let details = fitted.beside(&overlay, &intervals);
+        let object = FitObject::of(options.family(), report, details, fitted.seconds);
         serde_json::to_value(&object).map_err(|err| err.to_string())
     }
 
@@ -157,12 +157,12 @@ impl FitWanted {
             return Err(reason);
         }
         step(progress, 4, 4, "storing the analysis")?;
-        let beside = Beside {
+        let details = Beside {
             systematic: fitted.systematic.as_ref().and_then(|found| found.first()),
             ..fitted.beside(records).remove(0)
         };
         let report = &fitted.report.records[0].report;
-        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        let object = FitObject::of(options.family(), report, details, fitted.seconds);
         let mut results = serde_json::to_value(&object).map_err(|err| err.to_string())?;
         results["shared"] = json!(fitted.report.shared);
         Ok(results)

@@ -40,7 +40,7 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
     let id = passing.outline.manifest.session_id;
     let analyses = Analyses::read(session, &id).map_err(|err| err.to_string())?;
     let shelf = library.map(Shelf::open);
-    let kept = shelf.iter().flat_map(|shelf| &shelf.kept);
+    let stored = shelf.iter().flat_map(|shelf| &shelf.kept);
     let found = contacts::contacts(&passing.outline.entries);
     let verdict = passing.edits.verdict();
     Ok(Known {
@@ -49,7 +49,7 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
         analyses,
         verdict: verdict.map(|(verdict, edit)| (verdict, edit.by.clone(), edit.reason.clone())),
         contacts: found.iter().map(|one| one.position).collect(),
-        calibrations: kept.map(|one| (one.id.clone(), one.document.clone())).collect(),
+        calibrations: stored.map(|one| (one.id.clone(), one.document.clone())).collect(),
     })
 }
 

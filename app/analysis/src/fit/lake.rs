@@ -1,4 +1,4 @@
-//! The sessions of a lake, or one part of them, each fitted and kept in the lake.
+//! Fits of the sessions of a lake, or of one part of them, stored in the lake.
 
 use super::{Fitted, NotFitted, Recipe};
 use crate::compliance::Correction;
@@ -154,13 +154,13 @@ impl LakeRequest<'_> {
         let source = source::of_session(session, wanted.stretch, &[])?;
         let fitted: Fitted = self.recipe.fit_read(source)?;
         let report = fitted.result.map_err(NotFitted::Fit)?;
-        let kept = StoredFit {
+        let stored = StoredFit {
             report: &report,
             systematic: fitted.systematic.as_ref(),
             compliance: fitted.compliance.as_ref(),
             notes: &fitted.notes,
         };
-        keep_fit(&file, &kept)?;
+        keep_fit(&file, &stored)?;
         Ok(Outcome::Made)
     }
 

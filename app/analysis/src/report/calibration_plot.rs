@@ -118,7 +118,6 @@ fn in_mn(sigma: Option<Newtons>) -> f64 {
     sigma.map_or(0.0, |sigma| sigma.0 * 1e3)
 }
 
-/// The picture as SVG.
 #[must_use]
 pub fn picture(calibration: &Calibration, details: &Told) -> String {
     drawing(calibration, details).svg()

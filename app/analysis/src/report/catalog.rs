@@ -1,4 +1,4 @@
-//! What was found in the catalog, as text.
+//! Results of a catalog search as text.
 
 use super::text::{in_columns, table};
 use palpate_sessions::catalog::{Entry, Event, Found, ReviewIs};

@@ -284,7 +284,7 @@ fn look_of(index: usize) -> (Ink, f64) {
 /// that beginning are left out of the first, and named.
 #[must_use]
 pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
-    let lost: Vec<String> =
+    let without_origin: Vec<String> =
         all.iter().filter(|one| one.origin(align).is_none()).map(|one| one.name.clone()).collect();
     let (mut over_time, mut over_depth) = (Vec::new(), Vec::new());
     for (index, one) in all.iter().enumerate() {
@@ -306,7 +306,7 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
         drawing(["Force over time", &since], &force_plot(time, over_time), all),
         drawing(["Force over depth", "of the sessions compared"], &over_depth, all),
     ];
-    (drawings, lost)
+    (drawings, without_origin)
 }
 
 /// A plot under its heads; beneath, names and inks of sessions compared.

@@ -52,8 +52,8 @@ fn sessions_over_each_other_begin_together() {
     }
     later.ramp = later.ramp.map(|ramp| ramp + 100.0);
     later.contact = None;
-    let ([time, _], lost) = overlays(&[&one, &later], Align::Ramp);
-    assert!(lost.is_empty());
+    let ([time, _], without_origin) = overlays(&[&one, &later], Align::Ramp);
+    assert!(without_origin.is_empty());
     let svg = time.svg();
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
     let points = |ink| {
@@ -63,6 +63,6 @@ fn sessions_over_each_other_begin_together() {
     };
     assert!(!points(LIGHT.sessions[0]).is_empty());
     assert_eq!(points(LIGHT.sessions[0]), points(LIGHT.sessions[1]));
-    let (_, lost) = overlays(&[&one, &later], Align::Contact);
-    assert_eq!(lost, ["later"]);
+    let (_, without_origin) = overlays(&[&one, &later], Align::Contact);
+    assert_eq!(without_origin, ["later"]);
 }

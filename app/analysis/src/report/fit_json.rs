@@ -58,7 +58,7 @@ pub struct FitObject<'a> {
     #[serde(flatten)]
     family_text: FamilyText,
     #[serde(flatten)]
-    beside: Beside<'a>,
+    details: Beside<'a>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -82,10 +82,10 @@ impl<'a> FitObject<'a> {
     pub fn of(
         family: &dyn Family,
         report: &'a FitReport,
-        beside: Beside<'a>,
+        details: Beside<'a>,
         seconds: f64,
     ) -> Self {
-        Self { report, family_text: FamilyText::of(family), beside, seconds }
+        Self { report, family_text: FamilyText::of(family), details, seconds }
     }
 }
 
@@ -113,35 +113,35 @@ struct RecordObject<'a> {
     record: &'a str,
     report: &'a FitReport,
     #[serde(flatten)]
-    beside: Beside<'a>,
+    details: Beside<'a>,
 }
 
 impl<'a> JointObject<'a> {
-    /// `beside` has one for each record.
+    /// `details` has one for each record.
     pub fn of(
         family: &dyn Family,
         report: &'a JointReport,
-        beside: &[Beside<'a>],
+        details: &[Beside<'a>],
         systematic: Option<&'a [Systematic]>,
         seconds: f64,
     ) -> Self {
-        let records = report.records.iter().zip(beside);
+        let records = report.records.iter().zip(details);
         Self {
             family: family.key(),
             family_text: FamilyText::of(family),
             shared: &report.shared,
             records: records
-                .map(|(named, beside)| RecordObject {
+                .map(|(named, details)| RecordObject {
                     record: &named.record,
                     report: &named.report,
-                    beside: Beside { systematic: None, compliance: None, ..*beside },
+                    details: Beside { systematic: None, compliance: None, ..*details },
                 })
                 .collect(),
             samples: report.samples,
             free: report.free,
             rmse_n: report.rmse_n,
             effective_samples: report.effective_samples,
-            compliances: beside.iter().map(|one| one.compliance).collect(),
+            compliances: details.iter().map(|one| one.compliance).collect(),
             systematic,
             seconds,
         }

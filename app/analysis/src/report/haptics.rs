@@ -1,4 +1,4 @@
-//! What is said of a body on a device, and of a loop's time.
+//! Texts on a body on a device, and on the timing of a loop.
 
 use super::picture::{COLUMNS, LEFT, RIGHT, WIDTH, title};
 use super::text::{ParameterText, table};
@@ -137,7 +137,7 @@ pub fn slave_text(slaved: &Slaved) -> String {
             "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
             kept.late.count,
             1e3 * kept.late.p99_9.0,
-            kept.missed
+            statistics.missed
         ));
     }
     lines.join("\n")
@@ -162,16 +162,16 @@ fn loop_table(loops: &[Paced]) -> Vec<String> {
     let heads = "p50    p99   p99.9  max";
     lines.push(format!("{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}", "Hz", ""));
     for one in loops {
-        let kept = &one.kept;
+        let statistics = &one.kept;
         lines.push(format!(
             "{:>6.0} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
             one.rate_hz,
             one.busy_threads,
-            spread(&kept.late),
-            spread(&kept.period),
-            spread(&kept.work),
-            kept.overruns,
-            kept.missed
+            spread(&statistics.late),
+            spread(&statistics.period),
+            spread(&statistics.work),
+            statistics.overruns,
+            statistics.missed
         ));
     }
     lines

@@ -1,4 +1,4 @@
-//! What stands in an analysis that is kept beside a session, in words.
+//! The content of a stored analysis in words.
 
 use super::text::parameter_lines;
 use crate::analysed::ForceChange;

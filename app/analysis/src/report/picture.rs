@@ -132,8 +132,8 @@ fn plots_over_time(
     let known = || pairs().filter(|(one, _)| one.is_measured());
     let measured = thin(known().map(|(one, _)| [one.t.0 + shift, one.force.0]), columns);
     let fitted = thin(pairs().map(|(one, fit)| [one.t.0 + shift, fit.0]), columns);
-    let left = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
-    let residual = Series::line("residual", Ink::Series, 1.0, thin(left, columns));
+    let residuals = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
+    let residual = Series::line("residual", Ink::Series, 1.0, thin(residuals, columns));
     let time = || Axis::linear("time (s)");
     [
         force_plot(time(), [measured, fitted], uncertainty),

@@ -60,10 +60,8 @@ fn level(at: f64) -> Level {
     Level { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
-/// For what a course is expected.
 pub const EXPECTED: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
 
-/// The same as SVG.
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
     let mut svg = Svg::new(WIDTH);
@@ -129,7 +127,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     svg.finish(bottom + 60.0, LIGHT.canvas, &format!("Steps of {name}"))
 }
 
-/// A limit that belongs into the picture of a curve.
+/// The limit, if the curve comes near enough to it.
 fn in_sight(limit: f64, points: &[[f64; 2]]) -> Option<f64> {
     let most = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
     (most > LIMIT_IN_SIGHT * limit).then_some(limit)

@@ -16,7 +16,6 @@ const BOTTOM: f64 = 70.0;
 /// More than this many percent is no knowledge worth a place on the axis.
 const PERCENT_MAX: f64 = 100.0;
 
-/// The picture as SVG.
 #[must_use]
 pub fn picture(report: &PlanReport) -> String {
     let plots = plots(report);

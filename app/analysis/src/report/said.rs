@@ -1,4 +1,4 @@
-//! What is said of a session beside its samples, in the words that command line, window and page share.
+//! Edits, reviews and facts of a session in the words that command line, window and page share.
 
 use palpate_model::rig::SignalFacts;
 use palpate_sessions::{Change, HealthSummary, Review};
@@ -9,7 +9,6 @@ pub fn at(time: &chrono::DateTime<chrono::Utc>) -> String {
     time.format("%Y-%m-%d %H:%M:%SZ").to_string()
 }
 
-/// What an edit says.
 #[must_use]
 pub fn change(change: &Change) -> String {
     match change {
@@ -30,7 +29,6 @@ pub(crate) fn tags(add: &[String], remove: &[String]) -> String {
     format!("tags {}", signs.collect::<Vec<_>>().join(" "))
 }
 
-/// Whether a review still stands.
 #[must_use]
 pub fn review(review: &Review) -> String {
     let stands = match review.changed.as_slice() {
@@ -71,7 +69,6 @@ pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// How the signal was taken, line by line.
 #[must_use]
 pub fn signal(signal: &SignalFacts) -> [String; 3] {
     let range = signal

@@ -1,4 +1,4 @@
-//! Points over two logarithmic axes: what accuracy costs.
+//! Points over two logarithmic axes, such as error over cost.
 
 use palpate_figures::figure::{Axis, Ink, Labels, Level, Plot, Series};
 use palpate_rheology::trade::front;
@@ -18,9 +18,7 @@ pub struct Scatter<'a> {
     pub marks: &'a [Mark],
     /// Whether those that no other undercuts in both are joined: only where all stand for the same.
     pub has_front: bool,
-    /// The one recommended.
     pub chosen: Option<usize>,
-    /// A level not to exceed.
     pub level: Option<f64>,
 }
 

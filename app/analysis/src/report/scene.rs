@@ -1,11 +1,10 @@
-//! What is said of a scene's run, its plan and its curves.
+//! Texts on the run, the plan and the curves of a scene.
 
 use super::haptics::run_text;
 use crate::scene::Played;
 use crate::scene_bench::Bench;
 use palpate_haptics::surface::ScenePlan;
 
-/// A run in words.
 #[must_use]
 pub fn played_text(played: &Played) -> String {
     let mut lines = vec![format!(

@@ -3,7 +3,7 @@
 use super::text::{head, in_columns};
 use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
 
-/// Everything, the verdict last.
+/// The whole selection, the verdict last.
 #[must_use]
 pub fn whole(selection: &Selection) -> String {
     let mut parts = vec![records(selection), in_columns(&table(selection))];
@@ -97,7 +97,7 @@ pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
     rows
 }
 
-/// What was held out, and what the numbers count.
+/// Held-out records, and the sample counts of the criteria.
 #[must_use]
 pub fn tested(selection: &Selection) -> String {
     let known = selection.candidates.iter().find_map(|one| one.prediction.as_ref());
@@ -144,7 +144,6 @@ pub(super) fn digits(value: f64) -> String {
     }
 }
 
-/// Whether a family is the one to use.
 pub(super) fn is_chosen(selection: &Selection, family: &str) -> bool {
     selection.verdict.outcome != Outcome::NoneWithin
         && selection.verdict.family.as_deref() == Some(family)

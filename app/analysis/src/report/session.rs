@@ -1,4 +1,4 @@
-//! What happened in a run, as text: how it ended, what it is worth, what was kept, what the time went to.
+//! A run as text: its ending, data quality, samples, time use and targets.
 
 use super::text::table;
 use palpate_runner::fidelity::{Achieved, Fidelity};
@@ -7,7 +7,6 @@ use palpate_sessions::{EndRecord, Verdict};
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
 
-/// The lines of a session's fidelity.
 #[must_use]
 pub fn fidelity_text(
     found: &Fidelity,
@@ -64,7 +63,6 @@ pub(super) fn target_cells(one: &Achieved) -> [String; 5] {
     [cycle, one.quantity.to_owned(), with_unit(one.target), with_unit(one.achieved), error]
 }
 
-/// Whether samples came late, in words.
 pub(super) fn lateness(found: &Fidelity) -> String {
     match found.late {
         0 => "none late".to_owned(),

@@ -7,7 +7,6 @@ use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_
 use palpate_rheology::families::by_key;
 use palpate_rheology::fit::{FitReport, NamedReport, Parameter};
 
-/// One parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterText {
     pub name: String,
@@ -20,7 +19,6 @@ pub struct ParameterText {
 }
 
 impl ParameterText {
-    /// The words for a parameter.
     #[must_use]
     pub fn of(parameter: &Parameter) -> Self {
         let value = match parameter.std_error {
@@ -69,7 +67,7 @@ pub fn typeset(unit: &str) -> String {
     unit.replace("^2", "²").replace("^3", "³").replace('*', "·")
 }
 
-/// How well the model explains the record.
+/// Goodness of fit.
 #[must_use]
 pub fn quality(report: &FitReport) -> String {
     format!("R² {:.6}, rmse {:.3} mN, {} samples", report.r2, report.rmse_n * 1e3, report.samples)
@@ -91,7 +89,6 @@ pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
     Some(by_key(&report.body.family).ok()?.equation())
 }
 
-/// What no choice of its parameters can represent.
 pub(super) fn limit(report: &FitReport) -> Option<String> {
     let family = by_key(&report.body.family).ok()?;
     Some(format!("it cannot represent {}", family.cannot_represent()))
@@ -99,20 +96,20 @@ pub(super) fn limit(report: &FitReport) -> Option<String> {
 
 /// A whole fit, of every family the same: model, equation, parameters, how good it is, every sentence, further intervals.
 #[must_use]
-pub fn whole(report: &FitReport, beside: Beside<'_>) -> String {
+pub fn whole(report: &FitReport, details: Beside<'_>) -> String {
     let mut lines = vec![report.model.clone()];
     lines.extend(equation(report).map(|text| format!("  {text}")));
     lines.extend(parameter_lines(&report.parameters));
-    lines.extend([quality(report), energy(beside.overlay)]);
+    lines.extend([quality(report), energy(details.overlay)]);
     let sentences = report.sentences().map(str::to_owned).chain(limit(report));
     lines.extend(sentences.map(|sentence| format!("- {sentence}")));
-    lines.extend(interval_lines(beside.intervals, report));
+    lines.extend(interval_lines(details.intervals, report));
     lines.join("\n")
 }
 
 /// A fit of several recordings: what is shared once, then every recording with what is its own.
 #[must_use]
-pub fn together(fitted: &Together, beside: &[Beside<'_>]) -> String {
+pub fn together(fitted: &Together, details: &[Beside<'_>]) -> String {
     let (shared, records) = (&fitted.report.shared, &fitted.report.records);
     let part = |named: &NamedReport, is_shared: bool| {
         let mut chosen = named.report.parameters.clone();
@@ -126,11 +123,11 @@ pub fn together(fitted: &Together, beside: &[Beside<'_>]) -> String {
         lines.extend(equation(&first.report).map(|text| format!("  {text}")));
         lines.extend(part(first, true));
     }
-    for (named, beside) in records.iter().zip(beside) {
+    for (named, details) in records.iter().zip(details) {
         lines.push(named.record.clone());
         lines.extend(part(named, false));
-        let own = [quality(&named.report), energy(beside.overlay)].into_iter();
-        let own = own.chain(interval_lines(beside.intervals, &named.report));
+        let own = [quality(&named.report), energy(details.overlay)].into_iter();
+        let own = own.chain(interval_lines(details.intervals, &named.report));
         let own = own.chain(named.report.sentences().map(|sentence| format!("- {sentence}")));
         lines.extend(own.map(|line| format!("  {line}")));
     }
@@ -181,7 +178,6 @@ pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
     texts.iter().map(line).collect()
 }
 
-/// A text with its first letter large.
 #[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
@@ -278,7 +274,7 @@ mod tests {
         };
         report.body.family = "maxwell".into();
         let (overlay, intervals) = (Overlay::of(&FitReport::default(), &[]), Intervals::default());
-        let beside =
+        let details =
             Beside { overlay: &overlay, intervals: &intervals, systematic: None, compliance: None };
         let lines = [
             "a model",
@@ -291,7 +287,7 @@ mod tests {
             "- found",
             "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",
         ];
-        assert_eq!(whole(&report, beside), lines.join("\n"));
+        assert_eq!(whole(&report, details), lines.join("\n"));
     }
 
     #[test]

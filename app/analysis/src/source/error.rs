@@ -1,11 +1,10 @@
-//! Why there is nothing to fit or to analyse.
+//! Reasons why a source cannot be fitted or analysed.
 
 use crate::compliance::CorrectionError;
 use palpate_sessions::{AnalysisError, EditError, ReadError};
 use palpate_tables::import::TableError;
 use thiserror::Error;
 
-/// Nothing to fit or to analyse could be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
     #[error(transparent)]

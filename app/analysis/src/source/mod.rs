@@ -1,4 +1,4 @@
-//! From what is on disk to what a fit takes: sessions and foreign tables alike.
+//! Reads sessions and foreign tables for a fit.
 
 mod error;
 
@@ -16,7 +16,7 @@ use crate::analysed::{self, Opened};
 use crate::sources::is_session;
 use palpate_protocols::engine::{Effect, Record};
 
-/// Samples for a fit, and what a reader should know about them.
+/// Samples for a fit, with remarks on them.
 #[derive(Clone, Debug, Default)]
 pub struct FitSource {
     /// Time from the first sample, depth, force and its own uncertainty.
@@ -33,27 +33,23 @@ pub struct FitSource {
     pub calibration: Option<Calibration>,
 }
 
-/// What of an indentation is read.
+/// Part of an indentation that is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stretch {
     /// Ramp and hold: what the fit of the modified Kelvin body takes, which knows no unloading.
     #[default]
     RampHold,
-    /// The recorded way back as well, where there is one.
+    /// Unloading as well, where it was recorded.
     WithUnload,
 }
 
-/// What is asked of a source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
-    /// Which part of it.
     pub stretch: Stretch,
-    /// Take a session though it was rejected.
     pub is_rejected_included: bool,
 }
 
 impl Stretch {
-    /// With the way back or without.
     #[must_use]
     pub fn with_unload(is_wanted: bool) -> Self {
         if is_wanted { Self::WithUnload } else { Self::RampHold }
@@ -245,7 +241,7 @@ pub(super) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
     tripped.map_or(usize::MAX, |(after_sample, _)| after_sample as usize)
 }
 
-/// What the engine decided, each after so many samples.
+/// Decisions of the engine, each with the number of samples before it.
 pub(super) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     decisions_among(&session.entries)
 }
@@ -263,7 +259,7 @@ pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, S
         .collect()
 }
 
-/// The records among decisions, each after so many samples.
+/// Records among decisions, each with the number of samples before it.
 pub(super) fn records(
     decisions: &[(u64, Effect)],
 ) -> impl DoubleEndedIterator<Item = (u64, &Record)> {
@@ -307,7 +303,7 @@ pub(super) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
     })
 }
 
-/// A table knows nothing of its noise: every sample counts alike.
+/// The noise of a table is unknown, so every sample has the same weight.
 fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
     (0..table.t.len())
         .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])

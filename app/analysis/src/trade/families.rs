@@ -1,4 +1,4 @@
-//! Families by terms: what a step costs, and what leaving terms out does to the force.
+//! Families by terms: the cost of a step, and the error of the force with fewer terms.
 
 use super::paths::{Paths, difference, peak};
 use super::timing::Job;

@@ -31,12 +31,12 @@ pub(super) fn rows(
     let row = |&keep: &usize| {
         let (mut tau_square, mut force_square, mut samples) = (0.0, 0.0, 0);
         for recording in &recordings {
-            let kept = thin(recording, keep);
-            let found = fit(&kept, &FitOptions::default()).map_err(|err| err.to_string())?;
+            let reduced = thin(recording, keep);
+            let found = fit(&reduced, &FitOptions::default()).map_err(|err| err.to_string())?;
             let body = found.kelvin().ok_or("the fit is of another family")?;
             tau_square += (body.tau_eps / ModifiedKelvin::THESIS.tau_eps - 1.0).powi(2);
             force_square += difference(&along(&body, paths), paths.ramp_hold.exact()).powi(2);
-            samples = kept.len();
+            samples = reduced.len();
         }
         Ok(FitRow {
             rate_hz: RATE / keep as f64,
@@ -91,11 +91,11 @@ fn thin(samples: &[FitSample], keep: usize) -> Vec<FitSample> {
 pub(super) fn jobs<'a>(rows: &[FitRow], seed: u64, paths: &Paths) -> Result<Vec<Job<'a>>, String> {
     let recording = recording(seed, NOISE, paths)?;
     let job = |row: &FitRow| {
-        let kept = thin(&recording, (RATE / row.rate_hz).round() as usize);
+        let reduced = thin(&recording, (RATE / row.rate_hz).round() as usize);
         Job {
             per_call: 1.0,
             call: Box::new(move || {
-                black_box(fit(black_box(&kept), &FitOptions::default()).is_ok());
+                black_box(fit(black_box(&reduced), &FitOptions::default()).is_ok());
             }),
         }
     };

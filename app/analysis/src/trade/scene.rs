@@ -1,4 +1,4 @@
-//! What exactness costs in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
+//! The cost of accuracy in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
 
 use super::timing::{self, Job};
 use super::{Extent, families, integrators, paths};

@@ -1,4 +1,4 @@
-//! How long something takes, on a machine that has other things to do.
+//! Durations on a machine that has other work to do.
 //!
 //! All jobs take turns, round after round, so that a busy minute hits all of them; the least of a
 //! job's rounds counts, since other work only adds. Even and odd rounds are two measurements of the

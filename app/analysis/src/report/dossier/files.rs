@@ -1,4 +1,4 @@
-//! Which files a page describes: written into it by their hashes, and read back to be compared.
+//! The files that a page describes: their hashes are written into it and read back for comparison.
 
 use palpate_figures::drawing::escape;
 use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of};
@@ -40,8 +40,8 @@ pub(super) fn sealed(page: &str) -> String {
 
 fn own_hash(page: &str) -> String {
     let lines = page.split_inclusive('\n');
-    let kept = lines.filter(|line| !line.starts_with(MADE) && !line.starts_with(SEAL));
-    sha256(kept.collect::<String>().as_bytes())
+    let hashed = lines.filter(|line| !line.starts_with(MADE) && !line.starts_with(SEAL));
+    sha256(hashed.collect::<String>().as_bytes())
 }
 
 /// What a page says it describes, and whether the page itself is as it was made.

@@ -2,9 +2,9 @@
 
 use super::super::text::{ParameterText, capital, quality, typeset};
 use super::super::{calibration as calibrations, calibration_plot, figures, said};
-use super::compared::comparison;
+use super::comparison::comparison;
 use super::files::{MADE, attributes, sealed};
-use super::happened::{afterwards, deviations, events, made_with};
+use super::history::{afterwards, deviations, events, made_with};
 use super::{FitPart, Subject};
 use crate::report::figures::Align;
 use palpate_figures::page::{Body, document};

@@ -1,9 +1,9 @@
 //! The report on one session or several: everything that is known of them, on one page that says by hashes which files
 //! it describes.
 
-mod compared;
+mod comparison;
 mod files;
-mod happened;
+mod history;
 mod html;
 
 pub use files::{Claim, Compared, claims, compare};
@@ -48,7 +48,7 @@ pub struct Subject {
     pub(super) notes: Vec<String>,
     pub(super) entries: Vec<Entry>,
     pub(super) end: Option<EndRecord>,
-    pub(super) beside: Beside,
+    pub(super) auxiliary: Beside,
     pub(super) edits: Edits,
     pub(super) analyses: Analyses,
     pub(super) review: Option<Review>,
@@ -97,7 +97,7 @@ impl Subject {
             notes: session.notes.clone(),
             entries: session.entries.clone(),
             end: session.end.clone(),
-            beside: session.beside.clone(),
+            auxiliary: session.beside.clone(),
             review: edits.review(&seen),
             base: FoundBase::of_session(&session),
             fidelity: fidelity::of_session(&session).map_err(|err| err.to_string()),

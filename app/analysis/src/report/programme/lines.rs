@@ -1,4 +1,4 @@
-//! What the page says of each run, and of each specimen.
+//! Rows of the page for each run and each specimen.
 
 use crate::edited::Edited;
 use crate::source::SourceError;
@@ -7,7 +7,6 @@ use palpate_sessions::Manifest;
 use serde::Serialize;
 use std::path::Path;
 
-/// One run in the table of the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunLine {
     pub task: String,
@@ -15,15 +14,14 @@ pub struct RunLine {
     pub repeat: u32,
     /// Which attempt at it, from 1.
     pub attempt: u32,
-    /// Its session folder, from the programme's.
+    /// Session folder relative to that of the programme.
     pub session: String,
-    /// How it ended; none if it broke off.
+    /// `None` if the run broke off.
     pub ending: Option<String>,
     /// Whether its session is no longer what the journal says it was; none if it is.
-    pub lost: Option<SessionLoss>,
-    /// Who ran it, as its session says.
+    #[serde(rename = "lost")]
+    pub loss: Option<SessionLoss>,
     pub operator: String,
-    /// What was indented, as its session says.
     pub specimen: String,
     /// Its data quality, with the reason where it is not valid.
     pub verdict: Option<String>,
@@ -33,13 +31,12 @@ pub struct RunLine {
     pub force_peak_n: Option<f64>,
 }
 
-/// What became of a session that was recorded.
+/// Loss of a recorded session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SessionLoss {
-    /// It is not there.
     Missing,
-    /// It is there and not as it was written.
+    /// The files are not as they were written.
     Damaged,
 }
 
@@ -68,11 +65,10 @@ impl SessionLoss {
     }
 }
 
-/// What sessions tell of one specimen.
+/// Metadata of one specimen from its sessions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpecimenPart {
     pub specimen: String,
-    /// With which probe it was indented.
     pub indenter: String,
     /// Other metadata by key, without its place in the series.
     #[serde(rename = "told")]
@@ -106,8 +102,8 @@ impl SpecimenPart {
 impl RunLine {
     pub(super) fn ended_by(&self) -> String {
         let ending = self.ending.as_deref().unwrap_or("breaking off");
-        match self.lost {
-            Some(lost) => format!("{ending}, now {}", lost.word()),
+        match self.loss {
+            Some(loss) => format!("{ending}, now {}", loss.word()),
             None => ending.to_owned(),
         }
     }

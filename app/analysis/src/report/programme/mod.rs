@@ -39,20 +39,16 @@ pub struct TaskPart {
     pub predictions: Vec<PredictionLine>,
 }
 
-/// The fit of one session.
 #[derive(Clone, Debug, Serialize)]
 pub struct FitLine {
     pub session: String,
-    /// Names, values and standard errors.
     pub parameters: Vec<palpate_rheology::fit::Parameter>,
     /// Root mean square of the residual in N.
     pub rmse_n: f64,
 }
 
-/// The error of a prediction.
 #[derive(Clone, Debug, Serialize)]
 pub struct PredictionLine {
-    /// The session that was predicted.
     pub session: String,
     /// The task whose fit predicted it.
     pub fitted: String,
@@ -66,12 +62,10 @@ pub struct PredictionLine {
     pub at_peak_percent: f64,
 }
 
-/// Everything on the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct Page {
     /// The programme in words.
     pub title: String,
-    /// What it is for.
     pub purpose: String,
     pub runs: Vec<RunLine>,
     /// Every specimen, in the order in which it was met.
@@ -124,9 +118,9 @@ impl Page {
         let name = session.display().to_string();
         let path = folder.join(session);
         let opened = edited::open(&path);
-        let lost = SessionLoss::of(&opened, &path, ending.as_deref());
+        let loss = SessionLoss::of(&opened, &path, ending.as_deref());
         // What was said of a session holds for it as it was.
-        let whole = opened.as_ref().ok().filter(|_| lost.is_none());
+        let whole = opened.as_ref().ok().filter(|_| loss.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
         let is_rejected = opened.as_ref().ok().and_then(|one| one.rejection()).is_some();
         let verdict = verdict.map(|(verdict, edit)| match verdict {
@@ -148,7 +142,7 @@ impl Page {
             attempt: place.attempt,
             session: name.clone(),
             ending: ending.clone(),
-            lost: lost.as_ref().map(|(lost, _)| *lost),
+            loss: loss.as_ref().map(|(loss, _)| *loss),
             operator: word(|manifest| &manifest.operator),
             specimen: word(|manifest| &manifest.specimen),
             verdict,
@@ -161,8 +155,8 @@ impl Page {
             part.line(&line);
         };
         match opened {
-            _ if let Some((lost, reason)) = &lost => {
-                leave_out(&format!("{} ({reason})", lost.word()));
+            _ if let Some((loss, reason)) = &loss => {
+                leave_out(&format!("{} ({reason})", loss.word()));
             }
             // It is counted, and not fitted.
             Ok(_) if is_rejected => leave_out("rejected"),
@@ -201,18 +195,18 @@ impl Page {
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
     pub fn loss(&self) -> Option<String> {
         let finished = self.runs.iter().filter(|run| run.ending.as_deref() == Some(FINISHED));
-        let lost: Vec<String> = finished
-            .filter_map(|run| Some(format!("{} is {}", run.session, run.lost?.word())))
+        let loss: Vec<String> = finished
+            .filter_map(|run| Some(format!("{} is {}", run.session, run.loss?.word())))
             .collect();
-        (!lost.is_empty()).then(|| {
+        (!loss.is_empty()).then(|| {
             format!(
                 "of the finished sessions {}, so the page leaves it out; restore it from a backup and run the same command, or begin in a new folder",
-                lost.join(", ")
+                loss.join(", ")
             )
         })
     }
 
-    /// The page in HTML, whole in itself.
+    /// The page as one HTML file.
     pub fn html(&self) -> String {
         let mut body = Body::default();
         body.heading(1, &self.title);
@@ -347,7 +341,7 @@ impl TaskPart {
     }
 }
 
-/// What fits found, for later tasks to be compared with.
+/// Fitted bodies that later tasks are compared with.
 #[derive(Default)]
 struct Bodies {
     /// Name of a task and the body of its first session that was fitted.
@@ -357,7 +351,6 @@ struct Bodies {
 }
 
 impl Bodies {
-    /// The body of a task, or why there is none.
     fn of(&self, task: &str) -> Result<&(String, ModifiedKelvin), String> {
         let body = self.known.iter().find(|(known, _)| known == task);
         body.ok_or_else(|| {

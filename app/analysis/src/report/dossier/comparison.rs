@@ -1,4 +1,4 @@
-//! Several sessions beside each other.
+//! Comparison of several sessions.
 
 use super::super::figures::{Align, Traces, overlays};
 use super::super::said;
@@ -26,10 +26,12 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
         ["session", "read by", "specimen", "operator", "started (UTC)", "protocol", "verdict"];
     body.table("Sessions compared", &heads, &rows);
     let traces: Vec<&Traces> = subjects.iter().map(|one| &one.traces).collect();
-    let ([time, depth], lost) = overlays(&traces, align);
-    let left_out = match lost.as_slice() {
+    let ([time, depth], without_origin) = overlays(&traces, align);
+    let left_out = match without_origin.as_slice() {
         [] => String::new(),
-        lost => format!(" Left out, because they have no such start: {}.", lost.join(", ")),
+        without_origin => {
+            format!(" Left out, because they have no such start: {}.", without_origin.join(", "))
+        }
     };
     body.figure(
         &time.svg(),

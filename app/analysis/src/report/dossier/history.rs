@@ -1,4 +1,4 @@
-//! What happened in a session and what was said of it: deviations, events, edits and analyses, rig and program.
+//! History of a session: deviations, events, edits and analyses, rig and program.
 
 use super::super::session::{lateness, target_cells};
 use super::super::text::capital;
@@ -80,7 +80,7 @@ pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
     }
     body.heading(level, "Events");
     let mut rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
-    let left = rows.len().saturating_sub(EVENTS_MAX);
+    let remaining = rows.len().saturating_sub(EVENTS_MAX);
     rows.truncate(EVENTS_MAX);
     if rows.is_empty() {
         body.paragraph("None were recorded.");
@@ -88,8 +88,8 @@ pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
         let heads = ["session time (s)", "event"];
         body.table("Events of the run", &heads, &rows);
     }
-    if left > 0 {
-        body.paragraph(&format!("The log has {left} more events."));
+    if remaining > 0 {
+        body.paragraph(&format!("The log has {remaining} more events."));
     }
 }
 
@@ -186,6 +186,6 @@ pub(super) fn made_with(body: &mut Body, subject: &Subject, level: u8) {
     facts.extend(signal.map(|lines| ("signal", lines.join("; "))));
     let accepted = manifest.acknowledgements.iter();
     facts.extend(accepted.map(|line| ("acknowledged before the start", line.clone())));
-    facts.extend(said::health(&subject.beside.health));
+    facts.extend(said::health(&subject.auxiliary.health));
     body.facts("Rig, settings and program", &facts);
 }
