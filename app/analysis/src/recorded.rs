@@ -31,7 +31,7 @@ impl RecordedTicks {
         match self.lost {
             0 => format!("{} ticks recorded, none lost", self.ticks),
             lost => format!(
-                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be computed again",
+                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be replayed",
                 self.ticks
             ),
         }
@@ -70,10 +70,11 @@ impl Replayed {
             (true, false) => "every number that is left bit for bit as recorded",
             (false, _) => "not as recorded",
         };
-        let mut lines = vec![format!("{}: {} ticks computed again, {how}", self.name, self.ticks)];
+        let mut lines = vec![format!("{}: {} ticks replayed, {how}", self.name, self.ticks)];
         if !self.is_whole {
             lines.push(
-                "the recording was cut off; it was compared to its last whole tick".to_owned(),
+                "the recording was cut off; the replay compared it up to its last whole tick"
+                    .to_owned(),
             );
         }
         lines.push(format!("hash at the end {}", self.end_hash));
@@ -84,7 +85,7 @@ impl Replayed {
     pub fn failure(&self) -> Option<String> {
         let Some(first) = &self.first else {
             let cut_off = format!(
-                "the recording has no end: it was cut off after tick {}, and what came then is not known",
+                "the recording has no end: it was cut off after tick {}, and later ticks are unknown",
                 self.ticks
             );
             return (!self.is_whole).then_some(cut_off);

@@ -53,7 +53,7 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
     })
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Done {
     pub sentence: String,
     /// Session that got a new record.
@@ -97,12 +97,7 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
         }
     };
     write_new(to, &bytes)?;
-    Ok(Done {
-        sentence: format!("written: {}", to.display()),
-        changed: None,
-        is_edit: false,
-        made: None,
-    })
+    Ok(Done { sentence: format!("written: {}", to.display()), ..Done::default() })
 }
 
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {

@@ -9,7 +9,7 @@ use palpate_rheology::fit::{FitError, FitOptions, FitReport, Parameter, fit};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
 use palpate_tables::import::ColumnNames;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -20,13 +20,6 @@ const FILE: &str = "last-fit.json";
 const VERSION: u64 = 2;
 
 const DEFAULT_FAMILY: &str = "series-3";
-
-#[derive(Serialize)]
-struct RememberedFit<'a> {
-    source: String,
-    #[serde(flatten)]
-    report: &'a FitReport,
-}
 
 #[derive(Debug, Error)]
 pub enum KnownFitError {
@@ -136,15 +129,15 @@ pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::E
         return Ok(());
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let remembered = RememberedFit { source: source.display().to_string(), report };
-    write(&file, &remembered).map_err(|err| (file, err))
+    write(&file, report, &source).map_err(|err| (file, err))
 }
 
-fn write(file: &Path, remembered: &RememberedFit<'_>) -> io::Result<()> {
+fn write(file: &Path, report: &FitReport, source: &Path) -> io::Result<()> {
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder)?;
     }
-    let fit = serde_json::to_value(remembered)?;
+    let mut fit = serde_json::to_value(report)?;
+    fit["source"] = json!(source.display().to_string());
     let checksum = checksum(&fit.to_string());
     let object = json!({ "last_fit_version": VERSION, "checksum": checksum, "fit": fit });
     atomic::replace(file, object.to_string().as_bytes())

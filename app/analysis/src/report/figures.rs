@@ -161,7 +161,7 @@ impl Traces {
             false => format!(", {known} of them with a force"),
         };
         format!(
-            "{samples} samples{force}; drawn are the lowest and the highest of each column of pixels"
+            "{samples} samples{force}; the figure shows the lowest and the highest of each pixel column"
         )
     }
 

@@ -52,7 +52,7 @@ pub fn tried_text(tried: &Tried) -> String {
         false => "no energy returned".to_owned(),
     };
     format!(
-        "{guards} guards: {buzz}; the place swings by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
+        "{guards} guards: {buzz}; the position varies by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
         tried.swing_mm, tried.force_max_n, tried.damping_added_max
     )
 }
@@ -90,10 +90,8 @@ pub fn margin_text(margin: &Margin) -> String {
 
 #[must_use]
 pub fn run_text(paced: &Paced) -> String {
-    let mut lines = vec![format!("priority: {}", paced.priority)];
-    lines.extend(loop_table(std::slice::from_ref(paced)));
-    lines.extend(paced.recorded.map(|recorded| recorded.words()));
-    lines.join("\n")
+    let recorded = paced.recorded.map(|recorded| format!("\n{}", recorded.words()));
+    bench_text(std::slice::from_ref(paced)) + &recorded.unwrap_or_default()
 }
 
 #[must_use]
@@ -137,7 +135,7 @@ pub fn slave_text(slaved: &Slaved) -> String {
             "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
             kept.late.count,
             1e3 * kept.late.p99_9.0,
-            statistics.missed
+            kept.missed
         ));
     }
     lines.join("\n")
@@ -146,19 +144,12 @@ pub fn slave_text(slaved: &Slaved) -> String {
 /// Loops at several rates, as a table.
 #[must_use]
 pub fn bench_text(loops: &[Paced]) -> String {
-    let mut lines = Vec::new();
-    if let Some(first) = loops.first() {
-        lines.push(format!("priority: {}", first.priority));
-    }
-    lines.extend(loop_table(loops));
-    lines.join("\n")
-}
-
-fn loop_table(loops: &[Paced]) -> Vec<String> {
-    let mut lines = vec![format!(
+    let priority = loops.first().map(|first| format!("priority: {}", first.priority));
+    let mut lines: Vec<String> = priority.into_iter().collect();
+    lines.push(format!(
         "{:>6} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
         "rate", "busy", "late (us)", "period (us)", "work (us)", "overruns", "missed"
-    )];
+    ));
     let heads = "p50    p99   p99.9  max";
     lines.push(format!("{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}", "Hz", ""));
     for one in loops {
@@ -174,7 +165,7 @@ fn loop_table(loops: &[Paced]) -> Vec<String> {
             statistics.missed
         ));
     }
-    lines
+    lines.join("\n")
 }
 
 fn spread(spread: &Spread) -> String {
@@ -191,7 +182,7 @@ pub fn follow_text(followed: &Followed) -> String {
             followed.peak_commanded_n, followed.peak_measured_n
         ),
         format!(
-            "on the way in the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
+            "while loading, the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
             followed.offset_n, followed.scatter_n
         ),
     ];
@@ -217,9 +208,9 @@ pub fn follow_text(followed: &Followed) -> String {
 /// Why the fit of the measured force is not that of the commanded.
 fn difference(followed: &Followed) -> &'static str {
     if followed.settings.friction_share > 0.0 {
-        "the drive makes up for friction only while the rack moves: as the hold begins the measured force steps, and its fit takes that for relaxation"
+        "the drive compensates friction only while the rack moves: the measured force steps as the hold begins, and its fit interprets the step as relaxation"
     } else {
-        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body nearly as it is"
+        "friction and drag oppose the moving rack with a constant force, and friction remains in the hold: the fit finds this force as f_offset, and the body stays nearly unchanged"
     }
 }
 

@@ -64,22 +64,14 @@ pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCur
     let paths = paths::Paths::new()?;
     // Seeds of the noise in the fits: the first, and how many.
     let seeds = extent.choose([1, 8], [1, 2]);
-    let ends = |done: usize, what: &str| progress.tell(done, TABLES, what).is_break();
-    if ends(0, "errors of the integrators") {
-        return Ok(None);
-    }
+    let next = |done: usize, what: &str| progress.tell(done, TABLES, what).continue_value();
+    let Some(()) = next(0, "errors of the integrators") else { return Ok(None) };
     let integrators = integrators::rows(extent, &paths)?;
-    if ends(1, "errors of the families") {
-        return Ok(None);
-    }
+    let Some(()) = next(1, "errors of the families") else { return Ok(None) };
     let families = families::rows(extent, &paths)?;
-    if ends(2, "errors of the fit") {
-        return Ok(None);
-    }
+    let Some(()) = next(2, "errors of the fit") else { return Ok(None) };
     let fit = fit::rows(extent, seeds, &paths)?;
-    if ends(3, "errors of the live fit") {
-        return Ok(None);
-    }
+    let Some(()) = next(3, "errors of the live fit") else { return Ok(None) };
     let live = live::rows(&paths)?;
     let now: DateTime<Utc> = wall_now().into();
     Ok(Some(TradeCurves {

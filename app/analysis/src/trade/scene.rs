@@ -92,17 +92,15 @@ pub fn measure_scene(
     let reference = extent.choose(REFERENCE_NODES, REFERENCE_QUICK);
     let total = meshes.len() + 2 + timing::rounds(extent);
     let mut done = 0;
-    let mut goes_on = |what: &str| {
+    let mut next = |what: &str| {
         done += 1;
-        progress.tell(done - 1, total, what).is_continue()
+        progress.tell(done - 1, total, what).continue_value()
     };
     let scene = pokes();
     let mut curves = SceneCurves::default();
     let mut jobs = Vec::new();
     for &nodes in meshes {
-        if !goes_on(&format!("shape on {nodes} x {nodes} nodes")) {
-            return Ok(None);
-        }
+        let Some(()) = next(&format!("shape on {nodes} x {nodes} nodes")) else { return Ok(None) };
         let error = scene.mesh_error_against(nodes, reference);
         curves.meshes.push(MeshPoint {
             nodes: nodes as u32,
@@ -111,9 +109,7 @@ pub fn measure_scene(
         });
         jobs.push(job(&scene, nodes, Cut::NONE)?);
     }
-    if !goes_on("shape with a cut") {
-        return Ok(None);
-    }
+    let Some(()) = next("shape with a cut") else { return Ok(None) };
     for (range, threshold_mm) in CUTS {
         let cut = Cut::new(range, threshold_mm).map_err(|err| err.to_string())?;
         let error = scene.cut_error(CUT_NODES, cut);
@@ -125,9 +121,7 @@ pub fn measure_scene(
         });
         jobs.push(job(&scene, CUT_NODES, cut)?);
     }
-    if !goes_on("force of integrators and families") {
-        return Ok(None);
-    }
+    let Some(()) = next("force of integrators and families") else { return Ok(None) };
     let body = ModifiedKelvin::THESIS.into();
     for scheme in Scheme::ALL {
         for step_s in STEPS {

@@ -47,18 +47,16 @@ pub struct CycleReport {
 impl CycleReport {
     #[must_use]
     pub fn of(name: String, source: CycleSource, question: &Question) -> Self {
-        let sines = match question.frequency {
-            Some(frequency) => vec![sinusoid(&source.samples, frequency)],
+        let (sines, cycles) = match question.frequency {
+            // A table that is one sine has no loading.
+            Some(frequency) => (vec![sinusoid(&source.samples, frequency)], Vec::new()),
             None => {
-                let runs = source.sines.iter();
-                runs.map(|(frequency, range)| sinusoid(&source.samples[range.clone()], *frequency))
-                    .collect()
+                let sine = |(frequency, range): &(f64, std::ops::Range<usize>)| {
+                    sinusoid(&source.samples[range.clone()], *frequency)
+                };
+                let cycles = analyse(&source.samples, question.at, source.pulse);
+                (source.sines.iter().map(sine).collect(), cycles)
             }
-        };
-        // A table that is one sine has no ways in worth a name.
-        let cycles = match question.frequency {
-            Some(_) => Vec::new(),
-            None => analyse(&source.samples, question.at, source.pulse),
         };
         let predictions = match &question.body {
             Some(body) => cycles.iter().map(|one| prediction(body, &source, one)).collect(),

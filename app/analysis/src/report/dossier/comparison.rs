@@ -36,11 +36,11 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
     body.figure(
         &time.svg(),
         &format!(
-            "Force over time since {}. Drawn are the lowest and the highest of each column of pixels.{left_out}",
+            "Force over time since {}. The figure shows the lowest and the highest sample of each pixel column.{left_out}",
             align.word()
         ),
     );
-    let caption = "Force over depth. No sample is further than half a pixel from what is drawn.";
+    let caption = "Force over depth. Every sample is within half a pixel of the line.";
     body.figure(&depth.svg(), caption);
     parameters(body, subjects);
 }

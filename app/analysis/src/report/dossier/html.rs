@@ -140,7 +140,7 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     );
     body.figure(
         &figures::force_depth(traces).svg(),
-        "Force over depth from contact. No sample is further than half a pixel from what is drawn.",
+        "Force over depth from contact. Every sample is within half a pixel of the line.",
     );
 }
 
@@ -160,7 +160,7 @@ fn fit_part(body: &mut Body, part: &FitPart) {
     let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty that calibration and compliance add, the same in every repeat.";
     body.table(caption, &heads, &rows);
     body.list(report.sentences().chain(part.remarks.iter().map(String::as_str)));
-    let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and what the fit leaves over. Drawn are the lowest and the highest of each column of pixels.";
+    let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and the residual. The figure shows the lowest and the highest sample of each pixel column.";
     body.figure(&part.figure.svg(), caption);
 }
 
@@ -182,13 +182,13 @@ pub(super) fn cells(parameter: &Parameter) -> Vec<String> {
 fn calibration(body: &mut Body, subject: &Subject, level: u8) {
     body.heading(level, "Calibration");
     match &subject.calibration {
-        None => body.paragraph("The session has none: its forces are those of its file."),
+        None => body.paragraph("The session has no calibration: its forces are those of its file."),
         Some((calibration, Err(reason))) => {
             body.paragraph(&format!("{}: {reason}.", calibration.name));
         }
         Some((calibration, Ok(details))) => {
             body.pre(&calibrations::whole(calibration, None, details, &[]));
-            let caption = "The curve with its readings, what it misses of them, its slope, and the standard uncertainty of a force with every term that is stated.";
+            let caption = "The curve with its readings, its residuals, its slope, and the standard uncertainty of a force with every term that is stated.";
             body.figure(&calibration_plot::picture(calibration, details), caption);
         }
     }
@@ -197,7 +197,7 @@ fn calibration(body: &mut Body, subject: &Subject, level: u8) {
 fn files(body: &mut Body, subjects: &[Subject]) {
     body.heading(2, "Files that this page describes");
     body.paragraph(
-        "Each file by the SHA-256 of its bytes (FIPS 180-4). 'palpate report --check' with this page compares them with the files there are; any other program that makes these hashes can do so too.",
+        "The table has the SHA-256 (FIPS 180-4) of each file. 'palpate report --check' compares this page with the present files, and so can any program that computes SHA-256.",
     );
     let mut rows = Vec::new();
     let mut marks = Vec::new();

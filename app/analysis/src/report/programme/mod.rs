@@ -23,7 +23,7 @@ use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TaskPart {
     pub task: String,
     /// Its protocol in words.
@@ -62,7 +62,7 @@ pub struct PredictionLine {
     pub at_peak_percent: f64,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Page {
     /// The programme in words.
     pub title: String,
@@ -84,9 +84,7 @@ impl Page {
         let mut page = Self {
             title: programme.title.clone(),
             purpose: programme.purpose.clone(),
-            runs: Vec::new(),
-            specimens: Vec::new(),
-            tasks: Vec::new(),
+            ..Self::default()
         };
         let mut bodies = Bodies::default();
         for (index, task) in programme.tasks.iter().enumerate() {
@@ -94,10 +92,7 @@ impl Page {
             let mut part = TaskPart {
                 task: task.name.clone(),
                 title: task.protocol.title.clone(),
-                text: String::new(),
-                figures: Vec::new(),
-                fits: Vec::new(),
-                predictions: Vec::new(),
+                ..TaskPart::default()
             };
             for run in progress.runs.iter().filter(|run| run.0.task == index) {
                 page.add_run(&mut part, &mut bodies, task, run, folder);
