@@ -2,8 +2,8 @@
 //! of a force with every term.
 
 use super::calibration::Told;
-use super::picture::{LEFT, LINE, RIGHT, WIDTH, sentence_lines, title};
-use palpate_figures::drawing::{Drawing, Ink as TextInk, Svg};
+use super::picture::{LEFT, LINE, RIGHT, sentence_lines, titled};
+use palpate_figures::drawing::{Drawing, Ink as TextInk};
 use palpate_figures::figure::{self, AxisNames, Ink, Level, Plot, Series, Stretch};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::{Calibration, CalibrationError, Direction, FlatStretch, Term};
@@ -128,9 +128,8 @@ const PLACES_PX: [[f64; 2]; 4] = [[84.0, 320.0], [356.0, 450.0], [486.0, 600.0],
 
 #[must_use]
 pub fn drawing(calibration: &Calibration, details: &Told) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
     let line = format!("{}; {}", calibration.curve, calibration.source);
-    title(&mut svg, &calibration.name, &line);
+    let mut svg = titled(&calibration.name, &line);
     let Ok(plots) = plots(calibration, details) else {
         // A calibration with details has a curve and points.
         return svg.drawing(70.0, LIGHT.canvas, &calibration.name);

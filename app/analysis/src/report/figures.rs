@@ -1,7 +1,7 @@
 //! The figures of a session: force over time and over depth, alone or several sessions over each other.
 
-use super::picture::{LEFT, RIGHT, WIDTH, title};
-use palpate_figures::drawing::{Drawing, Ink as TextInk, Svg};
+use super::picture::{LEFT, RIGHT, titled};
+use palpate_figures::drawing::{Drawing, Ink as TextInk};
 use palpate_figures::figure::{Axis, AxisNames, Ink, Level, Plot, Series, Shape, Stretch};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
@@ -54,14 +54,6 @@ impl Align {
     }
 }
 
-/// A stretch of one phase.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Span {
-    phase: Phase,
-    from: f64,
-    until: f64,
-}
-
 /// What of a session is drawn: a few thousand points, whatever its length.
 #[derive(Clone, Debug)]
 pub struct Traces {
@@ -70,7 +62,8 @@ pub struct Traces {
     force_time: Vec<Vec<[f64; 2]>>,
     /// Force in N over depth in mm.
     force_depth: Vec<Vec<[f64; 2]>>,
-    phases: Vec<Span>,
+    /// Start of each phase in s.
+    phases: Vec<(f64, Phase)>,
     /// Time from and to in s.
     ends: [f64; 2],
     /// The interlock's limit in N, if it was recorded with one.
@@ -107,19 +100,9 @@ impl Traces {
             [only] => [time(*only), time(*only) + 1.0],
             [from, .., until] => [time(*from), time(*until)],
         };
-        let mut phases: Vec<Span> = Vec::new();
-        for &index in &within {
-            let (at, phase) = (time(index), session.rows[index].phase);
-            match phases.last_mut() {
-                Some(last) if last.phase == phase => last.until = at,
-                last => {
-                    if let Some(last) = last {
-                        last.until = at;
-                    }
-                    phases.push(Span { phase, from: at, until: at });
-                }
-            }
-        }
+        let phase = |index: usize| session.rows[index].phase;
+        let phases = within.chunk_by(|a, b| phase(*a) == phase(*b));
+        let phases = phases.map(|run| (time(run[0]), phase(run[0]))).collect();
         let force = |&index: &usize| session.rows[index].force.filter(|force| force.is_finite());
         let runs = within.chunk_by(|a, b| force(a).is_some() == force(b).is_some());
         let width = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
@@ -221,26 +204,34 @@ fn limit_in_reach(traces: &Traces) -> Option<f64> {
     traces.limit.map(|limit| limit.0).filter(|limit| *limit <= high + 1.5 * (high - low.min(high)))
 }
 
+/// Phases from their starts in s, every other one shaded; the last one ends at `end`.
+pub(super) fn phase_stretches(starts: &[(f64, Phase)], end: f64) -> Vec<Stretch> {
+    let until = |i: usize| starts.get(i + 1).map_or(end, |(next, _)| *next);
+    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| Stretch {
+        name: phase.name().to_owned(),
+        ends: [*start, until(i)],
+        ink: (i % 2 == 1).then_some(Ink::Line),
+    };
+    starts.iter().enumerate().map(stretch).collect()
+}
+
+/// The interlock's limit as a dashed level.
+pub(super) fn interlock(limit: Newtons) -> Level {
+    let name = format!("interlock at {limit:.1}");
+    Level { name, is_dashed: true, ..Level::plain(limit.0, Ink::Limit) }
+}
+
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
 #[must_use]
 pub fn force_time(traces: &Traces) -> Drawing {
-    let phases = traces.phases.iter().enumerate().map(|(index, span)| Stretch {
-        name: span.phase.name().to_owned(),
-        ends: [span.from, span.until],
-        ink: (index % 2 == 1).then_some(Ink::Line),
-    });
     let [first, last] = traces.ends;
+    let phases = phase_stretches(&traces.phases, last).into_iter();
     let left_out = traces.left_out_s.iter().map(|[from, until]| Stretch {
         name: "left out".to_owned(),
         ends: [from.max(first), until.min(last)],
         ink: Some(Ink::Notice),
     });
-    let limit = limit_in_reach(traces).map(|at| Level {
-        name: format!("interlock at {at:.1} N"),
-        at,
-        ink: Ink::Limit,
-        is_dashed: true,
-    });
+    let limit = limit_in_reach(traces).map(|at| interlock(Newtons(at)));
     let time = Axis::linear("time since the first sample (s)").over(traces.ends);
     let mut plot = Plot {
         stretches: phases.chain(left_out.filter(|one| one.ends[0] < one.ends[1])).collect(),
@@ -311,8 +302,7 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
 
 /// A plot under its heads; beneath, names and inks of sessions compared.
 fn drawing([head, words]: [&str; 2], plot: &Plot, all: &[&Traces]) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, head, words);
+    let mut svg = titled(head, words);
     plot.draw(&mut svg, [LEFT, TOP, RIGHT, BOTTOM], AxisNames::Both);
     let mut y = BOTTOM + 46.0;
     for (index, one) in all.iter().enumerate() {

@@ -1,9 +1,8 @@
 //! Texts on a body on a device, and on the timing of a loop.
 
-use super::picture::{COLUMNS, LEFT, RIGHT, WIDTH, title};
+use super::picture::{COLUMNS, LEFT, RIGHT, titled};
 use super::text::{ParameterText, table};
 use crate::haptics::{Checked, Followed, Paced, Tried};
-use palpate_figures::drawing::Svg;
 use palpate_figures::figure::{self, Axis, AxisNames, Ink, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
@@ -246,12 +245,11 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
     let measured = series(|one| [one.t.0, one.measured.0]);
     let torque = series(|one| [one.t.0, one.torque]);
     let last = followed.samples.last().map_or(1.0, |one| one.t.0);
-    let mut svg = Svg::new(WIDTH);
     let line = format!(
         "a slider pushes the rack while a cell measures; peak commanded {:.3} N, measured {:.3} N",
         followed.peak_commanded_n, followed.peak_measured_n
     );
-    title(&mut svg, source, &line);
+    let mut svg = titled(source, &line);
     let time = || Axis::linear("time (s)").over([0.0, last]);
     let force = Plot::new("", time(), Axis::linear("force (N)")).with([
         // Wide under narrow, so that both are seen where they agree.

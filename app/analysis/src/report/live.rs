@@ -1,9 +1,10 @@
 //! The plots of a run in progress (force over time and over depth, contact search, weight readings) and of daily checks.
 //! A painter converts a plot's points once and again only when the trace has changed.
 
+use super::figures::{interlock, phase_stretches};
 use super::picture::band;
 use crate::daily::Deviation;
-use palpate_figures::figure::{Axis, Ink, Level, Plot, Series, Stretch};
+use palpate_figures::figure::{Axis, Ink, Level, Plot, Series};
 use palpate_model::calibration::{Curve, Direction, ForceUncertainty, newtons_of};
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
@@ -142,19 +143,12 @@ pub fn set_course(plot: &mut Plot, run: Option<&RunView>, force_max: Newtons, is
     let phases = run.map_or(&[][..], |run| &run.phases);
     let ramp = phases.iter().find(|(_, phase)| *phase == Phase::Ramp);
     let from = ramp.filter(|_| is_from_ramp).map(|(start, _)| *start);
-    let until = |i: usize| phases.get(i + 1).map_or(now, |(end, _)| *end);
-    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| Stretch {
-        name: phase.name().to_owned(),
-        ends: [*start, until(i)],
-        ink: (i % 2 == 1).then_some(Ink::Line),
-    };
-    plot.stretches = phases.iter().enumerate().map(stretch).collect();
+    plot.stretches = phase_stretches(phases, now);
     plot.x.range = from.map(|start| [start - LEAD_S, now.max(start + 1.0)]);
     plot.x.seen = vec![0.0, now];
     // Room above the limit for the names of the phases.
     plot.y.seen = vec![-0.5, 1.12 * force_max.0];
-    let name = format!("interlock at {force_max:.1}");
-    plot.levels = vec![Level { name, at: force_max.0, ink: Ink::Limit, is_dashed: true }];
+    plot.levels = vec![interlock(force_max)];
 }
 
 /// Force over position while the surface is searched.

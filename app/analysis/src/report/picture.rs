@@ -12,7 +12,7 @@ use palpate_model::units::Newtons;
 use palpate_rheology::fit::{FitReport, FitSample};
 
 /// Width of a picture in px.
-pub(super) const WIDTH: f64 = 960.0;
+const WIDTH: f64 = 960.0;
 /// Left and right edge of what is drawn.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 936.0;
@@ -53,8 +53,7 @@ pub fn of_report(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
-    let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, (samples, &overlay.forces), report, uncertainty);
+    let mut svg = curves(source, (samples, &overlay.forces), report, uncertainty);
     // Where the force is not known the fit is not drawn over depth: the probe may have left the tissue.
     let pairs = samples.iter().zip(&overlay.forces);
     let known = || pairs.clone().filter(|(one, _)| one.is_measured());
@@ -84,28 +83,27 @@ pub fn of_fit(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, (samples, &report.predict(samples)), report, uncertainty);
+    let svg = curves(source, (samples, &report.predict(samples)), report, uncertainty);
     svg.drawing(556.0, LIGHT.canvas, &format!("Fit of {source}"))
 }
 
 /// Measured and fitted force over time, and what is left over beneath.
 fn curves(
-    svg: &mut Svg,
     source: &str,
     (samples, modelled): (&[FitSample], &[Newtons]),
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
-) {
-    title(svg, source, &format!("{}; {}", report.model, quality(report)));
+) -> Svg {
+    let mut svg = titled(source, &format!("{}; {}", report.model, quality(report)));
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let [mut force, mut residual] =
         plots_over_time((samples, modelled), uncertainty, -start, COLUMNS);
     force.x.range = Some(span(samples));
     residual.x.range = Some(span(samples));
-    figure::legend(svg, [RIGHT, 46.0], &force);
-    force.draw(svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
-    residual.draw(svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
+    figure::legend(&mut svg, [RIGHT, 46.0], &force);
+    force.draw(&mut svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
+    residual.draw(&mut svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
+    svg
 }
 
 /// Force over time, measured and fitted, and what is left over, thinned to so many columns. A shift in s is added to
@@ -165,8 +163,7 @@ pub(super) fn force_plot(
 pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let depth = thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), COLUMNS);
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, source, "not fitted");
+    let mut svg = titled(source, "not fitted");
     let plot =
         Plot::new("", Axis::linear("time (s)").over(span(samples)), Axis::linear("depth (mm)"));
     plot.with([Series::line("", Ink::Series, 1.6, depth)]).draw(
@@ -190,10 +187,13 @@ pub(super) fn look() -> Look {
     Look { text: LIGHT.text_quiet, grid: LIGHT.line }
 }
 
-pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
+/// An empty picture with a title and a line beneath it.
+pub(super) fn titled(title: &str, line: &str) -> Svg {
+    let mut svg = Svg::new(WIDTH);
     let ink = TextInk { size: 18.0, ..TextInk::plain(LIGHT.text) };
-    svg.text([LEFT, 28.0], ink, source);
+    svg.text([LEFT, 28.0], ink, title);
     svg.text([LEFT, 50.0], TextInk::plain(LIGHT.text_quiet), line);
+    svg
 }
 
 /// The parameters from `y` on; returns where what follows may begin.

@@ -1,8 +1,8 @@
 //! A plan as a picture before anything moves: depth and the force of an average specimen over time, or, of a
 //! plan that presses on nothing, what it does when.
 
-use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
-use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel, Svg};
+use super::picture::{LEFT, LINE, RIGHT, look, titled};
+use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel};
 use palpate_figures::figure::{Axis, AxisNames, Band, Ink, Level, Plot, Series};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::units::{MmPerS, Newtons};
@@ -64,8 +64,7 @@ pub const EXPECTED: &str = "expected for the pig stomach of the source thesis, t
 
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, name, EXPECTED);
+    let mut svg = titled(name, EXPECTED);
     let [depth, speed, force] = course(outline, None);
     let place = |top: f64| [LEFT, top, RIGHT, top + 194.0];
     depth.draw(&mut svg, place(66.0), AxisNames::Upright);
@@ -101,12 +100,8 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
             phases.push(*phase);
         }
     }
-    let mut svg = Svg::new(WIDTH);
-    title(
-        &mut svg,
-        name,
-        "expected: moves and waits are known, searches and people take their time",
-    );
+    let mut svg =
+        titled(name, "expected: moves and waits are known, searches and people take their time");
     let (top, look): (f64, Look) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;
     // The rows are drawn here; the panel has the time.

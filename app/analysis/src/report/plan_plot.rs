@@ -88,12 +88,8 @@ pub fn plots(report: &PlanReport) -> [Plot; 3] {
     let highest = percents(target.percent, f64::max);
     for plot in &mut plots {
         plot.y.range = Some([0.8 * lowest, 1.25 * highest]);
-        plot.levels.push(Level {
-            name: String::new(),
-            at: target.percent,
-            ink: Ink::Limit,
-            is_dashed: true,
-        });
+        let level = Level::plain(target.percent, Ink::Limit);
+        plot.levels.push(Level { is_dashed: true, ..level });
     }
     plots
 }

@@ -37,12 +37,9 @@ impl Scatter<'_> {
             Labels::Each(labels.collect())
         };
         let chosen: Vec<usize> = self.chosen.into_iter().collect();
-        let level = self.level.filter(|level| *level > 0.0).map(|at| Level {
-            name: "tolerance".to_owned(),
-            at,
-            ink: Ink::Limit,
-            is_dashed: false,
-        });
+        let level = self.level.filter(|level| *level > 0.0);
+        let level =
+            level.map(|at| Level { name: "tolerance".to_owned(), ..Level::plain(at, Ink::Limit) });
         Plot {
             levels: level.into_iter().collect(),
             ..Plot::new("", Axis::logarithmic(self.axes[0]), Axis::logarithmic(self.axes[1])).with(
