@@ -127,13 +127,11 @@ pub fn without_copied(
     found: Vec<PathBuf>,
     is_session: impl Fn(&Path) -> bool,
 ) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let ids: Vec<Option<(String, Option<String>)>> = found
-        .iter()
-        .map(|path| {
-            let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
-            Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
-        })
-        .collect();
+    let id = |path: &PathBuf| {
+        let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
+        Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
+    };
+    let ids: Vec<Option<(String, Option<String>)>> = found.iter().map(id).collect();
     let copied: BTreeSet<&String> = ids.iter().flatten().filter_map(|it| it.1.as_ref()).collect();
     let is_copied =
         |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));

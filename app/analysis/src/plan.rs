@@ -194,14 +194,12 @@ fn offer(
         Family::Cycles { .. } => Vec::new(),
     };
     // A proposal of which the rig refuses one press cannot be run.
-    let runs: Option<Vec<(String, Preview)>> = presses
-        .into_iter()
-        .map(|(speed, hold)| {
-            let press = RampHold { speed, depth, hold, ..RampHold::default() };
-            let preview = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
-            preview.refusals.is_empty().then(|| (command(&press), preview))
-        })
-        .collect();
+    let run = |(speed, hold)| {
+        let press = RampHold { speed, depth, hold, ..RampHold::default() };
+        let preview = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
+        preview.refusals.is_empty().then(|| (command(&press), preview))
+    };
+    let runs: Option<Vec<(String, Preview)>> = presses.into_iter().map(run).collect();
     let (commands, previews): (Vec<String>, Vec<Preview>) =
         runs.unwrap_or_default().into_iter().unzip();
     let all = previews.iter().flat_map(|one| one.acknowledgements.clone());

@@ -261,22 +261,16 @@ impl Recordings {
         &self,
         find: impl FnOnce(&[Traced<'_>]) -> Result<T, FitError>,
     ) -> Result<Option<T>, String> {
-        let origins: Result<Vec<Origin>, CalibrationError> = self
-            .all
-            .iter()
-            .map(|one| Origin::of(one.calibration.as_ref(), one.compliance.as_ref()))
-            .collect();
-        let origins = origins.map_err(|err| err.to_string())?;
+        let origin =
+            |one: &Recording| Origin::of(one.calibration.as_ref(), one.compliance.as_ref());
+        let origins: Result<Vec<_>, _> = self.all.iter().map(origin).collect();
+        let origins = origins.map_err(|err: CalibrationError| err.to_string())?;
         if !origins.iter().any(Origin::is_known) {
             return Ok(None);
         }
-        let traced: Vec<Traced<'_>> = self
-            .all
-            .iter()
-            .zip(&origins)
-            .map(|(one, origin)| origin.traced(&one.name, &one.samples))
-            .collect();
-        find(&traced).map(Some).map_err(|err| err.to_string())
+        let pairs = self.all.iter().zip(&origins);
+        let traced = pairs.map(|(one, origin)| origin.traced(&one.name, &one.samples));
+        find(&traced.collect::<Vec<_>>()).map(Some).map_err(|err| err.to_string())
     }
 }
 

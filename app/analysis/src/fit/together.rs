@@ -45,14 +45,11 @@ pub fn fit_together(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Together, FitError> {
     let body = request.options.body_names();
-    let shared: Vec<&str> = request
-        .shared
-        .iter()
-        .flat_map(|name| match *name {
-            BODY => body.clone(),
-            name => vec![name],
-        })
-        .collect();
+    let names = request.shared.iter().flat_map(|name| match *name {
+        BODY => body.clone(),
+        name => vec![name],
+    });
+    let shared: Vec<&str> = names.collect();
     let borrowed = records.borrowed();
     let watch = Stopwatch::start();
     let fitted = Fitted::joint(&borrowed, request.options, &shared)?;

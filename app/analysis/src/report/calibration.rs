@@ -257,10 +257,8 @@ fn spread(quality: &Quality) -> String {
 
 /// The uncertainty by its terms, as far as they are stated; empty without any.
 fn budget(details: &Told) -> String {
-    let stated: Vec<Term> = Term::ALL
-        .into_iter()
-        .filter(|term| !details.uncertainty.not_stated().contains(term))
-        .collect();
+    let missing = details.uncertainty.not_stated();
+    let stated: Vec<Term> = Term::ALL.into_iter().filter(|term| !missing.contains(term)).collect();
     if !details.uncertainty.is_stated() {
         return String::new();
     }

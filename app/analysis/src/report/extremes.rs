@@ -175,17 +175,13 @@ fn by_case(rows: &[&Row]) -> String {
 
 /// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&Row]) -> String {
-    let mut named: Vec<(Verdict, Vec<&str>)> = Verdict::ALL
-        .into_iter()
-        .map(|verdict| {
-            let own = rows.iter().filter(|row| row.verdict == verdict);
-            (verdict, own.map(|row| row.subject.as_str()).collect())
-        })
-        .collect();
+    let mut named: [(Verdict, Vec<&str>); 4] = Verdict::ALL.map(|verdict| {
+        let own = rows.iter().filter(|row| row.verdict == verdict);
+        (verdict, own.map(|row| row.subject.as_str()).collect())
+    });
     named.sort_by_key(|(_, subjects)| std::cmp::Reverse(subjects.len()));
-    let others: Vec<String> = named[1..]
-        .iter()
-        .filter(|(_, subjects)| !subjects.is_empty())
+    let others = named[1..].iter().filter(|(_, subjects)| !subjects.is_empty());
+    let others: Vec<String> = others
         .map(|(verdict, subjects)| format!("{}: {}", verdict.name(), subjects.join(" + ")))
         .collect();
     let most = named[0].0.name();

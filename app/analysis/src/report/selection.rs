@@ -13,14 +13,11 @@ pub fn whole(selection: &Selection) -> String {
     if !refused.is_empty() {
         parts.push(refused.join("\n"));
     }
-    let unpredicted: Vec<String> = selection
-        .candidates
-        .iter()
-        .filter_map(|one| {
-            let reason = one.prediction_refused.as_ref()?;
-            Some(format!("{} predicts nothing: {reason}", one.family))
-        })
-        .collect();
+    let unpredicted = |one: &Candidate| {
+        let reason = one.prediction_refused.as_ref()?;
+        Some(format!("{} predicts nothing: {reason}", one.family))
+    };
+    let unpredicted: Vec<String> = selection.candidates.iter().filter_map(unpredicted).collect();
     if !unpredicted.is_empty() {
         parts.push(unpredicted.join("\n"));
     }
@@ -109,14 +106,11 @@ pub fn tested(selection: &Selection) -> String {
                 return "One record: the body of its ramp and a third of what follows predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
             }
             let kinds = [Unseen::Speed, Unseen::Depth, Unseen::SpeedAndDepth, Unseen::Specimen];
-            let kinds: Vec<String> = kinds
-                .into_iter()
-                .filter(|kind| has(*kind))
-                .map(|kind| {
-                    let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
-                    format!("{} in {count}", kind.name())
-                })
-                .collect();
+            let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {
+                let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
+                format!("{} in {count}", kind.name())
+            });
+            let kinds: Vec<String> = kinds.collect();
             format!(
                 "Held out: each of {} records is predicted by the body of others ({}); its own sensor offset is found on it, in 'scaled' one factor on the body as well.",
                 prediction.records.len(),

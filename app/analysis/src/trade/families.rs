@@ -158,16 +158,13 @@ fn job<'a>(key: &str) -> Result<Job<'a>, String> {
     let family = by_key(key).map_err(|err| err.to_string())?;
     // A decade between relaxation times, a few newtons over 30 mm.
     let outer = family.outer();
-    let outer: Vec<f64> = outer
-        .iter()
-        .enumerate()
-        .map(|(i, one)| match one.unit {
-            "s" => 0.1 * 10f64.powi(i as i32),
-            "1/mm" => 0.15,
-            _ if one.name == "alpha" => 0.5,
-            _ => 300.0,
-        })
-        .collect();
+    let outer = outer.iter().enumerate().map(|(i, one)| match one.unit {
+        "s" => 0.1 * 10f64.powi(i as i32),
+        "1/mm" => 0.15,
+        _ if one.name == "alpha" => 0.5,
+        _ => 300.0,
+    });
+    let outer: Vec<f64> = outer.collect();
     let linear = vec![0.01; family.linear().len()];
     let start = family
         .model(&outer, &linear)

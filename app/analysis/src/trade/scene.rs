@@ -161,15 +161,12 @@ fn with_times(curves: &mut SceneCurves, costs: &[Cost], rows: &[FamilyRow]) {
         // A step longer than a tick is made in one tick of several, which must have the time.
         point.cost_us = of_schemes[scheme.unwrap_or(0)] * (TICK / point.step_s).max(1.0);
     }
-    curves.families = rows
-        .iter()
-        .zip(micros)
-        .map(|(row, cost_us)| FamilyPoint {
-            family: row.family.clone(),
-            error_n: row.error_n,
-            cost_us,
-        })
-        .collect();
+    let point = |(row, cost_us): (&FamilyRow, f64)| FamilyPoint {
+        family: row.family.clone(),
+        error_n: row.error_n,
+        cost_us,
+    };
+    curves.families = rows.iter().zip(micros).map(point).collect();
 }
 
 #[cfg(test)]

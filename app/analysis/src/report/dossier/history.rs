@@ -7,7 +7,7 @@ use super::Subject;
 use palpate_figures::page::Body;
 use palpate_protocols::engine::{Effect, Record};
 use palpate_runner::fidelity::{Achieved, Fidelity};
-use palpate_sessions::analyses::Analysed;
+use palpate_sessions::analyses::{Analysed, Analysis};
 use palpate_sessions::record::EntryKind;
 
 /// Events listed at most: a page with more is not read.
@@ -117,22 +117,20 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
         body.paragraph("The session has no analyses.");
         return;
     }
-    let rows: Vec<Vec<String>> = made
-        .iter()
-        .map(|one| {
-            let withdrawn = kept::withdrawn(analyses, &one.name);
-            vec![
-                one.name.clone(),
-                one.what.word().to_owned(),
-                said::at(&one.at),
-                one.by.clone(),
-                one.reason.clone(),
-                kept::deed(&one.what),
-                format!("palpate {}", one.software_version),
-                withdrawn.unwrap_or_else(|| "counts".to_owned()),
-            ]
-        })
-        .collect();
+    let row = |one: &&Analysis| {
+        let withdrawn = kept::withdrawn(analyses, &one.name);
+        vec![
+            one.name.clone(),
+            one.what.word().to_owned(),
+            said::at(&one.at),
+            one.by.clone(),
+            one.reason.clone(),
+            kept::deed(&one.what),
+            format!("palpate {}", one.software_version),
+            withdrawn.unwrap_or_else(|| "counts".to_owned()),
+        ]
+    };
+    let rows: Vec<Vec<String>> = made.iter().map(row).collect();
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses, in the order made", &heads, &rows);
     for one in made {
