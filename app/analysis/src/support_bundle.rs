@@ -65,7 +65,7 @@ pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError>
 }
 
 fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleError> {
-    let mut bundle = Bundle {
+    let mut bundle = BundleWriter {
         zip: ZipWriter::new(draft.writer()).set_auto_large_file(),
         files: Vec::new(),
         to: request.to.display().to_string(),
@@ -91,7 +91,7 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
     for session in &request.sessions {
         bundle.session(session)?;
     }
-    let Bundle { zip, files, to } = bundle;
+    let BundleWriter { zip, files, to } = bundle;
     let written = zip.finish().map_err(io::Error::from);
     written
         .and_then(|mut out| out.flush())
@@ -99,13 +99,13 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
     Ok(files)
 }
 
-struct Bundle<'a> {
+struct BundleWriter<'a> {
     zip: ZipWriter<BufWriter<&'a File>>,
     files: Vec<Bundled>,
     to: String,
 }
 
-impl Bundle<'_> {
+impl BundleWriter<'_> {
     fn text(&mut self, name: &str, what: &'static str, text: &str) -> Result<(), BundleError> {
         self.add(name, what, &mut text.as_bytes())
     }

@@ -388,7 +388,7 @@ fn the_day_in_the_laboratory_is_a_programme() {
     assert_eq!(programme(&text).questions(), []);
 }
 
-const TOLD: &str = r#"
+const LABELLED: &str = r#"
 palpate-programme = 1
 name = "labelled"
 title = "Told"
@@ -430,7 +430,7 @@ protocol = "sine"
 
 #[test]
 fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for() {
-    let text = TOLD.replace("specimen-source = \"x\"\n", "");
+    let text = LABELLED.replace("specimen-source = \"x\"\n", "");
     let mut whole = programme(&text);
     // Without a source the two protocols that ask for it say so, each at its line.
     let asked = whole.questions();
@@ -475,7 +475,7 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
 #[test]
 fn impossible_labels_are_refused_with_their_line() {
     let wrong = |from: &str, to: &str| {
-        let text = TOLD.replace(from, to);
+        let text = LABELLED.replace(from, to);
         let refusal = Programme::read(&text, &|name| Err(format!("no protocol '{name}'")));
         refusal.unwrap_err()
     };
@@ -517,7 +517,7 @@ fn the_programme_of_the_guide_is_one() {
 
 #[test]
 fn the_probe_leaves_the_tissue_before_a_specimen_is_looked_after_anew() {
-    let whole = programme(&TOLD.replace("specimen-source = \"x\"\n", ""));
+    let whole = programme(&LABELLED.replace("specimen-source = \"x\"\n", ""));
     let words = |remount| -> Vec<String> {
         let plan = whole.tasks[2].plan(1, remount).unwrap();
         let steps = plan.steps.iter().take(4);

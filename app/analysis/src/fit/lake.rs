@@ -164,7 +164,7 @@ impl LakeRequest<'_> {
         Ok(Outcome::Made)
     }
 
-    /// Everything that determines a fit besides its session.
+    /// Everything that determines a fit apart from its session.
     fn settings(&self, model: &str) -> Value {
         let sorted = |words: &[String]| {
             let mut words: Vec<&str> = words.iter().map(|word| word.trim()).collect();

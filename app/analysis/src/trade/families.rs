@@ -1,6 +1,6 @@
 //! Families by terms: the cost of a step, and the error of the force with fewer terms.
 
-use super::paths::{Paths, difference, peak};
+use super::paths::{ReferencePaths, difference, peak};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -99,7 +99,7 @@ fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
     by_key(key).map_err(|err| err.to_string())?.model(outer, linear).map_err(|err| err.to_string())
 }
 
-pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, String> {
+pub(super) fn rows(extent: Extent, paths: &ReferencePaths) -> Result<Vec<FamilyRow>, String> {
     let mut rows = Vec::new();
     for target in &TARGETS {
         let mut path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();

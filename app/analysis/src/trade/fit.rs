@@ -1,6 +1,6 @@
 //! The fit of a recording, thinned.
 
-use super::paths::{Paths, TICKS, difference};
+use super::paths::{ReferencePaths, TICKS, difference};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
 use palpate_model::random::SplitMix;
@@ -22,7 +22,7 @@ const RATE: f64 = 1000.0;
 pub(super) fn rows(
     extent: Extent,
     [first, count]: [u64; 2],
-    paths: &Paths,
+    paths: &ReferencePaths,
 ) -> Result<Vec<FitRow>, String> {
     let thinned = extent.choose(&THINNED[..], &THINNED_QUICK);
     let recordings: Result<Vec<_>, String> =
@@ -51,7 +51,7 @@ pub(super) fn rows(
 }
 
 /// Forces in N of a body at the moments of comparison.
-fn along(body: &ModifiedKelvin, paths: &Paths) -> Vec<f64> {
+fn along(body: &ModifiedKelvin, paths: &ReferencePaths) -> Vec<f64> {
     let mut state = KelvinState::at_rest();
     let mut before = Seconds(0.0);
     let points = paths.ramp_hold.checkpoints();
@@ -65,7 +65,11 @@ fn along(body: &ModifiedKelvin, paths: &Paths) -> Vec<f64> {
 }
 
 /// The thesis protocol at 1 kHz with white noise.
-pub(super) fn recording(seed: u64, noise: f64, paths: &Paths) -> Result<Vec<FitSample>, String> {
+pub(super) fn recording(
+    seed: u64,
+    noise: f64,
+    paths: &ReferencePaths,
+) -> Result<Vec<FitSample>, String> {
     let step = (TICKS as f64 / RATE) as u64;
     let depths: Vec<f64> = paths.ramp_hold.depths(step).collect();
     let mut forces = Vec::new();
@@ -88,7 +92,11 @@ fn thin(samples: &[FitSample], keep: usize) -> Vec<FitSample> {
     samples.iter().step_by(keep).copied().collect()
 }
 
-pub(super) fn jobs<'a>(rows: &[FitRow], seed: u64, paths: &Paths) -> Result<Vec<Job<'a>>, String> {
+pub(super) fn jobs<'a>(
+    rows: &[FitRow],
+    seed: u64,
+    paths: &ReferencePaths,
+) -> Result<Vec<Job<'a>>, String> {
     let recording = recording(seed, NOISE, paths)?;
     let job = |row: &FitRow| {
         let reduced = thin(&recording, (RATE / row.rate_hz).round() as usize);

@@ -61,7 +61,7 @@ pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCu
 /// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
 /// `progress` ended it.
 pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
-    let paths = paths::Paths::new()?;
+    let paths = paths::ReferencePaths::new()?;
     // Seeds of the noise in the fits: the first, and how many.
     let seeds = extent.choose([1, 8], [1, 2]);
     let next = |done: usize, what: &str| progress.tell(done, TABLES, what).continue_value();
@@ -95,7 +95,7 @@ fn times(
     extent: Extent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<TradeCurves>, String> {
-    let paths = paths::Paths::new()?;
+    let paths = paths::ReferencePaths::new()?;
     let mut jobs: Vec<Job> = Vec::new();
     jobs.extend(integrators::jobs());
     jobs.extend(families::jobs(&curves.families)?);

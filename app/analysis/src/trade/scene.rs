@@ -132,7 +132,7 @@ pub fn measure_scene(
         }
         jobs.push(integrators::job::<f64>(scheme));
     }
-    let mut rows = families::rows(extent, &paths::Paths::new()?)?;
+    let mut rows = families::rows(extent, &paths::ReferencePaths::new()?)?;
     rows.retain(|row| row.target == families::THESIS);
     jobs.extend(families::jobs(&rows)?);
     let costs = timing::measure(&mut jobs, extent, &mut || {

@@ -86,7 +86,7 @@ impl Page {
             purpose: programme.purpose.clone(),
             ..Self::default()
         };
-        let mut bodies = Bodies::default();
+        let mut bodies = FittedBodies::default();
         for (index, task) in programme.tasks.iter().enumerate() {
             tell(&task.name);
             let mut part = TaskPart {
@@ -105,7 +105,7 @@ impl Page {
     fn add_run(
         &mut self,
         part: &mut TaskPart,
-        bodies: &mut Bodies,
+        bodies: &mut FittedBodies,
         task: &Task,
         (place, session, ending): &(Place, PathBuf, Option<String>),
         folder: &Path,
@@ -234,7 +234,7 @@ impl TaskPart {
     }
 
     /// What one session adds: a calibration, cycles, a fit or the error of a prediction.
-    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut Bodies) {
+    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut FittedBodies) {
         if task.calibrates {
             match calibration_of(session, &task.name) {
                 Ok(calibration) => self.calibration(&calibration),
@@ -282,7 +282,7 @@ impl TaskPart {
         task: &Task,
         name: &str,
         (fitted, report): (&Fitted, &FitReport),
-        bodies: &mut Bodies,
+        bodies: &mut FittedBodies,
     ) {
         let samples = fitted.samples.as_slice();
         self.line(&format!("{name}:"));
@@ -338,14 +338,14 @@ impl TaskPart {
 
 /// Fitted bodies that later tasks are compared with.
 #[derive(Default)]
-struct Bodies {
+struct FittedBodies {
     /// Name of a task and the body of its first session that was fitted.
     known: Vec<(String, ModifiedKelvin)>,
     /// Name of a task and why a session of it was not fitted.
     left_out: Vec<(String, String)>,
 }
 
-impl Bodies {
+impl FittedBodies {
     fn of(&self, task: &str) -> Result<&(String, ModifiedKelvin), String> {
         let body = self.known.iter().find(|(known, _)| known == task);
         body.ok_or_else(|| {
