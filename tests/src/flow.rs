@@ -26,7 +26,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tempfile::TempDir;
 
-/// The window under test.
 pub type Window = Harness<'static, WorkbenchApp>;
 
 /// A screen of a window.
@@ -47,7 +46,6 @@ pub const FRAME: Duration = Duration::from_millis(5);
 
 /// A window on a simulated rig, driven by accessible name.
 pub struct Flow {
-    /// The window.
     pub window: Window,
     /// Where its sessions go.
     pub folder: TempDir,
@@ -68,7 +66,6 @@ impl Flow {
         Self::open_on(options, folder)
     }
 
-    /// The same on any rig.
     #[must_use]
     pub fn open_on(mut options: WindowOptions, folder: TempDir) -> Self {
         options.sessions = Some(folder.path().to_path_buf());
@@ -119,13 +116,11 @@ impl Flow {
         assert!(self.run().is_some_and(|run| is_there(&run)), "{}", self.story());
     }
 
-    /// The run on the screen.
     #[must_use]
     pub fn run(&self) -> Option<RunView> {
         self.window.state().snapshot().run.clone()
     }
 
-    /// Types into a named field.
     pub fn type_into(&mut self, name: &str, text: &str) {
         self.window.get_by_label(name).focus();
         self.window.step();
@@ -133,7 +128,6 @@ impl Flow {
         self.window.run_steps(2);
     }
 
-    /// Presses a named control.
     pub fn click(&mut self, name: &str) {
         // By name and not by place: a control may be scrolled out of sight.
         self.window.get_by_label(name).click_accesskit();

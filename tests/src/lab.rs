@@ -17,35 +17,28 @@ const TICK: Nanos = Nanos::from_millis(10);
 /// A sample with what the engine made of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// The sample.
     pub reading: Reading,
-    /// Derived from it.
     pub derived: Derived,
-    /// What the run was doing.
     pub phase: Phase,
-    /// Which repeat.
     pub cycle: u32,
-    /// Step of the plan.
     pub step_index: usize,
 }
 
-/// What most plans begin with: self-test, home, tare, contact.
+/// The usual first steps of a plan: self-test, home, tare, contact.
 #[must_use]
 pub fn set_up(tare: Seconds, contact: FindContact) -> Vec<Step> {
     approach(tare, contact)
 }
 
-/// What they end with.
+/// The usual last step of a plan.
 #[must_use]
 pub fn retract() -> Step {
     LEAVE
 }
 
-/// A run under way.
+/// A run of the engine without a runner.
 pub struct Lab<R: Rig> {
-    /// The rig.
     pub rig: R,
-    /// The engine.
     pub state: Option<State>,
     /// Time of the newest input.
     pub now: Nanos,
@@ -60,7 +53,6 @@ pub struct Lab<R: Rig> {
     is_keeping: bool,
     /// Whether prompts are answered at once.
     pub is_answering: bool,
-    /// How the run ended.
     pub outcome: Option<Outcome>,
 }
 
@@ -148,7 +140,6 @@ impl<R: Rig> Lab<R> {
         }
     }
 
-    /// The operator asks for something.
     pub fn operator(&mut self, choice: Operator) {
         self.give(Input::Operator { choice });
     }

@@ -51,11 +51,11 @@ pub fn original() -> Session {
 pub fn write(library: &Path, original: &Session, number: usize) -> PathBuf {
     let mut labels = Labels::default();
     let thickness = 5.0 + (number % 100) as f64 / 10.0;
-    let told = [
+    let metadata = [
         ("specimen.thickness_mm", thickness.to_string()),
         ("specimen.source", "pig stomach, fundus".into()),
     ];
-    for (key, value) in told {
+    for (key, value) in metadata {
         labels.tell(key, &value).expect("a key that is known");
     }
     let mut plan = original.manifest.plan.clone();
@@ -86,7 +86,7 @@ pub fn write(library: &Path, original: &Session, number: usize) -> PathBuf {
     log.finish(end).expect("an end");
     let folder = library.join("sessions").join(&manifest.session_id);
     fs::create_dir_all(&folder).expect("a folder");
-    let bytes = memory.0.lock().expect("nobody else writes");
+    let bytes = memory.0.lock().expect("no other writer");
     fs::write(folder.join("000.mcap"), bytes.as_slice()).expect("room on the disk");
     let verdict = [Verdict::Valid, Verdict::Suspect][usize::from(number % 9 == 8)];
     let edit = Edit {

@@ -18,13 +18,10 @@ const CRUISING: f64 = 1e-9;
 
 /// A search that has ended.
 pub struct Searched {
-    /// How.
     pub outcome: Outcome,
-    /// What was found.
     pub contact: Option<Contact>,
     /// True surface on the scale of the pulse counter, in mm.
     pub surface_mm: f64,
-    /// True body.
     pub body: ModifiedKelvin,
     /// Highest true force during the search, in N.
     pub force_true_max: f64,
@@ -32,9 +29,8 @@ pub struct Searched {
     pub force_filtered_max: f64,
     /// Depths between which the second pass went at its speed, in mm.
     pub pass: [f64; 2],
-    /// What the engine wrote down.
+    /// Records of the engine.
     pub records: Vec<Record>,
-    /// Time the search took.
     pub duration: Seconds,
 }
 

@@ -12,17 +12,14 @@ use std::sync::Arc;
 
 /// A run that has ended, or holds after a stop.
 pub struct Run {
-    /// The rig as the run left it.
     pub rig: SimRig,
-    /// The engine's last state.
     pub state: State,
-    /// What the engine wrote down.
+    /// Records of the engine.
     pub records: Vec<Record>,
     /// True force at its highest while contact was searched, in N.
     pub force_peak_in_contact_search: f64,
-    /// Samples of the hold.
     pub hold_ticks: u64,
-    /// Ramp and hold, as a fit takes them.
+    /// Samples of ramp and hold.
     pub samples: Vec<FitSample>,
 }
 

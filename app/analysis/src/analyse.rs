@@ -1,4 +1,4 @@
-//! From recordings on disk to what their cycles show.
+//! Cycle analysis of recordings on disk.
 
 use crate::cycles;
 use crate::progress::Progress;
@@ -8,23 +8,18 @@ use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// A recording shows no cycles.
 #[derive(Debug, Error)]
 pub enum AnalyseFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Nothing in it is a cycle.
     #[error(
-        "no way in with at least 20 samples was found in {}; record one, or name the frequency of a sine", .0.display()
+        "no loading with at least 20 samples is in {}; record a cycle, or name the frequency of a sine", .0.display()
     )]
     NoCycles(PathBuf),
-    /// Nobody wants the rest.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Analyses every recording by itself, in order.
 pub fn analyse(
     paths: &[PathBuf],
     columns: Option<&ColumnNames>,

@@ -1,34 +1,31 @@
 //! A session as one of its analyses reads it, and the record of a new one.
 //!
-//! A recalibration makes every force anew from the raw signal and the tares that were found; a mask names
+//! A recalibration recalculates every force from the raw signal and the tares that were found; a mask names
 //! stretches whose forces do not count. The log itself stays as it is.
 
 use crate::edited::{self, Edited};
-use crate::source::{SourceError, calibration_of, decisions, decisions_among};
+use crate::source::{SourceError, calibration_of, decisions_among, records};
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::units::{Seconds, Volts};
-use palpate_protocols::engine::{ENGINE_VERSION, Effect, Record};
+use palpate_protocols::engine::{ENGINE_VERSION, Record};
 use palpate_runner::wall_now;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };
-use palpate_sessions::log::{Outline, ReadError, Session};
-use palpate_sessions::record::Row;
+use palpate_sessions::{Entry, Outline, ReadError, Row, Session};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A session with its edits made, read as an analysis has it.
+/// A session with its edits applied, as one of its analyses reads it.
 #[derive(Clone, Debug)]
 pub struct Opened {
-    /// The session and its edits.
     pub edited: Edited,
-    /// Its analyses.
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
 }
 
-/// What another calibration does to the forces of a session.
+/// Effect of another calibration on the forces of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ForceChange {
     /// Samples with a force.
@@ -47,72 +44,61 @@ pub struct ForceChange {
 pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
     let mut edited = edited::open(path)?;
     let analyses = Analyses::read(path, &edited.session.manifest.session_id)?;
-    let read_by = ReadBy::of(path, &analyses, name)?;
+    let reading = AnalysisReading::of(path, &analyses, name)?;
     let session = &mut edited.session;
-    session.notes.extend(read_by.notes);
-    if let Some((_, calibration)) = &read_by.calibration {
+    session.notes.extend(reading.notes);
+    if let Some((_, calibration)) = &reading.calibration {
         recalibrate(session, calibration)?;
     }
-    Ok(Opened { edited, analyses, left_out_s: read_by.left_out_s })
+    Ok(Opened { edited, analyses, left_out_s: reading.left_out_s })
 }
 
-/// What an analysis reads a session with.
+/// Calibration and mask of an analysis and of the analyses it is based on.
 #[derive(Default)]
-struct ReadBy {
-    /// What is to be said of that.
+struct AnalysisReading {
     notes: Vec<String>,
-    /// The calibration that forces are made anew with, as it was written and as it is.
+    /// The calibration that forces are recalculated with, as it was written and as it is.
     calibration: Option<(serde_json::Value, Calibration)>,
-    /// Stretches whose forces do not count.
+    /// Intervals whose forces do not count, in s since the first sample.
     left_out_s: Vec<[f64; 2]>,
 }
 
-impl ReadBy {
+impl AnalysisReading {
     fn of(path: &Path, analyses: &Analyses, name: Option<&str>) -> Result<Self, SourceError> {
-        let mut read_by = Self::default();
+        let mut reading = Self::default();
         // A fit reads the session as what it is based on did. Each is older than the one that names it.
         let mut next = name.map(str::to_owned);
         while let Some(name) = next.take() {
             let one = analyses.get(&name)?.clone();
             let changed = changed_inputs(&one, &inputs_of(path)?);
-            read_by.notes.extend(made_before(&name, &changed));
+            if !changed.is_empty() {
+                let changed = changed.join(", ");
+                reading.notes.push(format!("analysis '{name}' was made before {changed} changed"));
+            }
             match one.what {
                 Analysed::Fit { based_on, .. } => next = based_on,
                 Analysed::Recalibration { calibration, .. } => {
-                    let own = serde_json::from_value(calibration.clone());
-                    let own = own.map_err(bad_calibration)?;
-                    read_by.notes.push(made_with(&name, &own));
-                    read_by.calibration = Some((calibration, own));
+                    let own: Calibration =
+                        serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;
+                    reading.notes.push(format!(
+                        "forces are made from the raw signal with calibration {}, as analysis '{name}' has it",
+                        own.name
+                    ));
+                    reading.calibration = Some((calibration, own));
                 }
                 Analysed::Mask { left_out_s } => {
-                    read_by.notes.push(masked(&name, left_out_s.len()));
-                    read_by.left_out_s = left_out_s;
+                    reading.notes.push(format!(
+                        "forces in {} stretches do not count, as analysis '{name}' has it",
+                        left_out_s.len()
+                    ));
+                    reading.left_out_s = left_out_s;
                 }
                 // It never counts, so it is not found.
                 Analysed::Withdrawal => {}
             }
         }
-        Ok(read_by)
+        Ok(reading)
     }
-}
-
-fn made_before(name: &str, changed: &[String]) -> Option<String> {
-    let words = || {
-        let changed = changed.join(", ");
-        format!("analysis '{name}' was made before {changed} changed")
-    };
-    (!changed.is_empty()).then(words)
-}
-
-fn made_with(name: &str, calibration: &Calibration) -> String {
-    let with = &calibration.name;
-    format!(
-        "forces are made from the raw signal with calibration {with}, as analysis '{name}' has it"
-    )
-}
-
-fn masked(name: &str, stretches: usize) -> String {
-    format!("forces in {stretches} stretches do not count, as analysis '{name}' has it")
 }
 
 impl Opened {
@@ -157,39 +143,52 @@ pub(super) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds
     session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
 
-/// The tares among decisions, each after so many samples.
-fn tares(decisions: &[(u64, Effect)]) -> impl Iterator<Item = (u64, Volts)> {
-    decisions.iter().filter_map(|(after, effect)| match effect {
-        Effect::Record(Record::Tared { volts, .. }) => Some((*after, *volts)),
-        _ => None,
-    })
+/// What recalculates forces: a curve, and the tares found, each after so many samples.
+#[derive(Clone, Debug)]
+struct Recalibration {
+    curve: Curve,
+    tares: Vec<(u64, Volts)>,
 }
 
-/// Makes every force of a session anew from its raw signal with a calibration, which takes the place of its
+impl Recalibration {
+    fn new(calibration: &Calibration, entries: &[Entry]) -> Result<Self, SourceError> {
+        let curve = calibration.curve().map_err(bad_calibration)?;
+        let decisions = decisions_among(entries)?;
+        let tares = records(&decisions).filter_map(|(after, record)| match record {
+            Record::Tared { volts, .. } => Some((after, *volts)),
+            _ => None,
+        });
+        Ok(Self { curve, tares: tares.collect() })
+    }
+
+    /// The recalculated force of a sample in N. One whose force was not known, such as one before the tare, has none.
+    fn force(&self, index: u64, row: &Row) -> Option<f64> {
+        row.force?;
+        let found = self.tares.partition_point(|(after, _)| *after <= index);
+        let tare = found.checked_sub(1).map(|latest| self.tares[latest].1);
+        Some(self.curve.newtons_above(Volts(row.volts?), tare).0)
+    }
+}
+
+/// Recalculates every force of a session from its raw signal with a calibration, which takes the place of its
 /// own. A sample whose force was not known, such as one before the tare, stays so.
 pub fn recalibrate(
     session: &mut Session,
     calibration: &Calibration,
 ) -> Result<ForceChange, SourceError> {
-    let curve = calibration.curve().map_err(bad_calibration)?;
-    let found = decisions(session)?;
-    let mut tares = tares(&found).peekable();
-    let (mut tare, mut change, mut squares) = (None, ForceChange::default(), 0.0);
+    let recalibration = Recalibration::new(calibration, &session.entries)?;
+    let (mut change, mut squares) = (ForceChange::default(), 0.0);
     let higher = |peak: Option<f64>, force: f64| Some(peak.map_or(force, |peak| peak.max(force)));
-    for (index, row) in session.rows.iter_mut().enumerate() {
-        while let Some((_, volts)) = tares.next_if(|(after, _)| *after <= index as u64) {
-            tare = Some(volts);
-        }
-        let (Some(force), Some(volts)) = (&mut row.force, row.volts) else {
+    for (index, row) in (0..).zip(&mut session.rows) {
+        let (Some(force_n), Some(force)) = (recalibration.force(index, row), &mut row.force) else {
             continue;
         };
-        let anew = curve.newtons_above(Volts(volts), tare).0;
         change.samples += 1;
-        squares += (anew - *force).powi(2);
-        change.max_n = change.max_n.max((anew - *force).abs());
+        squares += (force_n - *force).powi(2);
+        change.max_n = change.max_n.max((force_n - *force).abs());
         change.peak_before_n = higher(change.peak_before_n, *force);
-        change.peak_after_n = higher(change.peak_after_n, anew);
-        *force = anew;
+        change.peak_after_n = higher(change.peak_after_n, force_n);
+        *force = force_n;
     }
     if change.samples > 0 {
         change.rms_n = (squares / change.samples as f64).sqrt();
@@ -203,12 +202,10 @@ pub fn recalibrate(
 pub struct Passing {
     /// The session with its edits made; its manifest has the calibration that the forces are made with.
     pub edited: edited::Passing,
-    /// Its analyses.
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
-    /// What forces are made anew with: the curve, and each tare after so many samples.
-    anew: Option<(Curve, Vec<(u64, Volts)>)>,
+    recalibration: Option<Recalibration>,
 }
 
 /// Reads a session through, so that it is known to be whole, and keeps all but its samples.
@@ -216,7 +213,6 @@ pub fn passing(path: &Path, name: Option<&str>) -> Result<Passing, SourceError> 
     of_outline(path, Session::scan(path, &mut |_block| {})?, name)
 }
 
-/// The same of a session that was read through.
 pub fn of_outline(
     path: &Path,
     outline: Outline,
@@ -224,45 +220,34 @@ pub fn of_outline(
 ) -> Result<Passing, SourceError> {
     let mut edited = edited::of_outline(path, outline)?;
     let analyses = Analyses::read(path, &edited.outline.manifest.session_id)?;
-    let read_by = ReadBy::of(path, &analyses, name)?;
+    let reading = AnalysisReading::of(path, &analyses, name)?;
     let outline = &mut edited.outline;
-    outline.notes.extend(read_by.notes);
-    let mut anew = None;
-    if let Some((document, calibration)) = read_by.calibration {
-        let curve = calibration.curve().map_err(bad_calibration)?;
-        let found = decisions_among(&outline.entries)?;
-        anew = Some((curve, tares(&found).collect()));
+    outline.notes.extend(reading.notes);
+    let mut recalibration = None;
+    if let Some((document, calibration)) = reading.calibration {
+        recalibration = Some(Recalibration::new(&calibration, &outline.entries)?);
         outline.manifest.calibration = document;
     }
-    Ok(Passing { edited, analyses, left_out_s: read_by.left_out_s, anew })
+    Ok(Passing { edited, analyses, left_out_s: reading.left_out_s, recalibration })
 }
 
 impl Passing {
     /// Whether samples are other than those recorded.
     pub fn is_changed(&self) -> bool {
-        self.anew.is_some() || self.edited.is_changed()
+        self.recalibration.is_some() || self.edited.is_changed()
     }
 
     /// Hands out every sample that was there when the session was first read, as the analysis has it, in order,
     /// some at a time.
     pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
-        let Some((curve, tares)) = &self.anew else {
-            return self.edited.rows(path, visit);
-        };
-        let (mut index, mut tare) = (0, None);
-        let mut tares = tares.iter().peekable();
-        let mut own = Vec::new();
+        let Some(recalibration) = &self.recalibration else { return self.edited.rows(path, visit) };
+        let (mut index, mut own) = (0, Vec::new());
         self.edited.rows(path, &mut |rows| {
             own.clear();
             own.extend_from_slice(rows);
             for row in &mut own {
-                while let Some((_, volts)) = tares.next_if(|(after, _)| *after <= index) {
-                    tare = Some(*volts);
-                }
+                row.force = recalibration.force(index, row).or(row.force);
                 index += 1;
-                if let (Some(force), Some(volts)) = (&mut row.force, row.volts) {
-                    *force = curve.newtons_above(Volts(volts), tare).0;
-                }
             }
             visit(&own);
         })
@@ -290,7 +275,7 @@ pub fn recalibration(
     Ok((opened, inputs, what, change))
 }
 
-/// A record that is made now by this program.
+/// A record of this version of the program, dated now.
 #[must_use]
 pub fn record(name: &str, by: &str, reason: &str, inputs: Vec<Input>, what: Analysed) -> Analysis {
     Analysis {
@@ -324,7 +309,7 @@ mod tests {
             println!("{name}: {change:?}");
             assert!(change.samples > 50_000, "{name}: {change:?}");
             assert!(change.max_n <= 1e-9, "{name}: {change:?}");
-            // Were they not made anew at all, this would be so too: other forces are.
+            // Without any recalculation this would hold too, so the forces are changed first.
             let rows = &mut session.rows;
             rows.iter_mut().filter_map(|row| row.force.as_mut()).for_each(|force| *force = -1.0);
             recalibrate(&mut session, &own).unwrap();
@@ -377,9 +362,7 @@ mod tests {
         assert!(!heavier.steps.is_empty());
         recalibrate(&mut session, &heavier).unwrap();
         for (row, old) in session.rows.iter().zip(&before.rows) {
-            let (Some(force), Some(old)) = (row.force, old.force) else {
-                continue;
-            };
+            let (Some(force), Some(old)) = (row.force, old.force) else { continue };
             assert!((force - 2.0 * old).abs() < 1e-9, "{force} against {old}");
         }
         assert_eq!(calibration_of(&session).unwrap(), heavier);

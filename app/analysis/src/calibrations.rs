@@ -1,4 +1,4 @@
-//! The library's calibrations read, judged and added to, away from the window's thread.
+//! Reading, assessing and storing the library's calibrations, away from the window's thread.
 
 use crate::report::calibration::{Entry, Told};
 use crate::report::calibration_plot::plots;
@@ -9,36 +9,34 @@ use palpate_runner::wall_now;
 use palpate_sessions::{Session, Shelf, age_days, save, supersede};
 use std::path::Path;
 
-/// What the library holds, judged, and what was just added to it.
+/// Calibrations of the library with their assessment, and the one just stored.
 pub struct Shelved {
-    /// The rig's own first, then those of the library by id.
+    /// The rig's own first, then those of the library by identifier.
     pub shown: Vec<Shown>,
-    /// Why others cannot be read.
+    /// Reasons for each calibration that cannot be read.
     pub unreadable: Vec<String>,
-    /// Id of the one just stored, or why it was not.
+    /// Identifier of the one just stored, or the reason it was not.
     pub kept: Option<Result<String, String>>,
 }
 
-/// One calibration with all that is told of it.
+/// One calibration with its details.
 pub struct Shown {
-    /// Its line in the list.
     pub entry: Entry,
-    /// The document.
     pub calibration: Calibration,
-    /// What it is like and its curves, or why it makes none.
+    /// Details and plots, or the reason there are none.
     pub told: Result<(Told, [Plot; 4]), String>,
-    /// What speaks against using it on the rig it is said to be of.
+    /// Reasons against using it on its rig.
     pub doubts: Vec<String>,
 }
 
 impl Shown {
     fn of(entry: Entry, calibration: Calibration, rig: &str) -> Self {
-        let told = Told::of(&calibration).and_then(|told| {
-            let plots = plots(&calibration, &told)?;
-            Ok((told, plots))
+        let details = Told::of(&calibration).and_then(|details| {
+            let plots = plots(&calibration, &details)?;
+            Ok((details, plots))
         });
         Self {
-            told: told.map_err(|err| err.to_string()),
+            told: details.map_err(|err| err.to_string()),
             doubts: calibration.doubts(&Bench {
                 rig,
                 age_days: entry.age_days,
@@ -65,9 +63,9 @@ pub fn read(
         doubts: Vec::new(),
         ..Shown::of(entry, own, &rig)
     }];
-    shown.extend(shelf.kept.iter().map(|kept| {
-        let age = age_days(&kept.document, now.into());
-        Shown::of(Entry::of(&shelf, kept, age), kept.document.clone(), &rig)
+    shown.extend(shelf.kept.iter().map(|stored| {
+        let age = age_days(&stored.document, now.into());
+        Shown::of(Entry::of(&shelf, stored, age), stored.document.clone(), &rig)
     }));
     Shelved { shown, unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(), kept }
 }
@@ -77,9 +75,9 @@ pub fn keep(library: &Path, session: &Path, name: &str) -> Result<String, String
     let session = Session::open(session).map_err(|err| err.to_string())?;
     let calibration = calibration_of(&session, name).map_err(|err| err.to_string())?;
     let shelf = Shelf::open(library);
-    let kept = match shelf.in_force(&calibration.rig) {
+    let stored = match shelf.in_force(&calibration.rig) {
         Some(old) => supersede(library, &old.id, &calibration),
         None => save(library, &calibration),
     };
-    kept.map(|kept| kept.id).map_err(|err| err.to_string())
+    stored.map(|stored| stored.id).map_err(|err| err.to_string())
 }

@@ -1,51 +1,43 @@
-//! How far a rig gives way: found from a session against a stiff surface, and taken from the depths of other
-//! sessions. The axis goes as far as the probe sinks in and the rig gives way, so the probe's own depth is
-//! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
+//! Machine compliance: measured from a session against a stiff surface, and subtracted from the depths of other
+//! sessions. The axis travels as far as the probe sinks in and the rig yields, so the probe's own depth is
+//! `depth - compliance * force`. Raw depths stay as they are; corrected ones stand beside them.
 
 use crate::source::{
-    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, trusted_samples,
+    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
 };
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
 use palpate_model::units::{Depth, Newtons, Position};
-use palpate_protocols::engine::{Effect, Record};
+use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
 use palpate_rheology::fit::FitSample;
 use palpate_sessions::compliances::{Kept, Shelf};
-use palpate_sessions::log::Session;
-use palpate_sessions::record::Row;
-use palpate_sessions::shelf::LibraryError;
+use palpate_sessions::{LibraryError, Row, Session};
 use palpate_tables::export::Beside;
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
 
-/// What asks for the compliance in force for a session's rig.
+/// Name that stands for the compliance in force for a session's rig.
 pub const LAST: &str = "last";
 
-/// A session tells no compliance.
 #[derive(Debug, Error)]
 pub enum MeasureError {
-    /// The session cannot be used.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It was recorded by another program.
     #[error(
-        "an imported session has no rig and no calibration, so it tells no compliance; run stiff-surface and name its session"
+        "an imported session has no rig and no calibration, so it gives no compliance; run stiff-surface and name its session"
     )]
     Imported,
-    /// No surface was searched, or none found.
     #[error(
         "the session found no stiff surface, so what it pressed may have been tissue; run stiff-surface and name its session"
     )]
     NoSurface,
-    /// The surface was found and never pressed.
     #[error(
         "the session found a stiff surface and did not press it with a known force; run stiff-surface to its end"
     )]
     NoPress,
-    /// The forces are not those of a rig that gives way.
     #[error(transparent)]
     Line(#[from] ComplianceError),
 }
@@ -78,13 +70,13 @@ pub fn measured(
     })
 }
 
-/// The ways in after a stiff surface was found, press by press.
+/// Loading samples after a stiff surface was found, press by press.
 fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
-    let found = decisions.iter().rev().find_map(|(after, effect)| match effect {
-        Effect::Record(Record::BaseFound { position, .. }) => Some((*after as usize, *position)),
+    let found = records(&decisions).rev().find_map(|(after, record)| match record {
+        Record::BaseFound { position, .. } => Some((after as usize, *position)),
         _ => None,
     });
     let (after, surface) = found.ok_or(MeasureError::NoSurface)?;
@@ -92,9 +84,7 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
     let rows = session.rows.iter().enumerate().take(trusted).skip(after);
     for (_, row) in rows {
-        let (Some(force), Some(depth)) = (row.force, row.depth) else {
-            continue;
-        };
+        let (Some(force), Some(depth)) = (row.force, row.depth) else { continue };
         if row.phase != Phase::Ramp || is_saturated(session, row) {
             continue;
         }
@@ -111,159 +101,142 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
     Ok(presses)
 }
 
-/// A compliance cannot be used on a record.
 #[derive(Debug, Error)]
 pub enum CorrectionError {
-    /// It cannot be read or found.
     #[error(transparent)]
     Library(#[from] LibraryError),
-    /// None is kept for the rig.
     #[error(
-        "the library has no compliance of rig {rig}; run stiff-surface on it and keep what its session tells"
+        "the library has no compliance of rig {rig}; run stiff-surface on it and store the compliance of that session"
     )]
-    NoneInForce {
-        /// The rig.
-        rig: String,
-    },
-    /// A table does not say where it is from.
+    NoneInForce { rig: String },
     #[error(
         "a table does not say which rig it is from, so there is no last compliance for it; name the compliance's file"
     )]
     NoRig,
-    /// Another rig gives way otherwise.
     #[error(
         "{id} is the compliance of rig {of}, and this was recorded on rig {rig}; name one of that rig"
     )]
-    OtherRig {
-        /// The document.
-        id: String,
-        /// Its rig.
-        of: String,
-        /// The record's rig.
-        rig: String,
-    },
+    OtherRig { id: String, of: String, rig: String },
 }
 
-/// What is asked about compliance.
+/// Which compliance corrects depths.
 #[derive(Debug)]
-enum Asked {
-    /// Depths stay raw.
+enum CorrectionChoice {
     Raw,
     /// The one in force for the rig of each record.
     InForce,
-    /// This one.
     This(Box<Kept>),
 }
 
-/// Which compliance goes with which record.
+/// Compliance for each record.
 #[derive(Debug)]
 pub struct Corrections {
-    asked: Asked,
+    choice: CorrectionChoice,
     shelf: Shelf,
 }
 
 impl Corrections {
-    /// Depths stay raw; with a library, what the compliance in force would change is told.
+    /// Depths stay raw; with a library, [`Self::apply`] computes what the compliance in force would change.
     #[must_use]
     pub fn none(library: Option<&Path>) -> Self {
-        Self { asked: Asked::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
+        Self { choice: CorrectionChoice::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
     }
 
     /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
     pub fn named(name: &str, library: Option<&Path>) -> Result<Self, CorrectionError> {
         let shelf = library.map(Shelf::open).unwrap_or_default();
         let path = Path::new(name);
-        let asked = if name == LAST {
-            Asked::InForce
+        let choice = if name == LAST {
+            CorrectionChoice::InForce
         } else if path.is_file() {
             let stem = path.file_stem().unwrap_or_default();
-            Asked::This(Box::new(Kept {
+            CorrectionChoice::This(Box::new(Kept {
                 id: stem.to_string_lossy().into_owned(),
                 path: path.into(),
                 document: palpate_sessions::shelf::read(path)?,
             }))
         } else {
-            Asked::This(Box::new(shelf.find(name)?.clone()))
+            CorrectionChoice::This(Box::new(shelf.find(name)?.clone()))
         };
-        Ok(Self { asked, shelf })
+        Ok(Self { choice, shelf })
     }
 
     /// The document for a record of a rig, and whether depths are corrected with it; a table has no rig.
     pub fn of_rig(&self, rig: Option<&str>) -> Result<Option<(&Kept, bool)>, CorrectionError> {
         let in_force = |rig: &str| self.shelf.in_force(rig);
-        match (&self.asked, rig) {
-            (Asked::Raw, rig) => Ok(rig.and_then(in_force).map(|kept| (kept, false))),
-            (Asked::InForce, None) => Err(CorrectionError::NoRig),
-            (Asked::InForce, Some(rig)) => match in_force(rig) {
-                Some(kept) => Ok(Some((kept, true))),
+        match (&self.choice, rig) {
+            (CorrectionChoice::Raw, rig) => {
+                Ok(rig.and_then(in_force).map(|stored| (stored, false)))
+            }
+            (CorrectionChoice::InForce, None) => Err(CorrectionError::NoRig),
+            (CorrectionChoice::InForce, Some(rig)) => match in_force(rig) {
+                Some(stored) => Ok(Some((stored, true))),
                 None => Err(CorrectionError::NoneInForce { rig: rig.into() }),
             },
-            (Asked::This(kept), Some(rig)) if kept.document.rig != rig => {
+            (CorrectionChoice::This(stored), Some(rig)) if stored.document.rig != rig => {
                 Err(CorrectionError::OtherRig {
-                    id: kept.id.clone(),
-                    of: kept.document.rig.clone(),
+                    id: stored.id.clone(),
+                    of: stored.document.rig.clone(),
                     rig: rig.into(),
                 })
             }
-            (Asked::This(kept), _) => Ok(Some((kept, true))),
+            (CorrectionChoice::This(stored), _) => Ok(Some((stored, true))),
         }
     }
 
-    /// Corrects what is to be fitted, where that is asked, and tells what the compliance does to it; `None`
-    /// where none is asked and none is kept.
+    /// Corrects what is to be fitted, where that is choice, and tells what the compliance does to it; `None`
+    /// where none is choice and none is kept.
     pub fn apply(&self, source: &mut FitSource) -> Result<Option<Correction>, CorrectionError> {
-        let Some((kept, is_applied)) = self.of_rig(source.rig.as_deref())? else {
+        let Some((stored, is_applied)) = self.of_rig(source.rig.as_deref())? else {
             return Ok(None);
         };
-        let told = Correction::of(kept, is_applied, &source.samples);
+        let correction = Correction::of(stored, is_applied, &source.samples);
         if is_applied {
-            correct_samples(&mut source.samples, &kept.document.compliance());
-            source.notes.extend(told.doubt.clone());
+            correct_samples(&mut source.samples, &stored.document.compliance());
+            source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
-            if let Asked::InForce = self.asked {
+            if let CorrectionChoice::InForce = self.choice {
                 let unreadable = self.shelf.unreadable.iter();
                 source.notes.extend(unreadable.map(ToString::to_string));
             }
         }
-        Ok(Some(told))
+        Ok(Some(correction))
     }
 }
 
-/// What a compliance does to the depths of a record.
+/// Effect of a compliance on the depths of a record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correction {
-    /// The document.
     pub id: String,
-    /// Way of the axis per force, in mm/N.
+    /// Machine compliance in mm/N.
     pub mm_per_n: f64,
-    /// Its standard uncertainty.
     pub std_error_mm_per_n: f64,
     /// Whether depths were corrected; if not, this is what would be.
     pub is_applied: bool,
     /// Highest force of the record, in N.
     pub force_peak_n: f64,
-    /// By how much the depth is less there, in um.
+    /// Decrease of the depth at that force, in um.
     pub at_peak_um: f64,
     /// The standard uncertainty of that in um, from that of the compliance.
     pub at_peak_std_error_um: f64,
-    /// What speaks against it.
+    /// Reason to doubt the correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doubt: Option<String>,
 }
 
 impl Correction {
-    fn of(kept: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
+    fn of(stored: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
         let known = samples.iter().filter(|sample| sample.is_measured());
         let peak = known.map(|sample| sample.force.0).fold(0.0, f64::max);
-        let document = &kept.document;
+        let document = &stored.document;
         let doubt = (peak > document.force_max_n).then(|| {
             format!(
-                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond, it is taken as a straight line",
+                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond that the compliance is extrapolated as a straight line",
                 document.force_max_n
             )
         });
         Self {
-            id: kept.id.clone(),
+            id: stored.id.clone(),
             mm_per_n: document.mm_per_n,
             std_error_mm_per_n: document.std_error_mm_per_n,
             is_applied,
@@ -274,17 +247,16 @@ impl Correction {
         }
     }
 
-    /// In a sentence.
     pub fn sentence(&self) -> String {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {
             format!(
-                "depths are corrected for the rig's compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
+                "depths are corrected for machine compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
                 self.at_peak_std_error_um
             )
         } else {
             format!(
-                "depths are raw; the rig's compliance {id} would make them {um:.0} um less at {peak:.2} N"
+                "depths are not corrected; machine compliance {id} would make them {um:.0} um less at {peak:.2} N"
             )
         }
     }
@@ -325,12 +297,12 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
 
 /// The corrected depths of a session as columns beside its own: empty before contact, and where the converter
 /// was at an end of its range or an interlock had tripped, for there the force is not known.
-pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
+pub fn columns(session: &Session, stored: &Kept) -> Result<Beside, SourceError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let noise = noise_of(&decisions);
-    let compliance = kept.document.compliance();
+    let compliance = stored.document.compliance();
     let one = |(index, row): (usize, &Row)| -> Option<CorrectedDepth> {
         let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
         if index >= trusted || is_saturated(session, row) {
@@ -341,14 +313,14 @@ pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
     let corrected: Vec<Option<CorrectedDepth>> = session.rows.iter().enumerate().map(one).collect();
     let column = |of: fn(CorrectedDepth) -> f64| corrected.iter().map(|one| one.map(of)).collect();
     let document = serde_json::json!({
-        "id": kept.id,
-        "rig": kept.document.rig,
-        "taken_at": kept.document.taken_at,
-        "session_id": kept.document.session_id,
-        "session_checksum": kept.document.session_checksum,
-        "checksum": kept.checksum(),
-        "mm_per_n": kept.document.mm_per_n,
-        "std_error_mm_per_n": kept.document.std_error_mm_per_n,
+        "id": stored.id,
+        "rig": stored.document.rig,
+        "taken_at": stored.document.taken_at,
+        "session_id": stored.document.session_id,
+        "session_checksum": stored.document.session_checksum,
+        "checksum": stored.checksum(),
+        "mm_per_n": stored.document.mm_per_n,
+        "std_error_mm_per_n": stored.document.std_error_mm_per_n,
     });
     Ok(Beside {
         columns: vec![

@@ -1,8 +1,9 @@
-//! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
+//! Reads sessions and foreign tables for a cycle analysis.
 
 use crate::edited;
 use crate::source::{
-    SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
+    SourceError, calibration_of, decisions, is_saturated, records, table_of_imported,
+    trusted_samples,
 };
 use crate::sources::is_session;
 use palpate_model::calibration::Calibration;
@@ -10,12 +11,11 @@ use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_rheology::cycles::{CycleSample, by_depth};
-use palpate_sessions::log::Session;
-use palpate_sessions::record::Row;
+use palpate_sessions::{Row, Session};
 use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 
-/// A record in cycles, and what a reader should know about it.
+/// Samples of a record in cycles, with remarks on them.
 #[derive(Clone, Debug, Default)]
 pub struct CycleSource {
     /// Every sample with known force and depth, in order of time. Depths count from the first contact found.
@@ -50,9 +50,8 @@ pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, S
     Ok(of_table(&table, notes))
 }
 
-/// What an analysis takes of a table or an imported session.
 fn of_table(table: &Table, mut notes: Vec<String>) -> CycleSource {
-    notes.push("a table: its cycles, holds and ways back are told from the depth".into());
+    notes.push("a table: its cycles, holds and unloading are found from the depth".into());
     CycleSource {
         samples: by_depth(&table.t, &table.depth, &table.force),
         notes,
@@ -83,9 +82,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let mut places = Vec::with_capacity(session.rows.len());
     for (index, row) in session.rows.iter().enumerate() {
         places.push(source.samples.len());
-        let (Some(force), Some(depth)) = (row.force, row.depth) else {
-            continue;
-        };
+        let (Some(force), Some(depth)) = (row.force, row.depth) else { continue };
         if index >= trusted || is_saturated(session, row) {
             left_out += 1;
             continue;
@@ -129,13 +126,11 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
 
 /// Contacts found, each after so many samples.
 fn contacts(decisions: &[(u64, Effect)]) -> Vec<(u64, Position)> {
-    decisions
-        .iter()
-        .filter_map(|(after, effect)| match effect {
-            Effect::Record(Record::ContactFound { position, .. }) => Some((*after, *position)),
-            _ => None,
-        })
-        .collect()
+    let found = records(decisions).filter_map(|(after, record)| match record {
+        Record::ContactFound { position, .. } => Some((after, *position)),
+        _ => None,
+    });
+    found.collect()
 }
 
 /// How far the contact that held at a sample was from the first one.
@@ -149,18 +144,16 @@ fn offset_at(contacts: &[(u64, Position)], index: usize) -> Depth {
 
 /// Steps of the plan, each from the sample that it began with: the one that led to it.
 fn steps(decisions: &[(u64, Effect)]) -> Vec<(u64, u32)> {
-    decisions
-        .iter()
-        .filter_map(|(after, effect)| match effect {
-            Effect::Record(Record::PhaseStarted { step_index, .. }) => {
-                Some((after.saturating_sub(1), u32::try_from(*step_index).ok()?))
-            }
-            _ => None,
-        })
-        .collect()
+    let begun = records(decisions).filter_map(|(after, record)| match record {
+        Record::PhaseStarted { step_index, .. } => {
+            Some((after.saturating_sub(1), u32::try_from(*step_index).ok()?))
+        }
+        _ => None,
+    });
+    begun.collect()
 }
 
-/// The step a sample belongs to; the first one before any began.
+/// Step of a sample; the first one before any step began.
 fn step_at(steps: &[(u64, u32)], index: usize) -> u32 {
     let begun = steps.partition_point(|(from, _)| *from <= index as u64);
     begun.checked_sub(1).map_or(0, |latest| steps[latest].1)

@@ -1,21 +1,19 @@
 //! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
-//! tissue unless somebody takes the responsibility.
+//! tissue unless the operator acknowledges it.
 
 use crate::find::session_folders;
 use crate::progress::Progress;
-use crate::source::{SourceError, calibration_of, decisions};
+use crate::source::{SourceError, calibration_of, decisions, records};
 use palpate_model::calibration::{Calibration, CheckResult, KnownWeight};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
 use palpate_protocols::weighed::{Readings, Weighed};
-use palpate_sessions::ChainError;
 use palpate_sessions::checks::{CheckPart, DailyCheck, last_of_day, read_checks};
-use palpate_sessions::log::Session;
+use palpate_sessions::{ChainError, Session};
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Name of the built-in protocol.
 pub const DAILY_CHECK: &str = "daily-check";
 /// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
 const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
@@ -24,20 +22,17 @@ const ZERO_SHARE: f64 = 0.01;
 /// Two homings may differ by so many pulses: the switch closes between two of them.
 const HOME_PULSES: i64 = 1;
 
-/// A part and what was found.
 fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
     let (is_passed, sentence) = found.unwrap_or_else(|missing| (false, missing));
     CheckPart { what: what.into(), is_passed, sentence }
 }
 
-/// A daily check with what its session measured.
+/// A daily check with the deviations its session measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PastCheck {
-    /// The check as it was judged then.
     pub check: DailyCheck,
     /// The empty cell, and the known weight; none where the session is not in the library or lacks the reading.
     pub zero: Option<Deviation>,
-    /// See [`Self::zero`].
     pub weight: Option<Deviation>,
 }
 
@@ -57,8 +52,7 @@ pub fn past_checks(
     let count = checks.len();
     let mut past = Vec::with_capacity(count);
     for (done, check) in checks.into_iter().enumerate() {
-        let told = progress.tell(done, count, "the sessions of the checks");
-        if told.is_break() {
+        if progress.tell(done, count, "the sessions of the checks").is_break() {
             break;
         }
         let folder = folders.get(&check.session_id);
@@ -74,9 +68,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
         let session = Session::open(session).ok()?;
         Some((calibration_of(&session).ok()?, decisions(&session).ok()?))
     };
-    let Some((calibration, decisions)) = read() else {
-        return [None; 2];
-    };
+    let Some((calibration, decisions)) = read() else { return [None; 2] };
     let records = records_of(&decisions);
     let weight = weight_of(&calibration, &records).ok();
     [
@@ -86,13 +78,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
 }
 
 fn records_of(decisions: &[(u64, Effect)]) -> Vec<&Record> {
-    let effects = decisions.iter().map(|(_, effect)| effect);
-    effects
-        .filter_map(|effect| match effect {
-            Effect::Record(record) => Some(record),
-            _ => None,
-        })
-        .collect()
+    records(decisions).map(|(_, record)| record).collect()
 }
 
 /// Judges a session of the daily check. What was not done has not passed.
@@ -105,14 +91,12 @@ pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
         part("weight", weight(&calibration, &records)),
         part("home", home(&records)),
     ];
-    let finished = EndingKind::Finish.name();
-    match &session.end {
-        Some(end) if end.outcome == finished => {}
-        Some(end) => {
-            parts.push(part("run", Err(format!("the check did not finish: {}", end.reason))))
-        }
-        None => parts.push(part("run", Err("the check was interrupted; make it again".into()))),
-    }
+    let unfinished = match &session.end {
+        Some(end) if end.outcome == EndingKind::Finish.name() => None,
+        Some(end) => Some(format!("the check did not finish: {}", end.reason)),
+        None => Some("the check was interrupted; make it again".to_owned()),
+    };
+    parts.extend(unfinished.map(|reason| part("run", Err(reason))));
     Ok(parts)
 }
 
@@ -128,7 +112,7 @@ fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
 pub struct Deviation {
     /// Measured less expected.
     pub newtons: f64,
-    /// The most that passes, either way.
+    /// Largest magnitude that passes.
     pub limit: f64,
 }
 
@@ -148,20 +132,19 @@ fn zero_of(calibration: &Calibration, records: &[&Record]) -> Result<(Volts, Dev
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let (volts, Deviation { newtons, limit }) = zero_of(calibration, records)?;
     let is_passed = newtons.abs() <= limit;
-    let advice = match is_passed {
-        true => "",
-        false => "; look what touches the probe, then take a new calibration",
-    };
-    Ok((
-        is_passed,
-        format!(
-            "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {} the limit of {limit:.3} N{advice}",
-            if is_passed { "within" } else { "beyond" }
-        ),
-    ))
+    let side = if is_passed { "within" } else { "beyond" };
+    let sentence = format!(
+        "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {side} the limit of {limit:.3} N"
+    );
+    let advice = "check what touches the probe, then take a new calibration";
+    Ok(advised(is_passed, sentence, advice))
 }
 
-/// What the known weight reads.
+/// Adds advice to the sentence of a part that failed.
+fn advised(is_passed: bool, sentence: String, advice: &str) -> (bool, String) {
+    (is_passed, if is_passed { sentence } else { format!("{sentence}; {advice}") })
+}
+
 fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<CheckResult, String> {
     let mut tare = None;
     let known = readings(records).into_iter().find(|(mass_g, volts)| {
@@ -194,25 +177,18 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
         _ => None,
     });
     let missed = missed.ok_or("the home switch was not touched twice; make the check again")?;
-    let is_passed = missed.abs() <= HOME_PULSES;
-    let advice = match is_passed {
-        true => "",
-        false => "; check the switch, its cable and whether the slider moves freely",
-    };
-    Ok((
-        is_passed,
-        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed{advice}"),
-    ))
+    let sentence =
+        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed");
+    let advice = "check the switch, its cable and whether the slider moves freely";
+    Ok(advised(missed.abs() <= HOME_PULSES, sentence, advice))
 }
 
-/// What the daily check says to a run.
+/// Effect of the daily check on a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Gate {
-    /// Nothing.
     Open,
-    /// Something worth knowing.
     Note(String),
-    /// Somebody must take the responsibility; it is recorded.
+    /// The operator must acknowledge it, which is recorded.
     Acknowledge(String),
 }
 
@@ -238,15 +214,18 @@ impl Gate {
             return Ok(Self::Open);
         }
         let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;
+        let none = format!("rig {rig} had no daily check today");
         Ok(match last_of_day(&checks, now.into()) {
             Some(check) if check.is_passed => Self::Open,
-            Some(check) => Self::Acknowledge(failed(check)),
-            None if is_virtual => Self::Note(format!("{}; '{HOW}' makes one", none_today(rig))),
-            None => Self::Acknowledge(format!("{}; make one with '{HOW}' first", none_today(rig))),
+            Some(check) => Self::Acknowledge(format!(
+                "rig {rig} failed its daily check today ({}); mend it and repeat '{HOW}'",
+                check.failures()
+            )),
+            None if is_virtual => Self::Note(format!("{none}; '{HOW}' makes one")),
+            None => Self::Acknowledge(format!("{none}; make one with '{HOW}' first")),
         })
     }
 
-    /// What has to be acknowledged.
     pub fn to_acknowledge(&self) -> Vec<String> {
         match self {
             Self::Acknowledge(sentence) => vec![sentence.clone()],
@@ -255,20 +234,7 @@ impl Gate {
     }
 }
 
-/// The command that makes a check.
 pub const HOW: &str = "palpate daily-check";
-
-fn none_today(rig: &str) -> String {
-    format!("rig {rig} had no daily check today")
-}
-
-fn failed(check: &DailyCheck) -> String {
-    format!(
-        "rig {} failed its daily check today ({}); mend it and repeat '{HOW}'",
-        check.rig,
-        check.failures()
-    )
-}
 
 #[cfg(test)]
 mod tests {
@@ -330,8 +296,8 @@ mod tests {
         assert!(weight(&calibration, &[&weighed(200.0, 1.7)]).is_err());
         // On the flat stretch even a right reading tells nothing.
         let right = weighed(500.0, volts(0.5 * 9.80665));
-        let told = weight(&calibration, &[&weighed(0.0, volts(0.0)), &right]).unwrap_err();
-        assert!(told.contains("500 g to 0.501 N only"), "{told}");
+        let refusal = weight(&calibration, &[&weighed(0.0, volts(0.0)), &right]).unwrap_err();
+        assert!(refusal.contains("500 g to 0.501 N only"), "{refusal}");
         assert!(home(&[]).is_err());
     }
 
@@ -345,7 +311,7 @@ mod tests {
         });
         let calibration = Calibration::thesis();
         let curve = calibration.curve().unwrap();
-        let mut told = Vec::new();
+        let mut results = Vec::new();
         for mass_g in masses {
             let weight = palpate_model::units::Newtons(mass_g * 9.80665e-3);
             let records = [
@@ -353,10 +319,10 @@ mod tests {
                 weighed(mass_g, curve.volts_from_newtons(weight).0),
             ];
             let records: Vec<&Record> = records.iter().collect();
-            told.push(super::weight(&calibration, &records).unwrap());
+            results.push(super::weight(&calibration, &records).unwrap());
         }
-        let [(true, sentence)] = &told[..] else {
-            panic!("one known weight that reads right: {told:?}");
+        let [(true, sentence)] = &results[..] else {
+            panic!("one known weight that reads right: {results:?}");
         };
         assert!(sentence.ends_with("within the limit of 1 %"), "{sentence}");
     }

@@ -5,26 +5,21 @@
 
 use crate::source::SourceError;
 use palpate_model::units::Depth;
-use palpate_sessions::block::Block;
 pub use palpate_sessions::contacts::{FoundContact, contacts};
 use palpate_sessions::contacts::{contact_position, is_record};
-use palpate_sessions::edits::{Edits, Verdict};
-use palpate_sessions::log::{Outline, ReadError, Session};
-use palpate_sessions::record::{Entry, Row};
+use palpate_sessions::{Block, Edits, Entry, Outline, ReadError, Row, Session, Verdict};
 use std::ops::Range;
 use std::path::Path;
 
-/// A session with its edits made.
+/// A session with its edits applied.
 #[derive(Clone, Debug)]
 pub struct Edited {
-    /// The session, its notes telling what was corrected and doubted.
+    /// The session; its notes name corrections and doubts.
     pub session: Session,
-    /// The edits.
     pub edits: Edits,
 }
 
 impl Edited {
-    /// Why the session was rejected, if it was.
     pub fn rejection(&self) -> Option<&str> {
         match self.edits.verdict() {
             Some((Verdict::Rejected, edit)) => Some(&edit.reason),
@@ -59,7 +54,6 @@ fn doubts(edits: &Edits) -> Vec<String> {
 pub struct Passing {
     /// All but the samples, its notes telling what was corrected and doubted.
     pub outline: Outline,
-    /// The edits.
     pub edits: Edits,
     shifts: Vec<Shift>,
 }
@@ -70,7 +64,6 @@ pub fn outline(path: &Path) -> Result<Passing, SourceError> {
     of_outline(path, outline)
 }
 
-/// Makes the edits of a session that was read through.
 pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceError> {
     let edits = Edits::read(path, &outline.manifest.session_id)?;
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
@@ -93,8 +86,8 @@ impl Passing {
             rows.clear();
             rows.extend(block.rows());
             // One that is being recorded may have grown.
-            let left = self.outline.samples.saturating_sub(index);
-            rows.truncate(usize::try_from(left).unwrap_or(usize::MAX));
+            let remaining = self.outline.samples.saturating_sub(index);
+            rows.truncate(usize::try_from(remaining).unwrap_or(usize::MAX));
             for (number, row) in (index..).zip(&mut rows) {
                 for shift in &self.shifts {
                     shift.apply(number, row);
@@ -107,7 +100,7 @@ impl Passing {
     }
 }
 
-/// By how much the depths of some samples move.
+/// Shift of the depths of a range of samples.
 #[derive(Clone, Debug)]
 struct Shift {
     samples: Range<u64>,
@@ -139,9 +132,7 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
     let (mut shifts, mut notes) = (Vec::new(), Vec::new());
     for (index, found) in contacts.iter().enumerate() {
         let number = index as u32 + 1;
-        let Some((position, edit)) = edits.contact(number) else {
-            continue;
-        };
+        let Some((position, edit)) = edits.contact(number) else { continue };
         let next = contacts.get(index + 1).map(|next| next.after_sample);
         let deeper = found.position.depth_from(position);
         let base = entries.iter_mut().find(|entry| {
@@ -220,10 +211,7 @@ mod tests {
         };
         correct(&mut session, &edits);
         for (index, (old, new)) in before.rows.iter().zip(&session.rows).enumerate() {
-            let expected = match index >= second && index < third {
-                true => -0.5,
-                false => 0.0,
-            };
+            let expected = if index >= second && index < third { -0.5 } else { 0.0 };
             let moved = new.depth.unwrap_or(0.0) - old.depth.unwrap_or(0.0);
             assert!((moved - expected).abs() < 1e-12 || old.depth.is_none(), "{index}: {moved}");
         }

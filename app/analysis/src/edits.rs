@@ -1,57 +1,47 @@
-//! What people say of sessions afterwards, as the command line and the window both write it: every time a record beside
-//! the log, never over anything.
+//! Edits of sessions: tags, notes, data quality and reviews. Each is a record beside the log and overwrites nothing.
 
 use crate::progress::Progress;
+use crate::report::said::tags;
 use chrono::{DateTime, Utc};
 use palpate_runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
-use palpate_sessions::edits::{
-    Change, Decision, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit,
+use palpate_sessions::{
+    Change, Decision, EDITS_FILE, Edit, EditError, Edits, ReadError, Summary, Verdict, add_edit,
 };
-use palpate_sessions::log::{ReadError, Summary};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// The name given, or that of the login.
+/// The given name, else the login name.
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
     let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    given.map_or_else(|| login().unwrap_or_else(|_| "somebody".into()), str::to_owned)
+    given.map_or_else(|| login().unwrap_or_else(|_| "unknown".into()), str::to_owned)
 }
 
-/// Nothing was said of a session.
 #[derive(Debug, Error)]
 pub enum SayFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// Its analyses cannot be read.
     #[error(transparent)]
     Analyses(#[from] AnalysisError),
-    /// Its edits cannot be read or added to.
     #[error(transparent)]
     Edit(#[from] EditError),
 }
 
-/// A session of which something is to be said.
+/// A session to be edited.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Its folder.
     pub folder: PathBuf,
-    /// Its name.
     pub id: String,
-    /// What was said of it so far.
     pub edits: Edits,
 }
 
 impl Subject {
-    /// Reads what the session says of itself, and its edits.
     pub fn read(folder: &Path) -> Result<Self, SayFailure> {
         let id = Summary::read(folder)?.manifest.session_id;
         Ok(Self { edits: Edits::read(folder, &id)?, folder: folder.to_owned(), id })
     }
 
-    /// Adds an edit.
     pub fn say(&self, by: &str, reason: &str, change: Change) -> Result<Edit, SayFailure> {
         let edit = Edit {
             at: wall_now().into(),
@@ -66,40 +56,31 @@ impl Subject {
     /// A review of the session as it is now: with the hash of every file of the log and of the analyses.
     pub fn review(&self, decision: Decision) -> Result<Change, SayFailure> {
         let mut seen = inputs_of(&self.folder)?;
-        // What was said before is told by the order of the edits; the review itself is among them.
+        // The order of the edits shows which came before; the review itself is among them.
         seen.retain(|one| one.what != EDITS_FILE);
         seen.extend(Analyses::read(&self.folder, &self.id)?.input());
         Ok(Change::Review { decision, seen })
     }
 }
 
-/// What is to be said of sessions.
+/// An edit of one or several sessions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Saying {
-    /// Words by which they are found.
     Tags {
-        /// Those they get.
         add: Vec<String>,
-        /// Those they lose.
         remove: Vec<String>,
     },
-    /// A remark.
     Note(String),
-    /// What they are worth, and why.
+    /// Data quality, and the reason.
     Verdict(Verdict, String),
-    /// What somebody who looked decided, and why.
+    /// A reviewer's decision, and the reason.
     Review(Decision, String),
 }
 
 impl Saying {
-    /// In words.
     pub fn words(&self) -> String {
         match self {
-            Self::Tags { add, remove } => {
-                let added = add.iter().map(|tag| format!("+{tag}"));
-                let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
-                format!("tags {}", signs.collect::<Vec<_>>().join(" "))
-            }
+            Self::Tags { add, remove } => tags(add, remove),
             Self::Note(_) => "note".into(),
             Self::Verdict(verdict, _) => format!("verdict {verdict}"),
             Self::Review(decision, _) => format!("review, {}", decision.name()),
@@ -107,38 +88,28 @@ impl Saying {
     }
 }
 
-/// One edit that can be taken back: what was written, and what says the opposite.
+/// One edit that can be undone: the change that was written, and its opposite, each with its reason.
 #[derive(Clone, Debug, PartialEq)]
 struct Step {
     folder: PathBuf,
     wrote: DateTime<Utc>,
-    written: Part,
-    opposite: Part,
+    written: (Change, String),
+    opposite: (Change, String),
 }
 
-/// The part of an edit that an opposite has.
-#[derive(Clone, Debug, PartialEq)]
-enum Part {
-    Tags { add: Vec<String>, remove: Vec<String> },
-    Verdict(Verdict, String),
-}
-
-/// Edits made together, which are taken back together.
+/// Edits made together, which are undone together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Act {
-    /// What was done, in words.
     pub words: String,
     steps: Vec<Step>,
 }
 
-/// What came of saying something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Said {
-    /// What was done, in words.
     pub words: String,
-    /// What can be taken back of it.
+    /// The part that can be undone.
     pub act: Option<Act>,
-    /// Why nothing was said of some of the sessions, a sentence each.
+    /// A sentence for each session that could not be edited.
     pub failed: Vec<String>,
 }
 
@@ -149,8 +120,7 @@ fn sessions(count: usize) -> String {
     }
 }
 
-/// Does `one` to every session and tells what came of it; `one` gives what can be taken back, and whether anything was
-/// written.
+/// Does `one` to every session; `one` returns the step that can be undone, and whether anything was written.
 fn each<T>(
     words: &str,
     of: &[T],
@@ -162,8 +132,8 @@ fn each<T>(
     for (done, item) in of.iter().enumerate() {
         let name = folder(item).file_name().unwrap_or_default();
         if progress.tell(done, of.len(), &name.to_string_lossy()).is_break() {
-            let left = sessions(of.len() - done);
-            failed.push(format!("nothing was said of {left}: cancelled"));
+            let remaining = sessions(of.len() - done);
+            failed.push(format!("{remaining} not changed: cancelled"));
             break;
         }
         match one(item) {
@@ -178,91 +148,67 @@ fn each<T>(
     Said { act: (!steps.is_empty()).then(|| Act { words: words.clone(), steps }), words, failed }
 }
 
-/// Says something of sessions. Notes and reviews stay: only tags and verdicts can be taken back.
+/// Edits sessions. Notes and reviews stay: only tags and data quality can be undone.
 #[must_use]
 pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &dyn Progress) -> Said {
-    let folder = |folder: &PathBuf| -> Result<_, String> {
-        say_one(saying, folder, by).map_err(|err| err.to_string())
-    };
-    each(&saying.words(), folders, progress, |it| it.as_path(), folder)
+    let one = |folder: &PathBuf| say_one(saying, folder, by).map_err(|err| err.to_string());
+    each(&saying.words(), folders, progress, |it| it.as_path(), one)
 }
 
 fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bool), SayFailure> {
     let subject = Subject::read(folder)?;
-    let step = |edit: Edit, written, opposite| Step {
-        folder: folder.to_owned(),
-        wrote: edit.at,
-        written,
-        opposite,
-    };
-    match saying {
+    let (change, reason, opposite) = match saying {
         Saying::Tags { add, remove } => {
             let has = subject.edits.tags();
-            // Only what changes is written, so that only that is taken back.
-            let add: Vec<String> =
-                add.iter().filter(|tag| !has.contains(tag.as_str())).cloned().collect();
-            let remove: Vec<String> =
-                remove.iter().filter(|tag| has.contains(tag.as_str())).cloned().collect();
+            // Only what changes is written, so that only that is undone.
+            let (mut add, mut remove) = (add.clone(), remove.clone());
+            add.retain(|tag| !has.contains(tag.as_str()));
+            remove.retain(|tag| has.contains(tag.as_str()));
             if add.is_empty() && remove.is_empty() {
                 return Ok((None, false));
             }
-            let (written, opposite) = (
-                Part::Tags { add: add.clone(), remove: remove.clone() },
-                Part::Tags { add: remove.clone(), remove: add.clone() },
-            );
-            let edit = subject.say(by, "", Change::Tags { add, remove })?;
-            Ok((Some(step(edit, written, opposite)), true))
+            let opposite = Change::Tags { add: remove.clone(), remove: add.clone() };
+            (Change::Tags { add, remove }, "", Some((opposite, String::new())))
         }
-        Saying::Note(text) => {
-            subject.say(by, text, Change::Note)?;
-            Ok((None, true))
-        }
-        Saying::Review(decision, reason) => {
-            subject.say(by, reason, subject.review(*decision)?)?;
-            Ok((None, true))
-        }
+        Saying::Note(text) => (Change::Note, text.as_str(), None),
+        Saying::Review(decision, reason) => (subject.review(*decision)?, reason.as_str(), None),
         Saying::Verdict(verdict, reason) => {
-            let before = subject.edits.verdict();
-            let opposite =
-                before.map(|(verdict, edit)| Part::Verdict(verdict, edit.reason.clone()));
-            let edit = subject.say(by, reason, Change::Verdict { verdict: *verdict })?;
-            let written = Part::Verdict(*verdict, reason.clone());
-            Ok((opposite.map(|opposite| step(edit, written, opposite)), true))
+            let opposite = subject
+                .edits
+                .verdict()
+                .map(|(verdict, edit)| (Change::Verdict { verdict }, edit.reason.clone()));
+            (Change::Verdict { verdict: *verdict }, reason.as_str(), opposite)
         }
-    }
+    };
+    let wrote = subject.say(by, reason, change.clone())?.at;
+    let written = (change, reason.to_owned());
+    let folder = folder.to_owned();
+    Ok((opposite.map(|opposite| Step { folder, wrote, written, opposite }), true))
 }
 
-/// Writes the opposite of edits, as records of their own. What can be taken back of that is the way to do them again.
+/// Writes the opposite of edits, as records of their own. Undoing the result repeats the edits.
 #[must_use]
 pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
-    let mut said = each("", &act.steps, progress, |step| &step.folder, one);
-    said.words = match said.act {
+    let mut outcome = each("", &act.steps, progress, |step| &step.folder, one);
+    outcome.words = match outcome.act {
         Some(_) => act.words.clone(),
         None => "nothing was written".into(),
     };
-    if let Some(opposite) = &mut said.act {
+    if let Some(opposite) = &mut outcome.act {
         opposite.words.clone_from(&act.words);
     }
-    said
+    outcome
 }
 
 fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
     let subject = Subject::read(&step.folder).map_err(|err| err.to_string())?;
-    let (reason, change) = match &step.opposite {
-        Part::Tags { add, remove } => {
-            let (add, remove) = (add.clone(), remove.clone());
-            (String::new(), Change::Tags { add, remove })
-        }
-        Part::Verdict(verdict, reason) => {
-            let now = subject.edits.verdict();
-            if now.is_none_or(|(_, edit)| edit.at != step.wrote) {
-                return Err("its verdict was given again since, so it is not taken back".into());
-            }
-            (reason.clone(), Change::Verdict { verdict: *verdict })
-        }
-    };
-    let edit = subject.say(by, &reason, change).map_err(|err| err.to_string())?;
+    let (change, reason) = &step.opposite;
+    let is_newest = subject.edits.verdict().is_some_and(|(_, edit)| edit.at == step.wrote);
+    if matches!(change, Change::Verdict { .. }) && !is_newest {
+        return Err("its verdict was given again since, so it is not undone".into());
+    }
+    let edit = subject.say(by, reason, change.clone()).map_err(|err| err.to_string())?;
     Ok(Step {
         folder: step.folder.clone(),
         wrote: edit.at,

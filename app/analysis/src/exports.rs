@@ -3,33 +3,26 @@
 use crate::edited;
 use crate::progress::Progress;
 use crate::source::SourceError;
-use palpate_sessions::atomic;
-use palpate_sessions::log::Summary;
-use palpate_sessions::manifest::Manifest;
 use palpate_sessions::recover::is_in_use;
+use palpate_sessions::{Manifest, Summary, atomic};
 use palpate_tables::export::{Beside, ExportError, Feed, Format, Selection, Table};
 use palpate_tables::lake::{self, Added, Told};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Nothing was written of a session.
 #[derive(Debug, Error)]
 pub enum ExportFailure {
-    /// It cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be written.
     #[error(transparent)]
     Export(#[from] ExportError),
-    /// It is being recorded, and what is in a lake never changes.
     #[error(
         "{} is being recorded, and files of a lake never change; add it when the run has ended", .0.display()
     )]
     BeingRecorded(PathBuf),
 }
 
-/// What a session is written as.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
     /// A table in this folder that takes the session folder's name.
@@ -38,19 +31,16 @@ pub enum Target {
     Messages(PathBuf),
 }
 
-/// What was written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Written {
-    /// The file.
     pub path: PathBuf,
     /// Rows or messages in it.
     pub rows: u64,
-    /// What a user of the data must know.
     pub notes: Vec<String>,
 }
 
 impl Target {
-    /// Takes away what killed exports left where this one goes.
+    /// Removes leftovers of killed exports from the target folder.
     pub fn sweep(&self) {
         let folder = match self {
             Self::Table(_, folder) => Some(folder.as_path()),
@@ -101,7 +91,7 @@ pub fn export(
     Ok(target.write(session, &table, &mut feed)?)
 }
 
-/// A file takes the session folder's name.
+/// The name of the session's folder, for its export.
 fn stem(session: &Path, manifest: &Manifest) -> String {
     let whole = session.canonicalize().ok();
     // A folder's name may have dots in it; the ending of a file's does not count.
@@ -112,12 +102,11 @@ fn stem(session: &Path, manifest: &Manifest) -> String {
     stem.map_or_else(|| manifest.session_id.clone(), |name| name.to_string_lossy().into_owned())
 }
 
-/// Takes away what killed exports left in a lake.
+/// Removes leftovers of killed exports from a lake.
 pub fn sweep_lake(lake: &Path) {
     atomic::sweep(lake, usize::MAX);
 }
 
-/// Adds a session to a lake.
 pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
     // Looked at before it is read: a run that ends in between would be there without its end.
     let is_in_use = is_in_use(session);
@@ -126,9 +115,9 @@ pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
         return Err(ExportFailure::BeingRecorded(session.into()));
     }
     let verdict = passing.edits.verdict();
-    let told = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
+    let quality = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
     let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
-    Ok(lake::add(lake, &passing.outline, told, &mut feed)?)
+    Ok(lake::add(lake, &passing.outline, quality, &mut feed)?)
 }
 
 /// The sessions and tables without those sessions whose recovered copy is among them, so that samples count once; then
@@ -138,13 +127,11 @@ pub fn without_copied(
     found: Vec<PathBuf>,
     is_session: impl Fn(&Path) -> bool,
 ) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let ids: Vec<Option<(String, Option<String>)>> = found
-        .iter()
-        .map(|path| {
-            let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
-            Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
-        })
-        .collect();
+    let id = |path: &PathBuf| {
+        let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
+        Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
+    };
+    let ids: Vec<Option<(String, Option<String>)>> = found.iter().map(id).collect();
     let copied: BTreeSet<&String> = ids.iter().flatten().filter_map(|it| it.1.as_ref()).collect();
     let is_copied =
         |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));
@@ -154,52 +141,48 @@ pub fn without_copied(
     (paths(rest), paths(originals))
 }
 
-/// Where sessions chosen in the window go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
-    /// A table each.
     Tables(Format, PathBuf),
-    /// All into this lake.
     Lake(PathBuf),
 }
 
-/// What became of sessions chosen in the window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exported {
-    /// What was written and where, in one sentence.
     pub sentence: String,
     /// What was not, and why, a sentence each; and what a user of the data must know.
     pub remarks: Vec<String>,
 }
 
-/// Writes every session, one after the other. A file that is there is never written over: it is told.
+/// Writes every session, one after the other. An existing file is never overwritten; a remark names it.
 pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progress) -> Exported {
     let of = sessions.len();
     let (sessions, copied) = match to {
         Destination::Tables(..) => (sessions, Vec::new()),
         Destination::Lake(_) => without_copied(sessions, |_| true),
     };
-    let mut remarks: Vec<String> = copied
-        .iter()
-        .map(|path| format!("{}: left out, its recovered copy is chosen too", name(path)))
-        .collect();
-    if let Destination::Tables(_, folder) = to
-        && let Err(err) = std::fs::create_dir_all(folder)
-    {
-        let sentence = format!("{} cannot be made ({err}); nothing was written", folder.display());
-        return Exported { sentence, remarks };
-    }
+    let left_out =
+        |path: &PathBuf| format!("{}: left out, its recovered copy is chosen too", name(path));
+    let mut remarks: Vec<String> = copied.iter().map(left_out).collect();
     match to {
         Destination::Lake(lake) => sweep_lake(lake),
-        Destination::Tables(format, folder) => Target::Table(*format, folder.clone()).sweep(),
+        Destination::Tables(format, folder) => {
+            if let Err(err) = std::fs::create_dir_all(folder) {
+                let folder = folder.display();
+                let sentence = format!("{folder} cannot be made ({err}); nothing was written");
+                return Exported { sentence, remarks };
+            }
+            Target::Table(*format, folder.clone()).sweep();
+        }
     }
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {
-        if progress.tell(done, of, &name(session)).is_break() {
+        let name = name(session);
+        if progress.tell(done, of, &name).is_break() {
             remarks.push(format!("cancelled: {} were not begun", sessions.len() - done));
             break;
         }
-        let one = match to {
+        let notes = match to {
             Destination::Lake(lake) => into_lake(lake, session).map(|added| {
                 were_there += usize::from(added.was_there);
                 Vec::new()
@@ -207,21 +190,16 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
             Destination::Tables(format, folder) => {
                 let target = Target::Table(*format, folder.clone());
                 let mut tell = |rows, all| {
-                    let words = format!("{}: {rows} of {all} samples", name(session));
                     // One session is written whole once it is begun.
-                    let _ = progress.tell(done, of, &words);
+                    let _ = progress.tell(done, of, &format!("{name}: {rows} of {all} samples"));
                 };
-                export(session, &Selection::default(), &target, &mut tell)
-                    .map(|written| written.notes)
+                let exported = export(session, &Selection::default(), &target, &mut tell);
+                exported.map(|written| written.notes)
             }
         };
-        match one {
-            Ok(notes) => {
-                written += 1;
-                remarks.extend(notes.iter().map(|note| format!("{}: {note}", name(session))));
-            }
-            Err(err) => remarks.push(format!("{}: {err}", name(session))),
-        }
+        written += usize::from(notes.is_ok());
+        let notes = notes.unwrap_or_else(|err| vec![err.to_string()]);
+        remarks.extend(notes.iter().map(|note| format!("{name}: {note}")));
     }
     let sentence = match to {
         Destination::Tables(format, folder) => format!(

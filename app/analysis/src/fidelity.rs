@@ -1,17 +1,15 @@
-//! What a recorded session was to do against what it did.
+//! Targets of a recorded session, and the values it achieved.
 
 use crate::source::{SourceError, decisions};
 use palpate_protocols::plans::Plan;
 use palpate_runner::fidelity::{Fidelity, FidelityMeter};
 use palpate_sessions::log::Session;
 
-/// The fidelity of a recorded session.
 pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
     let rig = match (&session.manifest.imported, &session.manifest.rig) {
         (None, Some(rig)) => rig,
         (imported, _) => {
-            let file = imported.as_ref().map(|from| from.file.clone());
-            let file = file.unwrap_or_default();
+            let file = imported.as_ref().map(|from| from.file.clone()).unwrap_or_default();
             return Err(SourceError::Imported { file });
         }
     };

@@ -1,4 +1,4 @@
-//! The library's catalog asked and brought up to date, away from the window's thread.
+//! Queries and updates of the library's catalog, away from the window's thread.
 
 use crate::progress::Progress;
 use palpate_runner::Stopwatch;
@@ -6,39 +6,35 @@ use palpate_sessions::catalog::{Catalog, CatalogError, Changes, Choices, Entry, 
 use palpate_sessions::edits::{Edit, Edits};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// A search.
 #[derive(Clone, Debug)]
 pub struct Search {
-    /// The library.
     pub library: PathBuf,
-    /// What is looked for.
     pub query: Query,
-    /// So many of the first are told with all that is known of them.
+    /// Number of sessions, from the first, whose entries are returned as well.
     pub page: usize,
 }
 
-/// What a search found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// Folders of all that was found, below the library, in order.
+    /// Folders of all sessions found, below the library, in order.
     pub folders: Vec<String>,
-    /// What is known of the first of them.
+    /// Entries of the first of them.
     pub first: Vec<Entry>,
-    /// By what sessions can be chosen.
+    /// Values by which sessions can be chosen.
     pub choices: Choices,
-    /// Why nothing was found, where a condition can never be met.
+    /// Conditions that can never be met, where nothing is found.
     pub doubts: Vec<String>,
-    /// What happened to the catalog's file.
+    /// Remarks on the catalog's file.
     pub remarks: Vec<String>,
-    /// How long it took, in s.
+    /// Duration of the search in s.
     pub seconds: f64,
 }
 
 /// Opens the catalog of a library. One that is only in memory is made first.
 fn with<T>(
-    library: &std::path::Path,
+    library: &Path,
     remarks: &mut Vec<String>,
     mut work: impl FnMut(&mut Catalog) -> Result<T, CatalogError>,
 ) -> Result<T, String> {
@@ -59,35 +55,30 @@ pub fn search(search: &Search) -> Result<Found, String> {
     let mut found = with(&search.library, &mut remarks, |catalog| {
         let folders = catalog.folders(&search.query)?;
         let first = &folders[..folders.len().min(search.page)];
-        let doubts = match folders.is_empty() {
-            true => catalog.doubts(&search.query.conditions)?,
-            false => Vec::new(),
-        };
+        let is_empty = folders.is_empty();
         Ok(Found {
             first: catalog.entries(first)?,
             choices: catalog.choices()?,
-            doubts,
+            doubts: if is_empty { catalog.doubts(&search.query.conditions)? } else { Vec::new() },
             folders,
             ..Found::default()
         })
     })?;
-    found.remarks = remarks;
-    found.seconds = watch.seconds();
+    (found.remarks, found.seconds) = (remarks, watch.seconds());
     Ok(found)
 }
 
-/// What is known of these sessions.
 pub fn entries((library, folders): &(PathBuf, Vec<String>)) -> Result<Vec<Entry>, String> {
     with(library, &mut Vec::new(), |catalog| catalog.entries(folders))
 }
 
 /// Reads the sessions that are new or have changed.
-pub fn update(library: &std::path::Path, progress: &dyn Progress) -> Result<Changes, String> {
+pub fn update(library: &Path, progress: &dyn Progress) -> Result<Changes, String> {
     let mut remarks = Vec::new();
     let done = Catalog::with(library, |catalog| {
         remarks.append(&mut catalog.remarks);
         if catalog.is_in_memory() {
-            // Nobody else sees that one: every search makes its own.
+            // No other process sees an index in memory: every search builds its own.
             return Ok(Changes::default());
         }
         catalog.update_while(&mut |done, of| -> ControlFlow<()> {
@@ -101,31 +92,29 @@ pub fn update(library: &std::path::Path, progress: &dyn Progress) -> Result<Chan
 
 /// Folder below the library of every session in it, by the session's identifier.
 pub fn session_folders(
-    library: &std::path::Path,
+    library: &Path,
     progress: &dyn Progress,
 ) -> Result<BTreeMap<String, String>, String> {
     update(library, progress)?;
     let all = with(library, &mut Vec::new(), |catalog| catalog.all())?;
-    let pairs = all.into_iter().map(|entry| (entry.session_id, entry.folder));
-    Ok(pairs.collect())
+    Ok(all.into_iter().map(|entry| (entry.session_id, entry.folder)).collect())
 }
 
-/// What happened with a session, and what was said of it.
+/// Edits and analyses of a session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Told {
-    /// The remarks, in the order made.
+    /// Notes, in the order made.
     pub notes: Vec<Edit>,
-    /// Everything said and made, oldest first.
+    /// Edits and analyses, oldest first.
     pub events: Vec<Event>,
 }
 
-/// Reads what was said of a session in this library.
 pub fn told((library, entry): &(PathBuf, Entry)) -> Result<Told, String> {
     let folder = library.join(&entry.folder);
     let edits = Edits::read(&folder, &entry.session_id).map_err(|err| err.to_string())?;
-    let said = edits.all.iter().map(|edit| Event::said("", edit));
-    let made = entry.analyses.iter().map(|one| Event::made("", one));
-    let mut events: Vec<Event> = said.chain(made).collect();
+    let edited = edits.all.iter().map(|edit| Event::said("", edit));
+    let analysed = entry.analyses.iter().map(|one| Event::made("", one));
+    let mut events: Vec<Event> = edited.chain(analysed).collect();
     // Times of one form sort as they are written.
     events.sort_by(|a, b| a.at.cmp(&b.at));
     Ok(Told { notes: edits.notes().cloned().collect(), events })

@@ -1,4 +1,4 @@
-//! The check of the feedback as a session: its table made into one as a foreign file is, and said to be simulated.
+//! The feedback check as a session: its table is imported like a foreign file and marked as simulated.
 
 use super::haptics::Followed;
 use crate::report::haptics::follow_table;
@@ -19,7 +19,7 @@ pub fn keep_followed(followed: &Followed, source: &str, folder: &Path) -> Result
     for mut part in foreign.parts {
         part.imported.remarks.insert(0, provenance(followed, source));
         part.imported.facts = facts(followed, source);
-        let kept = Kept {
+        let target = Kept {
             folder,
             original: &foreign.bytes,
             session_id: new_session_id(at),
@@ -31,7 +31,7 @@ pub fn keep_followed(followed: &Followed, source: &str, folder: &Path) -> Result
                 ..Labels::default()
             },
         };
-        keep(&part, kept).map_err(|err| err.to_string())?;
+        keep(&part, target).map_err(|err| err.to_string())?;
     }
     Ok(())
 }
@@ -43,7 +43,7 @@ fn provenance(followed: &Followed, source: &str) -> String {
     )
 }
 
-/// What makes the same session again.
+/// Settings that reproduce the session.
 fn facts(followed: &Followed, source: &str) -> Vec<(String, String)> {
     let settings = &followed.settings;
     let body = &followed.body;

@@ -23,20 +23,18 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// The name of the body that needs no session.
+/// Name of the source thesis's body, which needs no session.
 pub const THESIS: &str = "thesis";
 
 /// Damping of the hand in N s/mm: a firm grip has more, which would calm what is to be seen.
 const GRIP_DAMPING: f64 = 0.002;
 
-/// A body and where it comes from.
+/// A body to render, from a fit or the source thesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
-    /// The body.
     pub body: ModifiedKelvin,
-    /// How deep the record went that it was fitted to.
+    /// Largest depth of the fitted record.
     pub deepest: Depth,
-    /// What is to be known of it, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -52,24 +50,13 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
     let options = FitOptions::default();
     let fitted = Fitted::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
-    let value = |name: &str| {
-        let parameter = report.parameter(name);
-        parameter
-            .map(|one| one.value)
-            .ok_or_else(|| format!("the fit of {} has no {name}", source.display()))
-    };
+    let body = report.kelvin().ok_or_else(|| {
+        format!("the fit of {} is not of the modified Kelvin model", source.display())
+    })?;
     let depths = fitted.samples.iter().map(|sample| sample.depth.0);
     let mut notes = fitted.notes;
     notes.extend(report.warnings.iter().cloned());
-    Ok(Source {
-        body: ModifiedKelvin {
-            tau_eps: value("tau_eps")?,
-            mu: [value("mu1")?, value("mu2")?, value("mu3")?],
-            tau_sig: value("tau_sig")?,
-        },
-        deepest: Depth(depths.fold(0.0, f64::max)),
-        notes,
-    })
+    Ok(Source { body, deepest: Depth(depths.fold(0.0, f64::max)), notes })
 }
 
 impl Source {
@@ -77,29 +64,25 @@ impl Source {
     pub fn beyond(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
-                "the record went to {:.3}; from there to {deepest:.3} the model is extrapolated, and nothing says that it holds",
+                "the record goes to {:.3}; from there to {deepest:.3} the model is extrapolated without any evidence",
                 self.deepest
             )
         })
     }
 }
 
-/// A device, a loop and a hand.
+/// Settings of a device, its loop and the simulated hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// The loop's tick.
     pub period: Period,
-    /// The motor's drive.
     pub drive: DriveKind,
     /// Damping of the device without its motor, in N s/mm.
     pub damping: f64,
     /// Its Coulomb friction; that of the source's motor without it.
     pub friction: Option<Newtons>,
-    /// Whole ticks from a count to the force made of it.
+    /// Whole ticks from an encoder count to its force.
     pub delay: usize,
-    /// End of the stroke.
     pub deepest: Depth,
-    /// Speed of the hand.
     pub speed: MmPerS,
 }
 
@@ -158,10 +141,9 @@ const BEFORE: f64 = 0.5;
 /// Columns that a trace is thinned for: more than half a screen is wide.
 const COLUMNS: usize = 1000;
 
-/// What the simulated device did.
+/// Result of a simulated stroke.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tried {
-    /// Whether guards and controller were at work.
     pub is_guarded: bool,
     /// Share of the ticks of the hold in which it buzzed.
     pub buzz_share: f64,
@@ -177,21 +159,17 @@ pub struct Tried {
     pub energy_min_mj: f64,
     /// Most damping that the controller added, in N s/m.
     pub damping_added_max: f64,
-    /// What was special on the way, one sentence each.
     pub flags: Vec<&'static str>,
     /// Place of the device in mm over time in s from when the hand arrived, thinned; for pictures.
     #[serde(skip)]
     pub trace: Vec<[f64; 2]>,
 }
 
-/// What is known of a body on a device before play.
+/// Stability margin of a body on a device, and its simulation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Checked {
-    /// The body.
     pub body: ModifiedKelvin,
-    /// The margin.
     pub margin: Verdict,
-    /// The margin in words.
     pub sentences: Vec<String>,
     /// Without guards, then with them.
     pub tried: [Tried; 2],
@@ -279,19 +257,15 @@ fn try_out(
     })
 }
 
-/// The loop's time at one rate.
+/// Timing of a loop at one rate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Paced {
-    /// Ticks a second.
     pub rate_hz: f64,
     /// Threads that did nothing but keep the processors busy meanwhile.
     pub busy_threads: usize,
-    /// The priority that the system gave.
     pub priority: String,
-    /// What was measured.
     #[serde(flatten)]
     pub kept: Kept,
-    /// What was recorded.
     pub recorded: Option<RecordedTicks>,
 }
 
@@ -336,8 +310,8 @@ pub fn pace(
         let _ = thread.join();
     }
     let taped = taped.ok_or("the loop failed; this is a mistake in palpate")?;
-    let left = taped.device.last().snapshot.sum();
-    let recorded = taped.recorder.map(|recorder| recorder.finish(left));
+    let hash = taped.device.last().snapshot.sum();
+    let recorded = taped.recorder.map(|recorder| recorder.finish(hash));
     Ok(Paced {
         recorded: recorded.transpose()?.map(RecordedTicks::from),
         rate_hz: 1.0 / period.seconds().0,
@@ -347,30 +321,25 @@ pub fn pace(
     })
 }
 
-/// Between two looks at a loop that runs.
+/// Interval between two looks at a running loop.
 const PART: Duration = Duration::from_millis(100);
 
 /// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Followed {
-    /// What was done.
     #[serde(skip)]
     pub settings: CheckSettings,
     /// What was measured; in a table of its own.
     #[serde(skip)]
     pub samples: Vec<CheckSample>,
-    /// The body rendered.
     pub body: ModifiedKelvin,
-    /// How many.
     #[serde(rename = "samples")]
     pub count: usize,
     /// Highest force commanded and measured, in N.
     pub peak_commanded_n: f64,
-    /// See [`Self::peak_commanded_n`].
     pub peak_measured_n: f64,
     /// Mean of measured minus commanded force on the way in, and root mean square of what is left about it, in N.
     pub offset_n: f64,
-    /// See [`Self::offset_n`].
     pub scatter_n: f64,
     /// Friction of the motor at the rack that the drive does not make up for, in N.
     pub friction_n: f64,
@@ -382,15 +351,13 @@ pub struct Followed {
     pub fit: Option<FitReport>,
     /// The body that a fit of the commanded force finds.
     pub fit_commanded: Option<FitReport>,
-    /// Why one of these is not there, one sentence each.
+    /// A sentence for each result that is missing.
     pub refusals: Vec<String>,
 }
 
-/// Makes the check.
 pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result<Followed, String> {
     let mut samples = Vec::new();
-    let made = run_check(settings, |one| samples.push(*one), progress);
-    made.map_err(|err| err.to_string())?;
+    run_check(settings, |one| samples.push(*one), progress).map_err(|err| err.to_string())?;
     let until = settings.ramp();
     let ramp = || samples.iter().filter(|one| one.t <= until);
     let count = ramp().count().max(1) as f64;
@@ -403,13 +370,13 @@ pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result
     let calibration = BiasCalibration::fit(&points);
     let calibration = calibration.map_err(|err| refusals.push(format!("no calibration: {err}")));
     let mut fitted = |force: fn(&CheckSample) -> Newtons, which: &str| {
-        let felt = samples.iter().map(|one| FitSample {
+        let record = samples.iter().map(|one| FitSample {
             t: one.t,
             depth: one.depth,
             force: force(one),
             sigma: Newtons(1.0),
         });
-        let found = fit(&felt.collect::<Vec<_>>(), &FitOptions::default());
+        let found = fit(&record.collect::<Vec<_>>(), &FitOptions::default());
         let found =
             found.map_err(|err| refusals.push(format!("no fit of the {which} force: {err}")));
         found.ok()

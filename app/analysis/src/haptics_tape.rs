@@ -1,7 +1,7 @@
-//! A run of the master-slave system recorded, and the recording computed again.
+//! Recordings of the master-slave system, and their replay.
 
 use super::haptics::Setting;
-use super::recorded::{Again, Ended, Replayed, computed_again};
+use super::recorded::{Ended, Replayable, Replayed, replay_ticks};
 use palpate_drivers::rig_file::fields::{Fields, in_words};
 use palpate_haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
@@ -14,10 +14,8 @@ use palpate_runner::haptics::{Led, Simulated, Ticking};
 use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use std::path::Path;
 
-/// Drives by name.
 const DRIVES: [(&str, bool); 2] = [("voltage", false), ("current", true)];
 
-/// Begins a recording in a new folder.
 pub fn recorder(
     folder: &Path,
     body: ModifiedKelvin,
@@ -26,7 +24,7 @@ pub fn recorder(
     TapeRecorder::start(folder, &text(body, setting, true), COLUMNS)
 }
 
-/// The same of a run whose hand is led from outside.
+/// For a run whose hand is led from outside.
 pub fn led_recorder(
     folder: &Path,
     body: ModifiedKelvin,
@@ -38,9 +36,8 @@ pub fn led_recorder(
 
 /// Ends the recording of a led run, if there is one.
 pub fn recorded(TapedLed { led, recorder }: TapedLed) -> Ended {
-    let left = Again::left(&led);
-    let told = recorder?.finish(left);
-    Some(told.map(|told| (told, left)))
+    let hash = Replayable::state_hash(&led);
+    Some(recorder?.finish(hash).map(|counts| (counts, hash)))
 }
 
 /// What a run was made of, as a text that reads back to the same bits.
@@ -65,69 +62,56 @@ fn text(body: ModifiedKelvin, setting: &Setting, is_guarded: bool) -> String {
 /// The body, the device and the hand, and whether guards and controller were at work.
 fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, Setting, bool), String> {
     let mut fields = Fields::read(text).map_err(|mistake| in_words(file, &[mistake]))?;
-    let body = read_body(&mut fields, "body");
+    let found = read_setting(&mut fields);
+    match (found, fields.finish()) {
+        (Some(found), mistakes) if mistakes.is_empty() => Ok(found),
+        (None, mistakes) if mistakes.is_empty() => Err(format!(
+            "{file}: the body, the period or the delay is missing; take a whole recording"
+        )),
+        (_, mistakes) => Err(in_words(file, &mistakes)),
+    }
+}
+
+/// Every field is read before the first that is missing ends it, so that all mistakes are listed.
+fn read_setting(fields: &mut Fields) -> Option<(ModifiedKelvin, Setting, bool)> {
     let most = 1e6;
+    let body = read_body(fields, "body");
     let period = fields.needed("device.period_ns", 1.0, 1e9);
-    let period = period.and_then(|nanos| Period::of_nanos(nanos as u64).ok());
     let is_current = fields.choice("device.drive", &DRIVES, None);
     let damping = fields.needed("device.damping_n_s_per_mm", 0.0, most);
-    let friction = fields.number("device.friction_n", 0.0, most);
+    let friction = fields.number("device.friction_n", 0.0, most).map(Newtons);
     let delay = fields.whole("device.delay_ticks", 0, DELAY_MAX as u64);
     let depth = fields.needed("device.depth_mm", 0.0, most);
     let speed = fields.needed("device.speed_mm_per_s", 0.0, most);
-    // Older recordings do not say it: all of theirs were guarded.
+    // Recordings of older versions do not have it, and all of them were guarded.
     let is_guarded = fields.flag("device.guards").unwrap_or(true);
-    let all = (body, period, is_current, damping, delay, depth, speed);
-    let mistakes = fields.finish();
-    let (
-        Some(body),
-        Some(period),
-        Some(is_current),
-        Some(damping),
-        Some(delay),
-        Some(depth),
-        Some(speed),
-    ) = all
-    else {
-        return Err(match mistakes.is_empty() {
-            true => format!(
-                "{file}: the body, the period or the delay is missing; take a whole recording"
-            ),
-            false => in_words(file, &mistakes),
-        });
-    };
-    if !mistakes.is_empty() {
-        return Err(in_words(file, &mistakes));
-    }
+    let period = Period::of_nanos(period? as u64).ok()?;
     let usual = Setting::source(period);
     let setting = Setting {
-        period,
-        drive: match is_current {
-            true => DriveKind::Current { amps_per_volt: 1.0 },
-            false => usual.drive,
-        },
-        damping,
-        friction: friction.map(Newtons),
-        delay: delay as usize,
-        deepest: Depth(depth),
-        speed: MmPerS(speed),
+        drive: if is_current? { DriveKind::Current { amps_per_volt: 1.0 } } else { usual.drive },
+        damping: damping?,
+        friction,
+        delay: delay? as usize,
+        deepest: Depth(depth?),
+        speed: MmPerS(speed?),
+        ..usual
     };
-    Ok((body, setting, is_guarded))
+    Some((body?, setting, is_guarded))
 }
 
-impl Again<3, 5> for Simulated {
+impl Replayable<3, 5> for Simulated {
     fn tick(&mut self, row: &TapedRow) -> TapedRow {
         let elapsed = row.whole[1];
         Ticking::tick(self, elapsed);
         taped_row(elapsed, self.last())
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.last().snapshot.sum()
     }
 }
 
-impl Again<3, 6> for Led {
+impl Replayable<3, 6> for Led {
     fn tick(&mut self, row: &LedRow) -> LedRow {
         let elapsed = row.whole[1];
         self.lead().to(row.real[0]);
@@ -135,7 +119,7 @@ impl Again<3, 6> for Led {
         led_row(elapsed, self)
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.live().last.snapshot.sum()
     }
 }
@@ -165,13 +149,13 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
         let (settings, speed) = simulation(&found.settings)?;
         let mut led = Led::new(&settings, speed).map_err(wrong)?;
         let name = "master and slave, led by hand";
-        return computed_again(name, &found, LED_COLUMNS, &mut led, is_going);
+        return replay_ticks(name, &found, LED_COLUMNS, &mut led, is_going);
     }
     let found = Recording::read(folder, COLUMNS)?;
     let (settings, _) = simulation(&found.settings)?;
     let mut device = Simulated::new(&settings).map_err(wrong)?;
     let name = "master and slave";
-    computed_again(name, &found, COLUMNS, &mut device, is_going)
+    replay_ticks(name, &found, COLUMNS, &mut device, is_going)
 }
 
 #[cfg(test)]
@@ -195,12 +179,12 @@ mod tests {
             let right = (ModifiedKelvin::THESIS, setting, setting == usual);
             assert_eq!(found, Ok(right), "{text}");
         }
-        for (text, told) in [
+        for (text, expected) in [
             ("[device]\ndrive = \"steam\"", "line 2: device.drive"),
             ("", "device.period_ns: is missing"),
         ] {
-            let said = parse("settings.toml", text).unwrap_err();
-            assert!(said.contains(told), "{said}");
+            let found = parse("settings.toml", text).unwrap_err();
+            assert!(found.contains(expected), "{found}");
         }
     }
 }

@@ -1,11 +1,9 @@
 //! Files of other programs made into sessions, as the command line and the window both do it.
 
 use crate::progress::Progress;
-use crate::report::imported;
 use palpate_model::about::Labels;
 use palpate_runner::wall_now;
-use palpate_sessions::{FolderError, Imported, library_folder};
-use palpate_sessions::{new_session_folder, new_session_id};
+use palpate_sessions::{FolderError, Imported, library_folder, new_session_folder, new_session_id};
 use palpate_tables::import::{
     Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
 };
@@ -14,64 +12,50 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// No session was made.
 #[derive(Debug, Error)]
 pub enum ImportFailure {
-    /// A file cannot be read or is not understood.
     #[error(transparent)]
     Foreign(#[from] ForeignError),
-    /// A session cannot be kept.
     #[error(transparent)]
     Keep(#[from] KeepError),
-    /// There is no library.
     #[error(transparent)]
     Library(#[from] FolderError),
-    /// A folder is there already or would be made twice.
     #[error("{} is there already or would be made twice; choose another folder", .0.display())]
     Taken(PathBuf),
-    /// Nobody wants the rest.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Where sessions go, and what is told of them.
+/// Files to import, and where their sessions go.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// The files.
     pub files: Vec<PathBuf>,
-    /// What is told of their layout; all else is detected.
+    /// Layout that the user states; all else is detected.
     pub told: Told,
-    /// Who, what, with which probe.
     pub labels: Labels,
     /// Folder for the new session folders, each named after its file.
     pub into: Option<PathBuf>,
     /// The library, where no folder is given; the user's own without it.
     pub library: Option<PathBuf>,
-    /// Only tell how the files would be read.
+    /// Report how the files would be read, and import nothing.
     pub is_dry_run: bool,
 }
 
-/// What was made of a file.
 #[derive(Debug, Serialize)]
 pub struct FileReport {
-    /// The file.
     pub file: PathBuf,
-    /// Its parts: sheets, blocks, intervals.
+    /// Sheets, blocks or intervals of the file.
     pub parts: Vec<PartReport>,
-    /// What was left out of it, in sentences.
     pub left_out: Vec<String>,
 }
 
-/// What was made of a part of a file.
 #[derive(Debug, Serialize)]
 pub struct PartReport {
-    /// The session; none of a dry run.
+    /// `None` in a dry run.
     pub session: Option<PathBuf>,
-    /// Samples in it.
     pub samples: usize,
     /// From the first to the last of them, in s.
     pub duration_s: f64,
-    /// How it was read.
     #[serde(flatten)]
     pub imported: Imported,
 }
@@ -91,7 +75,7 @@ pub fn import(
         }
         let foreign = read(path)?;
         check_folders(request.into.as_deref(), &foreign, &mut taken)?;
-        reports.push(told_of(path, foreign));
+        reports.push(report_of(path, foreign));
     }
     if !request.is_dry_run {
         for (done, (path, file)) in request.files.iter().zip(&mut reports).enumerate() {
@@ -99,8 +83,8 @@ pub fn import(
             let name = path.display().to_string();
             let _ = progress.tell(request.files.len() + done, of, &name);
             let foreign = read(path)?;
-            for (part, told) in foreign.parts.iter().zip(&mut file.parts) {
-                told.session = Some(make(part, &foreign.bytes, request)?);
+            for (part, report) in foreign.parts.iter().zip(&mut file.parts) {
+                report.session = Some(make(part, &foreign.bytes, request)?);
             }
         }
     }
@@ -134,7 +118,7 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
             new_session_folder(&library, &session_id)
         }
     };
-    let kept = Kept {
+    let target = Kept {
         folder: &folder,
         original,
         session_id,
@@ -142,11 +126,11 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
         software_version: env!("CARGO_PKG_VERSION"),
         labels: request.labels.clone(),
     };
-    keep(part, kept).map_err(ImportFailure::Keep)?;
+    keep(part, target).map_err(ImportFailure::Keep)?;
     Ok(folder)
 }
 
-fn told_of(path: &Path, foreign: Foreign) -> FileReport {
+fn report_of(path: &Path, foreign: Foreign) -> FileReport {
     let parts = foreign.parts.into_iter().map(|part| {
         let ends = [part.samples.first(), part.samples.last()];
         let [first, last] = ends.map(|one| one.map_or(0.0, |one| one.t));
@@ -160,13 +144,12 @@ fn told_of(path: &Path, foreign: Foreign) -> FileReport {
     FileReport { file: path.into(), parts: parts.collect(), left_out: foreign.left_out }
 }
 
-/// What was made of a file, in lines.
 #[must_use]
 pub fn text(file: &FileReport) -> String {
     let mut lines = vec![file.file.display().to_string()];
     for part in &file.parts {
         let rows = format!("{} over {:.3} s", part.samples, part.duration_s);
-        lines.extend(imported::lines(&part.imported, &rows));
+        lines.extend(import_lines(&part.imported, &rows));
         lines.push(match &part.session {
             Some(session) => format!("  session       {}", session.display()),
             None => "  session       none made: a dry run".into(),
@@ -179,6 +162,25 @@ pub fn text(file: &FileReport) -> String {
 
 /// Makes sessions of files and tells what was made of each, in lines; for the window.
 pub fn import_and_tell(request: &Request, progress: &dyn Progress) -> Result<Vec<String>, String> {
-    let reports = import(request, progress).map_err(|err| err.to_string())?;
-    Ok(reports.iter().map(text).collect())
+    Ok(import(request, progress).map_err(|err| err.to_string())?.iter().map(text).collect())
+}
+
+/// One line for each thing that was taken for something, with the option that says it otherwise.
+fn import_lines(imported: &Imported, rows: &str) -> Vec<String> {
+    let line = |what: &str, text: &str| format!("  {what:<13} {text}");
+    let mut lines =
+        vec![line("file", &format!("{} bytes, CRC-32 {}", imported.bytes, imported.checksum))];
+    if !imported.part.is_empty() {
+        lines.push(line("part", &format!("{} (--part NAME)", imported.part)));
+    }
+    let readings = imported.readings.iter();
+    lines.extend(readings.map(|one| {
+        // The record keeps this word for what the user stated.
+        let stated = if one.how == "told" { ", as stated" } else { "" };
+        line(&one.what, &format!("{}{stated} ({})", one.found, one.option))
+    }));
+    lines.push(line("rows", rows));
+    let remarks = imported.remarks.iter();
+    lines.extend(remarks.map(|remark| line("remark", remark)));
+    lines
 }

@@ -1,4 +1,4 @@
-//! What is done with recorded sessions, once for every front end: read, fit, compare, report, export.
+//! Use cases for recorded sessions, once for every front end: read, fit, compare, report, export.
 //!
 //! A use case takes a typed request and gives a typed result or error; it names no command-line flag
 //! and no button, prints nothing and draws in no window. It never commands a rig.
@@ -31,7 +31,6 @@ pub mod imports;
 #[cfg(feature = "haptics")]
 pub mod margin;
 pub mod opening;
-pub mod origin;
 pub mod plan;
 pub mod pool;
 pub mod progress;

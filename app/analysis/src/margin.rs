@@ -3,19 +3,19 @@
 use palpate_haptics::margin::{Device, Linear, Watch};
 use palpate_model::units::{Depth, MmPerS};
 
-/// Depths looked at: as many as a plot is wide.
+/// Number of depths: as many as a plot is wide.
 const DEPTHS: u32 = 600;
 
 /// Damping needed at a depth, in N s/m; each part stands on the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarginPoint {
-    /// Where, in mm.
+    /// In mm.
     pub depth: f64,
-    /// What the body's own lag asks for.
+    /// For the body's own lag.
     pub lag: f64,
-    /// With what the tick asks for besides.
+    /// With what the tick adds.
     pub tick: f64,
-    /// With what the delay asks for besides: all that is needed.
+    /// With what the delay adds: all that is needed.
     pub delay: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What a window opens with: the front end that parsed the request need not know any window.
+//! Requests that open a window: the front end that parses them need not know any window.
 
 use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
@@ -10,13 +10,10 @@ use palpate_runner::replay::Player;
 /// Name of the file in the library that holds what the window remembers of its user.
 pub const SETTINGS_FILE: &str = "window.json";
 
-/// A rig to work on.
 pub struct WorkbenchRequest {
-    /// The rig, opened.
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
-    /// Interlock thresholds.
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
@@ -24,25 +21,19 @@ pub struct WorkbenchRequest {
     pub scale: TimeScale,
 }
 
-/// A recorded session to show moment by moment.
+/// A recorded session to play back.
 pub struct PlaybackRequest {
-    /// The session, at its beginning.
     pub player: Player,
-    /// What its forces were read with.
     pub calibration: Calibration,
-    /// The force at which its interlock trips.
     pub force_max: Newtons,
-    /// What it is called in the head of the window.
+    /// Name in the head of the window.
     pub name: String,
-    /// Pace at which it begins.
     pub scale: TimeScale,
 }
 
 /// What opens windows. Each call returns when its window has closed.
 pub trait Windows {
-    /// The workbench.
     fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
 
-    /// A recorded session.
     fn playback(&self, request: PlaybackRequest) -> Result<(), String>;
 }

@@ -1,4 +1,4 @@
-//! The shortest protocol that will tell what is wanted of a body like one that is known.
+//! The shortest protocol that determines given parameters to given precision, for a body like a known one.
 
 use crate::fit::{KnownFit, KnownFitError, is_hardly_known};
 use palpate_model::calibration::Curve;
@@ -20,107 +20,74 @@ const STIFFER: f64 = 1.35;
 /// The white noise of the simulated rig's straight cell, in N.
 const NOISE_ASSUMED: Newtons = Newtons(0.02);
 
-/// The rig on which a plan will run.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench<'a> {
-    /// What it can do.
     pub rig: &'a RigDescription,
-    /// Its interlock's thresholds.
     pub limits: &'a Limits,
     /// Volts to newtons of its load cell.
     pub curve: &'a Curve,
 }
 
-/// What is wanted, and how far the rig may go for it.
+/// The precision to reach, and the limits of the rig.
 pub struct PlanRequest<'a> {
-    /// How well which parameters shall be known.
     pub targets: Vec<Target>,
-    /// What is found beside them.
+    /// Offsets that are fitted as well.
     pub unknowns: Unknowns,
     /// Noise that is independent from sample to sample; without it that of the fit.
     pub white: Option<Newtons>,
-    /// Slow noise on top.
     pub memory: Option<Memory>,
-    /// Samples per second.
     pub sample_rate_hz: f64,
-    /// Depth from contact.
     pub depth: Depth,
     /// Highest force; without it what leaves a specimen a third stiffer below the interlock.
     pub force_max: Option<Newtons>,
     /// Fastest speed; without it the rig's.
     pub speed_max: Option<MmPerS>,
-    /// Longest protocol.
     pub duration_max: Seconds,
-    /// How one press is asked for, in the words of the front end.
+    /// The command for one press, in the words of the front end.
     pub command: &'a dyn Fn(&RampHold) -> String,
 }
 
-/// There is no plan.
 #[derive(Debug, Error)]
 pub enum PlanFailure {
-    /// The rig is not as fast.
     #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]
-    TooFast {
-        /// Asked for.
-        wanted: MmPerS,
-        /// The rig's fastest.
-        most: MmPerS,
-        /// The rig.
-        rig: String,
-    },
-    /// The interlock would stop the run.
+    TooFast { wanted: MmPerS, most: MmPerS, rig: String },
     #[error("a force of {} N is more than the {most} at which the interlock stops a run", wanted.0)]
-    TooStrong {
-        /// Asked for.
-        wanted: Newtons,
-        /// The interlock's.
-        most: Newtons,
-    },
-    /// What is wanted cannot be computed or reached.
+    TooStrong { wanted: Newtons, most: Newtons },
     #[error(transparent)]
     Expected(#[from] ExpectedError),
 }
 
-/// Body and noise, and where they are from.
+/// Body and noise that a plan assumes.
 #[derive(Clone, Debug)]
-pub struct Assumed {
-    /// The body.
+pub struct PlanAssumptions {
     pub body: ModifiedKelvin,
-    /// White noise.
     pub noise: Newtons,
-    /// Where both are from, in words.
+    /// Origin of both, in words.
     pub source: String,
-    /// Whether the body is a poor ground for a plan.
+    /// Whether the relaxation time is too uncertain for a plan.
     pub is_hardly_known: bool,
-    /// What the reader of a recording remarked.
     pub notes: Vec<String>,
 }
 
 /// What a plan assumes: a recording or a fit; without one the last fit, and without that the source thesis.
-pub fn assumed(like: Option<&Path>) -> Result<Assumed, KnownFitError> {
-    let (known, source, notes) = match like {
-        Some(like) => {
-            let (known, notes) = KnownFit::of(like, None)?;
-            (known, like.display().to_string(), notes)
-        }
-        None => match KnownFit::last()? {
-            Some(known) => {
-                let of = known.source.as_deref().unwrap_or("an unnamed record");
-                let source = format!("the last fit, of {of}");
-                (known, source, Vec::new())
-            }
-            None => {
-                return Ok(Assumed {
-                    body: ModifiedKelvin::THESIS,
-                    noise: NOISE_ASSUMED,
-                    source: "pig stomach of the source thesis, since no fit is remembered".into(),
-                    is_hardly_known: false,
-                    notes: Vec::new(),
-                });
-            }
-        },
+pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
+    let (known, source, notes) = if let Some(like) = like {
+        let (known, notes) = KnownFit::of(like, None)?;
+        (known, like.display().to_string(), notes)
+    } else if let Some(known) = KnownFit::last()? {
+        let of = known.source.as_deref().unwrap_or("an unnamed record");
+        let source = format!("the last fit, of {of}");
+        (known, source, Vec::new())
+    } else {
+        return Ok(PlanAssumptions {
+            body: ModifiedKelvin::THESIS,
+            noise: NOISE_ASSUMED,
+            source: "pig stomach of the source thesis, since no fit is remembered".into(),
+            is_hardly_known: false,
+            notes: Vec::new(),
+        });
     };
-    Ok(Assumed {
+    Ok(PlanAssumptions {
         body: known.body()?,
         noise: Newtons(known.rmse_n),
         is_hardly_known: is_hardly_known(&known.parameters),
@@ -129,45 +96,35 @@ pub fn assumed(like: Option<&Path>) -> Result<Assumed, KnownFitError> {
     })
 }
 
-/// A plan: what was assumed, what is proposed, and how well else it would be known.
+/// A plan: its assumptions, the proposals, and the precision of other protocols.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlanReport {
-    /// The body assumed.
     pub body: ModifiedKelvin,
-    /// Where it is from.
     pub body_source: String,
-    /// The noise assumed.
     pub noise: Noise,
-    /// What is found beside the targets.
     pub unknowns: Unknowns,
-    /// How far the rig may go.
     pub rig: Rig,
-    /// What is wanted.
     pub targets: Vec<Target>,
-    /// The shortest first.
     pub proposals: Vec<Offer>,
     /// Intervals against hold, cycles and sampling rate.
     pub curves: Curves,
 }
 
-/// A proposal, and whether and how this program can run it.
+/// A proposal with the commands that run it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Offer {
-    /// What is proposed.
     #[serde(flatten)]
     pub proposal: Proposal,
-    /// One for every press; none where no plan exists.
+    /// One for every press; empty where no plan exists.
     pub commands: Vec<String>,
-    /// What the runs will ask to be acknowledged.
     pub acknowledgements: Vec<String>,
     /// With homing, finding contact and leaving the tissue, in s; none where no plan exists.
     pub run_s: Option<f64>,
 }
 
-/// Plans for what is assumed.
 pub fn plan(
     request: PlanRequest<'_>,
-    assumed: Assumed,
+    assumed: PlanAssumptions,
     bench: Bench<'_>,
 ) -> Result<PlanReport, PlanFailure> {
     let rig = request.rig(bench)?;
@@ -190,7 +147,6 @@ pub fn plan(
 }
 
 impl PlanRequest<'_> {
-    /// How far the rig may go.
     fn rig(&self, bench: Bench<'_>) -> Result<Rig, PlanFailure> {
         let (fastest, interlock) = (bench.rig.speed_max, bench.limits.force_max);
         let third = Newtons(interlock.0 / STIFFER);
@@ -238,18 +194,16 @@ fn offer(
         Family::Cycles { .. } => Vec::new(),
     };
     // A proposal of which the rig refuses one press cannot be run.
-    let runs: Option<Vec<(String, Preview)>> = presses
-        .into_iter()
-        .map(|(speed, hold)| {
-            let press = RampHold { speed, depth, hold, ..RampHold::default() };
-            let told = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
-            (told.refusals.is_empty()).then(|| (command(&press), told))
-        })
-        .collect();
+    let run = |(speed, hold)| {
+        let press = RampHold { speed, depth, hold, ..RampHold::default() };
+        let preview = preview(&press.plan(), bench.rig, bench.limits, bench.curve, false);
+        preview.refusals.is_empty().then(|| (command(&press), preview))
+    };
+    let runs: Option<Vec<(String, Preview)>> = presses.into_iter().map(run).collect();
     let (commands, previews): (Vec<String>, Vec<Preview>) =
         runs.unwrap_or_default().into_iter().unzip();
-    let asked = previews.iter().flat_map(|one| one.acknowledgements.clone());
-    let mut acknowledgements: Vec<String> = asked.collect();
+    let all = previews.iter().flat_map(|one| one.acknowledgements.clone());
+    let mut acknowledgements: Vec<String> = all.collect();
     acknowledgements.dedup();
     let secs = previews.iter().map(|preview| preview.expected.0);
     Offer {

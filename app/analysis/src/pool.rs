@@ -7,21 +7,18 @@ use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 
-/// What happened to one piece of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoAnswer {
-    /// It was not begun: the whole was asked to end.
+pub enum WorkFailure {
     NotBegun,
-    /// It panicked.
     Died,
 }
 
-/// What the one who waits is told, on the thread that asked.
+/// An event of the work, on the calling thread.
 pub enum News<R> {
-    /// So many pieces are done.
+    /// Number of pieces done.
     Done(usize),
     /// The answer to the next piece, in order.
-    Next(Result<R, NoAnswer>),
+    Next(Result<R, WorkFailure>),
 }
 
 /// Does `work` on every piece with `jobs` threads and tells `hear` every answer, in order. Once
@@ -44,19 +41,19 @@ pub fn in_order<T: Sync, R: Send>(
         .map_err(io::Error::other)?;
     // Pieces leave the bridge one by one, in order.
     let one = |piece: &T| match is_ending.load(Ordering::Relaxed) {
-        true => Err(NoAnswer::NotBegun),
+        true => Err(WorkFailure::NotBegun),
         false => {
             let _in = tracing::info_span!("worker").entered();
-            contained(|| work(piece)).map_err(|_| NoAnswer::Died)
+            contained(|| work(piece)).map_err(|_| WorkFailure::Died)
         }
     };
     let (sender, receiver) = sync_channel(jobs);
-    let mut answers: Vec<Option<Result<R, NoAnswer>>> = pieces.iter().map(|_| None).collect();
-    let (mut done, mut told) = (0, 0);
+    let mut answers: Vec<Option<Result<R, WorkFailure>>> = pieces.iter().map(|_| None).collect();
+    let (mut done, mut delivered) = (0, 0);
     pool.in_place_scope(|scope| {
         scope.spawn(|_| {
             let pieces = pieces.iter().enumerate().par_bridge();
-            // Nobody listens any more only where `hear` itself panicked.
+            // Sending fails only where `hear` itself panicked.
             let _ = pieces.try_for_each_with(sender, |sender, (index, piece)| {
                 sender.send((index, one(piece))).ok()
             });
@@ -67,9 +64,9 @@ pub fn in_order<T: Sync, R: Send>(
                 hear(News::Done(done));
             }
             answers[index] = Some(answer);
-            while let Some(answer) = answers.get_mut(told).and_then(Option::take) {
+            while let Some(answer) = answers.get_mut(delivered).and_then(Option::take) {
                 hear(News::Next(answer));
-                told += 1;
+                delivered += 1;
             }
         }
     });
@@ -86,7 +83,7 @@ mod tests {
         pieces: &[u32],
         is_ending: &AtomicBool,
         work: impl Fn(&u32) -> R + Sync,
-    ) -> (Vec<Result<R, NoAnswer>>, usize) {
+    ) -> (Vec<Result<R, WorkFailure>>, usize) {
         let (mut answers, mut most) = (Vec::new(), 0);
         in_order(jobs, pieces, is_ending, work, |news| match news {
             News::Done(count) => most = count,
@@ -99,7 +96,7 @@ mod tests {
     #[test]
     fn answers_come_in_order_whoever_is_first() {
         let pieces: Vec<u32> = (0..40).collect();
-        let expected: Vec<Result<u32, NoAnswer>> = pieces.iter().map(|i| Ok(i * i)).collect();
+        let expected: Vec<Result<u32, WorkFailure>> = pieces.iter().map(|i| Ok(i * i)).collect();
         for jobs in [1, 3, 100] {
             let (found, done) = answers(jobs, &pieces, &AtomicBool::new(false), |&i| {
                 // Later pieces are quicker.
@@ -119,7 +116,7 @@ mod tests {
             is_ending.store(i == 1, Ordering::Relaxed);
             i
         });
-        let not = Err(NoAnswer::NotBegun);
+        let not = Err(WorkFailure::NotBegun);
         assert_eq!((found, done), (vec![Ok(0), Ok(1), not, not], 2));
     }
 
@@ -129,6 +126,6 @@ mod tests {
             assert!(i != 1, "on purpose");
             i
         });
-        assert_eq!(found, [Ok(0), Err(NoAnswer::Died), Ok(2), Ok(3)]);
+        assert_eq!(found, [Ok(0), Err(WorkFailure::Died), Ok(2), Ok(3)]);
     }
 }

@@ -1,22 +1,22 @@
-//! How work that takes a while says how far it is, and learns that nobody wants the rest.
+//! Progress of long work, and its cancellation.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Whoever watches work: a bar, a window, a test.
+/// Receives the progress of work: a bar, a window, a test.
 pub trait Progress {
-    /// `done` of `of` pieces of like length are done and `what` comes next. Break: nobody wants the rest.
+    /// `done` of `of` pieces of like length are done and `what` comes next. Break cancels the rest.
     fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()>;
 
-    /// This share of the whole is done, 0 to 1. False: nobody wants the rest.
+    /// This share of the whole is done, 0 to 1. False cancels the rest.
     fn share(&self, share: f64, what: &str) -> bool {
         let done = (SHARES as f64 * share) as usize;
         self.tell(done, SHARES, what).is_continue()
     }
 }
 
-/// Parts of a whole that can be told apart.
+/// Resolution of a share.
 const SHARES: usize = 1000;
 
 impl<F: Fn(usize, usize, &str) -> ControlFlow<()>> Progress for F {
@@ -25,7 +25,7 @@ impl<F: Fn(usize, usize, &str) -> ControlFlow<()>> Progress for F {
     }
 }
 
-/// Nobody watches, and everything is wanted.
+/// Progress that is shown nowhere and never cancelled.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unwatched;
 
@@ -38,23 +38,14 @@ impl Progress for Unwatched {
 /// The progress of a task on another thread, which may be cancelled from here.
 #[derive(Debug, Default)]
 pub struct TaskProgress {
-    done: AtomicUsize,
-    of: AtomicUsize,
-    what: Mutex<String>,
+    state: Mutex<(usize, usize, String)>,
     is_cancelled: AtomicBool,
 }
 
 impl Progress for TaskProgress {
     fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
-        self.done.store(done, Ordering::Relaxed);
-        self.of.store(of, Ordering::Relaxed);
-        let mut text = self.what.lock().unwrap_or_else(PoisonError::into_inner);
-        text.clear();
-        text.push_str(what);
-        match self.is_cancelled() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
+        *self.state.lock().unwrap_or_else(PoisonError::into_inner) = (done, of, what.to_owned());
+        if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -64,15 +55,12 @@ impl TaskProgress {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work was asked to end.
     pub fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
     /// Pieces done, pieces in all, and what comes next.
     pub fn read(&self) -> (usize, usize, String) {
-        let what = self.what.lock().unwrap_or_else(PoisonError::into_inner);
-        let count = |pieces: &AtomicUsize| pieces.load(Ordering::Relaxed);
-        (count(&self.done), count(&self.of), what.clone())
+        self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

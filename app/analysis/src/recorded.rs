@@ -1,4 +1,4 @@
-//! Recordings of a loop computed again, of whichever loop.
+//! Replay of the recording of any loop.
 
 use palpate_sessions::ticks::{End, Recorded, Recording, Row};
 use serde::Serialize;
@@ -7,19 +7,16 @@ use serde::Serialize;
 /// where the loop failed and cut it off.
 pub type Ended = Option<Result<(Recorded, u64), String>>;
 
-/// A recording that was ended, in words.
 #[must_use]
 pub fn ended_words((recorded, left): (Recorded, u64)) -> String {
     let words = RecordedTicks::from(recorded).words();
     format!("{words}; hash at the end {left:016x}")
 }
 
-/// What of a run was recorded.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RecordedTicks {
-    /// Ticks written.
     pub ticks: u64,
-    /// Ticks for which there was no room.
+    /// Ticks that were dropped because the disk was too slow.
     pub lost: u64,
 }
 
@@ -30,73 +27,65 @@ impl From<Recorded> for RecordedTicks {
 }
 
 impl RecordedTicks {
-    /// In words.
     pub fn words(&self) -> String {
         match self.lost {
             0 => format!("{} ticks recorded, none lost", self.ticks),
             lost => format!(
-                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be computed again",
+                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be replayed",
                 self.ticks
             ),
         }
     }
 }
 
-/// What a recording gives when it is computed again.
+/// Result of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct Replayed {
-    /// What the recording is of.
     pub name: String,
-    /// Ticks computed.
     pub ticks: u64,
-    /// Whether every number has the recorded bits.
+    /// Whether every computed number has the recorded bits.
     pub is_identical: bool,
-    /// Where that is not so first.
-    pub first: Option<Different>,
+    pub first: Option<ReplayDifference>,
     /// Whether the recording has its end; without, it was cut off after the last tick compared.
     pub is_whole: bool,
-    /// Ticks that were lost while it was recorded.
+    /// Ticks dropped while recording.
     pub lost: u64,
-    /// Hash of what is left at the end.
+    /// Hash of the state at the end.
     pub end_hash: String,
 }
 
 /// A number that has other bits than the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Different {
-    /// The tick.
+pub struct ReplayDifference {
     pub tick: u64,
-    /// Which number.
     pub column: &'static str,
-    /// As it was recorded.
     pub recorded: String,
-    /// As it was computed.
     pub computed: String,
 }
 
 impl Replayed {
-    /// In words.
     pub fn words(&self) -> String {
         let how = match (self.is_identical, self.is_whole) {
             (true, true) => "every number bit for bit as recorded",
             (true, false) => "every number that is left bit for bit as recorded",
             (false, _) => "not as recorded",
         };
-        let mut lines = vec![format!("{}: {} ticks computed again, {how}", self.name, self.ticks)];
+        let mut lines = vec![format!("{}: {} ticks replayed, {how}", self.name, self.ticks)];
         if !self.is_whole {
             lines.push(
-                "the recording was cut off; it was compared to its last whole tick".to_owned(),
+                "the recording was cut off; the replay compared it up to its last whole tick"
+                    .to_owned(),
             );
         }
         lines.push(format!("hash at the end {}", self.end_hash));
         lines.join("\n")
     }
 
-    /// Why it is not as recorded, or not all of it, if so.
+    /// Difference from the recording, or that it was cut off.
     pub fn failure(&self) -> Option<String> {
         let Some(first) = &self.first else {
             let cut_off = format!(
-                "the recording has no end: it was cut off after tick {}, and what came then is not known",
+                "the recording has no end: it was cut off after tick {}, and later ticks are unknown",
                 self.ticks
             );
             return (!self.is_whole).then_some(cut_off);
@@ -112,34 +101,34 @@ impl Replayed {
     }
 }
 
-/// A loop that can be computed again.
-pub trait Again<const W: usize, const R: usize> {
+/// A loop that can be replayed.
+pub trait Replayable<const W: usize, const R: usize> {
     /// The tick of the recorded inputs of `row`.
     fn tick(&mut self, row: &Row<W, R>) -> Row<W, R>;
 
-    /// Hash of what is left.
-    fn left(&self) -> u64;
+    /// Hash of the state.
+    fn state_hash(&self) -> u64;
 }
 
 /// Computes every tick of a recording again, to the first that differs. `is_going` hears the share done and ends it early.
-pub fn computed_again<const W: usize, const R: usize>(
+pub fn replay_ticks<const W: usize, const R: usize>(
     name: &str,
     found: &Recording<W, R>,
     (whole, real): ([&'static str; W], [&'static str; R]),
-    again: &mut impl Again<W, R>,
+    replay: &mut impl Replayable<W, R>,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Replayed, String> {
     let mut first = None;
     let mut ticks = 0;
     for (index, row) in found.rows.iter().enumerate() {
-        let computed = again.tick(row);
+        let computed = replay.tick(row);
         ticks = row.whole[0];
         if let Some(column) = row.differs(&computed) {
             let text = |row: &Row<W, R>| match column.checked_sub(W) {
                 None => row.whole[column].to_string(),
                 Some(real) => format!("{:?}", row.real[real]),
             };
-            first = Some(Different {
+            first = Some(ReplayDifference {
                 tick: ticks,
                 column: whole.iter().chain(&real).copied().nth(column).unwrap_or(""),
                 recorded: text(row),
@@ -151,12 +140,12 @@ pub fn computed_again<const W: usize, const R: usize>(
             return Err("ended before it was done".to_owned());
         }
     }
-    let hash = again.left();
+    let hash = replay.state_hash();
     let (is_whole, lost) = match found.end {
         End::CutOff => (false, 0),
         End::Whole { lost, left } => {
             if first.is_none() && left != hash {
-                first = Some(Different {
+                first = Some(ReplayDifference {
                     tick: ticks,
                     column: "hash at the end",
                     recorded: format!("{left:016x}"),

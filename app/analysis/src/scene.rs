@@ -1,7 +1,7 @@
-//! A scene in real time, its recording, and the recording computed again.
+//! A scene in real time, its recording and its replay.
 
 use super::haptics::{Paced, body_of};
-use super::recorded::{Again, Ended, RecordedTicks, Replayed, computed_again};
+use super::recorded::{Ended, RecordedTicks, Replayable, Replayed, replay_ticks};
 use palpate_haptics::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
 use palpate_runner::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
@@ -13,14 +13,12 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
 
-/// Between two looks at a scene that runs: half a frame.
+/// Interval between two looks at a running scene: half a frame.
 const LOOK: Duration = Duration::from_millis(8);
 
 /// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
 pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
-    let Some(path) = file else {
-        return Ok((SceneFile::default(), Vec::new()));
-    };
+    let Some(path) = file else { return Ok((SceneFile::default(), Vec::new())) };
     let called = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|err| format!("cannot read {called} ({err}); give a scene file"))?;
@@ -36,30 +34,26 @@ pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String>
     Ok((scene, notes))
 }
 
-/// What a scene did in real time.
+/// Result of a scene that ran in real time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Played {
-    /// Its name.
     pub name: String,
     /// The hand's path.
     pub path: &'static str,
     /// Nodes along a side.
     pub nodes: usize,
-    /// Ticks that the scene made.
     pub ticks: u64,
     /// Greatest depth of a frame in mm.
     pub depth_max_mm: f64,
     /// Largest force of a frame in N.
     pub force_max_n: f64,
-    /// What took force away, with its share of the frames.
+    /// Reasons for reduced force, with their share of the frames.
     pub why: Vec<(&'static str, f64)>,
     /// Hash of the surface at the end.
     pub surface_hash: String,
     /// The budget of a tick in microseconds, and whether 999 ticks in a thousand kept to it.
     pub tick_us: f64,
-    /// See [`Self::tick_us`].
     pub is_within_budget: bool,
-    /// How the loop kept its time.
     #[serde(flatten)]
     pub paced: Paced,
 }
@@ -119,14 +113,14 @@ pub fn play(
     })
 }
 
-impl Again<3, 10> for LedScene {
+impl Replayable<3, 10> for LedScene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (hand, elapsed) = scene_input(row);
-        let told = self.tick_after(hand, elapsed);
-        scene_row(hand, elapsed, &told)
+        let tick = self.tick_after(hand, elapsed);
+        scene_row(hand, elapsed, &tick)
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.scene.hash()
     }
 }
@@ -134,26 +128,25 @@ impl Again<3, 10> for LedScene {
 /// What became of the recording of a scene that was ended, if it has one.
 #[must_use]
 pub fn recorded(end: SceneEnd) -> Ended {
-    let left = end.scene.hash();
-    let told = end.recorded?;
-    Some(told.map(|told| (told, left)))
+    let hash = end.scene.hash();
+    Some(end.recorded?.map(|counts| (counts, hash)))
 }
 
 /// On a device that was sensed.
-impl Again<3, 10> for Scene {
+impl Replayable<3, 10> for Scene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (sensed, elapsed) = scene_input(row);
         let Hand6 { at, turn } = sensed;
-        let told = self.feel(Pose { at, turn }, elapsed);
-        scene_row(sensed, elapsed, &told)
+        let tick = self.feel(Pose { at, turn }, elapsed);
+        scene_row(sensed, elapsed, &tick)
     }
 
-    fn left(&self) -> u64 {
+    fn state_hash(&self) -> u64 {
         self.hash()
     }
 }
 
-/// Computes every tick of a recording again from its inputs.
+/// Replays every tick of a recording from its inputs.
 pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
     let (whole, sensed) = SENSED_COLUMNS;
     let is_sensed = has_columns(folder, &whole, &sensed)?;
@@ -173,8 +166,8 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
     let mut scene = file.scene(nodes)?;
     let name = format!("scene '{}'", file.name);
     if is_sensed {
-        return computed_again(&name, &found, columns, &mut scene, is_going);
+        return replay_ticks(&name, &found, columns, &mut scene, is_going);
     }
     let mut led = LedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
-    computed_again(&name, &found, columns, &mut led, is_going)
+    replay_ticks(&name, &found, columns, &mut led, is_going)
 }

@@ -1,4 +1,4 @@
-//! What exactness costs in a scene on this computer, and the cheapest way that a scene's tolerances allow.
+//! The cost of accuracy in a scene on this computer, and the cheapest settings that a scene's tolerances allow.
 
 use crate::progress::Progress;
 use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
@@ -18,10 +18,8 @@ const FAMILY: &str = "series-3";
 /// For how long one method is timed, in s.
 const TIMED_S: f64 = 0.2;
 
-/// How fast a method moves nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MethodSpeed {
-    /// Its name.
     pub method: &'static str,
     /// Nodes along a side.
     pub nodes: usize,
@@ -29,12 +27,10 @@ pub struct MethodSpeed {
     pub nodes_per_ms: f64,
 }
 
-/// Everything measured, and what follows.
+/// Measured curves of a scene, and the plan from them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bench {
-    /// The machine.
     pub machine: Machine,
-    /// Whether only the short part was measured.
     pub quick: bool,
     /// Errors against times.
     pub curves: SceneCurves,
@@ -44,21 +40,18 @@ pub struct Bench {
     pub steps_on_front: Vec<bool>,
     /// The closed form beside the chain as it was published, in this run.
     pub methods: Vec<MethodSpeed>,
-    /// What the scene is to be played with.
     pub plan: Option<ScenePlan>,
     /// Why there is no plan that holds everything.
     pub no_plan: Option<NoPlan>,
 }
 
-/// Measures; none if `progress` ended it.
+/// `None` if `progress` cancelled it.
 pub fn bench(
     file: &SceneFile,
     extent: Extent,
     progress: &dyn Progress,
 ) -> Result<Option<Bench>, String> {
-    let Some(curves) = measure_scene(extent, progress)? else {
-        return Ok(None);
-    };
+    let Some(curves) = measure_scene(extent, progress)? else { return Ok(None) };
     let methods = [201, 401]
         .into_iter()
         .flat_map(|nodes| [Method::Envelope, Method::Chain].map(|method| (nodes, method)))
@@ -110,7 +103,6 @@ pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<Sc
     plan(&needs, &own, slower)
 }
 
-/// A scene made after a plan.
 #[must_use]
 pub fn made_after(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
     SceneFile {
@@ -132,7 +124,7 @@ pub fn planned_again(
     planned(file, curves, slower(before, 1.0, measured_us))
 }
 
-/// A poke that reaches half of the way to the border, made anew in every tick.
+/// A poke that reaches half of the way to the border, repeated in every tick.
 fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
     let grid = Grid::new(nodes, nodes, 1.0).map_err(|err| err.to_string())?;
     let middle = 0.5 * (nodes - 1) as f64;

@@ -1,4 +1,4 @@
-//! From recordings on disk to a comparison of models.
+//! Comparison of models on recordings on disk.
 
 use crate::compliance::Corrections;
 use crate::progress::Progress;
@@ -10,7 +10,6 @@ use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// What is compared on what.
 #[derive(Debug, Default)]
 pub struct SelectRequest {
     /// Recordings, or folders of them.
@@ -23,14 +22,11 @@ pub struct SelectRequest {
     pub options: SelectOptions,
     /// The specimen of each recording in turn; without it what they say of themselves.
     pub specimens: Option<Vec<String>>,
-    /// What the recordings are called.
     pub naming: Naming,
 }
 
-/// A comparison and what it was made of.
 #[derive(Clone, Debug)]
 pub struct Selected {
-    /// The comparison.
     pub selection: Selection,
     /// Remarks about the recordings, each with the name of its own.
     pub notes: Vec<String>,
@@ -38,21 +34,12 @@ pub struct Selected {
     pub seconds: f64,
 }
 
-/// No comparison.
 #[derive(Debug, Error)]
 pub enum SelectFailure {
-    /// The recordings cannot be read.
     #[error(transparent)]
     Sources(#[from] SourcesError),
-    /// There is not a specimen's name for each of them.
     #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
-    Specimens {
-        /// Names that are not empty.
-        names: usize,
-        /// Recordings.
-        sources: usize,
-    },
-    /// The records cannot be compared.
+    Specimens { names: usize, sources: usize },
     #[error(transparent)]
     Select(#[from] SelectError),
 }
@@ -87,8 +74,7 @@ fn specimens(
     records: &Recordings,
 ) -> Result<Vec<Option<String>>, SelectFailure> {
     let Some(names) = names else {
-        let told = records.all.iter().map(|one| one.specimen.clone());
-        return Ok(told.collect());
+        return Ok(records.all.iter().map(|one| one.specimen.clone()).collect());
     };
     let known = names.iter().filter(|name| !name.is_empty()).count();
     if known != names.len() || known != records.all.len() {

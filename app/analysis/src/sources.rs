@@ -2,11 +2,11 @@
 //!
 //! Decided here, once for every front end: a folder with a segment of a log is a session and any other folder a
 //! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
-//! refused; a rejected session is left out and told of.
+//! refused; a rejected session is left out with a note.
 
 use crate::compliance::{Correction, Corrections};
 use crate::exports::without_copied;
-use crate::origin::Origin;
+use crate::fit::Origin;
 use crate::source::{self, FitSource, SourceError, Wanted};
 use palpate_model::calibration::{Calibration, CalibrationError};
 use palpate_rheology::fit::{FitError, FitSample, Traced};
@@ -22,46 +22,26 @@ const TABLES: [&str; 2] = ["csv", "tsv"];
 /// Ending of a session's log.
 const LOG: &str = "mcap";
 
-/// Recordings cannot be looked at together.
 #[derive(Debug, Error)]
 pub enum SourcesError {
-    /// There is nothing of this name.
     #[error(transparent)]
     Missing(ReadError),
-    /// A folder cannot be looked into.
     #[error("cannot look into {} ({reason}); check its permissions", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// The operating system's words.
-        reason: String,
-    },
-    /// A folder has no recording in it.
+    Folder { path: PathBuf, reason: String },
     #[error("{} holds no session and no table (.csv or .tsv); name the folder that does", .0.display())]
     Nothing(PathBuf),
-    /// A table stands where a session is needed.
     #[error("{} is a table and no session", .0.display())]
     Table(PathBuf),
-    /// A recording is named twice.
     #[error("{} is given twice; taken together it would count as two recordings", .0.display())]
     Twice(PathBuf),
-    /// A recording cannot be read.
     #[error("{}: {reason}", path.display())]
-    Source {
-        /// The recording.
-        path: PathBuf,
-        /// Why not.
-        reason: Box<SourceError>,
-    },
-    /// Every session was rejected.
+    Source { path: PathBuf, reason: Box<SourceError> },
     #[error("{0} sources, all of them rejected: nothing is left")]
     Rejected(usize),
 }
 
-/// Recordings that were found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Those that count, in order.
     pub paths: Vec<PathBuf>,
     /// Sessions that are left out, because what was recovered from them is there too.
     pub copied: Vec<PathBuf>,
@@ -72,15 +52,11 @@ pub struct Found {
 pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String> {
     let names: Vec<String> = names.into_iter().collect();
     (!names.is_empty()).then(|| {
-        format!(
-            "left out, because the copy that was recovered from it is there too: {}",
-            names.join(", ")
-        )
+        format!("left out, because their recovered copies are included: {}", names.join(", "))
     })
 }
 
 impl Found {
-    /// What a user must know of what was left out.
     pub fn note(&self) -> Option<String> {
         copied_sentence(self.copied.iter().map(|path| path.display().to_string()))
     }
@@ -113,7 +89,7 @@ pub fn find(paths: &[PathBuf]) -> Result<Found, SourcesError> {
     Ok(Found { paths, copied })
 }
 
-/// The same of sessions alone.
+/// Sessions alone; a table is an error.
 pub fn find_sessions(paths: &[PathBuf]) -> Result<Found, SourcesError> {
     if let Some(table) = paths.iter().find(|path| !is_session(path)) {
         return Err(SourcesError::Table(table.clone()));
@@ -166,13 +142,12 @@ fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), walkdir::Error> 
     Ok(())
 }
 
-/// How recordings are called that are looked at together.
+/// Names of recordings that are analysed together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Naming {
-    /// By their paths as given.
     #[default]
     Path,
-    /// By the name of the folder or file alone.
+    /// Name of the folder or file alone.
     Stem,
 }
 
@@ -183,25 +158,20 @@ impl Naming {
     }
 }
 
-/// How recordings are read.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<'a> {
     /// Names of the columns of tables without a header.
     pub columns: Option<&'a ColumnNames>,
     /// Which part of each, and whether rejected ones are taken.
     pub wanted: Wanted,
-    /// What is taken from their depths.
     pub corrections: &'a Corrections,
-    /// What they are called.
     pub naming: Naming,
 }
 
-/// A recording that is looked at together with others.
+/// A recording that is analysed together with others.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// What it is called.
     pub name: String,
-    /// What is fitted.
     pub samples: Vec<FitSample>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
@@ -212,7 +182,6 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// What was read of a source.
     #[must_use]
     pub fn of(name: String, source: FitSource, compliance: Option<Correction>) -> Self {
         Self {
@@ -224,16 +193,13 @@ impl Recording {
         }
     }
 
-    /// As fits take it.
     pub fn borrowed(&self) -> (&str, &[FitSample]) {
         (&self.name, &self.samples)
     }
 }
 
-/// Recordings that were read, and what a user must know of them.
 #[derive(Clone, Debug, Default)]
 pub struct Recordings {
-    /// Those that count, in order.
     pub all: Vec<Recording>,
     /// Remarks, each with the name of its recording.
     pub notes: Vec<String>,
@@ -250,7 +216,7 @@ pub fn check_once<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<()
     }
 }
 
-/// Reads recordings that are looked at together, each once.
+/// Reads recordings that are analysed together, each once.
 pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesError> {
     check_once(paths)?;
     let mut read = Recordings::default();
@@ -268,8 +234,7 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
             }
             source => source.map_err(failed)?,
         };
-        let compliance = how.corrections.apply(&mut source);
-        let compliance = compliance.map_err(|err| failed(err.into()))?;
+        let compliance = how.corrections.apply(&mut source).map_err(|err| failed(err.into()))?;
         let applied = compliance.as_ref().filter(|one| one.is_applied);
         source.notes.extend(applied.map(Correction::sentence));
         let notes = source.notes.iter().map(|note| format!("{name}: {note}"));
@@ -287,7 +252,6 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
 }
 
 impl Recordings {
-    /// As fits take them.
     pub fn borrowed(&self) -> Vec<(&str, &[FitSample])> {
         self.all.iter().map(Recording::borrowed).collect()
     }
@@ -297,22 +261,16 @@ impl Recordings {
         &self,
         find: impl FnOnce(&[Traced<'_>]) -> Result<T, FitError>,
     ) -> Result<Option<T>, String> {
-        let origins: Result<Vec<Origin>, CalibrationError> = self
-            .all
-            .iter()
-            .map(|one| Origin::of(one.calibration.as_ref(), one.compliance.as_ref()))
-            .collect();
-        let origins = origins.map_err(|err| err.to_string())?;
+        let origin =
+            |one: &Recording| Origin::of(one.calibration.as_ref(), one.compliance.as_ref());
+        let origins: Result<Vec<_>, _> = self.all.iter().map(origin).collect();
+        let origins = origins.map_err(|err: CalibrationError| err.to_string())?;
         if !origins.iter().any(Origin::is_known) {
             return Ok(None);
         }
-        let traced: Vec<Traced<'_>> = self
-            .all
-            .iter()
-            .zip(&origins)
-            .map(|(one, origin)| origin.traced(&one.name, &one.samples))
-            .collect();
-        find(&traced).map(Some).map_err(|err| err.to_string())
+        let pairs = self.all.iter().zip(&origins);
+        let traced = pairs.map(|(one, origin)| origin.traced(&one.name, &one.samples));
+        find(&traced.collect::<Vec<_>>()).map(Some).map_err(|err| err.to_string())
     }
 }
 

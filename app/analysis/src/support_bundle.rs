@@ -1,12 +1,11 @@
-//! What somebody who helps from afar needs to see, in one zip file: the program's log, versions, settings, rig files
+//! What remote support needs, in one zip file: the program's log, versions, settings, rig files
 //! without secrets and what the doctor says. Nothing that was measured, unless a session is named.
 
 use crate::opening::SETTINGS_FILE;
 use palpate_protocols::engine::ENGINE_VERSION;
-use palpate_sessions::RECORD_VERSION;
 use palpate_sessions::atomic::{Draft, Existing};
-use palpate_sessions::log::Summary;
 use palpate_sessions::rotating::{log_files, log_folder};
+use palpate_sessions::{RECORD_VERSION, Summary};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -16,31 +15,18 @@ use walkdir::WalkDir;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Words in the name of a value that is nobody else's business.
-const SECRET: [&str; 9] = [
-    "password",
-    "passwd",
-    "passphrase",
-    "secret",
-    "token",
-    "credential",
-    "login",
-    "api_key",
-    "private_key",
-];
-/// What stands in the place of a secret.
+/// Words in the name of a secret value.
+const SECRET: &str = "password passwd passphrase secret token credential login api_key private_key";
 const REMOVED: &str = "removed";
 
-/// What goes into a bundle.
 #[derive(Clone, Debug, Default)]
 pub struct BundleRequest {
     /// The file to make. One that is there already is refused.
     pub to: PathBuf,
     /// The library whose log and settings are meant.
     pub library: PathBuf,
-    /// Rig files.
     pub rigs: Vec<PathBuf>,
-    /// What the doctor says of the library, in words.
+    /// Findings of the doctor on the library.
     pub findings: String,
     /// Parts that the program was built with.
     pub features: Vec<&'static str>,
@@ -50,42 +36,26 @@ pub struct BundleRequest {
     pub sessions: Vec<PathBuf>,
 }
 
-/// One file of a bundle.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Bundled {
     /// Its name in the bundle.
     pub name: String,
     /// Its size before it is compressed.
     pub bytes: u64,
-    /// What it is, in words.
     pub what: &'static str,
 }
 
-/// A bundle was not made.
 #[derive(Debug, Error)]
 pub enum BundleError {
-    /// Something to go in cannot be read.
     #[error("cannot read {path} ({source}); check its path and permissions")]
-    Read {
-        /// What.
-        path: String,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// A session to go in is none.
+    Read { path: String, source: io::Error },
     #[error("{0}")]
     Session(String),
-    /// The bundle cannot be written.
     #[error("cannot write the bundle {path} ({source}); choose a folder that may be written")]
-    Write {
-        /// The bundle.
-        path: String,
-        /// What the system says.
-        source: io::Error,
-    },
+    Write { path: String, source: io::Error },
 }
 
-/// Makes a bundle, and tells what is in it.
+/// Writes a bundle and lists its files.
 pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError> {
     let unwritable = |source| BundleError::Write { path: request.to.display().to_string(), source };
     let draft = Draft::new(&request.to).map_err(unwritable)?;
@@ -95,13 +65,13 @@ pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError>
 }
 
 fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleError> {
-    let mut bundle = Bundle {
+    let mut bundle = BundleWriter {
         zip: ZipWriter::new(draft.writer()).set_auto_large_file(),
         files: Vec::new(),
         to: request.to.display().to_string(),
     };
     bundle.text("versions.txt", "versions and parts of the program", &versions(request))?;
-    bundle.text("findings.txt", "what the doctor says of the sessions", &request.findings)?;
+    bundle.text("findings.txt", "findings of the doctor on the sessions", &request.findings)?;
     for log in log_files(&log_folder(&request.library)) {
         let name = format!("log/{}", file_name(&log));
         bundle.file(&name, "the program's log", &log)?;
@@ -121,7 +91,7 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
     for session in &request.sessions {
         bundle.session(session)?;
     }
-    let Bundle { zip, files, to } = bundle;
+    let BundleWriter { zip, files, to } = bundle;
     let written = zip.finish().map_err(io::Error::from);
     written
         .and_then(|mut out| out.flush())
@@ -129,13 +99,13 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
     Ok(files)
 }
 
-struct Bundle<'a> {
+struct BundleWriter<'a> {
     zip: ZipWriter<BufWriter<&'a File>>,
     files: Vec<Bundled>,
     to: String,
 }
 
-impl Bundle<'_> {
+impl BundleWriter<'_> {
     fn text(&mut self, name: &str, what: &'static str, text: &str) -> Result<(), BundleError> {
         self.add(name, what, &mut text.as_bytes())
     }
@@ -166,9 +136,7 @@ impl Bundle<'_> {
         let folders = WalkDir::new(&sessions).min_depth(1).max_depth(1);
         for folder in folders.sort_by_file_name().into_iter().flatten() {
             // One that cannot be read has its line among the findings.
-            let Ok(summary) = Summary::read(folder.path()) else {
-                continue;
-            };
+            let Ok(summary) = Summary::read(folder.path()) else { continue };
             let text = serde_json::to_string_pretty(&summary.manifest).unwrap_or_default();
             let name = format!("manifests/{}.json", file_name(folder.path()));
             self.text(&name, "a session's manifest", &text)?;
@@ -201,8 +169,7 @@ fn read(path: &Path) -> Result<String, BundleError> {
 }
 
 fn file_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn versions(request: &BundleRequest) -> String {
@@ -224,7 +191,7 @@ fn versions(request: &BundleRequest) -> String {
 pub fn without_secrets(text: &str) -> String {
     let lines = text.lines().map(|line| {
         let small = line.to_lowercase();
-        if SECRET.iter().any(|word| small.contains(word)) {
+        if SECRET.split(' ').any(|word| small.contains(word)) {
             // Without a key the line may be the secret.
             return match line.split_once(['=', ':']) {
                 Some((key, _)) => format!("{} = \"{REMOVED}\"\n", key.trim_end()),
@@ -240,9 +207,7 @@ pub fn without_secrets(text: &str) -> String {
 
 /// `user:password@host` without what stands before the host.
 fn without_login(word: &str) -> String {
-    let Some((login, host)) = word.rsplit_once('@') else {
-        return word.to_owned();
-    };
+    let Some((login, host)) = word.rsplit_once('@') else { return word.to_owned() };
     let scheme = login.find("://").map_or("", |end| &login[..end + 3]);
     format!("{scheme}{REMOVED}@{host}")
 }

@@ -53,7 +53,7 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     assert_eq!(by_file["parameters"], corrected["parameters"]);
     assert_ne!(raw["parameters"], corrected["parameters"]);
     let text = stdout(&palpate(at, &["fit", "demo", "--compliance", id]));
-    assert!(text.contains("depths are corrected for the rig's compliance"), "{text}");
+    assert!(text.contains("depths are corrected for machine compliance"), "{text}");
 
     // A table keeps the raw depth and gets two columns more.
     let export = ["export", "demo", "--compliance", "last", "--json"];

@@ -153,7 +153,7 @@ fn a_session_and_its_recovered_copy_count_once() {
     // In the lake before it was recovered.
     succeeded(&palpate(at, &["export", "L", "--lake", "lake"]));
     succeeded(&palpate(at, &["recover", "L/cut"]));
-    let printed = "because the copy that was recovered from it is there too: ";
+    let printed = "because their recovered copies are included: ";
     for (args, is_reported) in [
         (["export", "L", "--lake", "other", "--json"], true),
         (["export", "L/cut.recovered", "--lake", "lake", "--json"], false),

@@ -118,7 +118,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
     let texts = strict(&page);
     let all = texts.join("\n");
     for words in [
-        "What was measured",
+        "Measurement",
         "suspect, says",
         "accepted by",
         "as it was seen",
@@ -126,7 +126,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
         "95 % interval",
         "systematic",
         "Force over time",
-        "Targets and what was done",
+        "Targets and achieved values",
         "contact at",
         "knock &lt;b&gt;",
         "withdrawn by",

@@ -13,14 +13,12 @@ pub const CAN_MOUNT: &str = "unshare -Urm mount -t tmpfs none /tmp";
 /// Names the file that gets a line for every test that is skipped, as `scripts/skipped` reads them.
 const LIST: &str = "PALPATE_SKIPPED";
 
-/// What a test needs that a computer may lack.
+/// A requirement of a test that a computer may lack.
 #[derive(Clone, Copy, Debug)]
 pub enum Need<'a> {
-    /// A program on the path.
     Program(&'a str),
     /// A package that `python3` imports.
     Python(&'a str),
-    /// A file or a folder.
     File(&'a Path),
     /// A command of the shell that succeeds.
     Command(&'a str),

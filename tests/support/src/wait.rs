@@ -21,7 +21,6 @@ impl Deadline {
         Self(Instant::now() + PATIENCE)
     }
 
-    /// Whether it has passed.
     #[must_use]
     pub fn is_over(self) -> bool {
         Instant::now() >= self.0

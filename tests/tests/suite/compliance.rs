@@ -69,10 +69,11 @@ fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
         let raw = source(&session);
         let mut corrected = raw.clone();
         let corrections = Corrections::named("last", Some(&folder)).unwrap();
-        let told = corrections.apply(&mut corrected).unwrap().unwrap();
-        println!("  {}", told.sentence());
+        let correction = corrections.apply(&mut corrected).unwrap().unwrap();
+        println!("  {}", correction.sentence());
         assert!(
-            told.is_applied && (told.at_peak_um - 1e3 * wanted * told.force_peak_n).abs() < 5.0
+            correction.is_applied
+                && (correction.at_peak_um - 1e3 * wanted * correction.force_peak_n).abs() < 5.0
         );
         let before = body(&truth, &fit(&raw.samples, &options).unwrap());
         let after = body(&truth, &fit(&corrected.samples, &options).unwrap());

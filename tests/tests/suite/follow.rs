@@ -195,11 +195,11 @@ fn a_lead_that_is_no_number_is_refused_once_and_is_no_lead() {
     for depth in [None, Some(Depth(f64::NAN)), Some(Depth(f64::INFINITY)), None] {
         lab.give(Input::Lead { depth });
     }
-    let told = |lab: &Lab<SimRig>| {
+    let count_notes = |lab: &Lab<SimRig>| {
         let own = lab.records[before..].iter();
         own.filter(|(_, record)| matches!(record, Record::Refused { .. })).count()
     };
-    assert_eq!(told(&lab), 1);
+    assert_eq!(count_notes(&lab), 1);
     let at = lab.now;
     lead(&mut lab, 0.4, |_| Some(f64::NAN));
     assert_eq!(moves(&lab, at), []);
@@ -207,7 +207,7 @@ fn a_lead_that_is_no_number_is_refused_once_and_is_no_lead() {
     // Nothing but such leads is silence.
     lead(&mut lab, 60.0, |_| Some(f64::NAN));
     assert!((4.9..5.2).contains(&lab.now.since(at).seconds().0));
-    assert_eq!(told(&lab), 1);
+    assert_eq!(count_notes(&lab), 1);
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn slaved(path: HandPath, follow: Follow) -> (Session, Slaved) {
 #[test]
 fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     let path = HandPath::Sine { middle: 5.0, amplitude: 5.0, hz: 0.1 };
-    let (session, told) = slaved(path, follow(20.0, 9.0, 8.0));
+    let (session, summary) = slaved(path, follow(20.0, 9.0, 8.0));
     assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
     // The closed force of the specimen under the depth that the slave had.
     let body: ModifiedKelvin = rig().truth().body;
@@ -347,16 +347,22 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     }
     // 20 mN of noise are 3 mN in a mean of 50, and 0.02 mm of contact are as much.
     assert!(most > 0.3 && worst < 0.025, "{most} {worst}");
-    // What was told is the same.
-    assert!((told.model_max_n - most).abs() < 1e-9, "{told:?}");
-    assert!(told.model_less_cell.worst_n < 0.025 && told.model_less_cell.rms_n < 0.01, "{told:?}");
+    // The summary is the same.
+    assert!((summary.model_max_n - most).abs() < 1e-9, "{summary:?}");
+    assert!(
+        summary.model_less_cell.worst_n < 0.025 && summary.model_less_cell.rms_n < 0.01,
+        "{summary:?}"
+    );
     // The handle feels more than the cell: its place is ahead.
-    assert!(told.handle_less_cell.worst_n > told.model_less_cell.worst_n);
-    assert!(told.depth_max_mm <= 8.0 + 1e-9);
-    assert_eq!(told.contact_changes, 4, "{told:?}");
-    let lag = told.lag_ms.unwrap();
-    assert!(lag.median > 50.0 && lag.median < 400.0, "{told:?}");
-    assert!(told.damping_through_slave.unwrap() > 4.0 * told.damping_needed.max(1.0), "{told:?}");
+    assert!(summary.handle_less_cell.worst_n > summary.model_less_cell.worst_n);
+    assert!(summary.depth_max_mm <= 8.0 + 1e-9);
+    assert_eq!(summary.contact_changes, 4, "{summary:?}");
+    let lag = summary.lag_ms.unwrap();
+    assert!(lag.median > 50.0 && lag.median < 400.0, "{summary:?}");
+    assert!(
+        summary.damping_through_slave.unwrap() > 4.0 * summary.damping_needed.max(1.0),
+        "{summary:?}"
+    );
     // Leads are inputs like any other.
     let leads = session
         .entries
@@ -368,7 +374,7 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     assert_eq!(report.force_difference_n, 0.0);
     let (again, same) = slaved(path, follow(20.0, 9.0, 8.0));
     assert_eq!(again.rows, session.rows);
-    assert_eq!(same, told);
+    assert_eq!(same, summary);
     // A fit takes the first way in: the hand is back at 8 mm after 6.5 s, its slave soon after.
     let fitted = samples_of(&session, Stretch::default()).unwrap();
     let measured = fitted.iter().filter(|one| one.is_measured());

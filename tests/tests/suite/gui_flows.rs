@@ -234,7 +234,7 @@ fn forces_beyond_the_calibration_ask_for_an_acknowledgement() {
     assert!(flow.says("tick the box"));
     flow.click(tick);
     assert!(flow.is_enabled("Start  F5"));
-    // Other forces, other words: they ask anew.
+    // Other forces, other words: they ask again.
     flow.type_into("depth", "47");
     assert!(!flow.is_enabled("Start  F5"));
     flow.type_into("depth", "30");
@@ -285,7 +285,7 @@ fn frames_draw_as_much_of_a_long_run_as_of_a_short_one() {
 }
 
 #[test]
-fn what_a_crash_left_is_recovered_when_the_window_opens_and_told() {
+fn what_a_crash_left_is_recovered_and_reported_when_the_window_opens() {
     let folder = tempfile::tempdir().unwrap();
     let crashed = folder.path().join("sessions/crashed");
     std::fs::create_dir_all(&crashed).unwrap();
@@ -297,8 +297,8 @@ fn what_a_crash_left_is_recovered_when_the_window_opens_and_told() {
     let kept = flow.folder.path().join("sessions/crashed.recovered");
     let session = palpate_sessions::Session::open(&kept).unwrap();
     assert!(session.rows.len() > 10_000, "{}", session.rows.len());
-    let told = format!("{} samples kept in", session.rows.len());
-    assert!(flow.window.query_by_label_contains(&told).is_some(), "{told}");
+    let expected = format!("{} samples kept in", session.rows.len());
+    assert!(flow.window.query_by_label_contains(&expected).is_some(), "{expected}");
     // The original is as it was.
     assert_eq!(std::fs::read(crashed.join("000.mcap")).unwrap(), bytes[..bytes.len() / 2]);
 }

@@ -65,7 +65,7 @@ fn sessions_are_found_by_words_conditions_and_choices() {
     flow.type_into("find", "pig ada depth>=1cm");
     flow.wait_for_words("3 sessions, found in");
     assert!(flow.says(&row(12)) && !flow.says(&row(13)) && !flow.says(&row(8)));
-    // What is wrong with it is told in words, and the list stays.
+    // What is wrong with it appears in words, and the list stays.
     flow.type_into("find", "depth>=deep");
     flow.wait_for_words("'depth>=deep'");
     assert!(flow.says("3 sessions, found in"));
@@ -172,11 +172,11 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.type_into("reason", "looked at with the video");
     flow.click("Accept");
     flow.wait_for_words("accepted, by Grace: looked at with the video");
-    let told = edits(&sessions[20]);
-    let (worth, why) = told.verdict().unwrap();
+    let written = edits(&sessions[20]);
+    let (worth, why) = written.verdict().unwrap();
     assert_eq!((worth, why.by.as_str()), (Verdict::Suspect, "Grace"));
-    assert_eq!(told.notes().count(), 1);
-    assert!(told.all.iter().any(|edit| matches!(edit.change, Change::Review { .. })));
+    assert_eq!(written.notes().count(), 1);
+    assert!(written.all.iter().any(|edit| matches!(edit.change, Change::Review { .. })));
     flow.window.check_accessibility();
     // Whoever types a note finds the session by it.
     flow.type_into("find", "warm gel");
@@ -188,7 +188,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     // The review saw another verdict.
     flow.wait_for_words("outdated, by Grace");
     assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Valid);
-    // A verdict that somebody has given since is not taken back.
+    // A verdict that was replaced since is not undone.
     flow.type_into("reason", "hair again");
     flow.click("Rejected");
     flow.wait_for_words("rejected: hair again");
@@ -202,7 +202,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
 }
 
 #[test]
-fn damage_is_told_and_sessions_are_written_out() {
+fn damage_is_reported_and_sessions_are_exported() {
     let (mut flow, sessions) = opened();
     let log = |number: usize| sessions[number].join("000.mcap");
     fs::write(log(5), b"no log").unwrap();
@@ -223,7 +223,7 @@ fn damage_is_told_and_sessions_are_written_out() {
     flow.type_into("to folder", &to.display().to_string());
     flow.click("Export");
     flow.wait_for_words("2 of 3 sessions written");
-    assert!(flow.says(&format!("{}: ", row(7))), "what was not is told");
+    assert!(flow.says(&format!("{}: ", row(7))), "what was not exported is listed");
     let text = fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap();
     let rows = edited::open(&sessions[8]).unwrap().session.rows.len();
     assert_eq!(text.lines().count(), rows + 1);

@@ -12,7 +12,7 @@ use palpate_window::window::WindowOptions;
 struct Unplugged {
     rig: SimRig,
     tries: u32,
-    is_told: bool,
+    is_reported: bool,
 }
 
 impl Unplugged {
@@ -34,7 +34,7 @@ impl Rig for Unplugged {
         if !self.is_out(until) {
             return self.rig.next_event(until);
         }
-        if std::mem::replace(&mut self.is_told, true) {
+        if std::mem::replace(&mut self.is_reported, true) {
             return None;
         }
         let fault = Fault::LinkLost { detail: "the device has hung up".into() };
@@ -55,11 +55,14 @@ impl Rig for Unplugged {
 }
 
 #[test]
-fn a_lost_link_is_told_and_made_again_by_a_button() {
+fn a_lost_link_is_reported_and_reconnected_by_a_button() {
     let scale = TimeScale::Factor(1.0);
     let mut options = WindowOptions::open("sim", &SimSettings::default(), scale).unwrap();
-    options.rig =
-        Box::new(Unplugged { rig: SimRig::new(SimSettings::default()), tries: 0, is_told: false });
+    options.rig = Box::new(Unplugged {
+        rig: SimRig::new(SimSettings::default()),
+        tries: 0,
+        is_reported: false,
+    });
     let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
     flow.wait("the loss", |window| window.state().snapshot().rig.link_error.is_some());
     flow.window.step();

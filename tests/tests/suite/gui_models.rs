@@ -256,7 +256,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| screen_of::<TradeScreen>(window).scene_curves().is_some());
     flow.window.run_steps(3);
-    // So much is tolerated that the coarsest mesh does, and what that leaves out is told.
+    // So much is tolerated that the coarsest mesh does, and what that leaves out is listed.
     for words in [
         "the cheapest that holds both",
         "51 x 51 nodes (planned)",
@@ -270,7 +270,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
         assert!(flow.says("(planned)"), "{view}");
         flow.window.check_accessibility();
     }
-    // Nothing holds a shape so well: the nearest is told.
+    // Nothing holds a shape so well: the nearest is named.
     flow.type_into("shape", "0.0001");
     assert!(flow.says("no plan: ") && flow.says("Nearest within the budget"));
     flow.type_into("budget", "0");

@@ -198,21 +198,21 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     let calibration = serde_json::to_string(&Calibration::thesis()).expect("a document");
     fs::write(&document, calibration).expect("a file");
     panel.click("Other calibration");
-    panel.type_into("name", "anew");
+    panel.type_into("name", "repeat");
     assert!(panel.says("choose a calibration"));
     panel.type_into("or file", "nowhere.json");
     panel.click("Make analysis");
     panel.wait_for("nowhere.json");
     panel.type_into("or file", &document.display().to_string());
     panel.click("Make analysis");
-    panel.wait_for("kept as 'anew'");
-    panel.wait_for("Found by 'anew'");
+    panel.wait_for("kept as 'repeat'");
+    panel.wait_for("Found by 'repeat'");
     panel.wait_for("N rms and at most");
     assert_eq!(panel.analyses().counting().count(), 3);
     panel.type_into("reason", "only tried");
     panel.click("Undo the last");
     panel.wait_for("withdrawn by");
-    assert!(panel.analyses().get("anew").is_err());
+    assert!(panel.analyses().get("repeat").is_err());
     // The log is read again only where an edit changes what it means.
     assert_eq!(panel.window.state_mut().panel.take_changed(), None);
 }

@@ -152,7 +152,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
     assert!(flow.says("give a new folder that may be written"));
     flow.type_into("record to", "");
-    // Another body gives other forces, and a line that was changed is told.
+    // Another body gives other forces, and a changed line is reported.
     let settings = folder.join("settings.toml");
     let text = std::fs::read_to_string(&settings).unwrap();
     std::fs::write(&settings, text.replacen("tau_eps = 1", "tau_eps = 2", 1)).unwrap();
@@ -199,7 +199,8 @@ fn a_plan_is_taken_and_stands_in_the_form() {
 }
 
 #[test]
-fn a_missed_budget_is_told_before_anything_was_measured_and_a_button_leads_to_the_measurement() {
+fn a_missed_budget_is_reported_before_anything_was_measured_and_a_button_leads_to_the_measurement()
+{
     let mut flow = open();
     let path = flow.folder.path().join("strict.toml");
     // No computer makes a tick in a millionth of a microsecond.

@@ -37,14 +37,14 @@ fn write(folder: &Path, lines: &[String]) {
     std::fs::write(folder.join("ticks.csv"), lines.join("\n") + "\n").unwrap();
 }
 
-/// What was recorded is told as it stands on disk. A changed digit of a column is refused, and named where no end tells of it.
-fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
+/// The recording is described as it stands on disk. A changed digit of a column is refused, and named where no end tells of it.
+fn check_description(flow: &mut Flow, folder: &Path, column: &str) {
     flow.wait_for_words("ticks recorded, none lost");
     let whole = lines(folder);
     let end: Vec<&str> = whole.last().unwrap().split(',').collect();
     assert_eq!(end[0], "end");
-    let told = format!("{} ticks recorded, none lost; hash at the end {}", end[1], end[3]);
-    assert!(flow.says(&told), "{told}");
+    let expected = format!("{} ticks recorded, none lost; hash at the end {}", end[1], end[3]);
+    assert!(flow.says(&expected), "{expected}");
     flow.click("Replay it");
     flow.wait_for_words("every number bit for bit as recorded");
 
@@ -68,7 +68,7 @@ fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
 }
 
 #[test]
-fn the_end_of_a_recording_is_told_as_it_is_on_disk_and_a_changed_digit_is_found() {
+fn the_end_of_a_recording_is_described_as_it_is_on_disk_and_a_changed_digit_is_found() {
     let mut flow = open(Key::E);
     // A mesh that a slow test machine ticks in time.
     flow.type_into("nodes", "51");
@@ -77,7 +77,7 @@ fn the_end_of_a_recording_is_told_as_it_is_on_disk_and_a_changed_digit_is_found(
     assert!(flow.says("every tick is recorded"));
     flow.wait("a depth", is_deep);
     flow.click("Stop the scene");
-    check_told(&mut flow, &folder, "depth_mm");
+    check_description(&mut flow, &folder, "depth_mm");
     // What is not asked for is not recorded, and nothing is said of the one before.
     flow.click("Start the scene");
     assert!(screen_of::<SceneScreen>(&flow.window).is_running());
@@ -115,7 +115,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
         feel.is_some_and(|feel| feel.last().snapshot.force.0 > 1.0)
     });
     flow.click("Stop the loop");
-    check_told(&mut flow, &folder, "force_n");
+    check_description(&mut flow, &folder, "force_n");
     // Led away instead, the hand would not press.
     let whole = lines(&folder);
     let elsewhere = whole.iter().filter(|line| !line.starts_with("end"));

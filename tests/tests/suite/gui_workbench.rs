@@ -66,7 +66,7 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
     let mut flow = Flow::open(TimeScale::Factor(20.0));
     by_name(&mut flow, "start the protocol");
     flow.wait_for_phase(Phase::Contact);
-    flow.type_into("note", "somebody leaned on the table");
+    flow.type_into("note", "a visitor leaned on the table");
     flow.click("Note  F3");
     flow.window.key_press(Key::F3);
     flow.window.run_steps(3);
@@ -86,7 +86,7 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
     let bodies: Vec<String> = session.entries.iter().map(|one| one.body.to_string()).collect();
     let noted =
         |words: &str| bodies.iter().any(|body| body.contains("noted") && body.contains(words));
-    assert!(noted("somebody leaned on the table") && noted("mark"), "{bodies:?}");
+    assert!(noted("a visitor leaned on the table") && noted("mark"), "{bodies:?}");
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     let mm = moved * snapshot.rig.description.mm_per_pulse;
     assert!((mm - 5.0).abs() <= snapshot.rig.description.mm_per_pulse, "{mm}");
     assert_eq!(flow.sessions().len(), 2);
-    // What makes no sense is told, and nothing moves.
+    // What makes no sense is reported, and nothing moves.
     flow.type_into("distance", "far");
     assert!(flow.says("not a finite number") && !flow.is_enabled("Jog"));
     flow.type_into("distance", "500");

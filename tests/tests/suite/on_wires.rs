@@ -40,7 +40,7 @@ impl Emulator {
     fn at(path: &Path) -> Result<Self, String> {
         let is_over = Arc::new(AtomicBool::new(false));
         let stop = Arc::clone(&is_over);
-        let (sender, told) = sync_channel(4);
+        let (sender, events) = sync_channel(4);
         let options = ServeOptions {
             place: Place::Ptys(vec![Some(path.to_owned())]),
             baud: None,
@@ -56,12 +56,12 @@ impl Emulator {
                     ..GalilSettings::default()
                 });
                 let (_orders, received) = sync_channel(1);
-                let mut tell = |told| drop(sender.try_send(told));
+                let mut tell = |event| drop(sender.try_send(event));
                 // The sender falls with the thread, and so tells of a failure.
                 let _ = serve(&mut device, &options, &received, &stop, &mut tell);
             })
             .map_err(|err| err.to_string())?;
-        match told.recv_timeout(PATIENCE) {
+        match events.recv_timeout(PATIENCE) {
             Ok(Told::Ready(_)) => Ok(Self(is_over, Some(thread))),
             _ => Err("there is no pseudo-terminal".into()),
         }

@@ -183,7 +183,7 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
     let has_rested =
         matches!(plan.steps[paused].step, Step::Hold(_) | Step::HoldForce(_) | Step::Rest(_));
     for (index, (planned, foreseen)) in plan.steps.iter().zip(&previewed.steps).enumerate() {
-        // A prompt lasts until somebody answers.
+        // A prompt lasts until the operator answers.
         if index == paused || matches!(planned.step, Step::Prompt(_)) {
             continue;
         }

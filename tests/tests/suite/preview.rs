@@ -170,7 +170,7 @@ fn what_the_engine_refuses_at_its_start_the_preview_refuses_in_its_words() {
         let reason = ending(&lab).unwrap_err();
         assert!(reason.contains(wanted), "{reason} {wanted}");
     }
-    // Where contact is nobody knows before: what is beyond the travel even if it were at home is refused.
+    // The contact point is not known beforehand: what is beyond the travel even if it were at home is refused.
     let far = Sine { amplitude_mm: 90.0, frequency_hz: 0.005, cycles: 1 };
     for (step, wanted) in [(Step::Sine(far), "a sine to "), (jog(150.0), "a jog to ")] {
         let refusals = previewed(&plan(vec![ramp(12.0), step])).refusals;

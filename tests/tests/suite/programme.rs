@@ -263,12 +263,12 @@ calibrates = true
         assert!((volts.0 - step.volts.0).abs() < 3e-3, "{} g: {volts}", step.mass_g);
     }
     let quality = measured.quality().unwrap();
-    assert!(!quality.flat.is_empty(), "the flat stretch is not told");
+    assert!(!quality.flat.is_empty(), "the flat stretch is not reported");
     assert!(curve.is_extrapolated(Newtons(10.5)));
 }
 
 #[test]
-fn every_mistake_is_told_with_its_line() {
+fn every_mistake_is_reported_with_its_line() {
     let wrong = r#"
 palpate-programme = 1
 name = "wrong"
@@ -388,9 +388,9 @@ fn the_day_in_the_laboratory_is_a_programme() {
     assert_eq!(programme(&text).questions(), []);
 }
 
-const TOLD: &str = r#"
+const LABELLED: &str = r#"
 palpate-programme = 1
-name = "told"
+name = "labelled"
 title = "Told"
 purpose = "A test."
 
@@ -429,8 +429,8 @@ protocol = "sine"
 "#;
 
 #[test]
-fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_asked() {
-    let text = TOLD.replace("specimen-source = \"x\"\n", "");
+fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for() {
+    let text = LABELLED.replace("specimen-source = \"x\"\n", "");
     let mut whole = programme(&text);
     // Without a source the two protocols that ask for it say so, each at its line.
     let asked = whole.questions();
@@ -454,7 +454,7 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
     assert_eq!(second.about.get("specimen.thickness_mm"), Some(&11.0.into()));
     assert_eq!(second.about.get("specimen.source"), Some(&"pig".into()));
     assert_eq!(second.about.get("series.repeat"), Some(&2.into()));
-    assert_eq!(second.about.get("series.id"), Some(&"told/second".into()));
+    assert_eq!(second.about.get("series.id"), Some(&"labelled/second".into()));
     // The command line holds over the file, and two specimens stay two.
     whole.tell("operator", "Grace").unwrap();
     whole.tell("specimen", "rabbit").unwrap();
@@ -473,9 +473,9 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
 }
 
 #[test]
-fn what_cannot_be_told_is_refused_with_its_line() {
+fn impossible_labels_are_refused_with_their_line() {
     let wrong = |from: &str, to: &str| {
-        let text = TOLD.replace(from, to);
+        let text = LABELLED.replace(from, to);
         let refusal = Programme::read(&text, &|name| Err(format!("no protocol '{name}'")));
         refusal.unwrap_err()
     };
@@ -507,8 +507,8 @@ fn what_cannot_be_told_is_refused_with_its_line() {
 fn the_programme_of_the_guide_is_one() {
     let page = std::fs::read_to_string(workspace().join("docs/guide/programmes.md")).unwrap();
     let text = page.split("```toml").nth(1).unwrap().split("```").next().unwrap();
-    let told = programme(text);
-    let labels = |task| told.labels(task, 1).unwrap();
+    let labelled = programme(text);
+    let labels = |task| labelled.labels(task, 1).unwrap();
     let (first, second) = (labels(0), labels(1));
     assert_eq!((first.operator.as_str(), first.specimen.as_str()), ("Ada", "specimen 1"));
     assert_eq!(second.specimen, "stomach 8, fundus");
@@ -517,7 +517,7 @@ fn the_programme_of_the_guide_is_one() {
 
 #[test]
 fn the_probe_leaves_the_tissue_before_a_specimen_is_looked_after_anew() {
-    let whole = programme(&TOLD.replace("specimen-source = \"x\"\n", ""));
+    let whole = programme(&LABELLED.replace("specimen-source = \"x\"\n", ""));
     let words = |remount| -> Vec<String> {
         let plan = whole.tasks[2].plan(1, remount).unwrap();
         let steps = plan.steps.iter().take(4);

@@ -199,7 +199,7 @@ fn any_choice(random: &mut SplitMix, plan: &Plan) -> Operator {
     ][random.below(15)]
 }
 
-/// What nobody can know while a fault lasts, so that no limit can be kept by it.
+/// What cannot be known while a fault lasts, so that no limit can be kept by it.
 #[derive(Clone, Copy)]
 struct Hidden {
     force: bool,

@@ -181,7 +181,7 @@ fn a_played_session_shows_what_was_recorded() {
 }
 
 #[test]
-fn a_difference_is_told_in_the_words_of_the_protocol() {
+fn a_difference_is_reported_in_the_words_of_the_protocol() {
     let mut session = open("over-force-galil");
     let is_contact = |body: &serde_json::Value| body["record"] == "contact_found";
     let entry = session.entries.iter_mut().find(|entry| is_contact(&entry.body));

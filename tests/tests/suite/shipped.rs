@@ -106,15 +106,15 @@ fn shipped_sines_keep_contact_and_find_the_stiffness_of_the_body() {
             && found.len() > 1
         {
             // As the sweep's page has it: one over two pi times that frequency, to the steps of the sweep.
-            let told = 1.0 / (TAU * most.frequency);
+            let expected = 1.0 / (TAU * most.frequency);
             let tau = body.tau_eps;
-            assert!((0.6..1.7).contains(&(told / tau)), "{told}");
+            assert!((0.6..1.7).contains(&(expected / tau)), "{expected}");
         }
     }
 }
 
 #[test]
-fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
+fn a_sine_that_loses_the_tissue_is_noted_before_and_after() {
     for (name, values) in [
         ("sine", vec![("depth", "10 mm")]),
         (
@@ -123,8 +123,8 @@ fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
         ),
     ] {
         let plan = shipped(name, &values);
-        let told = notes(&plan);
-        assert!(told.len() == 1 && told[0].contains("lose the tissue"), "{told:?}");
+        let found = notes(&plan);
+        assert!(found.len() == 1 && found[0].contains("lose the tissue"), "{found:?}");
         let session = ran(SimProfile::Lab, &plan);
         let (verdict, reason) = verdict(&session);
         assert_eq!(verdict, Verdict::Suspect, "{reason}");
@@ -144,8 +144,8 @@ fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
 fn a_force_too_small_to_tell_is_not_called_met() {
     let brief = ("duration", "3 s");
     let plan = shipped("creep", &[("force", "0.001 N"), brief]);
-    let told = notes(&plan);
-    assert!(told.len() == 1 && told[0].contains("whether it was met"), "{told:?}");
+    let found = notes(&plan);
+    assert!(found.len() == 1 && found[0].contains("whether it was met"), "{found:?}");
     let (of_little, reason) = verdict(&ran(SimProfile::Lab, &plan));
     assert_eq!(of_little, Verdict::Suspect, "{reason}");
     assert!(reason.contains("0.0010 N"), "{reason}");

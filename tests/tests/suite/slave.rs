@@ -55,28 +55,28 @@ fn late(path: HandPath, delay: usize, share: f64, ms: u64) -> Slaved {
 #[test]
 fn a_slave_that_is_late_by_so_much_lags_by_so_much() {
     for delay in [40, 150] {
-        let told = late(ramp(100.0, 5.0), delay, 1.0, 3000);
-        let lag = told.lag_ms.unwrap();
+        let summary = late(ramp(100.0, 5.0), delay, 1.0, 3000);
+        let lag = summary.lag_ms.unwrap();
         // The master's place is of the sample, the slave's of one more before; places are whole pulses of 3 ms each.
-        assert!((lag.median - delay as f64).abs() <= 4.0, "{delay} {told:?}");
-        assert!(lag.worst <= delay as f64 + 40.0, "{delay} {told:?}");
+        assert!((lag.median - delay as f64).abs() <= 4.0, "{delay} {summary:?}");
+        assert!(lag.worst <= delay as f64 + 40.0, "{delay} {summary:?}");
         // The hand goes at 5 mm/s, its master slower: the body pushes back.
-        let share = told.lag_mm.median / (5e-3 * lag.median);
-        assert!((0.75..1.0).contains(&share), "{share} {told:?}");
+        let share = summary.lag_mm.median / (5e-3 * lag.median);
+        assert!((0.75..1.0).contains(&share), "{share} {summary:?}");
         // All of the body is felt, and so there is no difference but that of the lag.
-        assert!(told.model_less_cell.worst_n < 1e-9, "{told:?}");
-        assert!(told.handle_less_cell.worst_n > 0.01, "{told:?}");
-        assert_eq!(told.contact_changes, 1);
+        assert!(summary.model_less_cell.worst_n < 1e-9, "{summary:?}");
+        assert!(summary.handle_less_cell.worst_n > 0.01, "{summary:?}");
+        assert_eq!(summary.contact_changes, 1);
     }
 }
 
 #[test]
 fn a_specimen_that_is_softer_than_the_body_shows() {
-    let told = late(ramp(10.0, 5.0), 1, 0.8, 6000);
-    let share = told.cell_max_n / told.model_max_n;
-    assert!((share - 0.8).abs() < 1e-9, "{told:?}");
-    let share = told.model_less_cell.worst_n / told.model_max_n;
-    assert!((share - 0.2).abs() < 1e-9, "{told:?}");
+    let summary = late(ramp(10.0, 5.0), 1, 0.8, 6000);
+    let share = summary.cell_max_n / summary.model_max_n;
+    assert!((share - 0.8).abs() < 1e-9, "{summary:?}");
+    let share = summary.model_less_cell.worst_n / summary.model_max_n;
+    assert!((share - 0.2).abs() < 1e-9, "{summary:?}");
 }
 
 #[test]

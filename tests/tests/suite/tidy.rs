@@ -89,7 +89,7 @@ fn engine_reaches_no_file_thread_or_clock() {
 
 #[test]
 fn only_the_runner_sends_commands_to_a_rig() {
-    // Clippy knows the method whatever the value before it is called; here, that clippy is told.
+    // Clippy knows the method whatever the value before it is called; here, that clippy has the list.
     let ban = "palpate_drivers::Rig::send";
     let lines = |path: &str| -> BTreeSet<String> {
         let rules = read(path);
@@ -206,11 +206,11 @@ fn the_soak_script_names_its_parts() {
     }
     let script = workspace().join("scripts/soak");
     let help = std::process::Command::new("python3").arg(&script).arg("--help").output().unwrap();
-    let told = String::from_utf8_lossy(&help.stdout);
-    assert!(help.status.success(), "{told}");
+    let help_text = String::from_utf8_lossy(&help.stdout);
+    assert!(help.status.success(), "{help_text}");
     for part in ["bodies", "select", "coverage", "extremes", "haptics", "runs", "contact"] {
-        let is_named = told.lines().any(|line| line.trim_start().starts_with(part));
-        assert!(is_named, "{part}: {told}");
+        let is_named = help_text.lines().any(|line| line.trim_start().starts_with(part));
+        assert!(is_named, "{part}: {help_text}");
     }
 }
 

@@ -14,7 +14,7 @@ fn recorded() -> TradeCurves {
 fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
     let recorded = recorded();
     let now = errors(Extent::Quick, &Unwatched).unwrap();
-    let now = now.expect("nobody ended it");
+    let now = now.expect("it was not cancelled");
     recorded.agrees_with(&now).unwrap();
     // Every error counts, to a percent at least, whose percent is twice its rounding.
     let mut perturbed = 0;

@@ -119,15 +119,15 @@ fn pause_stops_the_clock_of_the_wait() {
 
 #[test]
 fn rig_without_the_sensor_is_refused_by_the_preview() {
-    let told = |rig: &SimRig| {
+    let preview_on = |rig: &SimRig| {
         let curve = rig.calibration().curve().unwrap();
         let description = rig.description();
         let limits = Limits::for_travel(description.travel);
         let plan = plan(wait(HIGH, 5.0, OnTimeout::Stop));
         preview(&plan, description, &limits, &curve, false)
     };
-    assert_eq!(told(&rig()).refusals.len(), 0);
-    let usual = told(&SimRig::new(SimSettings::default()));
+    assert_eq!(preview_on(&rig()).refusals.len(), 0);
+    let usual = preview_on(&SimRig::new(SimSettings::default()));
     assert_eq!((usual.refusals.len(), usual.steps[1].refusals.len()), (1, 1));
 }
 

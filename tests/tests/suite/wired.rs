@@ -53,8 +53,8 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
         }
     })
     .unwrap();
-    // Every reading is there as it was told, at its time.
-    let told: Vec<(Nanos, String)> = session
+    // Every reading is there as it was sent, at its time.
+    let sent: Vec<(Nanos, String)> = session
         .rows
         .iter()
         .map(|row| {
@@ -62,7 +62,7 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
             (row.host, format!("{} {counts} {pulses}\r\n", row.tick))
         })
         .collect();
-    assert!(cell == told, "{} readings, {} told", told.len(), cell.len());
+    assert!(cell == sent, "{} readings, {} sent", sent.len(), cell.len());
     assert!(sent.starts_with("EnableMotor\r"), "{sent}");
     assert_eq!(session.beside.raw_bytes, bytes);
     assert_eq!(end.raw_bytes, bytes);
@@ -114,8 +114,8 @@ fn a_computer_that_stands_still_before_a_rig_on_wires_ends_the_run() {
         let session = run(Box::new(rig), TimeScale::Factor(40.0), &out);
         let end = session.end.as_ref().unwrap();
         assert_eq!(end.outcome, ending, "{}", end.reason);
-        let is_told = end.reason.contains("stood still");
-        assert_eq!(is_told, !is_virtual, "{}", end.reason);
+        let is_reported = end.reason.contains("stood still");
+        assert_eq!(is_reported, !is_virtual, "{}", end.reason);
         let worst = session.beside.health.worst.unwrap();
         assert!(worst.lateness_s >= 0.5, "{worst:?}");
         assert_eq!(replay(&session, &[]).unwrap().first_difference, None);

@@ -1,4 +1,4 @@
-//! A session fitted once more, and what of it is kept.
+//! A further fit of a session, and its stored form.
 
 use super::step;
 use crate::fit::{Fitted, IntervalsWanted, TogetherRequest, fit_together};
@@ -13,50 +13,43 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// How a session is fitted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FitWanted {
-    /// Key of a family; none for the modified Kelvin body.
+    /// Key of a model family; `None` is the modified Kelvin model.
     pub family: Option<String>,
-    /// The way back too, where the family knows it.
+    /// Fit the unloading too, where the family describes it.
     pub with_unload: bool,
-    /// Take sessions though they were rejected.
     pub is_rejected_included: bool,
-    /// Intervals from the profile likelihood as well.
     pub with_profile: bool,
-    /// The analysis that the session is read by.
+    /// Analysis through which the session is read.
     pub based_on: Option<String>,
-    /// Sessions fitted together with it, one body for all.
+    /// Sessions fitted together with it, with one body for all.
     pub together_with: Vec<Wanted>,
 }
 
 /// What is kept of how a fit was asked for, so that it can be asked for again.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FitSettings {
-    /// Key of a family; none for the modified Kelvin body.
+    /// Key of a model family; `None` is the modified Kelvin model.
     pub family: Option<String>,
-    /// Whether the way back was fitted too.
     pub unload: bool,
     /// Parameters held, as name=value.
     pub fixed: Vec<String>,
     /// Parameters found that are held by default.
     pub free: Vec<String>,
-    /// Whether what the calibration's errors do was told.
+    /// Whether the systematic uncertainty was estimated.
     pub systematic: bool,
     /// Whether intervals from the profile likelihood were found.
     pub profile: bool,
-    /// Fits of a bootstrap.
+    /// Number of bootstrap fits.
     pub bootstrap: Option<usize>,
-    /// Its seed.
     pub seed: Option<u64>,
-    /// What was taken from the depths.
+    /// Identifier of the compliance that was subtracted from the depths.
     pub compliance: Option<String>,
-    /// Whether a rejected session was fitted all the same.
     pub include_rejected: bool,
 }
 
 impl FitWanted {
-    /// The family, all its parameters free.
     fn options(&self) -> Result<FitOptions, String> {
         match &self.family {
             Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
@@ -64,7 +57,7 @@ impl FitWanted {
         }
     }
 
-    /// What is kept of the question.
+    /// Settings that are stored with the fit.
     pub(super) fn settings(&self) -> Value {
         let settings = FitSettings {
             family: self.family.clone(),
@@ -129,7 +122,7 @@ impl FitWanted {
         progress: &dyn Progress,
     ) -> Result<Value, String> {
         let fitted = Fitted::of(source, options);
-        step(progress, 2, 4, "moving the calibration by its errors")?;
+        step(progress, 2, 4, "estimating the systematic uncertainty")?;
         let fitted = fitted.with_systematic(options);
         let report = fitted.result.as_ref().map_err(ToString::to_string)?;
         if self.with_profile {
@@ -137,10 +130,10 @@ impl FitWanted {
         }
         let intervals = fitted.intervals(options, self.intervals(), |_| ());
         let intervals = intervals.map_err(|err| err.to_string())?;
-        step(progress, 4, 4, "keeping it")?;
+        step(progress, 4, 4, "storing the analysis")?;
         let overlay = Overlay::of(report, &fitted.samples);
-        let beside = fitted.beside(&overlay, &intervals);
-        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        let details = fitted.beside(&overlay, &intervals);
+        let object = FitObject::of(options.family(), report, details, fitted.seconds);
         serde_json::to_value(&object).map_err(|err| err.to_string())
     }
 
@@ -158,18 +151,18 @@ impl FitWanted {
             is_systematic: true,
             intervals: self.intervals(),
         };
-        let fitted = fit_together(records, &request, |_, _| ());
-        let mut fitted = fitted.map_err(|err| err.to_string())?;
+        let mut fitted =
+            fit_together(records, &request, |_, _| ()).map_err(|err| err.to_string())?;
         if let Some(reason) = fitted.notes.pop() {
             return Err(reason);
         }
-        step(progress, 4, 4, "keeping it")?;
-        let beside = Beside {
+        step(progress, 4, 4, "storing the analysis")?;
+        let details = Beside {
             systematic: fitted.systematic.as_ref().and_then(|found| found.first()),
             ..fitted.beside(records).remove(0)
         };
         let report = &fitted.report.records[0].report;
-        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        let object = FitObject::of(options.family(), report, details, fitted.seconds);
         let mut results = serde_json::to_value(&object).map_err(|err| err.to_string())?;
         results["shared"] = json!(fitted.report.shared);
         Ok(results)

@@ -1,9 +1,9 @@
-//! The sessions of a lake, or one part of them, each fitted and kept in the lake.
+//! Fits of the sessions of a lake, or of one part of them, stored in the lake.
 
 use super::{Fitted, NotFitted, Recipe};
 use crate::compliance::Correction;
 use crate::exports::sweep_lake;
-use crate::pool::{News, NoAnswer, in_order};
+use crate::pool::{News, WorkFailure, in_order};
 use crate::source;
 use crate::sources::copied_sentence;
 use palpate_rheology::fit::{FitReport, Systematic};
@@ -23,14 +23,10 @@ use thiserror::Error;
 /// The folder of fits of the body that is fitted where no family is named.
 const MODEL: &str = "modified-kelvin";
 
-/// Which sessions of which lake are fitted how.
 #[derive(Debug)]
 pub struct LakeRequest<'a> {
-    /// The lake.
     pub lake: &'a Path,
-    /// The part of its sessions.
     pub shard: Shard,
-    /// How each is fitted.
     pub recipe: &'a Recipe,
     /// Parameters held, as name=value.
     pub fixed: &'a [String],
@@ -38,34 +34,25 @@ pub struct LakeRequest<'a> {
     pub free: &'a [String],
     /// SHA-256 of the compliance's file, if depths are corrected.
     pub compliance_sha256: Option<String>,
-    /// Fits at a time.
+    /// Number of concurrent fits.
     pub jobs: usize,
 }
 
-/// What came of one session of a lake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Its fit was made.
     Made,
-    /// Its fit was there already.
     There,
-    /// It was rejected.
     Rejected,
 }
 
-/// A session of a lake has no fit.
 #[derive(Debug, Error)]
 pub enum LakeFailure {
-    /// The lake cannot be read.
     #[error(transparent)]
     Lake(#[from] LakeError),
-    /// The fit cannot be written.
     #[error(transparent)]
     Keep(#[from] ExportError),
-    /// The session cannot be read or fitted.
     #[error(transparent)]
     NotFitted(#[from] NotFitted),
-    /// No thread can be started.
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
 }
@@ -76,35 +63,29 @@ impl From<source::SourceError> for LakeFailure {
     }
 }
 
-/// What `hear` is told of the fits of a lake.
+/// An event in the fitting of a lake.
 #[derive(Debug)]
 pub enum LakeFit<'a> {
-    /// What a user must know.
     Note(String),
-    /// So many of so many sessions are done.
+    /// Number of sessions done, and of all.
     Done(usize, usize),
-    /// What came of a session, in the sessions' order.
+    /// Outcome of a session, in the sessions' order.
     Next(&'a str, Result<Outcome, LakeFailure>),
 }
 
-/// How many sessions came to what.
+/// Counts of outcomes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LakeTally {
-    /// The folder of their fits.
     pub model: String,
-    /// In the part of the lake that was looked at.
     pub sessions: usize,
-    /// Fitted now.
     pub made: usize,
-    /// Fitted before.
     pub were_there: usize,
-    /// Not fitted because they were rejected.
     pub rejected: usize,
 }
 
 /// What is kept of a fit: nothing that depends on when or where it was made.
 #[derive(Serialize)]
-struct Kept<'a> {
+struct StoredFit<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -144,7 +125,8 @@ pub fn fit_lake(
     in_order(request.jobs, &found, is_ending, work, |news| match news {
         News::Done(count) => hear(LakeFit::Done(count, found.len())),
         News::Next(answer) => {
-            let came = answer.unwrap_or_else(|none: NoAnswer| Err(NotFitted::from(none).into()));
+            let came =
+                answer.unwrap_or_else(|failure: WorkFailure| Err(NotFitted::from(failure).into()));
             match &came {
                 Ok(Outcome::Made) => tally.made += 1,
                 Ok(Outcome::There) => tally.were_there += 1,
@@ -172,17 +154,17 @@ impl LakeRequest<'_> {
         let source = source::of_session(session, wanted.stretch, &[])?;
         let fitted: Fitted = self.recipe.fit_read(source)?;
         let report = fitted.result.map_err(NotFitted::Fit)?;
-        let kept = Kept {
+        let stored = StoredFit {
             report: &report,
             systematic: fitted.systematic.as_ref(),
             compliance: fitted.compliance.as_ref(),
             notes: &fitted.notes,
         };
-        keep_fit(&file, &kept)?;
+        keep_fit(&file, &stored)?;
         Ok(Outcome::Made)
     }
 
-    /// All that decides about a fit beside its session.
+    /// Everything that determines a fit apart from its session.
     fn settings(&self, model: &str) -> Value {
         let sorted = |words: &[String]| {
             let mut words: Vec<&str> = words.iter().map(|word| word.trim()).collect();

@@ -3,13 +3,13 @@
 //! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
 //! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
-use crate::source::{self, SourceError};
+use crate::source::{self, SourceError, Stretch};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{FitError, FitOptions, FitReport, Parameter, fit};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
 use palpate_tables::import::ColumnNames;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -17,57 +17,30 @@ use std::{fs, io};
 use thiserror::Error;
 
 const FILE: &str = "last-fit.json";
-/// Version of the file.
 const VERSION: u64 = 2;
 
-/// The body that a plan assumes.
 const DEFAULT_FAMILY: &str = "series-3";
 
-#[derive(Serialize)]
-struct Remembered<'a> {
-    source: String,
-    #[serde(flatten)]
-    report: &'a FitReport,
-}
-
-/// A fit in a file cannot be used.
 #[derive(Debug, Error)]
 pub enum KnownFitError {
-    /// It is none.
     #[error("this is not a fit: {reason}, {}", path.display())]
-    NotAFit {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// Its checksum says that it was changed or damaged.
+    NotAFit { path: PathBuf, reason: String },
     #[error("the remembered fit is not as it was written; fit again, {}", .0.display())]
     Changed(PathBuf),
-    /// It is a fit of another body.
     #[error("the fit has no parameter {0}")]
     Parameter(&'static str),
-    /// What is to be fitted cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// It cannot be fitted.
     #[error("{} cannot be fitted: {reason}", path.display())]
-    Fit {
-        /// The recording.
-        path: PathBuf,
-        /// Why not.
-        reason: FitError,
-    },
+    Fit { path: PathBuf, reason: FitError },
 }
 
 /// What is needed of a fit that was written as JSON, remembered or as the answer of a command.
 #[derive(Debug, Deserialize)]
 pub struct KnownFit {
-    /// What was fitted, if that was written.
     pub source: Option<String>,
     /// Root mean square of the residuals in N.
     pub rmse_n: f64,
-    /// What was found.
     pub parameters: Vec<Parameter>,
 }
 
@@ -110,7 +83,7 @@ impl KnownFit {
         if path.extension().is_some_and(|ending| ending == "json") {
             return Ok((Self::read(path)?, Vec::new()));
         }
-        let source = source::read_named(path, columns)?;
+        let source = source::read_stretch(path, columns, Stretch::RampHold)?;
         let report = fit(&source.samples, &FitOptions::default());
         let report =
             report.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
@@ -122,7 +95,7 @@ impl KnownFit {
         Ok((known, source.notes))
     }
 
-    /// The body found; a name that is missing is named.
+    /// The modified Kelvin body; an error names a missing parameter.
     pub fn body(&self) -> Result<ModifiedKelvin, KnownFitError> {
         let value = |name: &'static str| {
             let mut all = self.parameters.iter();
@@ -156,15 +129,15 @@ pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::E
         return Ok(());
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
-    let remembered = Remembered { source: source.display().to_string(), report };
-    write(&file, &remembered).map_err(|err| (file, err))
+    write(&file, report, &source).map_err(|err| (file, err))
 }
 
-fn write(file: &Path, remembered: &Remembered<'_>) -> io::Result<()> {
+fn write(file: &Path, report: &FitReport, source: &Path) -> io::Result<()> {
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder)?;
     }
-    let fit = serde_json::to_value(remembered)?;
+    let mut fit = serde_json::to_value(report)?;
+    fit["source"] = json!(source.display().to_string());
     let checksum = checksum(&fit.to_string());
     let object = json!({ "last_fit_version": VERSION, "checksum": checksum, "fit": fit });
     atomic::replace(file, object.to_string().as_bytes())

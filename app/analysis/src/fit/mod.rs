@@ -1,49 +1,49 @@
 //! From recordings on disk to fits: one, many each by itself, several together, or those of a lake.
 
-mod each;
 mod lake;
 mod last;
 mod together;
 
-pub use each::{NotFitted, each};
 pub use lake::{LakeFailure, LakeFit, LakeRequest, LakeTally, Outcome, fit_lake};
 pub use last::{KnownFit, KnownFitError, is_hardly_known, remember};
 pub use together::{Together, TogetherRequest, fit_together};
 
 use crate::compliance::{Correction, Corrections};
-use crate::origin::Origin;
+use crate::pool::{News, WorkFailure, in_order};
 use crate::report::fit_json::{Beside, Overlay};
 use crate::source::{self, FitSource, SourceError, Wanted};
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty};
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
     self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample,
-    ProfileInterval, Systematic, systematic,
+    ProfileInterval, Systematic, Traced, systematic,
 };
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
 use serde::Serialize;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use thiserror::Error;
 
-/// How every source is read and fitted.
+/// Options for reading and fitting sources.
 #[derive(Debug)]
 pub struct Recipe {
     /// The family, and which of its parameters are found.
     pub options: FitOptions,
     /// Names of the columns of tables without a header.
     pub columns: Option<ColumnNames>,
-    /// Whether what the errors of calibration and compliance do is told.
+    /// Whether the systematic uncertainty from calibration and compliance is estimated.
     pub is_systematic: bool,
     /// Which part of a source, and whether rejected ones are taken.
     pub wanted: Wanted,
     /// The analysis that a session is read by.
     pub analysis: Option<String>,
-    /// What is taken from depths.
     pub corrections: Corrections,
 }
 
 impl Recipe {
-    /// All that is known of sources of this kind, their depths raw.
+    /// With systematic uncertainty and uncorrected depths.
     #[must_use]
     pub fn new(options: FitOptions, wanted: Wanted) -> Self {
         Self {
@@ -56,46 +56,68 @@ impl Recipe {
         }
     }
 
-    /// Reads a source and fits it.
     pub fn fit(&self, path: &Path) -> Result<Fitted, SourceError> {
         let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
         self.fit_read(source::read_analysed(path, columns, self.wanted, name)?)
     }
 
-    /// Fits what was read.
     pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
         let fitted = Fitted { compliance, ..Fitted::of(source, &self.options) };
-        Ok(match self.is_systematic {
-            true => fitted.with_systematic(&self.options),
-            false => fitted,
-        })
+        Ok(if self.is_systematic { fitted.with_systematic(&self.options) } else { fitted })
     }
 }
 
-/// What came of a source that could be read.
+#[derive(Debug, Error)]
+pub enum NotFitted {
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error("not begun; the batch was asked to end")]
+    NotBegun,
+    #[error("the fit ended unexpectedly; report this with the source")]
+    Died,
+}
+
+impl From<WorkFailure> for NotFitted {
+    fn from(failure: WorkFailure) -> Self {
+        match failure {
+            WorkFailure::NotBegun => Self::NotBegun,
+            WorkFailure::Died => Self::Died,
+        }
+    }
+}
+
+/// Fits every source with `jobs` threads and tells `hear` every answer, in order. Once `is_ending` is set no fit is begun.
+pub fn each(
+    sources: &[PathBuf],
+    jobs: usize,
+    recipe: &Recipe,
+    is_ending: &AtomicBool,
+    hear: impl FnMut(News<Result<Fitted, SourceError>>),
+) -> io::Result<()> {
+    in_order(jobs, sources, is_ending, |source| recipe.fit(source), hear)
+}
+
+/// Result for a source that could be read.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// The samples fitted.
     pub samples: Vec<FitSample>,
     /// Session time of the first sample.
     pub start: Seconds,
-    /// What the reader of the source remarked.
     pub notes: Vec<String>,
-    /// The fit, or why there is none.
     pub result: Result<FitReport, FitError>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
-    /// What the calibration adds to the uncertainty, once asked for.
     pub systematic: Option<Systematic>,
     /// What the rig's compliance does to the depths, or would, once asked for.
     pub compliance: Option<Correction>,
 }
 
 impl Fitted {
-    /// Fits what was read.
     #[must_use]
     pub fn of(source: FitSource, options: &FitOptions) -> Self {
         let watch = Stopwatch::start();
@@ -116,9 +138,7 @@ impl Fitted {
     /// a note. `options` are those of the fit.
     #[must_use]
     pub fn with_systematic(mut self, options: &FitOptions) -> Self {
-        let Ok(report) = &self.result else {
-            return self;
-        };
+        let Ok(report) = &self.result else { return self };
         let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
         let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
             let record = origin.traced("", &self.samples);
@@ -136,7 +156,6 @@ impl Fitted {
         self
     }
 
-    /// What is told of the fit beside its report.
     #[must_use]
     pub fn beside<'a>(&'a self, overlay: &'a Overlay, intervals: &'a Intervals) -> Beside<'a> {
         Beside {
@@ -162,16 +181,14 @@ impl Fitted {
     }
 }
 
-/// That systematic errors are not told, and why.
 #[must_use]
 pub fn no_systematic(reason: &str) -> String {
-    format!("what calibration and compliance add to the uncertainty cannot be told: {reason}")
+    format!("the systematic uncertainty from calibration and compliance is unknown: {reason}")
 }
 
-/// Which intervals that take more than one pass are asked for.
+/// Request for intervals that take more than one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct IntervalsWanted {
-    /// From the profile likelihood.
     pub with_profile: bool,
     /// From fits to residuals shuffled in blocks.
     pub bootstrap: Option<Bootstrap>,
@@ -186,10 +203,7 @@ impl IntervalsWanted {
         progress: impl FnMut(usize),
     ) -> Result<Intervals, FitError> {
         Ok(Intervals {
-            profile: match self.with_profile {
-                true => fitted.profile(record)?,
-                false => Vec::new(),
-            },
+            profile: if self.with_profile { fitted.profile(record)? } else { Vec::new() },
             bootstrap_seed: self.bootstrap.map(|choice| choice.seed),
             bootstrap: match self.bootstrap {
                 Some(choice) => fitted.bootstrap(record, choice, progress)?,
@@ -205,10 +219,50 @@ pub struct Intervals {
     /// From the profile likelihood; ends are null where they are open.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<ProfileInterval>,
-    /// Seed of the bootstrap.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bootstrap_seed: Option<u64>,
     /// From fits to residuals shuffled in blocks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bootstrap: Vec<BootstrapInterval>,
+}
+
+/// Calibration and compliance of one source, both by name and with their uncertainty.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Origin {
+    calibration: Option<(String, ForceUncertainty)>,
+    /// Uncertainty in mm/N.
+    compliance: Option<(String, f64)>,
+}
+
+impl Origin {
+    /// Of forces read with this calibration, if with any, and depths from which this was taken, if anything was.
+    pub fn of(
+        calibration: Option<&Calibration>,
+        compliance: Option<&Correction>,
+    ) -> Result<Self, CalibrationError> {
+        let stated = |one: &Calibration| {
+            ForceUncertainty::of(one).map(|uncertainty| (one.name.clone(), uncertainty))
+        };
+        let applied = compliance.filter(|one| one.is_applied);
+        Ok(Self {
+            calibration: calibration.map(stated).transpose()?,
+            compliance: applied.map(|one| (one.id.clone(), one.std_error_mm_per_n)),
+        })
+    }
+
+    pub fn is_known(&self) -> bool {
+        self.calibration.is_some() || self.compliance.is_some()
+    }
+
+    #[must_use]
+    pub fn traced<'a>(&'a self, name: &'a str, samples: &'a [FitSample]) -> Traced<'a> {
+        let calibration = self.calibration.as_ref();
+        let compliance = self.compliance.as_ref();
+        Traced {
+            name,
+            samples,
+            calibration: calibration.map(|(name, uncertainty)| (name.as_str(), uncertainty)),
+            compliance: compliance.map(|(name, error)| (name.as_str(), *error)),
+        }
+    }
 }

@@ -11,23 +11,21 @@ use palpate_runner::Stopwatch;
 /// Stands for all parameters of the specimen.
 const BODY: &str = "body";
 
-/// What is fitted together, and how.
 #[derive(Clone, Debug)]
 pub struct TogetherRequest<'a> {
     /// The family, and which of its parameters are found.
     pub options: &'a FitOptions,
     /// Names of the parameters that are the same in all, `body` for all of the specimen.
     pub shared: Vec<&'a str>,
-    /// Whether what the errors of calibrations and compliances do is told.
+    /// Whether the systematic uncertainty from calibrations and compliances is estimated.
     pub is_systematic: bool,
     /// Intervals that take more than one pass.
     pub intervals: IntervalsWanted,
 }
 
-/// A fit of several recordings, with what is told of each beside its report.
+/// A fit of several recordings, with the details of each beside its report.
 #[derive(Clone, Debug)]
 pub struct Together {
-    /// The fit.
     pub report: JointReport,
     /// The modelled force along each recording.
     pub overlays: Vec<Overlay>,
@@ -37,7 +35,6 @@ pub struct Together {
     pub systematic: Option<Vec<Systematic>>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
-    /// What a user must know of it.
     pub notes: Vec<String>,
 }
 
@@ -48,14 +45,11 @@ pub fn fit_together(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Together, FitError> {
     let body = request.options.body_names();
-    let shared: Vec<&str> = request
-        .shared
-        .iter()
-        .flat_map(|name| match *name {
-            BODY => body.clone(),
-            name => vec![name],
-        })
-        .collect();
+    let names = request.shared.iter().flat_map(|name| match *name {
+        BODY => body.clone(),
+        name => vec![name],
+    });
+    let shared: Vec<&str> = names.collect();
     let borrowed = records.borrowed();
     let watch = Stopwatch::start();
     let fitted = Fitted::joint(&borrowed, request.options, &shared)?;
@@ -75,10 +69,8 @@ pub fn fit_together(
     }
     let overlays = report.records.iter().zip(&borrowed);
     let overlays = overlays.map(|(one, (_, samples))| Overlay::of(&one.report, samples));
-    let intervals = (0..borrowed.len()).map(|record| {
-        let wanted = request.intervals;
-        wanted.find(&fitted, record, |done| progress(record, done))
-    });
+    let intervals = (0..borrowed.len())
+        .map(|record| request.intervals.find(&fitted, record, |done| progress(record, done)));
     Ok(Together {
         overlays: overlays.collect(),
         intervals: intervals.collect::<Result<_, _>>()?,
@@ -90,11 +82,12 @@ pub fn fit_together(
 }
 
 impl Together {
-    /// What is told of each recording beside its report.
     #[must_use]
     pub fn beside<'a>(&'a self, records: &'a Recordings) -> Vec<Beside<'a>> {
-        let all = self.overlays.iter().zip(&self.intervals);
-        all.zip(&records.all)
+        self.overlays
+            .iter()
+            .zip(&self.intervals)
+            .zip(&records.all)
             .map(|((overlay, intervals), record)| Beside {
                 overlay,
                 intervals,
@@ -104,7 +97,6 @@ impl Together {
             .collect()
     }
 
-    /// As machines read it.
     #[must_use]
     pub fn object<'a>(&'a self, options: &FitOptions, beside: &[Beside<'a>]) -> JointObject<'a> {
         let systematic = self.systematic.as_deref();

@@ -2,7 +2,7 @@
 //! [`super::calibration_plot`].
 
 pub use super::calibration_plot::picture;
-use super::text::in_columns;
+use super::text::table;
 use palpate_model::calibration::{
     Calibration, CalibrationError, Candidate, CheckResult, CurveKind, ForceUncertainty, Quality,
     Term, candidates, judge_kind,
@@ -12,49 +12,36 @@ use palpate_sessions::calibrations::{Kept, Shelf};
 use serde::Serialize;
 use std::path::Path;
 
-/// One line of a list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Entry {
-    /// Its id.
     pub id: String,
-    /// Its name.
     pub name: String,
-    /// The rig whose cell it is.
     pub rig: String,
-    /// The cell's serial number.
+    /// Serial number.
     pub cell: String,
-    /// When it was taken.
     pub taken_at: Option<String>,
-    /// Days since then.
     pub age_days: Option<i64>,
-    /// Days for which it is valid.
     pub valid_days: u32,
-    /// Whether it is the one in force for its rig.
     pub is_in_force: bool,
-    /// The one that took its place.
     pub superseded_by: Option<String>,
 }
 
 impl Entry {
-    /// The line of one that is kept.
+    /// Of a stored calibration.
     #[must_use]
     pub fn of(shelf: &Shelf, kept: &Kept, age_days: Option<i64>) -> Self {
         let document = &kept.document;
         let in_force = shelf.in_force(&document.rig);
         Self {
             id: kept.id.clone(),
-            name: document.name.clone(),
-            rig: document.rig.clone(),
-            cell: document.cell.clone(),
-            taken_at: document.taken_at.clone(),
             age_days,
-            valid_days: document.valid_days(),
             is_in_force: in_force.is_some_and(|one| one.id == kept.id),
             superseded_by: shelf.successor(&kept.id).map(str::to_owned),
+            ..Self::built_in(document)
         }
     }
 
-    /// The line of one that comes with its rig and is in no library.
+    /// Of the calibration that comes with a rig and is in no library.
     #[must_use]
     pub fn built_in(document: &Calibration) -> Self {
         Self {
@@ -82,24 +69,21 @@ impl Entry {
     }
 }
 
-/// The list of a library.
 #[must_use]
 pub fn list(entries: &[Entry], folder: &Path) -> String {
     if entries.is_empty() {
         return format!("no calibration in {}", folder.display());
     }
-    let mut lines = vec![["id", "name", "rig", "cell", "age", "state"].map(String::from).to_vec()];
-    lines.extend(entries.iter().map(|one| {
+    let row = |one: &Entry| {
         let age = one.age_days.map_or("not stated".to_owned(), |age| format!("{age} d"));
         vec![one.id.clone(), one.name.clone(), one.rig.clone(), one.cell.clone(), age, one.state()]
-    }));
-    in_columns(&lines)
+    };
+    table("id | name | rig | cell | age | state", entries.iter().map(row))
 }
 
-/// The uncertainty of one force and where it comes from, in N.
+/// Uncertainty budget of one force.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Budget {
-    /// The force.
     pub force_n: f64,
     /// All terms together; null where nothing is stated.
     pub uncertainty_n: Option<f64>,
@@ -107,33 +91,27 @@ pub struct Budget {
     pub terms: Vec<BudgetTerm>,
 }
 
-/// One term of it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BudgetTerm {
-    /// Where it comes from.
     pub term: Term,
     /// Its standard uncertainty in N; null where it is not stated.
     pub uncertainty_n: Option<f64>,
 }
 
-/// All that is told of a calibration.
+/// Quality, candidate curves and uncertainty of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct Told {
-    /// What it is like.
     pub quality: Quality,
     /// Every curve tried, the best first.
     pub candidates: Vec<Candidate>,
-    /// The curve in use.
     pub chosen: Option<Candidate>,
     /// Uncertainty at each weight and half-way to the next.
     pub budget: Vec<Budget>,
-    /// The same as a function.
     #[serde(skip)]
     pub uncertainty: ForceUncertainty,
 }
 
 impl Told {
-    /// Finds all of it.
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
         let points = calibration.points()?;
         let uncertainty = ForceUncertainty::of(calibration)?;
@@ -162,23 +140,23 @@ impl Told {
     }
 }
 
-/// The page of a calibration.
 #[must_use]
 pub fn whole(
     calibration: &Calibration,
     id: Option<&str>,
-    told: &Told,
+    details: &Told,
     doubts: &[String],
 ) -> String {
-    let mut parts = vec![head(calibration, id)];
-    parts.push(points(&told.quality));
-    parts.push(curves(calibration, told));
-    parts.push(spread(&told.quality));
-    if told.uncertainty.is_stated() {
-        parts.push(budget(told));
-    }
-    let sentences = told.quality.findings.iter().chain(doubts);
-    parts.push(sentences.map(|one| format!("- {one}")).collect::<Vec<_>>().join("\n"));
+    let sentences = details.quality.findings.iter().chain(doubts);
+    let sentences: Vec<String> = sentences.map(|one| format!("- {one}")).collect();
+    let mut parts = vec![
+        head(calibration, id),
+        points(&details.quality),
+        curves(calibration, details),
+        spread(&details.quality),
+        budget(details),
+        sentences.join("\n"),
+    ];
     parts.retain(|part| !part.is_empty());
     parts.join("\n\n")
 }
@@ -206,18 +184,7 @@ fn points(quality: &Quality) -> String {
     let some = |value: Option<f64>, digits: usize| {
         value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
     };
-    let heads = [
-        "mass (g)",
-        "force (N)",
-        "signal (V)",
-        "readings",
-        "residual (mN)",
-        "V/N",
-        "load - unload (mV)",
-        "u (N)",
-    ];
-    let mut lines = vec![heads.map(String::from).to_vec()];
-    lines.extend(quality.points.iter().map(|one| {
+    let rows = quality.points.iter().map(|one| {
         vec![
             format!("{:.1}", one.mass_g),
             format!("{:.3}", one.force_n),
@@ -229,24 +196,21 @@ fn points(quality: &Quality) -> String {
             some(one.hysteresis_v.map(|volts| volts * 1e3), 2),
             some(one.uncertainty_n, 3),
         ]
-    }));
-    in_columns(&lines)
+    });
+    let head = "mass (g) | force (N) | signal (V) | readings | residual (mN) | V/N | load - unload (mV) | u (N)";
+    table(head, rows)
 }
 
-fn curves(calibration: &Calibration, told: &Told) -> String {
+fn curves(calibration: &Calibration, details: &Told) -> String {
     let newtons = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let heads =
-        ["curve", "left out, rms (N)", "worst (N)", "ends, rms (N)", "residuals, rms (mN)", ""];
-    let mut lines = vec![heads.map(String::from).to_vec()];
     let is_chosen = |one: &Candidate| one.curve == calibration.curve;
-    let own = told.chosen.iter().filter(|_| !told.candidates.iter().any(is_chosen));
-    for one in told.candidates.iter().chain(own) {
+    let own = details.chosen.iter().filter(|_| !details.candidates.iter().any(is_chosen));
+    let rows = details.candidates.iter().chain(own).map(|one| {
+        if let Some(reason) = &one.refused {
+            return vec![one.name.clone(), reason.clone()];
+        }
         let square: f64 = one.residuals_n.iter().map(|residual| residual * residual).sum();
         let count = one.residuals_n.len().max(1) as f64;
-        if let Some(reason) = &one.refused {
-            lines.push(vec![one.name.clone(), reason.clone()]);
-            continue;
-        }
         let through = match &one.curve {
             CurveKind::Segments { through_g } => {
                 let masses: Vec<String> = through_g.iter().map(|mass| mass.to_string()).collect();
@@ -255,21 +219,20 @@ fn curves(calibration: &Calibration, told: &Told) -> String {
             _ => String::new(),
         };
         let mark = if is_chosen(one) { "in use " } else { "" };
-        lines.push(vec![
+        vec![
             one.name.clone(),
             newtons(one.left_out_rms_n),
             newtons(one.left_out_worst_n),
             newtons(one.left_out_ends_rms_n),
             format!("{:.1}", (square / count).sqrt() * 1e3),
             format!("{mark}{through}"),
-        ]);
-    }
-    in_columns(&lines)
+        ]
+    });
+    table("curve | left out, rms (N) | worst (N) | ends, rms (N) | residuals, rms (mN) | ", rows)
 }
 
 fn spread(quality: &Quality) -> String {
-    let mut lines = Vec::new();
-    lines.push(match &quality.hysteresis {
+    let hysteresis = match &quality.hysteresis {
         Some(one) => format!(
             "hysteresis: at most {:.2} mV or {:.3} N, rms {:.2} mV or {:.3} N",
             one.max_v * 1e3,
@@ -277,41 +240,39 @@ fn spread(quality: &Quality) -> String {
             one.rms_v * 1e3,
             one.rms_n
         ),
-        None => "hysteresis: not taken; go down again weight by weight".to_owned(),
-    });
-    lines.push(match quality.repeatability_v {
+        None => "hysteresis: not measured; unload weight by weight".to_owned(),
+    };
+    let repeatability = match quality.repeatability_v {
         Some(volts) => format!("repeatability: {:.2} mV from reading to reading", volts * 1e3),
-        None => "repeatability: not taken; repeat the series".to_owned(),
-    });
-    lines.push(match (quality.zero_shift_v, quality.zero_shift_n) {
+        None => "repeatability: not measured; repeat the series".to_owned(),
+    };
+    let zero_shift = match (quality.zero_shift_v, quality.zero_shift_n) {
         (Some(volts), Some(newtons)) => {
             format!("zero shift: {:+.2} mV or {newtons:+.3} N", volts * 1e3)
         }
-        _ => "zero shift: not taken; read the empty cell before and after".to_owned(),
-    });
-    lines.join("\n")
+        _ => "zero shift: not measured; read the empty cell before and after".to_owned(),
+    };
+    [hysteresis, repeatability, zero_shift].join("\n")
 }
 
-/// The uncertainty by its terms, those that are stated.
-fn budget(told: &Told) -> String {
-    let stated: Vec<Term> = Term::ALL
-        .into_iter()
-        .filter(|term| !told.uncertainty.not_stated().contains(term))
-        .collect();
-    let mut heads = vec!["force (N)".to_owned(), "u (N)".to_owned()];
-    heads.extend(stated.iter().map(|term| term.name().to_owned()));
-    let mut lines = vec![heads];
-    lines.extend(told.budget.iter().map(|one| {
+/// The uncertainty by its terms, as far as they are stated; empty without any.
+fn budget(details: &Told) -> String {
+    let missing = details.uncertainty.not_stated();
+    let stated: Vec<Term> = Term::ALL.into_iter().filter(|term| !missing.contains(term)).collect();
+    if !details.uncertainty.is_stated() {
+        return String::new();
+    }
+    let names: String = stated.iter().map(|term| format!(" | {}", term.name())).collect();
+    let rows = details.budget.iter().map(|one| {
         let number = |value: Option<f64>| format!("{:.4}", value.unwrap_or_default());
         let mut line = vec![format!("{:.3}", one.force_n), number(one.uncertainty_n)];
         let own = one.terms.iter().filter(|own| stated.contains(&own.term));
         line.extend(own.map(|own| number(own.uncertainty_n)));
         line
-    }));
-    in_columns(&lines)
+    });
+    table(&format!("force (N) | u (N){names}"), rows)
 }
 
-/// The answer of a check.
 #[must_use]
 pub fn check(result: &CheckResult) -> String {
     let verdict = if result.is_passed { "passed" } else { "FAILED" };
@@ -335,18 +296,18 @@ mod tests {
     #[test]
     fn the_page_tells_every_weight_every_curve_and_every_finding() {
         let thesis = Calibration::thesis();
-        let told = Told::of(&thesis).unwrap();
-        let page = whole(&thesis, Some("id-1"), &told, &["a doubt".into()]);
-        for weight in &told.quality.points {
+        let details = Told::of(&thesis).unwrap();
+        let page = whole(&thesis, Some("id-1"), &details, &["a doubt".into()]);
+        for weight in &details.quality.points {
             assert!(page.contains(&format!("{:.1} ", weight.mass_g)), "{}", weight.mass_g);
         }
-        for one in &told.candidates {
+        for one in &details.candidates {
             assert!(page.contains(&one.name), "{}", one.name);
         }
-        for sentence in &told.quality.findings {
+        for sentence in &details.quality.findings {
             assert!(page.contains(sentence), "{sentence}");
         }
-        assert!(page.contains("hysteresis: not taken") && page.contains("- a doubt"));
+        assert!(page.contains("hysteresis: not measured") && page.contains("- a doubt"));
         assert!(page.contains("digits of the readings") && !page.contains("NaN"));
         assert_eq!(page.matches("in use").count(), 1);
     }
@@ -354,10 +315,10 @@ mod tests {
     #[test]
     fn a_straight_line_of_two_points_has_a_page_too() {
         let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
-        let told = Told::of(&line).unwrap();
-        let page = whole(&line, None, &told, &[]);
+        let details = Told::of(&line).unwrap();
+        let page = whole(&line, None, &details, &[]);
         assert!(page.contains("monotone interpolation") && !page.contains("NaN"), "{page}");
-        assert!(!picture(&line, &told).contains("NaN"));
+        assert!(!picture(&line, &details).contains("NaN"));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //! of a force with every term.
 
 use super::calibration::Told;
-use super::picture::{LEFT, LINE, RIGHT, WIDTH, sentence_lines, title};
-use palpate_figures::drawing::{Drawing, Ink as TextInk, Svg};
+use super::picture::{LEFT, LINE, RIGHT, sentence_lines, titled};
+use palpate_figures::drawing::{Drawing, Ink as TextInk};
 use palpate_figures::figure::{self, AxisNames, Ink, Level, Plot, Series, Stretch};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::{Calibration, CalibrationError, Direction, FlatStretch, Term};
@@ -27,8 +27,8 @@ impl Axis {
     }
 }
 
-/// The plots of a calibration that has been told of, over force in N: signal, residual, slope and uncertainty.
-pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], CalibrationError> {
+/// The plots of a calibration over force in N: signal, residual, slope and uncertainty.
+pub fn plots(calibration: &Calibration, details: &Told) -> Result<[Plot; 4], CalibrationError> {
     let (curve, points) = (calibration.curve()?, calibration.points()?);
     let (first, last) = curve.force_range();
     let axis = Axis([first.0, last.0 + BEYOND * (last.0 - first.0)]);
@@ -50,7 +50,7 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
     }
     let slope = axis.along(|force| curve.sensitivity_at(Newtons(force)));
     let plot = |title: &str, y: figure::Axis| Plot {
-        stretches: told.quality.flat.iter().map(flat).collect(),
+        stretches: details.quality.flat.iter().map(flat).collect(),
         ..Plot::new(title, figure::Axis::linear("force (N)").over(axis.0), y)
     };
     let upright = figure::Axis::linear;
@@ -74,10 +74,10 @@ pub fn plots(calibration: &Calibration, told: &Told) -> Result<[Plot; 4], Calibr
             slope,
         )]),
         Plot {
-            remark: (!told.uncertainty.is_stated())
-                .then(|| "the calibration states nothing of its errors".to_owned()),
+            remark: (!details.uncertainty.is_stated())
+                .then(|| "the calibration states no uncertainty".to_owned()),
             ..plot("uncertainty (mN)", upright("u (mN)").seeing(&[0.0, 1.0]))
-                .with(uncertainties(told, axis))
+                .with(uncertainties(details, axis))
         },
     ])
 }
@@ -95,8 +95,8 @@ fn dots([loading, unloading]: [Vec<[f64; 2]>; 2]) -> impl Iterator<Item = Series
 }
 
 /// Every term that is stated, and all of them together.
-fn uncertainties(told: &Told, axis: Axis) -> Vec<Series> {
-    let own = &told.uncertainty;
+fn uncertainties(details: &Told, axis: Axis) -> Vec<Series> {
+    let own = &details.uncertainty;
     if !own.is_stated() {
         return Vec::new();
     }
@@ -118,23 +118,20 @@ fn in_mn(sigma: Option<Newtons>) -> f64 {
     sigma.map_or(0.0, |sigma| sigma.0 * 1e3)
 }
 
-/// The picture of a calibration that has been told of.
 #[must_use]
-pub fn picture(calibration: &Calibration, told: &Told) -> String {
-    drawing(calibration, told).svg()
+pub fn picture(calibration: &Calibration, details: &Told) -> String {
+    drawing(calibration, details).svg()
 }
 
 /// Upper and lower edges of the plots in px.
 const PLACES_PX: [[f64; 2]; 4] = [[84.0, 320.0], [356.0, 450.0], [486.0, 600.0], [654.0, 820.0]];
 
-/// The same, not yet in any format.
 #[must_use]
-pub fn drawing(calibration: &Calibration, told: &Told) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
+pub fn drawing(calibration: &Calibration, details: &Told) -> Drawing {
     let line = format!("{}; {}", calibration.curve, calibration.source);
-    title(&mut svg, &calibration.name, &line);
-    let Ok(plots) = plots(calibration, told) else {
-        // Only what has a curve and points was told of.
+    let mut svg = titled(&calibration.name, &line);
+    let Ok(plots) = plots(calibration, details) else {
+        // A calibration with details has a curve and points.
         return svg.drawing(70.0, LIGHT.canvas, &calibration.name);
     };
     for (index, (plot, [top, bottom])) in plots.iter().zip(PLACES_PX).enumerate() {
@@ -148,7 +145,7 @@ pub fn drawing(calibration: &Calibration, told: &Told) -> Drawing {
         }
     }
     let mut y = PLACES_PX[3][1] + 2.0 * LINE + 30.0;
-    for finding in &told.quality.findings {
+    for finding in &details.quality.findings {
         y = sentence_lines(&mut svg, y, TextInk::plain(LIGHT.text), finding);
     }
     svg.drawing(y, LIGHT.canvas, &format!("Calibration {}", calibration.name))

@@ -1,20 +1,18 @@
-//! What was found in the catalog, as text.
+//! Results of a catalog search as text.
 
-use super::text::in_columns;
+use super::text::{in_columns, table};
 use palpate_sessions::catalog::{Entry, Event, Found, ReviewIs};
 
 /// One line a session, and how many there are.
 #[must_use]
 pub fn list(found: &Found, page: usize, pages: usize) -> String {
     if found.count == 0 {
-        return "no session is like that".into();
+        return "no session matches".into();
     }
-    let head =
-        ["started", "specimen", "operator", "protocol", "length", "verdict", "review", "folder"];
-    let mut lines = vec![head.map(String::from).to_vec()];
-    lines.extend(found.entries.iter().map(line));
+    let head = "started | specimen | operator | protocol | length | verdict | review | folder";
     let sessions = if found.count == 1 { "session" } else { "sessions" };
-    let mut text = format!("{}\n{} {sessions}", in_columns(&lines), found.count);
+    let mut text =
+        format!("{}\n{} {sessions}", table(head, found.entries.iter().map(line)), found.count);
     if pages > 1 {
         text += &format!(", page {page} of {pages}");
     }
@@ -83,6 +81,5 @@ pub fn history(events: &[Event]) -> String {
 
 /// A text without anything that would end its line or move the cursor.
 pub fn one_line(text: &str) -> String {
-    let plain = text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter });
-    plain.collect()
+    text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }

@@ -4,10 +4,8 @@ use super::text::capital;
 use palpate_rheology::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
-/// One group of cases in numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSummary {
-    /// The group.
     pub group: &'static str,
     /// Rows of each of [`Verdict::ALL`].
     pub counts: [usize; 4],
@@ -18,7 +16,7 @@ pub struct GroupSummary {
 /// Every group in numbers, in the order they were run.
 #[must_use]
 pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
-    groups(rows)
+    grouped(rows, |row| row.group)
         .into_iter()
         .map(|(group, rows)| GroupSummary {
             group,
@@ -31,13 +29,17 @@ pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
         .collect()
 }
 
-/// Groups in the order they were run, with their rows.
-fn groups(rows: &[Row]) -> Vec<(&'static str, Vec<&Row>)> {
-    let mut groups: Vec<(&'static str, Vec<&Row>)> = Vec::new();
+/// Rows by a word of theirs, in the order in which the words come first.
+fn grouped<'a, K: PartialEq>(
+    rows: impl IntoIterator<Item = &'a Row>,
+    word: impl Fn(&'a Row) -> K,
+) -> Vec<(K, Vec<&'a Row>)> {
+    let mut groups: Vec<(K, Vec<&Row>)> = Vec::new();
     for row in rows {
-        match groups.iter_mut().find(|(group, _)| *group == row.group) {
+        let key = word(row);
+        match groups.iter_mut().find(|(group, _)| *group == key) {
             Some((_, own)) => own.push(row),
-            None => groups.push((row.group, vec![row])),
+            None => groups.push((key, vec![row])),
         }
     }
     groups
@@ -72,7 +74,6 @@ pub fn text(rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-/// The Markdown page.
 #[must_use]
 pub fn page(rows: &[Row]) -> String {
     let mut page = format!("{PAGE_HEAD}{INTRODUCTION}");
@@ -82,7 +83,7 @@ pub fn page(rows: &[Row]) -> String {
         let (group, tightest) = (one.group, one.tightest.unwrap_or_default());
         page += &format!("| {group} | {right} | {refused} | {flagged} | {wrong} | {tightest} |\n");
     }
-    for (group, rows) in groups(rows) {
+    for (group, rows) in grouped(rows, |row| row.group) {
         page += &format!("\n## {}\n\n", capital(group));
         page += &match group {
             "relaxation time and step" => by_time_and_step(&rows),
@@ -93,33 +94,13 @@ pub fn page(rows: &[Row]) -> String {
     page
 }
 
-/// How every page begins.
 pub const PAGE_HEAD: &str = "\
 # Extremes
 
 Written by `palpate extremes --page docs/explanation/extremes.md`; do not edit.
 ";
 
-const INTRODUCTION: &str = "
-What happens where numbers end: relaxation times of a nanosecond and of thirty years, depths of a metre,
-a hundred million samples, records of one sample, NaN. Every family of force models, every integrator and
-every fit is put to the same cases, and each row is
-
-* **right**: the error is within the tolerance. For a force it is relative to the largest force of
-  the path, against a reference in 75 digits or more; for the exact step and the families the
-  tolerance is 1e-13 and in single precision 3e-6. An approximate integrator is held to the same against its
-  own textbook step in as many digits: how near that step is to the exact force, the trade says. For a fit of a record without noise it is that of the worst
-  parameter, tolerance 1e-6 (1e-3 with an offset of a million times the signal, or times since 1970).
-* **refused**: no number, and one sentence that names the reason and what to do.
-* **flagged**: numbers of a fit with a warning not to rely on them.
-* **wrong**: anything else, NaN, infinity, or a refusal of what has an answer. The command then ends
-  with exit code 1.
-
-Forces below 1e-180 N count as none, and forces beyond 1e300 N are refused. The two longest records, 1e8
-samples and 24 h at 1 kHz, are put to the exact step; families take 1e7 samples, those of more than twelve
-terms 1e6, and all of them all with `palpate extremes --soak`.
-
-";
+const INTRODUCTION: &str = include_str!("extremes.md");
 
 /// What became of several rows in one short cell: the worst error, or the worst verdict.
 fn cell(rows: &[&Row]) -> String {
@@ -162,39 +143,28 @@ fn by_time_and_step(rows: &[&Row]) -> String {
 }
 
 fn by_ratio(rows: &[&Row]) -> String {
-    let mut subjects: Vec<&str> = Vec::new();
+    let of_ratio = |row: &&&Row| exponents(&row.case).is_some();
+    let subjects = grouped(rows.iter().filter(of_ratio).copied(), |row| row.subject.as_str());
     let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
     for row in rows {
-        let Some((tau, step)) = exponents(&row.case) else {
-            continue;
-        };
-        if !subjects.contains(&row.subject.as_str()) {
-            subjects.push(&row.subject);
+        if let Some((tau, step)) = exponents(&row.case) {
+            cells.entry(step - tau).or_default().entry(&row.subject).or_default().push(row);
         }
-        let of_ratio = cells.entry(step - tau).or_default();
-        of_ratio.entry(&row.subject).or_default().push(row);
     }
     let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();
-    table += &header("step / tau", subjects.iter().map(|&name| name.to_owned()));
+    table += &header("step / tau", subjects.iter().map(|(name, _)| (*name).to_owned()));
     for (ratio, row) in &cells {
-        let line =
-            subjects.iter().map(|name| row.get(name).map_or(String::new(), |rows| cell(rows)));
+        let own = |name: &&str| row.get(name).map_or(String::new(), |rows| cell(rows));
+        let line = subjects.iter().map(|(name, _)| own(name));
         table += &line_of(&format!("1e{ratio}"), line.collect());
     }
     table
 }
 
 fn by_case(rows: &[&Row]) -> String {
-    let mut cases: Vec<(&str, Vec<&Row>)> = Vec::new();
-    for row in rows {
-        match cases.iter_mut().find(|(case, _)| *case == row.case) {
-            Some((_, own)) => own.push(row),
-            None => cases.push((&row.case, vec![row])),
-        }
-    }
     let names = ["what", "worst error", "the first sentence"];
     let mut table = header("case", names.into_iter().map(str::to_owned));
-    for (case, rows) in cases {
+    for (case, rows) in grouped(rows.iter().copied(), |row| row.case.as_str()) {
         let error = tightest(&rows).map_or(String::new(), |(_, error)| format!("{error:.0e}"));
         let sentence = rows.iter().find(|row| !row.sentence.is_empty());
         let sentence = sentence.map_or(String::new(), |row| row.sentence.replace('|', "/"));
@@ -205,24 +175,19 @@ fn by_case(rows: &[&Row]) -> String {
 
 /// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&Row]) -> String {
-    let mut named: Vec<(Verdict, Vec<&str>)> = Verdict::ALL
-        .into_iter()
-        .map(|verdict| {
-            let own = rows.iter().filter(|row| row.verdict == verdict);
-            (verdict, own.map(|row| row.subject.as_str()).collect())
-        })
-        .collect();
+    let mut named: [(Verdict, Vec<&str>); 4] = Verdict::ALL.map(|verdict| {
+        let own = rows.iter().filter(|row| row.verdict == verdict);
+        (verdict, own.map(|row| row.subject.as_str()).collect())
+    });
     named.sort_by_key(|(_, subjects)| std::cmp::Reverse(subjects.len()));
-    let others: Vec<String> = named[1..]
-        .iter()
-        .filter(|(_, subjects)| !subjects.is_empty())
+    let others = named[1..].iter().filter(|(_, subjects)| !subjects.is_empty());
+    let others: Vec<String> = others
         .map(|(verdict, subjects)| format!("{}: {}", verdict.name(), subjects.join(" + ")))
         .collect();
     let most = named[0].0.name();
-    if others.is_empty() {
-        format!("all {most}")
-    } else {
-        format!("{most} but for {}", others.join("; "))
+    match others.as_slice() {
+        [] => format!("all {most}"),
+        others => format!("{most} but for {}", others.join("; ")),
     }
 }
 

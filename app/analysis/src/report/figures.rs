@@ -1,7 +1,7 @@
 //! The figures of a session: force over time and over depth, alone or several sessions over each other.
 
-use super::picture::{LEFT, RIGHT, WIDTH, title};
-use palpate_figures::drawing::{Drawing, Ink as TextInk, Svg};
+use super::picture::{LEFT, RIGHT, titled};
+use palpate_figures::drawing::{Drawing, Ink as TextInk};
 use palpate_figures::figure::{Axis, AxisNames, Ink, Level, Plot, Series, Shape, Stretch};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
@@ -21,14 +21,11 @@ const LEGEND: f64 = 20.0;
 /// A stretch of time in s since the first sample, as the column `t_s` of an export has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// From here.
     pub from: f64,
-    /// To here.
     pub until: f64,
 }
 
 impl Window {
-    /// All of it.
     pub const WHOLE: Self = Self { from: f64::NEG_INFINITY, until: f64::INFINITY };
 
     fn holds(self, at: f64) -> bool {
@@ -36,7 +33,7 @@ impl Window {
     }
 }
 
-/// Where several sessions are laid over each other.
+/// Origin of time in an overlay of several sessions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Align {
     /// The first sample of the first ramp.
@@ -57,24 +54,16 @@ impl Align {
     }
 }
 
-/// A stretch of one phase.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Span {
-    phase: Phase,
-    from: f64,
-    until: f64,
-}
-
 /// What of a session is drawn: a few thousand points, whatever its length.
 #[derive(Clone, Debug)]
 pub struct Traces {
-    /// What it is called.
     pub name: String,
     /// Force in N over time in s, a line for every stretch in which it is known.
     force_time: Vec<Vec<[f64; 2]>>,
     /// Force in N over depth in mm.
     force_depth: Vec<Vec<[f64; 2]>>,
-    phases: Vec<Span>,
+    /// Start of each phase in s.
+    phases: Vec<(f64, Phase)>,
     /// Time from and to in s.
     ends: [f64; 2],
     /// The interlock's limit in N, if it was recorded with one.
@@ -89,7 +78,7 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// The same, stretches marked whose forces do not count.
+    /// With intervals marked whose forces do not count.
     #[must_use]
     pub fn leaving_out(self, left_out_s: &[[f64; 2]]) -> Self {
         Self { left_out_s: left_out_s.to_vec(), ..self }
@@ -111,19 +100,9 @@ impl Traces {
             [only] => [time(*only), time(*only) + 1.0],
             [from, .., until] => [time(*from), time(*until)],
         };
-        let mut phases: Vec<Span> = Vec::new();
-        for &index in &within {
-            let (at, phase) = (time(index), session.rows[index].phase);
-            match phases.last_mut() {
-                Some(last) if last.phase == phase => last.until = at,
-                last => {
-                    if let Some(last) = last {
-                        last.until = at;
-                    }
-                    phases.push(Span { phase, from: at, until: at });
-                }
-            }
-        }
+        let phase = |index: usize| session.rows[index].phase;
+        let phases = within.chunk_by(|a, b| phase(*a) == phase(*b));
+        let phases = phases.map(|run| (time(run[0]), phase(run[0]))).collect();
         let force = |&index: &usize| session.rows[index].force.filter(|force| force.is_finite());
         let runs = within.chunk_by(|a, b| force(a).is_some() == force(b).is_some());
         let width = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
@@ -136,8 +115,7 @@ impl Traces {
         let force_time: Vec<_> = force_time.collect();
         let known = within.iter().filter(|index| force(index).is_some()).count();
         let ramp = session.rows.iter().position(|row| row.phase == Phase::Ramp);
-        let found = contacts(&session.entries);
-        let contact = found.iter().map(|one| one.after_sample as usize);
+        let contact = contacts(&session.entries).into_iter().map(|one| one.after_sample as usize);
         let mut contact =
             contact.filter(|at| ramp.is_none_or(|ramp| *at <= ramp) && *at < session.rows.len());
         Self {
@@ -154,12 +132,11 @@ impl Traces {
         }
     }
 
-    /// Whether nothing is drawn.
     pub fn is_empty(&self) -> bool {
         self.samples[1] == 0
     }
 
-    /// What a reader must know of how points were left out.
+    /// How many samples are drawn, and how they are thinned.
     pub fn thinning(&self) -> String {
         let [samples, known] = self.samples;
         let force = match known == samples {
@@ -167,7 +144,7 @@ impl Traces {
             false => format!(", {known} of them with a force"),
         };
         format!(
-            "{samples} samples{force}; drawn are the lowest and the highest of each column of pixels"
+            "{samples} samples{force}; the figure shows the lowest and the highest of each pixel column"
         )
     }
 
@@ -227,26 +204,34 @@ fn limit_in_reach(traces: &Traces) -> Option<f64> {
     traces.limit.map(|limit| limit.0).filter(|limit| *limit <= high + 1.5 * (high - low.min(high)))
 }
 
+/// Phases from their starts in s, every other one shaded; the last one ends at `end`.
+pub(super) fn phase_stretches(starts: &[(f64, Phase)], end: f64) -> Vec<Stretch> {
+    let until = |i: usize| starts.get(i + 1).map_or(end, |(next, _)| *next);
+    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| Stretch {
+        name: phase.name().to_owned(),
+        ends: [*start, until(i)],
+        ink: (i % 2 == 1).then_some(Ink::Line),
+    };
+    starts.iter().enumerate().map(stretch).collect()
+}
+
+/// The interlock's limit as a dashed level.
+pub(super) fn interlock(limit: Newtons) -> Level {
+    let name = format!("interlock at {limit:.1}");
+    Level { name, is_dashed: true, ..Level::plain(limit.0, Ink::Limit) }
+}
+
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
 #[must_use]
 pub fn force_time(traces: &Traces) -> Drawing {
-    let phases = traces.phases.iter().enumerate().map(|(index, span)| Stretch {
-        name: span.phase.name().to_owned(),
-        ends: [span.from, span.until],
-        ink: (index % 2 == 1).then_some(Ink::Line),
-    });
     let [first, last] = traces.ends;
+    let phases = phase_stretches(&traces.phases, last).into_iter();
     let left_out = traces.left_out_s.iter().map(|[from, until]| Stretch {
         name: "left out".to_owned(),
         ends: [from.max(first), until.min(last)],
         ink: Some(Ink::Notice),
     });
-    let limit = limit_in_reach(traces).map(|at| Level {
-        name: format!("interlock at {at:.1} N"),
-        at,
-        ink: Ink::Limit,
-        is_dashed: true,
-    });
+    let limit = limit_in_reach(traces).map(|at| interlock(Newtons(at)));
     let time = Axis::linear("time since the first sample (s)").over(traces.ends);
     let mut plot = Plot {
         stretches: phases.chain(left_out.filter(|one| one.ends[0] < one.ends[1])).collect(),
@@ -258,7 +243,6 @@ pub fn force_time(traces: &Traces) -> Drawing {
     drawing([&traces.name, "force over time"], &plot, &[])
 }
 
-/// Force over depth.
 #[must_use]
 pub fn force_depth(traces: &Traces) -> Drawing {
     let lines = lines(&traces.force_depth, Ink::Series, 0.0).collect();
@@ -271,13 +255,12 @@ fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = Seri
 }
 
 fn force_plot(x: Axis, series: Vec<Series>) -> Plot {
-    let remark = series.is_empty().then(|| "nothing is known here".to_owned());
+    let remark = series.is_empty().then(|| "no force is known here".to_owned());
     Plot { remark, ..Plot::new("", x, Axis::linear("force (N)")).with(series) }
 }
 
 fn depth_axis(all: &[&Traces]) -> Axis {
-    let points = all.iter().flat_map(|one| one.force_depth.iter().flatten());
-    let depths = points.map(|point| point[0]);
+    let depths = all.iter().flat_map(|one| one.force_depth.iter().flatten()).map(|point| point[0]);
     let low = depths.clone().fold(0.0f64, f64::min);
     let high = depths.fold(low, f64::max);
     Axis::linear("depth (mm)").over(if high > low { [low, high] } else { [0.0, 1.0] })
@@ -292,15 +275,13 @@ fn look_of(index: usize) -> (Ink, f64) {
 /// that beginning are left out of the first, and named.
 #[must_use]
 pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
-    let lost: Vec<String> =
+    let without_origin: Vec<String> =
         all.iter().filter(|one| one.origin(align).is_none()).map(|one| one.name.clone()).collect();
     let (mut over_time, mut over_depth) = (Vec::new(), Vec::new());
     for (index, one) in all.iter().enumerate() {
         let (ink, dash) = look_of(index);
         over_depth.extend(lines(&one.force_depth, ink, dash));
-        let Some(origin) = one.origin(align) else {
-            continue;
-        };
+        let Some(origin) = one.origin(align) else { continue };
         over_time.extend(lines(&one.force_time, ink, dash).map(|mut line| {
             line.points.iter_mut().for_each(|point| point[0] -= origin);
             line.points.retain(|point| point[0] >= -LEAD_S);
@@ -316,13 +297,12 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
         drawing(["Force over time", &since], &force_plot(time, over_time), all),
         drawing(["Force over depth", "of the sessions compared"], &over_depth, all),
     ];
-    (drawings, lost)
+    (drawings, without_origin)
 }
 
 /// A plot under its heads; beneath, names and inks of sessions compared.
 fn drawing([head, words]: [&str; 2], plot: &Plot, all: &[&Traces]) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, head, words);
+    let mut svg = titled(head, words);
     plot.draw(&mut svg, [LEFT, TOP, RIGHT, BOTTOM], AxisNames::Both);
     let mut y = BOTTOM + 46.0;
     for (index, one) in all.iter().enumerate() {

@@ -32,14 +32,13 @@ fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
 #[test]
 fn a_window_leaves_the_rest_out() {
     let session = recorded();
-    let whole = Traces::of("one", &session, Window::WHOLE);
-    let ramp = whole.ramp.unwrap();
+    let ramp = Traces::of("one", &session, Window::WHOLE).ramp.unwrap();
     let window = Window { from: ramp, until: ramp + 1.0 };
     let part = Traces::of("one", &session, window);
     assert!(part.ends[0] >= ramp && part.ends[1] <= ramp + 1.0);
     assert!(part.samples[0] > 900 && part.samples[0] < 1100, "{:?}", part.samples);
     let none = Traces::of("one", &session, Window { from: 1e9, until: 2e9 });
-    assert!(none.is_empty() && force_time(&none).svg().contains("nothing is known"));
+    assert!(none.is_empty() && force_time(&none).svg().contains("no force is known"));
 }
 
 #[test]
@@ -53,8 +52,8 @@ fn sessions_over_each_other_begin_together() {
     }
     later.ramp = later.ramp.map(|ramp| ramp + 100.0);
     later.contact = None;
-    let ([time, _], lost) = overlays(&[&one, &later], Align::Ramp);
-    assert!(lost.is_empty());
+    let ([time, _], without_origin) = overlays(&[&one, &later], Align::Ramp);
+    assert!(without_origin.is_empty());
     let svg = time.svg();
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
     let points = |ink| {
@@ -64,6 +63,6 @@ fn sessions_over_each_other_begin_together() {
     };
     assert!(!points(LIGHT.sessions[0]).is_empty());
     assert_eq!(points(LIGHT.sessions[0]), points(LIGHT.sessions[1]));
-    let (_, lost) = overlays(&[&one, &later], Align::Contact);
-    assert_eq!(lost, ["later"]);
+    let (_, without_origin) = overlays(&[&one, &later], Align::Contact);
+    assert_eq!(without_origin, ["later"]);
 }

@@ -39,46 +39,42 @@ impl Overlay {
     }
 }
 
-/// What a family is, in words.
 #[derive(Serialize)]
-struct Words {
+struct FamilyText {
     equation: &'static str,
     cannot_represent: &'static str,
 }
 
-impl Words {
+impl FamilyText {
     fn of(family: &dyn Family) -> Self {
         Self { equation: family.equation(), cannot_represent: family.cannot_represent() }
     }
 }
 
-/// A fit of one record.
 #[derive(Serialize)]
 pub struct FitObject<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     #[serde(flatten)]
-    words: Words,
+    family_text: FamilyText,
     #[serde(flatten)]
-    overlay: &'a Overlay,
-    #[serde(flatten)]
-    intervals: &'a Intervals,
-    /// What calibration and compliance add; absent for tables and where it was not asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    systematic: Option<&'a Systematic>,
-    /// What the rig's compliance did to the depths, or would; absent where none is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    compliance: Option<&'a Correction>,
+    details: Beside<'a>,
     /// The fit alone, without reading.
     seconds: f64,
 }
 
-/// What is told of a fit beside its report.
-#[derive(Clone, Copy)]
+/// Parts of a fit beside its report.
+#[derive(Clone, Copy, Serialize)]
 pub struct Beside<'a> {
+    #[serde(flatten)]
     pub overlay: &'a Overlay,
+    #[serde(flatten)]
     pub intervals: &'a Intervals,
+    /// What calibration and compliance add; absent for tables and where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<&'a Systematic>,
+    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub compliance: Option<&'a Correction>,
 }
 
@@ -86,27 +82,18 @@ impl<'a> FitObject<'a> {
     pub fn of(
         family: &dyn Family,
         report: &'a FitReport,
-        beside: Beside<'a>,
+        details: Beside<'a>,
         seconds: f64,
     ) -> Self {
-        Self {
-            report,
-            words: Words::of(family),
-            overlay: beside.overlay,
-            intervals: beside.intervals,
-            systematic: beside.systematic,
-            compliance: beside.compliance,
-            seconds,
-        }
+        Self { report, family_text: FamilyText::of(family), details, seconds }
     }
 }
 
-/// A fit of several records together.
 #[derive(Serialize)]
 pub struct JointObject<'a> {
     family: String,
     #[serde(flatten)]
-    words: Words,
+    family_text: FamilyText,
     shared: &'a [String],
     records: Vec<RecordObject<'a>>,
     samples: usize,
@@ -126,38 +113,35 @@ struct RecordObject<'a> {
     record: &'a str,
     report: &'a FitReport,
     #[serde(flatten)]
-    overlay: &'a Overlay,
-    #[serde(flatten)]
-    intervals: &'a Intervals,
+    details: Beside<'a>,
 }
 
 impl<'a> JointObject<'a> {
-    /// `beside` has one for each record.
+    /// `details` has one for each record.
     pub fn of(
         family: &dyn Family,
         report: &'a JointReport,
-        beside: &[Beside<'a>],
+        details: &[Beside<'a>],
         systematic: Option<&'a [Systematic]>,
         seconds: f64,
     ) -> Self {
-        let records = report.records.iter().zip(beside);
+        let records = report.records.iter().zip(details);
         Self {
             family: family.key(),
-            words: Words::of(family),
+            family_text: FamilyText::of(family),
             shared: &report.shared,
             records: records
-                .map(|(named, beside)| RecordObject {
+                .map(|(named, details)| RecordObject {
                     record: &named.record,
                     report: &named.report,
-                    overlay: beside.overlay,
-                    intervals: beside.intervals,
+                    details: Beside { systematic: None, compliance: None, ..*details },
                 })
                 .collect(),
             samples: report.samples,
             free: report.free,
             rmse_n: report.rmse_n,
             effective_samples: report.effective_samples,
-            compliances: beside.iter().map(|one| one.compliance).collect(),
+            compliances: details.iter().map(|one| one.compliance).collect(),
             systematic,
             seconds,
         }

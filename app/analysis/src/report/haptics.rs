@@ -1,9 +1,8 @@
-//! What is said of a body on a device, and of a loop's time.
+//! Texts on a body on a device, and on the timing of a loop.
 
-use super::picture::{COLUMNS, LEFT, RIGHT, WIDTH, title};
-use super::text::{ParameterText, in_columns};
+use super::picture::{COLUMNS, LEFT, RIGHT, titled};
+use super::text::{ParameterText, table};
 use crate::haptics::{Checked, Followed, Paced, Tried};
-use palpate_figures::drawing::Svg;
 use palpate_figures::figure::{self, Axis, AxisNames, Ink, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
@@ -17,7 +16,6 @@ use palpate_rheology::fit::FitReport;
 use palpate_runner::haptics::slave::{Difference, MasterLoop, Slaved};
 use palpate_runner::haptics::timing::Spread;
 
-/// A check in words.
 #[must_use]
 pub fn check_text(checked: &Checked) -> String {
     let body = &checked.body;
@@ -38,7 +36,6 @@ pub fn check_text(checked: &Checked) -> String {
     lines.join("\n")
 }
 
-/// What the simulated device did, in words.
 #[must_use]
 pub fn tried_text(tried: &Tried) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
@@ -54,7 +51,7 @@ pub fn tried_text(tried: &Tried) -> String {
         false => "no energy returned".to_owned(),
     };
     format!(
-        "{guards} guards: {buzz}; the place swings by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
+        "{guards} guards: {buzz}; the position varies by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
         tried.swing_mm, tried.force_max_n, tried.damping_added_max
     )
 }
@@ -90,16 +87,12 @@ pub fn margin_text(margin: &Margin) -> String {
     }
 }
 
-/// A run of the loop in words.
 #[must_use]
 pub fn run_text(paced: &Paced) -> String {
-    let mut lines = vec![format!("priority: {}", paced.priority)];
-    lines.extend(table(std::slice::from_ref(paced)));
-    lines.extend(paced.recorded.map(|recorded| recorded.words()));
-    lines.join("\n")
+    let recorded = paced.recorded.map(|recorded| format!("\n{}", recorded.words()));
+    bench_text(std::slice::from_ref(paced)) + &recorded.unwrap_or_default()
 }
 
-/// A slave that followed, in words.
 #[must_use]
 pub fn slave_text(slaved: &Slaved) -> String {
     let less = |one: &Difference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
@@ -150,35 +143,28 @@ pub fn slave_text(slaved: &Slaved) -> String {
 /// Loops at several rates, as a table.
 #[must_use]
 pub fn bench_text(loops: &[Paced]) -> String {
-    let mut lines = Vec::new();
-    if let Some(first) = loops.first() {
-        lines.push(format!("priority: {}", first.priority));
-    }
-    lines.extend(table(loops));
-    lines.join("\n")
-}
-
-fn table(loops: &[Paced]) -> Vec<String> {
-    let mut lines = vec![format!(
+    let priority = loops.first().map(|first| format!("priority: {}", first.priority));
+    let mut lines: Vec<String> = priority.into_iter().collect();
+    lines.push(format!(
         "{:>6} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
         "rate", "busy", "late (us)", "period (us)", "work (us)", "overruns", "missed"
-    )];
+    ));
     let heads = "p50    p99   p99.9  max";
     lines.push(format!("{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}", "Hz", ""));
     for one in loops {
-        let kept = &one.kept;
+        let statistics = &one.kept;
         lines.push(format!(
             "{:>6.0} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
             one.rate_hz,
             one.busy_threads,
-            spread(&kept.late),
-            spread(&kept.period),
-            spread(&kept.work),
-            kept.overruns,
-            kept.missed
+            spread(&statistics.late),
+            spread(&statistics.period),
+            spread(&statistics.work),
+            statistics.overruns,
+            statistics.missed
         ));
     }
-    lines
+    lines.join("\n")
 }
 
 fn spread(spread: &Spread) -> String {
@@ -187,7 +173,6 @@ fn spread(spread: &Spread) -> String {
     format!("{p50:<6} {p99:<5} {p99_9:<6} {max:<8}")
 }
 
-/// A check of the feedback in words.
 #[must_use]
 pub fn follow_text(followed: &Followed) -> String {
     let mut lines = vec![
@@ -196,7 +181,7 @@ pub fn follow_text(followed: &Followed) -> String {
             followed.peak_commanded_n, followed.peak_measured_n
         ),
         format!(
-            "on the way in the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
+            "while loading, the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
             followed.offset_n, followed.scatter_n
         ),
     ];
@@ -222,9 +207,9 @@ pub fn follow_text(followed: &Followed) -> String {
 /// Why the fit of the measured force is not that of the commanded.
 fn difference(followed: &Followed) -> &'static str {
     if followed.settings.friction_share > 0.0 {
-        "the drive makes up for friction only while the rack moves: as the hold begins the measured force steps, and its fit takes that for relaxation"
+        "the drive compensates friction only while the rack moves: the measured force steps as the hold begins, and its fit interprets the step as relaxation"
     } else {
-        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body nearly as it is"
+        "friction and drag oppose the moving rack with a constant force, and friction remains in the hold: the fit finds this force as f_offset, and the body stays nearly unchanged"
     }
 }
 
@@ -239,18 +224,17 @@ fn fits_beside_the_body(followed: &Followed) -> String {
     let row = |name: &str, value: f64, unit: &str| {
         let measured = cell(&followed.fit, name);
         let commanded = cell(&followed.fit_commanded, name);
-        [name, &plain(value), &commanded, &measured, unit].map(str::to_owned).into()
+        [name, &plain(value), &commanded, &measured, unit].map(str::to_owned).to_vec()
     };
-    let heads = ["", "body", "fit of the commanded", "fit of the measured force", ""];
-    in_columns(&[
-        heads.map(str::to_owned).into(),
+    let rows = [
         row("tau_eps", body.tau_eps, "s"),
         row("mu1", mu1, "N/mm"),
         row("mu2", mu2, "N/mm²"),
         row("mu3", mu3, "N/mm³"),
         row("tau_sig", body.tau_sig, "N·s/mm²"),
         row("f_offset", 0.0, "N"),
-    ])
+    ];
+    table(" | body | fit of the commanded | fit of the measured force | ", rows)
 }
 
 /// A check of the feedback as a picture: forces over time, and one over the other.
@@ -261,12 +245,11 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
     let measured = series(|one| [one.t.0, one.measured.0]);
     let torque = series(|one| [one.t.0, one.torque]);
     let last = followed.samples.last().map_or(1.0, |one| one.t.0);
-    let mut svg = Svg::new(WIDTH);
     let line = format!(
         "a slider pushes the rack while a cell measures; peak commanded {:.3} N, measured {:.3} N",
         followed.peak_commanded_n, followed.peak_measured_n
     );
-    title(&mut svg, source, &line);
+    let mut svg = titled(source, &line);
     let time = || Axis::linear("time (s)").over([0.0, last]);
     let force = Plot::new("", time(), Axis::linear("force (N)")).with([
         // Wide under narrow, so that both are seen where they agree.
@@ -303,9 +286,9 @@ mod tests {
     use palpate_model::units::{Depth, Newtons};
 
     #[test]
-    fn what_takes_force_away_is_told_and_nothing_else() {
+    fn only_flags_that_take_force_away_are_listed() {
         assert!(why_less(Flags::NONE, 0).is_empty());
-        // These are told elsewhere: they take no force.
+        // These appear elsewhere: they take no force.
         assert!(why_less(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
         let all = why_less(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
         assert_eq!(all.len(), 4);

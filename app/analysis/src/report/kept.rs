@@ -1,4 +1,4 @@
-//! What stands in an analysis that is kept beside a session, in words.
+//! The content of a stored analysis in words.
 
 use super::text::parameter_lines;
 use crate::analysed::ForceChange;
@@ -7,47 +7,25 @@ use palpate_sessions::analyses::{Analysed, Analyses, Analysis};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// A parameter as any fit keeps it: those of other families have no interval.
-#[derive(Deserialize)]
-struct Kept {
-    name: String,
-    value: f64,
-    unit: String,
-    std_error: Option<f64>,
-    #[serde(default)]
-    ci95: Option<[f64; 2]>,
-    #[serde(default)]
-    is_fixed: bool,
-    #[serde(default)]
-    systematic_error: Option<f64>,
-}
-
 /// The parameters that a kept fit found; those that cannot be understood are left out.
 #[must_use]
 pub fn parameters(results: &Value) -> Vec<Parameter> {
-    let all = results["parameters"].as_array().into_iter().flatten();
-    let known = all.filter_map(|one| Kept::deserialize(one).ok());
-    let parameter = |one: Kept| Parameter {
-        name: one.name,
-        value: one.value,
-        unit: one.unit,
-        std_error: one.std_error,
-        ci95: one.ci95,
-        is_fixed: one.is_fixed,
-        systematic_error: one.systematic_error,
+    let parameter = |one: &Value| {
+        let mut one = one.clone();
+        // Fits of other families were once stored without it.
+        one.as_object_mut()?.entry("is_fixed").or_insert(false.into());
+        Parameter::deserialize(one).ok()
     };
-    known.map(parameter).collect()
+    results["parameters"].as_array().into_iter().flatten().filter_map(parameter).collect()
 }
 
-/// What a kept fit said, one sentence each.
+/// Warnings and findings of a stored fit.
 #[must_use]
 pub fn sentences(results: &Value) -> Vec<String> {
     let lists = ["warnings", "findings"].map(|name| results[name].as_array());
-    let all = lists.into_iter().flatten().flatten();
-    all.filter_map(Value::as_str).map(str::to_owned).collect()
+    lists.into_iter().flatten().flatten().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
-/// What another calibration did to the forces.
 #[must_use]
 pub fn change(change: &ForceChange) -> String {
     let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
@@ -61,7 +39,6 @@ pub fn change(change: &ForceChange) -> String {
     )
 }
 
-/// What an analysis did, in one sentence.
 #[must_use]
 pub fn deed(what: &Analysed) -> String {
     match what {
@@ -85,22 +62,20 @@ pub fn deed(what: &Analysed) -> String {
             let spans: Vec<String> = spans.map(|[a, b]| format!("{a} to {b} s")).collect();
             format!("left out: {}", spans.join(", "))
         }
-        Analysed::Withdrawal => "does not count any more".to_owned(),
+        Analysed::Withdrawal => "withdrawn".to_owned(),
     }
 }
 
 /// The lines of a kept fit: parameters, then sentences; empty for what is no fit.
 #[must_use]
 pub fn fit_lines(one: &Analysis) -> Vec<String> {
-    let Analysed::Fit { results, .. } = &one.what else {
-        return Vec::new();
-    };
+    let Analysed::Fit { results, .. } = &one.what else { return Vec::new() };
     let mut lines = parameter_lines(&parameters(results));
     lines.extend(sentences(results).iter().map(|one| format!("- {one}")));
     lines
 }
 
-/// Who withdrew an analysis, and why; none while it counts.
+/// Author and reason of a withdrawal; `None` while the analysis counts.
 #[must_use]
 pub fn withdrawn(analyses: &Analyses, name: &str) -> Option<String> {
     let by = analyses.withdrawal(name)?;
@@ -131,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn deeds_are_told() {
+    fn an_analysis_is_described_by_its_content() {
         let mask = Analysed::Mask { left_out_s: vec![[1.0, 2.5], [3.0, 4.0]] };
         assert_eq!(deed(&mask), "left out: 1 to 2.5 s, 3 to 4 s");
         let change = ForceChange { samples: 7, peak_after_n: Some(2.0), ..ForceChange::default() };
@@ -139,8 +114,8 @@ mod tests {
             calibration: json!({"name": "June"}),
             results: serde_json::to_value(change).unwrap(),
         };
-        let told = deed(&other);
-        assert!(told.starts_with("calibration June: 7 forces"), "{told}");
-        assert!(told.ends_with("peak 2.000 N instead of -"), "{told}");
+        let words = deed(&other);
+        assert!(words.starts_with("calibration June: 7 forces"), "{words}");
+        assert!(words.ends_with("peak 2.000 N instead of -"), "{words}");
     }
 }

@@ -1,9 +1,10 @@
 //! The plots of a run in progress (force over time and over depth, contact search, weight readings) and of daily checks.
 //! A painter converts a plot's points once and again only when the trace has changed.
 
-use super::band;
+use super::figures::{interlock, phase_stretches};
+use super::picture::band;
 use crate::daily::Deviation;
-use palpate_figures::figure::{Axis, Ink, Level, Plot, Series, Stretch};
+use palpate_figures::figure::{Axis, Ink, Level, Plot, Series};
 use palpate_model::calibration::{Curve, Direction, ForceUncertainty, newtons_of};
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
@@ -25,7 +26,6 @@ const LEAD_MM: f64 = 3.0;
 const DEPTH: &str = "depth from contact (mm)";
 const FORCE: &str = "force above tare (N)";
 
-/// One repeat of a series.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycle {
     /// Its number, from 1.
@@ -60,7 +60,7 @@ impl RunPlots {
         let (over_time, is_time_cut) = known(&points, |point| [point.t, point.force]);
         let (over_depth, is_depth_cut) = known(&points, over_depth);
         let banded = |title: &str, x: &str, lines: Vec<Vec<[f64; 2]>>| Plot {
-            bands: lines.iter().flat_map(|line| band::around(line, uncertainty)).collect(),
+            bands: lines.iter().flat_map(|line| band(line, uncertainty)).collect(),
             ..Plot::new(title, Axis::linear(x), Axis::linear(FORCE))
                 .with(lines.into_iter().map(|line| Series::line("force", Ink::Series, WIDTH, line)))
         };
@@ -77,7 +77,7 @@ impl RunPlots {
         let of_each = trace.samples_per_bucket();
         let remark = match () {
             () if is_time_cut || is_depth_cut => {
-                Some("too many gaps to draw; the session holds everything".to_owned())
+                Some("too many gaps to draw; the session has all samples".to_owned())
             }
             () if cycles.len() > LOOPS_MAX => {
                 Some(format!("over depth the newest {LOOPS_MAX} cycles are drawn"))
@@ -143,19 +143,12 @@ pub fn set_course(plot: &mut Plot, run: Option<&RunView>, force_max: Newtons, is
     let phases = run.map_or(&[][..], |run| &run.phases);
     let ramp = phases.iter().find(|(_, phase)| *phase == Phase::Ramp);
     let from = ramp.filter(|_| is_from_ramp).map(|(start, _)| *start);
-    let until = |i: usize| phases.get(i + 1).map_or(now, |(end, _)| *end);
-    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| Stretch {
-        name: phase.name().to_owned(),
-        ends: [*start, until(i)],
-        ink: (i % 2 == 1).then_some(Ink::Line),
-    };
-    plot.stretches = phases.iter().enumerate().map(stretch).collect();
+    plot.stretches = phase_stretches(phases, now);
     plot.x.range = from.map(|start| [start - LEAD_S, now.max(start + 1.0)]);
     plot.x.seen = vec![0.0, now];
     // Room above the limit for the names of the phases.
     plot.y.seen = vec![-0.5, 1.12 * force_max.0];
-    let name = format!("interlock at {force_max:.1}");
-    plot.levels = vec![Level { name, at: force_max.0, ink: Ink::Limit, is_dashed: true }];
+    plot.levels = vec![interlock(force_max)];
 }
 
 /// Force over position while the surface is searched.
@@ -213,7 +206,7 @@ pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
         )
         .with([
             Series::dots("loading", Ink::Series, 3.6, deviations(Direction::Loading)),
-            // Hollow, so that the two are told apart without colours.
+            // Hollow, so that colour is not needed to distinguish the two.
             Series::rings("unloading", Ink::Limit, 4.6, deviations(Direction::Unloading)),
         ])
     }

@@ -1,7 +1,6 @@
 //! Results as people read them: the strings of a fit and of a selection that window, command line and
 //! pictures share, the pictures themselves, and the page of the extremes.
 
-mod band;
 pub mod calibration;
 pub mod calibration_plot;
 pub mod catalog;
@@ -13,7 +12,6 @@ pub mod figures;
 pub mod fit_json;
 #[cfg(feature = "haptics")]
 pub mod haptics;
-pub(super) mod imported;
 pub mod kept;
 pub mod live;
 pub mod picture;

@@ -1,11 +1,10 @@
 //! A fit as one picture: measured and fitted force over time, what is left over beneath, the
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
-use super::band;
 use super::fit_json::Overlay;
 use super::text::{ParameterText, energy, equation, limit, quality};
 use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink as TextInk, Look, Svg};
-use palpate_figures::figure::{self, Axis, AxisNames, Ink, Level, Plot, Series};
+use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Level, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
@@ -13,7 +12,7 @@ use palpate_model::units::Newtons;
 use palpate_rheology::fit::{FitReport, FitSample};
 
 /// Width of a picture in px.
-pub(super) const WIDTH: f64 = 960.0;
+const WIDTH: f64 = 960.0;
 /// Left and right edge of what is drawn.
 pub(super) const LEFT: f64 = 76.0;
 pub(super) const RIGHT: f64 = 936.0;
@@ -23,6 +22,26 @@ pub(super) const COLUMNS: usize = (RIGHT - LEFT) as usize;
 pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
 const LETTERS: usize = 120;
+
+/// The band of a calibration around a force reaches so many standard uncertainties either way: about 95 % where errors
+/// are normal (JCGM 100:2008, 6.2).
+const SIGMAS: f64 = 2.0;
+
+const BAND_NAME: &str = "calibration, ± 2u";
+
+/// The band around points whose ordinates are forces in N; `None` where no uncertainty is stated.
+pub(super) fn band(forces: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) -> Option<Band> {
+    let edge = |sigmas: f64| {
+        let at = |&[x, force]: &[f64; 2]| {
+            let sigma = uncertainty?.sigma(Newtons(force))?;
+            Some([x, force + sigmas * sigma.0])
+        };
+        forces.iter().filter_map(at).collect::<Vec<_>>()
+    };
+    let edges = [edge(-SIGMAS), edge(SIGMAS)];
+    let is_stated = !edges[0].is_empty();
+    is_stated.then(|| Band { name: BAND_NAME.to_owned(), ink: Ink::Series, edges })
+}
 
 /// The picture of a fit that was made: force over time, what is left over, force over depth, parameters and sentences.
 /// `source` is what was fitted, for the title; around the force lies the band of twice its calibration's standard
@@ -34,8 +53,7 @@ pub fn of_report(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
-    let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, (samples, &overlay.forces), report, uncertainty);
+    let mut svg = curves(source, (samples, &overlay.forces), report, uncertainty);
     // Where the force is not known the fit is not drawn over depth: the probe may have left the tissue.
     let pairs = samples.iter().zip(&overlay.forces);
     let known = || pairs.clone().filter(|(one, _)| one.is_measured());
@@ -65,28 +83,27 @@ pub fn of_fit(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> Drawing {
-    let mut svg = Svg::new(WIDTH);
-    curves(&mut svg, source, (samples, &report.predict(samples)), report, uncertainty);
+    let svg = curves(source, (samples, &report.predict(samples)), report, uncertainty);
     svg.drawing(556.0, LIGHT.canvas, &format!("Fit of {source}"))
 }
 
 /// Measured and fitted force over time, and what is left over beneath.
 fn curves(
-    svg: &mut Svg,
     source: &str,
     (samples, modelled): (&[FitSample], &[Newtons]),
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
-) {
-    title(svg, source, &format!("{}; {}", report.model, quality(report)));
+) -> Svg {
+    let mut svg = titled(source, &format!("{}; {}", report.model, quality(report)));
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let [mut force, mut residual] =
         plots_over_time((samples, modelled), uncertainty, -start, COLUMNS);
     force.x.range = Some(span(samples));
     residual.x.range = Some(span(samples));
-    figure::legend(svg, [RIGHT, 46.0], &force);
-    force.draw(svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
-    residual.draw(svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
+    figure::legend(&mut svg, [RIGHT, 46.0], &force);
+    force.draw(&mut svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
+    residual.draw(&mut svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
+    svg
 }
 
 /// Force over time, measured and fitted, and what is left over, thinned to so many columns. A shift in s is added to
@@ -113,8 +130,8 @@ fn plots_over_time(
     let known = || pairs().filter(|(one, _)| one.is_measured());
     let measured = thin(known().map(|(one, _)| [one.t.0 + shift, one.force.0]), columns);
     let fitted = thin(pairs().map(|(one, fit)| [one.t.0 + shift, fit.0]), columns);
-    let left = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
-    let residual = Series::line("residual", Ink::Series, 1.0, thin(left, columns));
+    let residuals = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
+    let residual = Series::line("residual", Ink::Series, 1.0, thin(residuals, columns));
     let time = || Axis::linear("time (s)");
     [
         force_plot(time(), [measured, fitted], uncertainty),
@@ -132,7 +149,7 @@ pub(super) fn force_plot(
     uncertainty: Option<&ForceUncertainty>,
 ) -> Plot {
     Plot {
-        bands: band::around(&fitted, uncertainty).into_iter().collect(),
+        bands: band(&fitted, uncertainty).into_iter().collect(),
         ..Plot::new("", x, Axis::linear("force (N)")).with([
             // Wide under narrow, so that both are seen where they agree.
             Series::line("measured", Ink::Series, 2.6, measured),
@@ -146,8 +163,7 @@ pub(super) fn force_plot(
 pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let depth = thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), COLUMNS);
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, source, "not fitted");
+    let mut svg = titled(source, "not fitted");
     let plot =
         Plot::new("", Axis::linear("time (s)").over(span(samples)), Axis::linear("depth (mm)"));
     plot.with([Series::line("", Ink::Series, 1.6, depth)]).draw(
@@ -171,10 +187,13 @@ pub(super) fn look() -> Look {
     Look { text: LIGHT.text_quiet, grid: LIGHT.line }
 }
 
-pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
+/// An empty picture with a title and a line beneath it.
+pub(super) fn titled(title: &str, line: &str) -> Svg {
+    let mut svg = Svg::new(WIDTH);
     let ink = TextInk { size: 18.0, ..TextInk::plain(LIGHT.text) };
-    svg.text([LEFT, 28.0], ink, source);
+    svg.text([LEFT, 28.0], ink, title);
     svg.text([LEFT, 50.0], TextInk::plain(LIGHT.text_quiet), line);
+    svg
 }
 
 /// The parameters from `y` on; returns where what follows may begin.

@@ -1,8 +1,8 @@
 //! A plan as a picture before anything moves: depth and the force of an average specimen over time, or, of a
 //! plan that presses on nothing, what it does when.
 
-use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
-use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel, Svg};
+use super::picture::{LEFT, LINE, RIGHT, look, titled};
+use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel};
 use palpate_figures::figure::{Axis, AxisNames, Band, Ink, Level, Plot, Series};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::units::{MmPerS, Newtons};
@@ -14,7 +14,6 @@ const SECONDS_MAX: f64 = 600.0;
 /// A limit is in the picture where the plan comes to half of it; a further one would flatten the curve.
 const LIMIT_IN_SIGHT: f64 = 0.5;
 
-/// What ends or bounds a run on this rig.
 #[derive(Clone, Copy, Debug)]
 pub struct CourseLimits {
     /// Force above tare that ends a run, as tight as the plan has it.
@@ -30,8 +29,7 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
     let end = outline.last().map_or(1.0, |point| point.t.0.max(1e-3));
     let (unit, axis) = unit_of(end);
     let series = |value: &dyn Fn(&OutlinePoint) -> f64| -> Vec<[f64; 2]> {
-        let points = outline.iter();
-        points.map(|point| [point.t.0 / unit, value(point)]).collect()
+        outline.iter().map(|point| [point.t.0 / unit, value(point)]).collect()
     };
     let speed: Vec<[f64; 2]> = speeds(outline).into_iter().map(|[t, v]| [t / unit, v]).collect();
     let edges = [0, 1].map(|edge: usize| series(&|point| point.force_band()[edge].0));
@@ -62,14 +60,11 @@ fn level(at: f64) -> Level {
     Level { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
-/// For what a course is expected.
 pub const EXPECTED: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
 
-/// The same as SVG.
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
-    let mut svg = Svg::new(WIDTH);
-    title(&mut svg, name, EXPECTED);
+    let mut svg = titled(name, EXPECTED);
     let [depth, speed, force] = course(outline, None);
     let place = |top: f64| [LEFT, top, RIGHT, top + 194.0];
     depth.draw(&mut svg, place(66.0), AxisNames::Upright);
@@ -105,12 +100,8 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
             phases.push(*phase);
         }
     }
-    let mut svg = Svg::new(WIDTH);
-    title(
-        &mut svg,
-        name,
-        "expected: moves and waits are known, searches and people take their time",
-    );
+    let mut svg =
+        titled(name, "expected: moves and waits are known, searches and people take their time");
     let (top, look): (f64, Look) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;
     // The rows are drawn here; the panel has the time.
@@ -131,7 +122,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     svg.finish(bottom + 60.0, LIGHT.canvas, &format!("Steps of {name}"))
 }
 
-/// A limit that belongs into the picture of a curve.
+/// The limit, if the curve comes near enough to it.
 fn in_sight(limit: f64, points: &[[f64; 2]]) -> Option<f64> {
     let most = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
     (most > LIMIT_IN_SIGHT * limit).then_some(limit)

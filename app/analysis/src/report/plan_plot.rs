@@ -16,7 +16,6 @@ const BOTTOM: f64 = 70.0;
 /// More than this many percent is no knowledge worth a place on the axis.
 const PERCENT_MAX: f64 = 100.0;
 
-/// The picture as SVG.
 #[must_use]
 pub fn picture(report: &PlanReport) -> String {
     let plots = plots(report);
@@ -41,7 +40,7 @@ fn heading(report: &PlanReport) -> String {
         format!(" and {sd} mN over {} s", plain(memory.time.0))
     });
     format!(
-        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep; dashed: wanted, dot: proposed",
+        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep; dashed: target, dot: proposed",
         report.targets[0].parameter,
         digits(report.noise.white.0 * 1e3, 3),
         plain(report.rig.depth.0)
@@ -53,8 +52,7 @@ fn heading(report: &PlanReport) -> String {
 pub fn plots(report: &PlanReport) -> [Plot; 3] {
     let target = &report.targets[0];
     let mut names = PARAMETER_NAMES.iter();
-    let k = names.position(|name| *name == target.parameter);
-    let k = k.unwrap_or(0);
+    let k = names.position(|name| *name == target.parameter).unwrap_or(0);
     let curves = &report.curves;
     let proposed = report.proposals.iter().find_map(|offer| {
         let percent = offer.proposal.expected.parameters[k].percent?;
@@ -83,20 +81,15 @@ pub fn plots(report: &PlanReport) -> [Plot; 3] {
         ),
     ];
     let percents = |start: f64, of: fn(f64, f64) -> f64| {
-        let series = plots.iter().flat_map(|plot| &plot.series);
-        let points = series.flat_map(|one| &one.points);
+        let points = plots.iter().flat_map(|plot| &plot.series).flat_map(|one| &one.points);
         points.map(|point| point[1]).fold(start, of)
     };
     let lowest = percents(target.percent, f64::min);
     let highest = percents(target.percent, f64::max);
     for plot in &mut plots {
         plot.y.range = Some([0.8 * lowest, 1.25 * highest]);
-        plot.levels.push(Level {
-            name: String::new(),
-            at: target.percent,
-            ink: Ink::Limit,
-            is_dashed: true,
-        });
+        let level = Level::plain(target.percent, Ink::Limit);
+        plot.levels.push(Level { is_dashed: true, ..level });
     }
     plots
 }
@@ -113,8 +106,8 @@ fn plot(title: &str, x: &str, curves: &[Curve], k: usize, mark: Option<[f64; 2]>
     let mark = mark.map(|at| Series::dots("proposed", Ink::Limit, 6.0, vec![at]));
     let y = Axis::logarithmic("95 % interval (%)");
     let plot = Plot::new(title, Axis::logarithmic(x), y).with(lines.chain(mark));
-    let is_told = plot.series.iter().any(|one| !one.points.is_empty());
-    Plot { remark: (!is_told).then(|| "cannot be told".to_owned()), ..plot }
+    let is_known = plot.series.iter().any(|one| !one.points.is_empty());
+    Plot { remark: (!is_known).then(|| "not identifiable".to_owned()), ..plot }
 }
 
 fn points(curve: &Curve, k: usize) -> Vec<[f64; 2]> {

@@ -1,8 +1,7 @@
-//! What is said of a session beside its samples, in the words that command line, window and page share.
+//! Edits, reviews and facts of a session in the words that command line, window and page share.
 
 use palpate_model::rig::SignalFacts;
-use palpate_sessions::HealthSummary;
-use palpate_sessions::edits::{Change, Review};
+use palpate_sessions::{Change, HealthSummary, Review};
 
 /// A time to the second, UTC.
 #[must_use]
@@ -10,17 +9,12 @@ pub fn at(time: &chrono::DateTime<chrono::Utc>) -> String {
     time.format("%Y-%m-%d %H:%M:%SZ").to_string()
 }
 
-/// What an edit says.
 #[must_use]
 pub fn change(change: &Change) -> String {
     match change {
         Change::Verdict { verdict } => verdict.to_string(),
         Change::Note => "note".to_owned(),
-        Change::Tags { add, remove } => {
-            let added = add.iter().map(|tag| format!("+{tag}"));
-            let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
-            format!("tags {}", signs.collect::<Vec<_>>().join(" "))
-        }
+        Change::Tags { add, remove } => tags(add, remove),
         Change::Review { decision, .. } => format!("review, {}", decision.name()),
         Change::Contact { number, position_mm, was_mm } => {
             format!("contact {number} at {:.3} mm instead of {:.3} mm", position_mm.0, was_mm.0)
@@ -28,7 +22,13 @@ pub fn change(change: &Change) -> String {
     }
 }
 
-/// Whether a review still stands.
+/// Tags that are added and removed.
+pub(crate) fn tags(add: &[String], remove: &[String]) -> String {
+    let added = add.iter().map(|tag| format!("+{tag}"));
+    let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
+    format!("tags {}", signs.collect::<Vec<_>>().join(" "))
+}
+
 #[must_use]
 pub fn review(review: &Review) -> String {
     let stands = match review.changed.as_slice() {
@@ -39,7 +39,7 @@ pub fn review(review: &Review) -> String {
     format!("{decision} by {}, {stands}", review.by)
 }
 
-/// The worst that is told of the computer, each with its name.
+/// The worst readings of the computer, each with its name.
 #[must_use]
 pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
@@ -69,7 +69,6 @@ pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// How the signal was taken, line by line.
 #[must_use]
 pub fn signal(signal: &SignalFacts) -> [String; 3] {
     let range = signal

@@ -1,34 +1,28 @@
-//! Points over two logarithmic axes: what accuracy costs.
+//! Points over two logarithmic axes, such as error over cost.
 
 use palpate_figures::figure::{Axis, Ink, Labels, Level, Plot, Series};
 use palpate_rheology::trade::front;
 
-/// One point.
 #[derive(Clone, Debug)]
 pub struct Mark {
     /// Along both axes, above zero.
     pub at: [f64; 2],
-    /// A short name beside it, and what is told of it on demand.
+    /// A short name beside it, and the text of its tooltip.
     pub label: [String; 2],
 }
 
-/// What is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Scatter<'a> {
     /// Names of both axes with their units.
     pub axes: [&'a str; 2],
-    /// All points.
     pub marks: &'a [Mark],
     /// Whether those that no other undercuts in both are joined: only where all stand for the same.
     pub has_front: bool,
-    /// The one recommended.
     pub chosen: Option<usize>,
-    /// A level not to exceed.
     pub level: Option<f64>,
 }
 
 impl Scatter<'_> {
-    /// As a plot.
     pub fn plot(&self) -> Plot {
         let best: Vec<usize> = match self.has_front {
             true => front(&self.marks.iter().map(|mark| mark.at).collect::<Vec<_>>()),
@@ -43,12 +37,9 @@ impl Scatter<'_> {
             Labels::Each(labels.collect())
         };
         let chosen: Vec<usize> = self.chosen.into_iter().collect();
-        let level = self.level.filter(|level| *level > 0.0).map(|at| Level {
-            name: "tolerance".to_owned(),
-            at,
-            ink: Ink::Limit,
-            is_dashed: false,
-        });
+        let level = self.level.filter(|level| *level > 0.0);
+        let level =
+            level.map(|at| Level { name: "tolerance".to_owned(), ..Level::plain(at, Ink::Limit) });
         Plot {
             levels: level.into_iter().collect(),
             ..Plot::new("", Axis::logarithmic(self.axes[0]), Axis::logarithmic(self.axes[1])).with(

@@ -1,11 +1,10 @@
-//! What is said of a scene's run, its plan and its curves.
+//! Texts on the run, the plan and the curves of a scene.
 
 use super::haptics::run_text;
 use crate::scene::Played;
 use crate::scene_bench::Bench;
 use palpate_haptics::surface::ScenePlan;
 
-/// A run in words.
 #[must_use]
 pub fn played_text(played: &Played) -> String {
     let mut lines = vec![format!(
@@ -45,10 +44,7 @@ pub fn plan_text(plan: &ScenePlan) -> String {
         "plan: {0} x {0} nodes, {1}, cut {2}: shape within {3:.3} mm, force within {4:.4} N, {5:.1} us a tick",
         plan.mesh.nodes,
         plan.step.scheme.name(),
-        match plan.cut.threshold_mm > 0.0 {
-            true => plan.cut.words(),
-            false => "nowhere".to_owned(),
-        },
+        if plan.cut.threshold_mm > 0.0 { plan.cut.words() } else { "nowhere".to_owned() },
         plan.shape_error_mm,
         plan.force_error_n,
         plan.cost_us

@@ -1,9 +1,9 @@
 //! A selection in words: the table, the ladder and the verdict.
 
-use super::text::in_columns;
+use super::text::{head, in_columns};
 use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
 
-/// Everything, the verdict last.
+/// The whole selection, the verdict last.
 #[must_use]
 pub fn whole(selection: &Selection) -> String {
     let mut parts = vec![records(selection), in_columns(&table(selection))];
@@ -13,20 +13,17 @@ pub fn whole(selection: &Selection) -> String {
     if !refused.is_empty() {
         parts.push(refused.join("\n"));
     }
-    let unpredicted: Vec<String> = selection
-        .candidates
-        .iter()
-        .filter_map(|one| {
-            let reason = one.prediction_refused.as_ref()?;
-            Some(format!("{} predicts nothing: {reason}", one.family))
-        })
-        .collect();
+    let unpredicted = |one: &Candidate| {
+        let reason = one.prediction_refused.as_ref()?;
+        Some(format!("{} predicts nothing: {reason}", one.family))
+    };
+    let unpredicted: Vec<String> = selection.candidates.iter().filter_map(unpredicted).collect();
     if !unpredicted.is_empty() {
         parts.push(unpredicted.join("\n"));
     }
     let ladder = ladder(selection);
     if ladder.len() > 1 {
-        parts.push(format!("What each extra term buys:\n{}", in_columns(&ladder)));
+        parts.push(format!("Effect of each extra term:\n{}", in_columns(&ladder)));
     }
     parts.push(tested(selection));
     parts.push(selection.verdict.sentences.join("\n"));
@@ -48,24 +45,11 @@ pub fn records(selection: &Selection) -> String {
 /// Rows of the comparison, the head first.
 #[must_use]
 pub fn table(selection: &Selection) -> Vec<Vec<String>> {
-    let mut head = vec![
-        "family",
-        "free",
-        "rms mN",
-        "worst mN",
-        "dAICc",
-        "dBIC",
-        "predicted mN",
-        "scaled mN",
-        "states",
-        "ops",
-    ];
-    if selection.tolerance_n.is_some() {
-        head.push("within");
-    }
-    let mut rows = vec![head.into_iter().map(String::from).collect()];
-    rows.extend(selection.candidates.iter().map(row));
-    rows
+    let mut names = head(
+        "family | free | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | states | ops",
+    );
+    names.extend(selection.tolerance_n.map(|_| "within".to_owned()));
+    std::iter::once(names).chain(selection.candidates.iter().map(row)).collect()
 }
 
 fn row(one: &Candidate) -> Vec<String> {
@@ -94,8 +78,7 @@ fn row(one: &Candidate) -> Vec<String> {
 /// Rows of the ladder, the head first.
 #[must_use]
 pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
-    let head = ["step", "adds", "rms mN", "predicted mN", "dBIC", "ops"];
-    let mut rows = vec![head.map(String::from).to_vec()];
+    let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | ops")];
     let change =
         |[before, after]: [f64; 2]| format!("{} > {}", digits(1e3 * before), digits(1e3 * after));
     rows.extend(selection.steps.iter().map(|step| {
@@ -111,7 +94,7 @@ pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
     rows
 }
 
-/// What was held out, and what the numbers count.
+/// Held-out records, and the sample counts of the criteria.
 #[must_use]
 pub fn tested(selection: &Selection) -> String {
     let known = selection.candidates.iter().find_map(|one| one.prediction.as_ref());
@@ -123,14 +106,11 @@ pub fn tested(selection: &Selection) -> String {
                 return "One record: the body of its ramp and a third of what follows predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
             }
             let kinds = [Unseen::Speed, Unseen::Depth, Unseen::SpeedAndDepth, Unseen::Specimen];
-            let kinds: Vec<String> = kinds
-                .into_iter()
-                .filter(|kind| has(*kind))
-                .map(|kind| {
-                    let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
-                    format!("{} in {count}", kind.name())
-                })
-                .collect();
+            let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {
+                let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
+                format!("{} in {count}", kind.name())
+            });
+            let kinds: Vec<String> = kinds.collect();
             format!(
                 "Held out: each of {} records is predicted by the body of others ({}); its own sensor offset is found on it, in 'scaled' one factor on the body as well.",
                 prediction.records.len(),
@@ -158,7 +138,6 @@ pub(super) fn digits(value: f64) -> String {
     }
 }
 
-/// Whether a family is the one to use.
 pub(super) fn is_chosen(selection: &Selection, family: &str) -> bool {
     selection.verdict.outcome != Outcome::NoneWithin
         && selection.verdict.family.as_deref() == Some(family)

@@ -56,8 +56,7 @@ pub fn plot(selection: &Selection) -> Plot {
 #[must_use]
 pub fn of_selection(selection: &Selection) -> String {
     let mut svg = Svg::new(WIDTH);
-    let first = selection.verdict.sentences.first();
-    let title = first.map_or("", String::as_str);
+    let title = selection.verdict.sentences.first().map_or("", String::as_str);
     for (index, line) in wrap(title, LETTERS).iter().take(2).enumerate() {
         let at = [20.0, 24.0 + 18.0 * index as f64];
         svg.text(at, Ink::plain(LIGHT.text), line);

@@ -1,13 +1,12 @@
-//! What happened in a run, as text: how it ended, what it is worth, what was kept, what the time went to.
+//! A run as text: its ending, data quality, samples, time use and targets.
 
-use super::text::in_columns;
+use super::text::table;
 use palpate_runner::fidelity::{Achieved, Fidelity};
 use palpate_sessions::{EndRecord, Verdict};
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
 
-/// The lines of a session's fidelity.
 #[must_use]
 pub fn fidelity_text(
     found: &Fidelity,
@@ -22,10 +21,7 @@ pub fn fidelity_text(
         Some((verdict, reason)) => format!("verdict    {verdict}: {reason}"),
         None => "verdict    none".into(),
     });
-    let late = match found.late {
-        0 => "none late".into(),
-        late => format!("{late} late, by up to {:.0} ms", found.late_worst_s * 1e3),
-    };
+    let late = lateness(found);
     // A rig that is asked for its samples over a link gives them as it can.
     let apart = match found.longest_gap_s {
         gap if gap > GAP_USUAL_S => format!(", at most {:.1} ms apart", gap * 1e3),
@@ -51,33 +47,35 @@ pub fn fidelity_text(
         (count, missed) => format!("targets    {count}, {missed} missed"),
     });
     if !found.targets.is_empty() {
-        lines.push(table(&found.targets));
+        lines.push(targets(&found.targets));
     }
     lines.join("\n")
 }
 
-fn table(targets: &[Achieved]) -> String {
-    let head = ["step", "", "cycle", "quantity", "target", "achieved", "error", ""];
-    let mut rows = vec![head.map(String::from).to_vec()];
-    rows.extend(targets.iter().map(|one| {
-        let cycle = match one.cycle {
-            0 => String::new(),
-            cycle => cycle.to_string(),
-        };
-        let error = one.error_percent.map_or_else(
-            || format!("{:+.4} {}", one.achieved - one.target, one.unit),
-            |percent| format!("{percent:+.3} %"),
-        );
-        vec![
-            (one.step_index + 1).to_string(),
-            one.step.into(),
-            cycle,
-            one.quantity.into(),
-            format!("{:.4} {}", one.target, one.unit),
-            format!("{:.4} {}", one.achieved, one.unit),
-            error,
-            if one.is_within { "" } else { "missed" }.into(),
-        ]
-    }));
-    in_columns(&rows)
+/// Cycle, quantity, target, achieved value and error of a target.
+pub(super) fn target_cells(one: &Achieved) -> [String; 5] {
+    let cycle = if one.cycle == 0 { String::new() } else { one.cycle.to_string() };
+    let error = one.error_percent.map_or_else(
+        || format!("{:+.4} {}", one.achieved - one.target, one.unit),
+        |percent| format!("{percent:+.3} %"),
+    );
+    let with_unit = |value: f64| format!("{value:.4} {}", one.unit);
+    [cycle, one.quantity.to_owned(), with_unit(one.target), with_unit(one.achieved), error]
+}
+
+pub(super) fn lateness(found: &Fidelity) -> String {
+    match found.late {
+        0 => "none late".to_owned(),
+        late => format!("{late} late, by up to {:.0} ms", found.late_worst_s * 1e3),
+    }
+}
+
+fn targets(targets: &[Achieved]) -> String {
+    let rows = targets.iter().map(|one| {
+        let mut row = vec![(one.step_index + 1).to_string(), one.step.into()];
+        row.extend(target_cells(one));
+        row.push(if one.is_within { "" } else { "missed" }.into());
+        row
+    });
+    table("step | | cycle | quantity | target | achieved | error | ", rows)
 }

@@ -7,10 +7,8 @@ use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_
 use palpate_rheology::families::by_key;
 use palpate_rheology::fit::{FitReport, NamedReport, Parameter};
 
-/// One parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterText {
-    /// Its name.
     pub name: String,
     /// `value ± standard error`, or the value and why it has no error.
     pub value: String,
@@ -21,7 +19,6 @@ pub struct ParameterText {
 }
 
 impl ParameterText {
-    /// The words for a parameter.
     #[must_use]
     pub fn of(parameter: &Parameter) -> Self {
         let value = match parameter.std_error {
@@ -70,17 +67,17 @@ pub fn typeset(unit: &str) -> String {
     unit.replace("^2", "²").replace("^3", "³").replace('*', "·")
 }
 
-/// How well the model explains the record.
+/// Goodness of fit.
 #[must_use]
 pub fn quality(report: &FitReport) -> String {
     format!("R² {:.6}, rmse {:.3} mN, {} samples", report.r2, report.rmse_n * 1e3, report.samples)
 }
 
-/// What energy went in and how far the fit is off at worst.
+/// Work along the path and the largest residual.
 #[must_use]
 pub fn energy(overlay: &Overlay) -> String {
     format!(
-        "energy {:.3} N·mm measured, {:.3} fitted; at worst {:.1} mN off",
+        "energy {:.3} N·mm measured, {:.3} fitted; largest residual {:.1} mN",
         overlay.work_measured_n_mm,
         overlay.work_fitted_n_mm,
         overlay.worst_n * 1e3
@@ -92,7 +89,6 @@ pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
     Some(by_key(&report.body.family).ok()?.equation())
 }
 
-/// What no choice of its parameters can represent.
 pub(super) fn limit(report: &FitReport) -> Option<String> {
     let family = by_key(&report.body.family).ok()?;
     Some(format!("it cannot represent {}", family.cannot_represent()))
@@ -100,20 +96,20 @@ pub(super) fn limit(report: &FitReport) -> Option<String> {
 
 /// A whole fit, of every family the same: model, equation, parameters, how good it is, every sentence, further intervals.
 #[must_use]
-pub fn whole(report: &FitReport, beside: Beside<'_>) -> String {
+pub fn whole(report: &FitReport, details: Beside<'_>) -> String {
     let mut lines = vec![report.model.clone()];
     lines.extend(equation(report).map(|text| format!("  {text}")));
     lines.extend(parameter_lines(&report.parameters));
-    lines.extend([quality(report), energy(beside.overlay)]);
+    lines.extend([quality(report), energy(details.overlay)]);
     let sentences = report.sentences().map(str::to_owned).chain(limit(report));
     lines.extend(sentences.map(|sentence| format!("- {sentence}")));
-    lines.extend(interval_lines(beside.intervals, report));
+    lines.extend(interval_lines(details.intervals, report));
     lines.join("\n")
 }
 
 /// A fit of several recordings: what is shared once, then every recording with what is its own.
 #[must_use]
-pub fn together(fitted: &Together, beside: &[Beside<'_>]) -> String {
+pub fn together(fitted: &Together, details: &[Beside<'_>]) -> String {
     let (shared, records) = (&fitted.report.shared, &fitted.report.records);
     let part = |named: &NamedReport, is_shared: bool| {
         let mut chosen = named.report.parameters.clone();
@@ -127,11 +123,11 @@ pub fn together(fitted: &Together, beside: &[Beside<'_>]) -> String {
         lines.extend(equation(&first.report).map(|text| format!("  {text}")));
         lines.extend(part(first, true));
     }
-    for (named, beside) in records.iter().zip(beside) {
+    for (named, details) in records.iter().zip(details) {
         lines.push(named.record.clone());
         lines.extend(part(named, false));
-        let own = [quality(&named.report), energy(beside.overlay)].into_iter();
-        let own = own.chain(interval_lines(beside.intervals, &named.report));
+        let own = [quality(&named.report), energy(details.overlay)].into_iter();
+        let own = own.chain(interval_lines(details.intervals, &named.report));
         let own = own.chain(named.report.sentences().map(|sentence| format!("- {sentence}")));
         lines.extend(own.map(|line| format!("  {line}")));
     }
@@ -169,8 +165,7 @@ fn interval_lines(found: &Intervals, report: &FitReport) -> Vec<String> {
 #[must_use]
 pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
     let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
-    let widest = texts.iter().map(|text| text.value.chars().count()).max();
-    let width = widest.unwrap_or(0);
+    let width = texts.iter().map(|text| text.value.chars().count()).max().unwrap_or(0);
     let line = |text: &ParameterText| {
         let interval = match text.interval.as_str() {
             "" => String::new(),
@@ -183,12 +178,21 @@ pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
     texts.iter().map(line).collect()
 }
 
-/// A text with its first letter large.
 #[must_use]
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|letter| letter.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str()
+}
+
+/// The cells of a table's head, given in one text with `|` between them.
+pub(super) fn head(names: &str) -> Vec<String> {
+    names.split('|').map(|name| name.trim().to_owned()).collect()
+}
+
+/// A table in columns under its head.
+pub(super) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    in_columns(&std::iter::once(head(names)).chain(rows).collect::<Vec<_>>())
 }
 
 /// Cells in columns as wide as their widest; a sentence at the end of a short line widens none.
@@ -206,8 +210,7 @@ pub fn in_columns(lines: &[Vec<String>]) -> String {
             // Counted by letters: `±` is two bytes and one letter.
             format!("{cell:<width$}")
         });
-        let joined = padded.collect::<Vec<_>>().join("  ");
-        joined.trim_end().to_owned()
+        padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
     };
     lines.iter().map(line).collect::<Vec<_>>().join("\n")
 }
@@ -271,7 +274,7 @@ mod tests {
         };
         report.body.family = "maxwell".into();
         let (overlay, intervals) = (Overlay::of(&FitReport::default(), &[]), Intervals::default());
-        let beside =
+        let details =
             Beside { overlay: &overlay, intervals: &intervals, systematic: None, compliance: None };
         let lines = [
             "a model",
@@ -279,12 +282,12 @@ mod tests {
             "  tau_sig    1.50 ± 0.10  N·s/mm²  95 % [1.30, 1.70]",
             "  tau_sig    1.500 fixed  N·s/mm²",
             "R² 0.999123, rmse 3.450 mN, 900 samples",
-            "energy 0.000 N·mm measured, 0.000 fitted; at worst 0.0 mN off",
+            "energy 0.000 N·mm measured, 0.000 fitted; largest residual 0.0 mN",
             "- beware",
             "- found",
             "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",
         ];
-        assert_eq!(whole(&report, beside), lines.join("\n"));
+        assert_eq!(whole(&report, details), lines.join("\n"));
     }
 
     #[test]

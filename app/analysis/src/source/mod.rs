@@ -1,4 +1,4 @@
-//! From what is on disk to what a fit takes: sessions and foreign tables alike.
+//! Reads sessions and foreign tables for a fit.
 
 mod error;
 
@@ -8,8 +8,7 @@ use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 use palpate_rheology::fit::FitSample;
-use palpate_sessions::log::Session;
-use palpate_sessions::record::{Entry, EntryKind, Row};
+use palpate_sessions::{Entry, EntryKind, Row, Session};
 use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 
@@ -17,8 +16,8 @@ use crate::analysed::{self, Opened};
 use crate::sources::is_session;
 use palpate_protocols::engine::{Effect, Record};
 
-/// Samples for a fit, and what a reader should know about them.
-#[derive(Clone, Debug)]
+/// Samples for a fit, with remarks on them.
+#[derive(Clone, Debug, Default)]
 pub struct FitSource {
     /// Time from the first sample, depth, force and its own uncertainty.
     pub samples: Vec<FitSample>,
@@ -34,33 +33,26 @@ pub struct FitSource {
     pub calibration: Option<Calibration>,
 }
 
-/// What of an indentation is read.
+/// Part of an indentation that is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stretch {
     /// Ramp and hold: what the fit of the modified Kelvin body takes, which knows no unloading.
     #[default]
     RampHold,
-    /// The recorded way back as well, where there is one.
+    /// Unloading as well, where it was recorded.
     WithUnload,
 }
 
-/// What is asked of a source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wanted {
-    /// Which part of it.
     pub stretch: Stretch,
-    /// Take a session though it was rejected.
     pub is_rejected_included: bool,
 }
 
 impl Stretch {
-    /// With the way back or without.
     #[must_use]
     pub fn with_unload(is_wanted: bool) -> Self {
-        match is_wanted {
-            true => Self::WithUnload,
-            false => Self::RampHold,
-        }
+        if is_wanted { Self::WithUnload } else { Self::RampHold }
     }
 }
 
@@ -82,10 +74,7 @@ fn lift_off(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
     let mut lows = 0;
     let last = phases.iter().zip(samples).position(|(phase, one)| {
         let is_low = one.is_measured() && one.force.0 < LIFT_OFF * one.sigma.0;
-        lows = match is_low && *phase == Phase::Unload {
-            true => lows + 1,
-            false => 0,
-        };
+        lows = if is_low && *phase == Phase::Unload { lows + 1 } else { 0 };
         lows == LIFT_OFF_RUN
     })?;
     Some(last + 1 - LIFT_OFF_RUN)
@@ -104,18 +93,13 @@ fn turn(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
     })
 }
 
-/// Reads a session folder, a session file or a table.
+/// Ramp and hold of a session folder, a session file or a table.
 pub fn read(path: &Path) -> Result<FitSource, SourceError> {
-    read_named(path, None)
+    read_stretch(path, None, Stretch::RampHold)
 }
 
-/// As [`read`]; `columns` names the columns of a table that has no header.
-pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSource, SourceError> {
-    read_stretch(path, columns, Stretch::RampHold)
-}
-
-/// As [`read_named`], of what is asked for. A table without phases is taken whole. The edits of a session
-/// are made, and a rejected one is refused.
+/// The chosen part of a session or a table; `columns` names the columns of a table that has no header. A table without
+/// phases is taken whole. The edits of a session are applied, and a rejected one is refused.
 pub fn read_stretch(
     path: &Path,
     columns: Option<&ColumnNames>,
@@ -137,14 +121,8 @@ pub fn read_analysed(
             return Err(SourceError::TableAnalysis { name: name.to_owned() });
         }
         let table = read_table(path, columns)?;
-        return Ok(FitSource {
-            samples: samples_of_table(&table, stretch),
-            start: Seconds(0.0),
-            notes: table.notes,
-            specimen: None,
-            rig: None,
-            calibration: None,
-        });
+        let samples = samples_of_table(&table, stretch);
+        return Ok(FitSource { samples, notes: table.notes, ..FitSource::default() });
     }
     let Opened { edited, left_out_s, .. } = analysed::open(path, analysis)?;
     if let (Some(reason), false) = (edited.rejection(), is_rejected_included) {
@@ -160,10 +138,13 @@ pub fn of_session(
     stretch: Stretch,
     left_out_s: &[[f64; 2]],
 ) -> Result<FitSource, SourceError> {
+    let specimen = session.manifest.specimen.trim();
+    let specimen = (!specimen.is_empty()).then(|| specimen.to_owned());
     if session.manifest.imported.is_some() {
-        let mut source = source_of_imported(session, stretch);
-        leave_out(left_out_s, Seconds(0.0), &mut source.samples);
-        return Ok(source);
+        // As of a table, because the noise of its forces is unknown.
+        let mut samples = samples_of_table(&table_of_imported(&session), stretch);
+        leave_out(left_out_s, Seconds(0.0), &mut samples);
+        return Ok(FitSource { samples, specimen, notes: session.notes, ..FitSource::default() });
     }
     let mut samples = samples_of(&session, stretch)?;
     leave_out(left_out_s, since_first(&session, stretch), &mut samples);
@@ -173,32 +154,11 @@ pub fn of_session(
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
     if censored > 0 {
         notes.push(format!(
-            "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, the probe had left the tissue, or somebody left them out"
+            "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, the probe had left the tissue, or a mask leaves them out"
         ));
     }
-    let specimen = session.manifest.specimen.trim();
-    Ok(FitSource {
-        rig: session.manifest.rig.map(|rig| rig.name),
-        specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
-        samples,
-        start,
-        notes,
-        calibration,
-    })
-}
-
-/// What a fit takes of an imported session: as of a table, for nobody knows the noise of its forces.
-fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
-    let table = table_of_imported(&session);
-    let specimen = session.manifest.specimen.trim();
-    FitSource {
-        rig: None,
-        samples: samples_of_table(&table, stretch),
-        start: Seconds(0.0),
-        specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
-        notes: session.notes,
-        calibration: None,
-    }
+    let rig = session.manifest.rig.map(|rig| rig.name);
+    Ok(FitSource { samples, start, notes, specimen, rig, calibration })
 }
 
 /// The samples of an imported session, its time from the first one.
@@ -207,9 +167,7 @@ pub(super) fn table_of_imported(session: &Session) -> Table {
     for row in &session.rows {
         let is_taken =
             matches!(row.phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
-        let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else {
-            continue;
-        };
+        let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else { continue };
         table.t.push(session.manifest.time_of(row.tick as i64).0);
         table.depth.push(depth);
         table.force.push(force);
@@ -240,7 +198,6 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.tick().0;
     let trusted = trusted_samples(&decisions);
-    let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
     let (mut first_tick, mut phases) = (None, Vec::new());
     let mut samples: Vec<FitSample> = rows
@@ -249,17 +206,11 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
             let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
             let first_tick = *first_tick.get_or_insert(row.tick);
             phases.push(row.phase);
-            let sigma = if is_known(index, row) {
-                curve.force_sigma(force, noise)
-            } else {
-                Newtons(f64::INFINITY)
-            };
-            Some(FitSample {
-                t: Seconds((row.tick - first_tick) as f64 * tick_secs),
-                depth,
-                force,
-                sigma,
-            })
+            let is_known = index < trusted && !is_saturated(session, row);
+            let unknown = Newtons(f64::INFINITY);
+            let sigma = if is_known { curve.force_sigma(force, noise) } else { unknown };
+            let t = Seconds((row.tick - first_tick) as f64 * tick_secs);
+            Some(FitSample { t, depth, force, sigma })
         })
         .collect();
     if let Some(from) = lift_off(&phases, &samples).or_else(|| turn(&phases, &samples)) {
@@ -271,12 +222,9 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
 }
 
 fn is_fitted(row: &Row, stretch: Stretch) -> bool {
-    let is_asked = match row.phase {
-        Phase::Ramp | Phase::Hold | Phase::Follow => true,
-        Phase::Unload => stretch == Stretch::WithUnload,
-        _ => false,
-    };
-    is_asked && row.force.is_some() && row.depth.is_some()
+    let is_wanted = matches!(row.phase, Phase::Ramp | Phase::Hold | Phase::Follow)
+        || row.phase == Phase::Unload && stretch == Stretch::WithUnload;
+    is_wanted && row.force.is_some() && row.depth.is_some()
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
@@ -288,13 +236,12 @@ pub(super) fn is_saturated(session: &Session, row: &Row) -> bool {
 
 /// How many samples came before an interlock tripped; all of them if none did.
 pub(super) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
-    let tripped = decisions
-        .iter()
-        .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
-    tripped.map_or(usize::MAX, |(after_sample, _)| *after_sample as usize)
+    let is_trip = |record: &Record| matches!(record, Record::InterlockTripped { .. });
+    let tripped = records(decisions).find(|(_, record)| is_trip(record));
+    tripped.map_or(usize::MAX, |(after_sample, _)| after_sample as usize)
 }
 
-/// What the engine decided, each after so many samples.
+/// Decisions of the engine, each with the number of samples before it.
 pub(super) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     decisions_among(&session.entries)
 }
@@ -310,6 +257,16 @@ pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, S
             Err(err) => Err(SourceError::Decision { detail: err.to_string() }),
         })
         .collect()
+}
+
+/// Records among decisions, each with the number of samples before it.
+pub(super) fn records(
+    decisions: &[(u64, Effect)],
+) -> impl DoubleEndedIterator<Item = (u64, &Record)> {
+    decisions.iter().filter_map(|(after, effect)| match effect {
+        Effect::Record(record) => Some((*after, record)),
+        _ => None,
+    })
 }
 
 /// Forces in stretches of time, in s since the session's first sample, count no more. `offset` is the time
@@ -340,13 +297,13 @@ fn start_of(session: &Session) -> Seconds {
 
 /// The signal's noise as the tare found it.
 pub(super) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
-    decisions.iter().find_map(|(_, effect)| match effect {
-        Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
+    records(decisions).find_map(|(_, record)| match record {
+        Record::Tared { noise, .. } => Some(*noise),
         _ => None,
     })
 }
 
-/// A table knows nothing of its noise: every sample counts alike.
+/// The noise of a table is unknown, so every sample has the same weight.
 fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
     (0..table.t.len())
         .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])

@@ -1,6 +1,6 @@
-//! Families by terms: what a step costs, and what leaving terms out does to the force.
+//! Families by terms: the cost of a step, and the error of the force with fewer terms.
 
-use super::paths::{Paths, difference, peak};
+use super::paths::{ReferencePaths, difference, peak};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -18,9 +18,8 @@ const THESIS_SPEED: f64 = 0.75;
 /// Name of the first target.
 pub(super) const THESIS: &str = "thesis body";
 
-/// What rows of one target stand for, and how.
+/// A body that the families of one table approximate.
 struct Target {
-    /// In words.
     name: &'static str,
     /// The body: family, outer parameters, coefficients.
     body: (&'static str, &'static [f64], &'static [f64]),
@@ -28,8 +27,8 @@ struct Target {
     is_fitted: bool,
     /// Whether the probe comes back after the hold.
     comes_back: bool,
-    /// Families; the first of them alone with `--quick`.
-    families: &'static [&'static str],
+    /// Keys of families; a quick measurement takes the first `quick` of them.
+    families: &'static str,
     quick: usize,
 }
 
@@ -41,17 +40,7 @@ const TARGETS: [Target; 5] = [
         body: ("series-3", &[1.023], &[0.05333, -0.0086, 0.000_434_5, 0.06]),
         is_fitted: true,
         comes_back: false,
-        families: &[
-            "series-1",
-            "series-2",
-            "series-3",
-            "series-4",
-            "series-5",
-            "voigt",
-            "maxwell",
-            "kelvin",
-            "exponential",
-        ],
+        families: "series-1 series-2 series-3 series-4 series-5 voigt maxwell kelvin exponential",
         quick: 3,
     },
     Target {
@@ -63,7 +52,7 @@ const TARGETS: [Target; 5] = [
         ),
         is_fitted: true,
         comes_back: true,
-        families: &["series-3", "unloading-3"],
+        families: "series-3 unloading-3",
         quick: 2,
     },
     Target {
@@ -71,7 +60,7 @@ const TARGETS: [Target; 5] = [
         body: ("fractional-12", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: true,
         comes_back: false,
-        families: &["prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6"],
+        families: "prony-1 prony-2 prony-3 prony-4 prony-5 prony-6",
         quick: 2,
     },
     Target {
@@ -79,15 +68,7 @@ const TARGETS: [Target; 5] = [
         body: ("fractional-14", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: false,
         comes_back: false,
-        families: &[
-            "fractional-1",
-            "fractional-2",
-            "fractional-4",
-            "fractional-6",
-            "fractional-8",
-            "fractional-10",
-            "fractional-12",
-        ],
+        families: "fractional-1 fractional-2 fractional-4 fractional-6 fractional-8 fractional-10 fractional-12",
         quick: 2,
     },
     Target {
@@ -95,7 +76,7 @@ const TARGETS: [Target; 5] = [
         body: ("fung-64", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
         is_fitted: false,
         comes_back: false,
-        families: &["fung-2", "fung-4", "fung-8", "fung-16", "fung", "fung-32"],
+        families: "fung-2 fung-4 fung-8 fung-16 fung fung-32",
         quick: 2,
     },
 ];
@@ -115,11 +96,10 @@ fn come_back(path: &mut Vec<(Seconds, Depth)>) {
 }
 
 fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
-    let family = by_key(key).map_err(|err| err.to_string())?;
-    family.model(outer, linear).map_err(|err| err.to_string())
+    by_key(key).map_err(|err| err.to_string())?.model(outer, linear).map_err(|err| err.to_string())
 }
 
-pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, String> {
+pub(super) fn rows(extent: Extent, paths: &ReferencePaths) -> Result<Vec<FamilyRow>, String> {
     let mut rows = Vec::new();
     for target in &TARGETS {
         let mut path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();
@@ -128,18 +108,14 @@ pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, Stri
         }
         let (key, outer, linear) = target.body;
         let exact = along(&model(key, outer, linear)?, &path)?;
-        let count = match extent {
-            Extent::Full => target.families.len(),
-            Extent::Quick => target.quick,
-        };
-        for key in &target.families[..count] {
-            let found = if target.is_fitted {
-                fitted(key, &path, &exact)?
-            } else {
-                model(key, outer, linear)?
+        let count = extent.choose(usize::MAX, target.quick);
+        for key in target.families.split(' ').take(count) {
+            let found = match target.is_fitted {
+                true => fitted(key, &path, &exact)?,
+                false => model(key, outer, linear)?,
             };
             rows.push(FamilyRow {
-                family: (*key).to_owned(),
+                family: key.to_owned(),
                 target: target.name.to_owned(),
                 peak_n: peak(&exact),
                 error_n: difference(&along(&found, &path)?, &exact),
@@ -168,8 +144,7 @@ fn fitted(key: &str, path: &[(Seconds, Depth)], forces: &[f64]) -> Result<Model,
             sigma: Newtons(0.02),
         })
         .collect();
-    let options = FitOptions::by_key(key).map_err(|err| err.to_string())?;
-    let mut options = options.at_rest();
+    let mut options = FitOptions::by_key(key).map_err(|err| err.to_string())?.at_rest();
     let found = options.fix("f_offset", 0.0).and_then(|()| fit(&samples, &options));
     found.map(|report| report.body).map_err(|err| format!("{key}: {err}"))
 }
@@ -183,16 +158,13 @@ fn job<'a>(key: &str) -> Result<Job<'a>, String> {
     let family = by_key(key).map_err(|err| err.to_string())?;
     // A decade between relaxation times, a few newtons over 30 mm.
     let outer = family.outer();
-    let outer: Vec<f64> = outer
-        .iter()
-        .enumerate()
-        .map(|(i, one)| match one.unit {
-            "s" => 0.1 * 10f64.powi(i as i32),
-            "1/mm" => 0.15,
-            _ if one.name == "alpha" => 0.5,
-            _ => 300.0,
-        })
-        .collect();
+    let outer = outer.iter().enumerate().map(|(i, one)| match one.unit {
+        "s" => 0.1 * 10f64.powi(i as i32),
+        "1/mm" => 0.15,
+        _ if one.name == "alpha" => 0.5,
+        _ => 300.0,
+    });
+    let outer: Vec<f64> = outer.collect();
     let linear = vec![0.01; family.linear().len()];
     let start = family
         .model(&outer, &linear)

@@ -1,6 +1,6 @@
 //! The fit of a recording, thinned.
 
-use super::paths::{Paths, TICKS, difference};
+use super::paths::{ReferencePaths, TICKS, difference};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
 use palpate_model::random::SplitMix;
@@ -22,24 +22,21 @@ const RATE: f64 = 1000.0;
 pub(super) fn rows(
     extent: Extent,
     [first, count]: [u64; 2],
-    paths: &Paths,
+    paths: &ReferencePaths,
 ) -> Result<Vec<FitRow>, String> {
-    let thinned = match extent {
-        Extent::Full => &THINNED[..],
-        Extent::Quick => &THINNED_QUICK,
-    };
+    let thinned = extent.choose(&THINNED[..], &THINNED_QUICK);
     let recordings: Result<Vec<_>, String> =
         (first..first + count).map(|seed| recording(seed, NOISE, paths)).collect();
     let recordings = recordings?;
     let row = |&keep: &usize| {
         let (mut tau_square, mut force_square, mut samples) = (0.0, 0.0, 0);
         for recording in &recordings {
-            let kept = thin(recording, keep);
-            let found = fit(&kept, &FitOptions::default()).map_err(|err| err.to_string())?;
+            let reduced = thin(recording, keep);
+            let found = fit(&reduced, &FitOptions::default()).map_err(|err| err.to_string())?;
             let body = found.kelvin().ok_or("the fit is of another family")?;
             tau_square += (body.tau_eps / ModifiedKelvin::THESIS.tau_eps - 1.0).powi(2);
             force_square += difference(&along(&body, paths), paths.ramp_hold.exact()).powi(2);
-            samples = kept.len();
+            samples = reduced.len();
         }
         Ok(FitRow {
             rate_hz: RATE / keep as f64,
@@ -54,7 +51,7 @@ pub(super) fn rows(
 }
 
 /// Forces in N of a body at the moments of comparison.
-fn along(body: &ModifiedKelvin, paths: &Paths) -> Vec<f64> {
+fn along(body: &ModifiedKelvin, paths: &ReferencePaths) -> Vec<f64> {
     let mut state = KelvinState::at_rest();
     let mut before = Seconds(0.0);
     let points = paths.ramp_hold.checkpoints();
@@ -68,7 +65,11 @@ fn along(body: &ModifiedKelvin, paths: &Paths) -> Vec<f64> {
 }
 
 /// The thesis protocol at 1 kHz with white noise.
-pub(super) fn recording(seed: u64, noise: f64, paths: &Paths) -> Result<Vec<FitSample>, String> {
+pub(super) fn recording(
+    seed: u64,
+    noise: f64,
+    paths: &ReferencePaths,
+) -> Result<Vec<FitSample>, String> {
     let step = (TICKS as f64 / RATE) as u64;
     let depths: Vec<f64> = paths.ramp_hold.depths(step).collect();
     let mut forces = Vec::new();
@@ -91,14 +92,18 @@ fn thin(samples: &[FitSample], keep: usize) -> Vec<FitSample> {
     samples.iter().step_by(keep).copied().collect()
 }
 
-pub(super) fn jobs<'a>(rows: &[FitRow], seed: u64, paths: &Paths) -> Result<Vec<Job<'a>>, String> {
+pub(super) fn jobs<'a>(
+    rows: &[FitRow],
+    seed: u64,
+    paths: &ReferencePaths,
+) -> Result<Vec<Job<'a>>, String> {
     let recording = recording(seed, NOISE, paths)?;
     let job = |row: &FitRow| {
-        let kept = thin(&recording, (RATE / row.rate_hz).round() as usize);
+        let reduced = thin(&recording, (RATE / row.rate_hz).round() as usize);
         Job {
             per_call: 1.0,
             call: Box::new(move || {
-                black_box(fit(black_box(&kept), &FitOptions::default()).is_ok());
+                black_box(fit(black_box(&reduced), &FitOptions::default()).is_ok());
             }),
         }
     };

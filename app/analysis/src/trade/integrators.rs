@@ -1,6 +1,6 @@
 //! Integrators by step and precision.
 
-use super::paths::{Path, Paths, TICKS, body};
+use super::paths::{DepthPath, ReferencePaths, TICKS, body};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
 use palpate_rheology::integrators::{IntegratorError, Precision, Real, Scheme};
@@ -16,11 +16,8 @@ const RUN: usize = 1024;
 /// One job for every integrator and precision: a step costs the same whatever its length.
 pub(super) const JOBS: usize = 2 * Scheme::ALL.len();
 
-pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<IntegratorRow>, String> {
-    let steps = match extent {
-        Extent::Full => &STEPS[..],
-        Extent::Quick => &STEPS_QUICK,
-    };
+pub(super) fn rows(extent: Extent, paths: &ReferencePaths) -> Result<Vec<IntegratorRow>, String> {
+    let steps = extent.choose(&STEPS[..], &STEPS_QUICK);
     let mut rows = Vec::new();
     for scheme in Scheme::ALL {
         for precision in Precision::ALL {
@@ -50,8 +47,12 @@ pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<IntegratorRow>, 
     Ok(rows)
 }
 
-fn error<R: Real>(scheme: Scheme, step: u64, paths: &Paths) -> Result<ForceError, IntegratorError> {
-    let on = |path: &Path| {
+fn error<R: Real>(
+    scheme: Scheme,
+    step: u64,
+    paths: &ReferencePaths,
+) -> Result<ForceError, IntegratorError> {
+    let on = |path: &DepthPath| {
         let depths: Vec<R> = path.depths(step).map(R::of).collect();
         let mut forces = Vec::new();
         scheme.respond(&body(), step as f64 / TICKS as f64, &depths, &mut forces)?;

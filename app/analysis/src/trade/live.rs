@@ -1,6 +1,6 @@
 //! The live fit.
 
-use super::paths::Paths;
+use super::paths::ReferencePaths;
 use super::timing::Job;
 use super::{UNMEASURED, fit};
 use palpate_model::units::Depth;
@@ -21,7 +21,7 @@ fn pushed(nodes: usize, samples: &[FitSample]) -> Option<LiveFit> {
     Some(live)
 }
 
-pub(super) fn rows(paths: &Paths) -> Result<Vec<LiveRow>, String> {
+pub(super) fn rows(paths: &ReferencePaths) -> Result<Vec<LiveRow>, String> {
     let recording = fit::recording(0, 0.0, paths)?;
     let row = |&nodes: &usize| {
         let answer = pushed(nodes, &recording).and_then(|live| live.estimate());
@@ -36,7 +36,7 @@ pub(super) fn rows(paths: &Paths) -> Result<Vec<LiveRow>, String> {
     Ok(NODES.iter().map(row).collect())
 }
 
-pub(super) fn jobs<'a>(rows: &[LiveRow], paths: &Paths) -> Result<Vec<Job<'a>>, String> {
+pub(super) fn jobs<'a>(rows: &[LiveRow], paths: &ReferencePaths) -> Result<Vec<Job<'a>>, String> {
     let recording = fit::recording(0, 0.0, paths)?;
     let job = |row: &LiveRow| {
         let (nodes, samples) = (row.nodes, recording.clone());

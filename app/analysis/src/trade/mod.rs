@@ -7,7 +7,6 @@ mod families;
 mod fit;
 mod integrators;
 mod live;
-mod machine;
 mod paths;
 mod picture;
 #[cfg(feature = "haptics")]
@@ -16,7 +15,6 @@ pub mod stored;
 pub mod text;
 mod timing;
 
-pub use machine::{age_days, this_machine, version};
 pub use picture::svg;
 #[cfg(feature = "haptics")]
 pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
@@ -24,12 +22,11 @@ pub use text::text;
 
 use crate::progress::Progress;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_rheology::trade::{Cost, TRADE_FORMAT, TradeCurves};
+use palpate_rheology::trade::{Cost, Machine, TRADE_FORMAT, TradeCurves};
 use palpate_runner::wall_now;
 use std::ops::ControlFlow;
 use timing::Job;
 
-/// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Every row, long enough for times that can be repeated.
@@ -38,11 +35,14 @@ pub enum Extent {
     Quick,
 }
 
+impl Extent {
+    fn choose<T>(self, full: T, quick: T) -> T {
+        if self == Self::Full { full } else { quick }
+    }
+}
+
 /// Tables whose errors [`errors`] computes.
 const TABLES: usize = 4;
-/// Seeds of the noise in the fits: the first, and how many.
-const SEEDS_FULL: [u64; 2] = [1, 8];
-const SEEDS_QUICK: [u64; 2] = [1, 2];
 /// What stands for a time that is not measured yet.
 const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
 
@@ -50,9 +50,7 @@ const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
 pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let total = TABLES + timing::rounds(extent);
     let of_errors = |done: usize, _: usize, what: &str| progress.tell(done, total, what);
-    let Some(curves) = errors(extent, &of_errors)? else {
-        return Ok(None);
-    };
+    let Some(curves) = errors(extent, &of_errors)? else { return Ok(None) };
     let mut done = TABLES;
     times(curves, extent, &mut || {
         done += 1;
@@ -63,27 +61,17 @@ pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCu
 /// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
 /// `progress` ended it.
 pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
-    let paths = paths::Paths::new()?;
-    let seeds = match extent {
-        Extent::Full => SEEDS_FULL,
-        Extent::Quick => SEEDS_QUICK,
-    };
-    let ends = |done: usize, what: &str| progress.tell(done, TABLES, what).is_break();
-    if ends(0, "errors of the integrators") {
-        return Ok(None);
-    }
+    let paths = paths::ReferencePaths::new()?;
+    // Seeds of the noise in the fits: the first, and how many.
+    let seeds = extent.choose([1, 8], [1, 2]);
+    let next = |done: usize, what: &str| progress.tell(done, TABLES, what).continue_value();
+    let Some(()) = next(0, "errors of the integrators") else { return Ok(None) };
     let integrators = integrators::rows(extent, &paths)?;
-    if ends(1, "errors of the families") {
-        return Ok(None);
-    }
+    let Some(()) = next(1, "errors of the families") else { return Ok(None) };
     let families = families::rows(extent, &paths)?;
-    if ends(2, "errors of the fit") {
-        return Ok(None);
-    }
+    let Some(()) = next(2, "errors of the fit") else { return Ok(None) };
     let fit = fit::rows(extent, seeds, &paths)?;
-    if ends(3, "errors of the live fit") {
-        return Ok(None);
-    }
+    let Some(()) = next(3, "errors of the live fit") else { return Ok(None) };
     let live = live::rows(&paths)?;
     let now: DateTime<Utc> = wall_now().into();
     Ok(Some(TradeCurves {
@@ -101,21 +89,19 @@ pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCur
     }))
 }
 
-/// Measures the times of all rows; `step` is told of each round done and may end the whole.
+/// Measures the times of all rows; `step` hears of each round done and may end the whole.
 fn times(
     mut curves: TradeCurves,
     extent: Extent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<TradeCurves>, String> {
-    let paths = paths::Paths::new()?;
+    let paths = paths::ReferencePaths::new()?;
     let mut jobs: Vec<Job> = Vec::new();
     jobs.extend(integrators::jobs());
     jobs.extend(families::jobs(&curves.families)?);
     jobs.extend(fit::jobs(&curves.fit, curves.seeds[0], &paths)?);
     jobs.extend(live::jobs(&curves.live, &paths)?);
-    let Some(costs) = timing::measure(&mut jobs, extent, step) else {
-        return Ok(None);
-    };
+    let Some(costs) = timing::measure(&mut jobs, extent, step) else { return Ok(None) };
     let mut costs = costs.into_iter();
     let by_scheme: Vec<Cost> = costs.by_ref().take(integrators::JOBS).collect();
     for row in &mut curves.integrators {
@@ -128,4 +114,52 @@ fn times(
     rest.zip(costs).for_each(|(slot, cost)| *slot = cost);
     curves.mark_fronts();
     Ok(Some(curves))
+}
+
+/// Version of this program.
+#[must_use]
+pub fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// What is known of the machine this program runs on.
+#[must_use]
+pub fn this_machine() -> Machine {
+    let described = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    Machine {
+        cpu: cpu_name(&described).unwrap_or(std::env::consts::ARCH).into(),
+        os: std::env::consts::OS.into(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        profile: if cfg!(debug_assertions) { "debug".into() } else { "release".into() },
+    }
+}
+
+/// The processor's name as Linux tells it; elsewhere there is no such text.
+fn cpu_name(described: &str) -> Option<&str> {
+    let line = described.lines().find(|line| line.starts_with("model name"))?;
+    let name = line.split_once(':')?.1.trim();
+    (!name.is_empty()).then_some(name)
+}
+
+/// Days since curves were measured; endless if their date cannot be read.
+#[must_use]
+pub fn age_days(curves: &TradeCurves) -> f64 {
+    let now: DateTime<Utc> = wall_now().into();
+    DateTime::parse_from_rfc3339(&curves.measured_at).map_or(f64::INFINITY, |then| {
+        (now - then.with_timezone(&Utc)).num_seconds() as f64 / 86_400.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_the_processor_is_found_where_there_is_one() {
+        let text = "processor\t: 0\nmodel name\t: Example(R) CPU\nflags\t: fpu\n";
+        assert_eq!(cpu_name(text), Some("Example(R) CPU"));
+        assert_eq!(cpu_name("processor\t: 0\n"), None);
+        assert_eq!(cpu_name(""), None);
+        assert!(this_machine().cores >= 1);
+    }
 }

@@ -13,7 +13,7 @@ use palpate_rheology::trade::ForceError;
 pub(super) const TICKS: u64 = 10_000;
 
 /// Depth that moves straight between corners.
-pub(super) struct Path {
+pub(super) struct DepthPath {
     /// Tick and depth in mm.
     corners: &'static [(u64, f64)],
     /// Ticks between the moments at which forces are compared; corners are such moments.
@@ -28,9 +28,9 @@ const RAMP_HOLD: &[(u64, f64)] = &[(0, 0.0), (40 * TICKS, 30.0), (90 * TICKS, 30
 const POKE: &[(u64, f64)] =
     &[(0, 0.0), (TICKS / 10, 10.0), (TICKS, 10.0), (TICKS + TICKS / 10, 0.0), (10 * TICKS, 0.0)];
 
-pub(super) struct Paths {
-    pub ramp_hold: Path,
-    pub poke: Path,
+pub(super) struct ReferencePaths {
+    pub ramp_hold: DepthPath,
+    pub poke: DepthPath,
 }
 
 /// The body whose errors are measured.
@@ -38,12 +38,12 @@ pub(super) fn body() -> SeriesBody<3> {
     ModifiedKelvin::THESIS.into()
 }
 
-impl Paths {
+impl ReferencePaths {
     pub fn new() -> Result<Self, String> {
         // A tenth and a hundredth of the relaxation time of a second: errors live that long.
         Ok(Self {
-            ramp_hold: Path::new(RAMP_HOLD, TICKS / 10)?,
-            poke: Path::new(POKE, TICKS / 100)?,
+            ramp_hold: DepthPath::new(RAMP_HOLD, TICKS / 10)?,
+            poke: DepthPath::new(POKE, TICKS / 100)?,
         })
     }
 
@@ -52,21 +52,21 @@ impl Paths {
     }
 }
 
-/// The largest size.
+/// Largest magnitude.
 pub(super) fn peak(forces: &[f64]) -> f64 {
     forces.iter().fold(0.0, |peak, force| peak.max(force.abs()))
 }
 
-impl Path {
+impl DepthPath {
     fn new(corners: &'static [(u64, f64)], every: u64) -> Result<Self, String> {
         let mut path = Self { corners, every, exact: Vec::new() };
         let mut reference =
             Reference::new(&[body().term()], Depth(0.0)).map_err(|err| err.to_string())?;
         let dt = Seconds(every as f64 / TICKS as f64);
-        let forces = path.checkpoints().skip(1).map(|(_, depth)| {
-            let force = reference.step(depth, dt).map_err(|err| err.to_string())?;
-            Ok(force.0)
-        });
+        let forces = path
+            .checkpoints()
+            .skip(1)
+            .map(|(_, depth)| Ok(reference.step(depth, dt).map_err(|err| err.to_string())?.0));
         let forces: Result<Vec<f64>, String> = std::iter::once(Ok(0.0)).chain(forces).collect();
         path.exact = forces?;
         Ok(path)
@@ -112,11 +112,10 @@ impl Path {
         &self.exact
     }
 
-    /// Largest error in N of forces along [`Path::depths`], where they meet moments of comparison.
+    /// Largest error in N of forces along [`DepthPath::depths`], where they meet moments of comparison.
     pub fn error_of(&self, step: u64, forces: impl Iterator<Item = f64>) -> f64 {
         let every = self.every as i64;
-        let met = self.ticks(step).zip(forces);
-        let met = met.filter(|(tick, _)| *tick >= 0 && tick % every == 0);
+        let met = self.ticks(step).zip(forces).filter(|(tick, _)| *tick >= 0 && tick % every == 0);
         met.fold(0.0, |worst: f64, (tick, force)| {
             worst.max((force - self.exact[(tick / every) as usize]).abs())
         })
@@ -134,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_peaks_are_those_of_the_closed_form() {
-        let paths = Paths::new().unwrap();
+        let paths = ReferencePaths::new().unwrap();
         // End of the ramp, in 50 digits.
         let peak = paths.peak();
         assert!((peak.ramp_hold_n - 6.396_495_407_963_657).abs() < 1e-13);

@@ -18,7 +18,6 @@ const BELOW: f64 = 50.0;
 /// Errors below this share of the force are its last digits.
 const LEAST: f64 = 1e-17;
 
-/// Points that belong together.
 struct Group {
     name: String,
     ink: Ink,
@@ -52,10 +51,7 @@ impl Group {
             points
         };
         let front = points(&|one| one.front);
-        let labels = match self.name.is_empty() {
-            true => Labels::None,
-            false => Labels::AtEnd,
-        };
+        let labels = if self.name.is_empty() { Labels::None } else { Labels::AtEnd };
         [
             Series::line(&self.name, Ink::Line, 1.0, points(&|_| true)).labelled(labels),
             Series::line("", self.ink, 2.0, front.clone()),
@@ -65,7 +61,6 @@ impl Group {
     }
 }
 
-/// The picture as text.
 #[must_use]
 pub fn svg(curves: &TradeCurves) -> String {
     let mut svg = Svg::new(WIDTH);
@@ -114,8 +109,7 @@ fn integrators(curves: &TradeCurves) -> Vec<Group> {
         }
     };
     let both = |scheme| [of(scheme, Precision::F64), of(scheme, Precision::F32)];
-    let all = Scheme::ALL.into_iter().flat_map(both);
-    all.filter(|series| !series.points.is_empty()).collect()
+    Scheme::ALL.into_iter().flat_map(both).filter(|series| !series.points.is_empty()).collect()
 }
 
 /// A series for each family, so that each has its name, and the front of each target.

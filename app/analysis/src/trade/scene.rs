@@ -1,4 +1,4 @@
-//! What exactness costs in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
+//! The cost of accuracy in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
 
 use super::timing::{self, Job};
 use super::{Extent, families, integrators, paths};
@@ -87,23 +87,19 @@ pub fn measure_scene(
     extent: Extent,
     progress: &dyn Progress,
 ) -> Result<Option<SceneCurves>, String> {
-    let (meshes, reference) = match extent {
-        Extent::Full => (&MESHES[..], REFERENCE_NODES),
-        Extent::Quick => (&MESHES_QUICK[..], REFERENCE_QUICK),
-    };
+    let meshes = extent.choose(&MESHES[..], &MESHES_QUICK);
+    let reference = extent.choose(REFERENCE_NODES, REFERENCE_QUICK);
     let total = meshes.len() + 2 + timing::rounds(extent);
     let mut done = 0;
-    let mut goes_on = |what: &str| {
+    let mut next = |what: &str| {
         done += 1;
-        progress.tell(done - 1, total, what).is_continue()
+        progress.tell(done - 1, total, what).continue_value()
     };
     let scene = pokes();
     let mut curves = SceneCurves::default();
     let mut jobs = Vec::new();
     for &nodes in meshes {
-        if !goes_on(&format!("shape on {nodes} x {nodes} nodes")) {
-            return Ok(None);
-        }
+        let Some(()) = next(&format!("shape on {nodes} x {nodes} nodes")) else { return Ok(None) };
         let error = scene.mesh_error_against(nodes, reference);
         curves.meshes.push(MeshPoint {
             nodes: nodes as u32,
@@ -112,9 +108,7 @@ pub fn measure_scene(
         });
         jobs.push(job(&scene, nodes, Cut::NONE)?);
     }
-    if !goes_on("shape with a cut") {
-        return Ok(None);
-    }
+    let Some(()) = next("shape with a cut") else { return Ok(None) };
     for (range, threshold_mm) in CUTS {
         let cut = Cut::new(range, threshold_mm).map_err(|err| err.to_string())?;
         let error = scene.cut_error(CUT_NODES, cut);
@@ -126,9 +120,7 @@ pub fn measure_scene(
         });
         jobs.push(job(&scene, CUT_NODES, cut)?);
     }
-    if !goes_on("force of integrators and families") {
-        return Ok(None);
-    }
+    let Some(()) = next("force of integrators and families") else { return Ok(None) };
     let body = ModifiedKelvin::THESIS.into();
     for scheme in Scheme::ALL {
         for step_s in STEPS {
@@ -139,16 +131,14 @@ pub fn measure_scene(
         }
         jobs.push(integrators::job::<f64>(scheme));
     }
-    let mut rows = families::rows(extent, &paths::Paths::new()?)?;
+    let mut rows = families::rows(extent, &paths::ReferencePaths::new()?)?;
     rows.retain(|row| row.target == families::THESIS);
     jobs.extend(families::jobs(&rows)?);
     let costs = timing::measure(&mut jobs, extent, &mut || {
         done += 1;
         progress.tell(done - 1, total, "times")
     });
-    let Some(costs) = costs else {
-        return Ok(None);
-    };
+    let Some(costs) = costs else { return Ok(None) };
     with_times(&mut curves, &costs, &rows);
     Ok(Some(curves))
 }
@@ -170,15 +160,12 @@ fn with_times(curves: &mut SceneCurves, costs: &[Cost], rows: &[FamilyRow]) {
         // A step longer than a tick is made in one tick of several, which must have the time.
         point.cost_us = of_schemes[scheme.unwrap_or(0)] * (TICK / point.step_s).max(1.0);
     }
-    curves.families = rows
-        .iter()
-        .zip(micros)
-        .map(|(row, cost_us)| FamilyPoint {
-            family: row.family.clone(),
-            error_n: row.error_n,
-            cost_us,
-        })
-        .collect();
+    let point = |(row, cost_us): (&FamilyRow, f64)| FamilyPoint {
+        family: row.family.clone(),
+        error_n: row.error_n,
+        cost_us,
+    };
+    curves.families = rows.iter().zip(micros).map(point).collect();
 }
 
 #[cfg(test)]

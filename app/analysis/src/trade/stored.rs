@@ -11,58 +11,22 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Curves could not be stored or read.
 #[derive(Debug, Error)]
 pub enum TradeFileError {
-    /// The disk refused.
     #[error("the curves cannot be {what}: {source}, {}", path.display())]
-    Io {
-        /// `stored` or `read`.
-        what: &'static str,
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// Something else than curves.
+    Io { what: &'static str, path: PathBuf, source: io::Error },
     #[error("this file holds no curves ({reason}); measure again, {}", path.display())]
-    NotCurves {
-        /// The file.
-        path: PathBuf,
-        /// What is missing or wrong.
-        reason: String,
-    },
-    /// Other content than was written.
+    NotCurves { path: PathBuf, reason: String },
     #[error("these curves were changed after they were measured; measure again, {}", path.display())]
-    Checksum {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Curves that cannot have been measured.
+    Checksum { path: PathBuf },
     #[error("{source}, {}", path.display())]
-    Curves {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: CurveError,
-    },
+    Curves { path: PathBuf, source: CurveError },
 }
 
 #[derive(Serialize, Deserialize)]
 struct Stored {
     checksum: u32,
     curves: TradeCurves,
-}
-
-/// What every version of the form has.
-#[derive(Deserialize)]
-struct AnyStored {
-    curves: AnyCurves,
-}
-
-#[derive(Deserialize)]
-struct AnyCurves {
-    format: u32,
 }
 
 fn checksum(curves: &TradeCurves) -> io::Result<u32> {
@@ -115,9 +79,12 @@ pub fn read_trade(path: &Path) -> Result<TradeCurves, TradeFileError> {
     };
     let impossible = |source| TradeFileError::Curves { path: path.into(), source };
     let text = fs::read_to_string(path).map_err(failed)?;
-    let any: AnyStored = serde_json::from_str(&text).map_err(none)?;
-    if any.curves.format != TRADE_FORMAT {
-        return Err(impossible(CurveError::Format(any.curves.format)));
+    // Every version of the form states its number; what follows may differ.
+    let any: serde_json::Value = serde_json::from_str(&text).map_err(none)?;
+    if let Some(format) = any["curves"]["format"].as_u64().and_then(|it| u32::try_from(it).ok())
+        && format != TRADE_FORMAT
+    {
+        return Err(impossible(CurveError::Format(format)));
     }
     let stored: Stored = serde_json::from_str(&text).map_err(none)?;
     if checksum(&stored.curves).map_err(failed)? != stored.checksum {

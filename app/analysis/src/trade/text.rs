@@ -4,7 +4,6 @@ use palpate_rheology::integrators::Scheme;
 use palpate_rheology::trade::{Advice, Cost, Recommendation, TradeCurves};
 use std::fmt::Write;
 
-/// Everything, in words and tables.
 #[must_use]
 pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
     let mut out = String::new();
@@ -88,9 +87,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
             let rows: Vec<_> = rows
                 .filter(|row| row.scheme == scheme && row.precision.name() == precision)
                 .collect();
-            let Some(first) = rows.first() else {
-                continue;
-            };
+            let Some(first) = rows.first() else { continue };
             let name = format!("{}, {precision}", scheme.name());
             let _ = write!(out, "{name:34}{} ", cost(&first.cost));
             for row in &rows {
@@ -168,7 +165,6 @@ fn recommended(out: &mut String, recommendation: &Recommendation) {
     }
 }
 
-/// What was asked for.
 pub fn terms(recommendation: &Recommendation) -> String {
     format!(
         "{} and {} updates a second, using at most {} of each period",

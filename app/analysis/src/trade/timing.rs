@@ -1,4 +1,4 @@
-//! How long something takes, on a machine that has other things to do.
+//! Durations on a machine that has other work to do.
 //!
 //! All jobs take turns, round after round, so that a busy minute hits all of them; the least of a
 //! job's rounds counts, since other work only adds. Even and odd rounds are two measurements of the
@@ -9,11 +9,9 @@ use palpate_rheology::trade::Cost;
 use palpate_runner::Stopwatch;
 use std::ops::ControlFlow;
 
-/// Something to be timed.
 pub(super) struct Job<'a> {
     /// Evaluations in one call.
     pub per_call: f64,
-    /// The call.
     pub call: Box<dyn FnMut() + 'a>,
 }
 
@@ -23,10 +21,7 @@ const BATCH_QUICK: f64 = 1e-3;
 
 /// Rounds, even in number.
 pub(super) fn rounds(extent: Extent) -> usize {
-    match extent {
-        Extent::Full => 24,
-        Extent::Quick => 4,
-    }
+    extent.choose(24, 4)
 }
 
 /// The cost of an evaluation of each job; none if a step breaks it off.
@@ -35,10 +30,7 @@ pub(super) fn measure(
     extent: Extent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Option<Vec<Cost>> {
-    let batch = match extent {
-        Extent::Full => BATCH,
-        Extent::Quick => BATCH_QUICK,
-    };
+    let batch = extent.choose(BATCH, BATCH_QUICK);
     let timed = |job: &mut Job, calls: usize| {
         let watch = Stopwatch::start();
         for _ in 0..calls {
@@ -71,10 +63,8 @@ pub(super) fn measure(
 
 /// The cost that rounds of measured ns amount to.
 fn cost(rounds: &[f64]) -> Cost {
-    let least_of = |first: usize| {
-        let half = rounds.iter().skip(first).step_by(2);
-        half.copied().fold(f64::INFINITY, f64::min)
-    };
+    let least_of =
+        |first: usize| rounds.iter().skip(first).step_by(2).copied().fold(f64::INFINITY, f64::min);
     let (even, odd) = (least_of(0), least_of(1));
     let ns = even.min(odd);
     let mut sorted = rounds.to_vec();

@@ -18,12 +18,11 @@ use palpate_rheology::cycles::{
 };
 use palpate_rheology::fit::FitSample;
 
-/// What is asked of an analysis.
+/// Settings of a cycle analysis.
 #[derive(Clone, Debug, Default)]
 pub struct Question {
     /// Depth of the stiffness; 80 % of the first cycle's depth without it.
     pub at: Option<Depth>,
-    /// When cycles count as steady.
     pub rule: SteadyRule,
     /// Frequency in Hz of a record that is one sine.
     pub frequency: Option<f64>,
@@ -31,18 +30,13 @@ pub struct Question {
     pub body: Option<ModifiedKelvin>,
 }
 
-/// Everything found in one record.
 #[derive(Clone, Debug)]
 pub struct CycleReport {
-    /// What was analysed.
     pub name: String,
-    /// Its samples.
     pub source: CycleSource,
-    /// Every way in with what belongs to it.
+    /// One for each loading.
     pub cycles: Vec<CycleAnalysis>,
-    /// Changes between them.
     pub steadiness: Steadiness,
-    /// The rule by which they were judged.
     pub rule: SteadyRule,
     /// The sines, or why one could not be evaluated.
     pub sines: Vec<Result<Sinusoid, SinusoidError>>,
@@ -51,21 +45,18 @@ pub struct CycleReport {
 }
 
 impl CycleReport {
-    /// Analyses a record.
     #[must_use]
     pub fn of(name: String, source: CycleSource, question: &Question) -> Self {
-        let sines = match question.frequency {
-            Some(frequency) => vec![sinusoid(&source.samples, frequency)],
+        let (sines, cycles) = match question.frequency {
+            // A table that is one sine has no loading.
+            Some(frequency) => (vec![sinusoid(&source.samples, frequency)], Vec::new()),
             None => {
-                let runs = source.sines.iter();
-                runs.map(|(frequency, range)| sinusoid(&source.samples[range.clone()], *frequency))
-                    .collect()
+                let sine = |(frequency, range): &(f64, std::ops::Range<usize>)| {
+                    sinusoid(&source.samples[range.clone()], *frequency)
+                };
+                let cycles = analyse(&source.samples, question.at, source.pulse);
+                (source.sines.iter().map(sine).collect(), cycles)
             }
-        };
-        // A table that is one sine has no ways in worth a name.
-        let cycles = match question.frequency {
-            Some(_) => Vec::new(),
-            None => analyse(&source.samples, question.at, source.pulse),
         };
         let predictions = match &question.body {
             Some(body) => cycles.iter().map(|one| prediction(body, &source, one)).collect(),

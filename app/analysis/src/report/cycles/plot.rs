@@ -1,9 +1,7 @@
 //! The picture of an analysis of cycles: loops, how peak and place change, and how the force relaxes.
 
 use super::CycleReport;
-use crate::report::band;
-use crate::report::picture::{LEFT, RIGHT, WIDTH, title};
-use palpate_figures::drawing::Svg;
+use crate::report::picture::{LEFT, RIGHT, band, titled};
 use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Plot, Series};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
@@ -27,13 +25,12 @@ const SLOTS_MIN: usize = 8;
 /// first and the last, as more would hide each other.
 #[must_use]
 pub fn picture(report: &CycleReport) -> String {
-    let mut svg = Svg::new(WIDTH);
     let count = report.cycles.len();
     let words = match report.steadiness.steady_from {
         Some(cycle) => format!("{count} cycles, steady from cycle {cycle} on"),
         None => format!("{count} cycles"),
     };
-    title(&mut svg, &report.name, &words);
+    let mut svg = titled(&report.name, &words);
     let calibration = report.source.calibration.as_ref();
     let uncertainty = calibration.and_then(|one| ForceUncertainty::of(one).ok());
     let loops = loops(report, uncertainty.as_ref());
@@ -87,7 +84,7 @@ fn faded(
     let banded = curves.iter().filter(|(index, _)| ends.contains(&Some(*index)));
     let parts = banded.flat_map(|(index, parts)| parts.iter().map(move |part| (index, part)));
     let bands = parts.filter_map(|(index, part)| {
-        Some(Band { ink: ink(*index, count), ..band::around(part, uncertainty)? })
+        Some(Band { ink: ink(*index, count), ..band(part, uncertainty)? })
     });
     let bands = bands.collect();
     let lines = curves.iter().map(|(index, parts)| {
@@ -146,7 +143,7 @@ fn by_cycle(
     });
     let dots: Vec<Series> = dots.collect();
     Plot {
-        bands: band::around(&points, uncertainty).into_iter().collect(),
+        bands: band(&points, uncertainty).into_iter().collect(),
         ..Plot::new("", Axis::linear("cycle").over(range), Axis::linear(name))
             .with(std::iter::once(Series::line("", Ink::Line, 1.0, points)).chain(dots))
     }

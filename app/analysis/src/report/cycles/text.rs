@@ -1,7 +1,7 @@
 //! The tables of an analysis of cycles.
 
 use super::CycleReport;
-use crate::report::text::in_columns;
+use crate::report::text::table;
 use palpate_figures::uncertain::{plain, with_error};
 use palpate_model::units::{Depth, Newtons};
 use palpate_rheology::cycles::{CycleAnalysis, Estimate, Prediction, Sinusoid};
@@ -11,14 +11,11 @@ use palpate_rheology::cycles::{CycleAnalysis, Estimate, Prediction, Sinusoid};
 pub fn whole(report: &CycleReport) -> String {
     let mut parts = vec![report.name.clone()];
     if !report.cycles.is_empty() {
-        parts.push(in_columns(&loops(report)));
+        parts.push(loops(report));
         parts.push(steady(report));
     }
     let sections = [relaxation(report), creep(report), prediction(report), sines(report)];
-    for (title, lines) in sections.into_iter().filter(|(_, lines)| lines.len() > 1) {
-        parts.push(title.to_owned());
-        parts.push(in_columns(&lines));
-    }
+    parts.extend(sections.into_iter().flatten());
     let remarks = report.sines.iter().flatten().filter_map(Sinusoid::remark);
     parts.extend(remarks.map(|remark| format!("- {remark}")));
     parts.extend(report.source.notes.iter().map(|note| format!("- {note}")));
@@ -31,50 +28,47 @@ fn estimate<T: Copy>(one: Option<Estimate<T>>, number: impl Fn(T) -> f64) -> Str
     one.map_or(NONE.into(), |one| with_error(number(one.value), number(one.std_error)))
 }
 
+fn newtons(one: Estimate<Newtons>) -> String {
+    estimate(Some(one), Newtons::get)
+}
+
+fn number(one: Estimate<f64>) -> String {
+    estimate(Some(one), |number| number)
+}
+
 fn maybe(number: Option<f64>, decimals: usize) -> String {
     number.map_or(NONE.into(), |number| format!("{number:.decimals$}"))
 }
 
-fn line<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
+/// A table under its title, if it has rows.
+fn section(title: &str, head: &str, rows: Vec<Vec<String>>) -> Option<String> {
+    (!rows.is_empty()).then(|| format!("{title}\n{}", table(head, rows)))
 }
 
-fn loops(report: &CycleReport) -> Vec<Vec<String>> {
+fn loops(report: &CycleReport) -> String {
     let at = report.cycles.iter().find_map(|one| one.stiffness);
     let at = at.map_or(String::new(), |one| format!(" at {:.2} mm", one.depth.0));
-    let stiffness = format!("N/mm{at}");
-    let mut lines = vec![line([
-        "cycle",
-        "mm/s",
-        "depth mm",
-        "start N",
-        "peak N",
-        "change %",
-        "shift mm",
-        "loading N·mm",
-        "loop N·mm",
-        "lost %",
-        &stiffness,
-    ])];
-    for (index, one) in report.cycles.iter().enumerate() {
+    let head = format!(
+        "cycle | mm/s | depth mm | start N | peak N | change % | shift mm | loading N·mm | loop N·mm | lost % | N/mm{at}"
+    );
+    let row = |(index, one): (usize, &CycleAnalysis)| {
         let change = index.checked_sub(1).map(|before| report.steadiness.changes[before]);
-        lines.push(vec![
+        let shift = change.and_then(|change| change.shift);
+        vec![
             one.cycle.to_string(),
             plain(one.speed.0),
             format!("{:.3}", one.depth_peak.0),
             estimate(one.force_start, Newtons::get),
-            estimate(Some(one.force_peak), Newtons::get),
+            newtons(one.force_peak),
             change.map_or(NONE.into(), |change| format!("{:+.2}", change.peak_percent)),
-            change
-                .and_then(|change| change.shift)
-                .map_or(NONE.into(), |shift| format!("{:+.3}", shift.0)),
+            shift.map_or(NONE.into(), |shift| format!("{:+.3}", shift.0)),
             format!("{:.3}", one.work_loading),
             maybe(one.work_loop, 3),
             maybe(one.loss_share().map(|share| 100.0 * share), 1),
             estimate(one.stiffness.map(|one| one.slope), |slope| slope),
-        ]);
-    }
-    lines
+        ]
+    };
+    table(&head, report.cycles.iter().enumerate().map(row))
 }
 
 fn steady(report: &CycleReport) -> String {
@@ -91,50 +85,29 @@ fn steady(report: &CycleReport) -> String {
     }
 }
 
-fn relaxation(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
-    let mut lines = vec![line([
-        "cycle",
-        "held s",
-        "peak N",
-        "end N",
-        "relaxed %",
-        "half-time s",
-        "end rate N/s",
-        "equilibrium N",
-    ])];
-    for one in &report.cycles {
-        let Some(relaxation) = &one.relaxation else {
-            continue;
-        };
-        lines.push(vec![
+fn relaxation(report: &CycleReport) -> Option<String> {
+    let row = |one: &CycleAnalysis| {
+        let relaxation = one.relaxation.as_ref()?;
+        Some(vec![
             one.cycle.to_string(),
             format!("{:.1}", relaxation.duration.0),
-            estimate(Some(one.force_peak), Newtons::get),
-            estimate(Some(relaxation.force_end), Newtons::get),
-            estimate(Some(relaxation.percent), |percent| percent),
+            newtons(one.force_peak),
+            newtons(relaxation.force_end),
+            number(relaxation.percent),
             maybe(relaxation.half_time.map(|time| time.0), 3),
-            estimate(Some(relaxation.rate_end), |rate| rate),
+            number(relaxation.rate_end),
             estimate(relaxation.equilibrium, Newtons::get),
-        ]);
-    }
-    ("relaxation at constant depth", lines)
+        ])
+    };
+    let head =
+        "cycle | held s | peak N | end N | relaxed % | half-time s | end rate N/s | equilibrium N";
+    section("relaxation at constant depth", head, report.cycles.iter().filter_map(row).collect())
 }
 
-fn creep(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
-    let mut lines = vec![line([
-        "cycle",
-        "held s",
-        "force N",
-        "sd N",
-        "from mm",
-        "to mm",
-        "added %",
-        "end rate mm/s",
-    ])];
-    let all = report.cycles.iter();
-    let all = all.flat_map(|one| one.creep.iter().map(|creep| (one.cycle, creep)));
-    for (cycle, creep) in all {
-        lines.push(vec![
+fn creep(report: &CycleReport) -> Option<String> {
+    let all = report.cycles.iter().flat_map(|one| one.creep.iter().map(|creep| (one.cycle, creep)));
+    let rows = all.map(|(cycle, creep)| {
+        vec![
             cycle.to_string(),
             format!("{:.1}", creep.duration.0),
             plain(creep.force.0),
@@ -142,39 +115,26 @@ fn creep(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
             format!("{:.3}", creep.depth_start.0),
             estimate(Some(creep.depth_end), Depth::get),
             format!("{:.2}", creep.percent),
-            estimate(Some(creep.rate_end), |rate| rate),
-        ]);
-    }
-    ("creep at constant force", lines)
+            number(creep.rate_end),
+        ]
+    });
+    let head = "cycle | held s | force N | sd N | from mm | to mm | added % | end rate mm/s";
+    section("creep at constant force", head, rows.collect())
 }
 
-fn prediction(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
-    let mut lines = vec![line([
-        "cycle",
-        "rms N",
-        "rms %",
-        "mean N",
-        "sd %",
-        "worst N",
-        "worst %",
-        "at s",
-        "at peak N",
-        "at peak %",
-        "at end N",
-        "at end %",
-    ])];
-    for (one, result) in report.cycles.iter().zip(&report.predictions) {
-        lines.push(match result {
-            Ok(found) => predicted(one, found),
-            Err(err) => vec![one.cycle.to_string(), err.to_string()],
-        });
-    }
-    ("prediction minus measurement, percent of the measured peak", lines)
+fn prediction(report: &CycleReport) -> Option<String> {
+    let all = report.cycles.iter().zip(&report.predictions);
+    let rows = all.map(|(one, result)| match result {
+        Ok(found) => predicted(one, found),
+        Err(err) => vec![one.cycle.to_string(), err.to_string()],
+    });
+    let title = "prediction minus measurement, percent of the measured peak";
+    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | at s | at peak N | at peak % | at end N | at end %";
+    section(title, head, rows.collect())
 }
 
 fn predicted(one: &CycleAnalysis, found: &Prediction) -> Vec<String> {
     let percent = |error: Newtons| format!("{:+.2}", found.percent(error));
-    let end = found.at_end;
     vec![
         one.cycle.to_string(),
         format!("{:.4}", found.rms.0),
@@ -184,46 +144,29 @@ fn predicted(one: &CycleAnalysis, found: &Prediction) -> Vec<String> {
         format!("{:+.4}", found.worst.0.0),
         percent(found.worst.0),
         format!("{:.1}", found.worst.1.0 - one.start.0),
-        estimate(Some(found.at_peak), Newtons::get),
+        newtons(found.at_peak),
         percent(found.at_peak.value),
-        estimate(end, Newtons::get),
-        end.map_or(NONE.into(), |end| percent(end.value)),
+        estimate(found.at_end, Newtons::get),
+        found.at_end.map_or(NONE.into(), |end| percent(end.value)),
     ]
 }
 
-fn sines(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
-    let mut lines = vec![line([
-        "Hz",
-        "cycles",
-        "depth mm",
-        "± mm",
-        "force N",
-        "± N",
-        "phase °",
-        "storage N/mm",
-        "loss N/mm",
-        "distortion %",
-    ])];
-    for result in &report.sines {
-        lines.push(match result {
-            Ok(one) => sine(one),
-            Err(err) => vec![NONE.into(), err.to_string()],
-        });
-    }
-    ("sine", lines)
-}
-
-fn sine(one: &Sinusoid) -> Vec<String> {
-    vec![
-        plain(one.frequency),
-        one.cycles.to_string(),
-        format!("{:.3}", one.depth_mean.0),
-        format!("{:.4}", one.depth_amplitude.0),
-        plain(one.force_mean.0),
-        estimate(Some(one.force_amplitude), Newtons::get),
-        estimate(Some(one.phase_degrees), |phase| phase),
-        estimate(Some(one.storage), |stiffness| stiffness),
-        estimate(Some(one.loss), |stiffness| stiffness),
-        format!("{:.2}", one.distortion_percent),
-    ]
+fn sines(report: &CycleReport) -> Option<String> {
+    let rows = report.sines.iter().map(|result| match result {
+        Ok(one) => vec![
+            plain(one.frequency),
+            one.cycles.to_string(),
+            format!("{:.3}", one.depth_mean.0),
+            format!("{:.4}", one.depth_amplitude.0),
+            plain(one.force_mean.0),
+            newtons(one.force_amplitude),
+            number(one.phase_degrees),
+            number(one.storage),
+            number(one.loss),
+            format!("{:.2}", one.distortion_percent),
+        ],
+        Err(err) => vec![NONE.into(), err.to_string()],
+    });
+    let head = "Hz | cycles | depth mm | ± mm | force N | ± N | phase ° | storage N/mm | loss N/mm | distortion %";
+    section("sine", head, rows.collect())
 }

@@ -1,11 +1,10 @@
-//! Which files a page describes: written into it by their hashes, and read back to be compared.
+//! The files that a page describes: their hashes are written into it and read back for comparison.
 
 use palpate_figures::drawing::escape;
 use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of};
 use palpate_sessions::text::{sha256, sha256_of_file};
 use std::path::Path;
 
-/// How the row of a file begins.
 const ROW: &str = "<tr data-session=\"";
 /// How the line of the date begins: all else is the same whenever the page is made.
 pub(super) const MADE: &str = "<p class=\"made\">";
@@ -13,20 +12,16 @@ pub(super) const MADE: &str = "<p class=\"made\">";
 const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
 const SEAL_END: &str = " -->\n";
 
-/// A file that a page says it describes.
+/// A file that a page lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Claim {
-    /// The session.
     pub session_id: String,
-    /// Name of its folder.
     pub folder: String,
-    /// The file in it.
     pub file: String,
     /// SHA-256 of its bytes.
     pub sha256: String,
 }
 
-/// The attributes of a file's row.
 pub(super) fn attributes(session_id: &str, folder: &str, file: &Input) -> String {
     format!(
         "{}{}\" data-folder=\"{}\" data-file=\"{}\" data-sha256=\"{}\"",
@@ -45,21 +40,19 @@ pub(super) fn sealed(page: &str) -> String {
 
 fn own_hash(page: &str) -> String {
     let lines = page.split_inclusive('\n');
-    let kept = lines.filter(|line| !line.starts_with(MADE) && !line.starts_with(SEAL));
-    sha256(kept.collect::<String>().as_bytes())
+    let hashed = lines.filter(|line| !line.starts_with(MADE) && !line.starts_with(SEAL));
+    sha256(hashed.collect::<String>().as_bytes())
 }
 
 /// What a page says it describes, and whether the page itself is as it was made.
 pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
-    let no_page = "this is not the page of a report; name one";
+    let no_page = "the file is not the page of a report; name a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
-    let told = seal.strip_suffix(SEAL_END).unwrap_or_default();
+    let stated = seal.strip_suffix(SEAL_END).unwrap_or_default();
     let rows = page.split(ROW).skip(1).map(|row| {
         let (row, _) = row.split_once('>')?;
         let parts: Vec<&str> = row.split('"').collect();
-        let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else {
-            return None;
-        };
+        let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else { return None };
         let names = [*f, *w, *h].map(str::trim);
         (names == ["data-folder=", "data-file=", "data-sha256="]).then(|| Claim {
             session_id: unescape(session),
@@ -70,7 +63,7 @@ pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
     });
     let claims: Option<Vec<Claim>> = rows.collect();
     let claims = claims.filter(|claims| !claims.is_empty()).ok_or(no_page)?;
-    Ok((claims, own_hash(page) == told))
+    Ok((claims, own_hash(page) == stated))
 }
 
 fn unescape(text: &str) -> String {
@@ -79,16 +72,15 @@ fn unescape(text: &str) -> String {
     text.replace("&amp;", "&")
 }
 
-/// What became of the files of a session since a page was made.
+/// Comparison of a session's files with those that a page lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
-    /// Files that are as they were.
+    /// Number of unchanged files.
     pub same: usize,
-    /// One sentence for each that is not.
+    /// A sentence for each other file.
     pub differences: Vec<String>,
 }
 
-/// Compares what is claimed of one session with a folder.
 pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisError> {
     let mut now = inputs_of(session)?;
     let analyses = session.join(ANALYSES_FILE);
@@ -106,12 +98,12 @@ pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisEr
             Some(_) => {
                 compared.differences.push(format!("{} is not as the page describes it", claim.file))
             }
-            None => compared.differences.push(format!("{} is gone", claim.file)),
+            None => compared.differences.push(format!("{} is missing", claim.file)),
         }
     }
     for one in &now {
         if claims.iter().all(|claim| claim.file != one.what) {
-            let sentence = format!("{} has come since", one.what);
+            let sentence = format!("{} is newer than the page", one.what);
             compared.differences.push(sentence);
         }
     }

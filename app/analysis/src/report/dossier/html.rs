@@ -2,16 +2,15 @@
 
 use super::super::text::{ParameterText, capital, quality, typeset};
 use super::super::{calibration as calibrations, calibration_plot, figures, said};
-use super::compared::comparison;
+use super::comparison::comparison;
 use super::files::{MADE, attributes, sealed};
-use super::happened::{afterwards, deviations, events, made_with};
+use super::history::{afterwards, deviations, events, made_with};
 use super::{FitPart, Subject};
 use crate::report::figures::Align;
 use palpate_figures::page::{Body, document};
 use palpate_figures::uncertain::{error_alone, interval};
 use palpate_rheology::fit::Parameter;
 
-/// The whole page.
 pub(super) fn page(subjects: &[Subject], align: Align, made: &str) -> String {
     let (title, level) = match subjects {
         [one] => (title_of(one), 2),
@@ -70,7 +69,7 @@ fn session(body: &mut Body, subject: &Subject, level: u8) {
 
 fn summary(body: &mut Body, subject: &Subject, level: u8) {
     let manifest = &subject.manifest;
-    body.heading(level, "What was measured");
+    body.heading(level, "Measurement");
     let plan = &manifest.plan;
     let protocol = plan["name"].as_str().map(|name| {
         let version = plan["version"].as_u64().unwrap_or_default();
@@ -86,8 +85,7 @@ fn summary(body: &mut Body, subject: &Subject, level: u8) {
         ("indenter", manifest.indenter.clone()),
         ("protocol", protocol.unwrap_or_default()),
     ];
-    let values = plan["source"]["values"].as_object();
-    let values = values.into_iter().flatten();
+    let values = plan["source"]["values"].as_object().into_iter().flatten();
     facts.extend(
         values.map(|(name, value)| (name.as_str(), value.as_str().unwrap_or_default().to_owned())),
     );
@@ -112,22 +110,22 @@ fn ending(subject: &Subject) -> String {
 }
 
 fn worth(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "What it is worth");
+    body.heading(level, "Data quality");
     let verdict = match subject.edits.verdict() {
         Some((verdict, edit)) => format!("{verdict}, says {}: {}", edit.by, edit.reason),
-        None => "nobody gave a verdict".to_owned(),
+        None => "none".to_owned(),
     };
     let review = match &subject.review {
         Some(review) => format!("{}; {}", said::review(review), review.reason),
-        None => "nobody reviewed it".to_owned(),
+        None => "not reviewed".to_owned(),
     };
     let tags: Vec<&str> = subject.edits.tags().into_iter().collect();
     body.facts(
-        "Verdict and review",
+        "Data quality and review",
         &[("verdict", verdict), ("review", review), ("tags", tags.join(", "))],
     );
     if !subject.notes.is_empty() {
-        body.paragraph("What a reader of the data must know:");
+        body.paragraph("Notes on the data:");
         body.list(subject.notes.iter().map(String::as_str));
     }
 }
@@ -142,7 +140,7 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     );
     body.figure(
         &figures::force_depth(traces).svg(),
-        "Force over depth from contact. No sample is further than half a pixel from what is drawn.",
+        "Force over depth from contact. Every sample is within half a pixel of the line.",
     );
 }
 
@@ -162,7 +160,7 @@ fn fit_part(body: &mut Body, part: &FitPart) {
     let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty that calibration and compliance add, the same in every repeat.";
     body.table(caption, &heads, &rows);
     body.list(report.sentences().chain(part.remarks.iter().map(String::as_str)));
-    let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and what the fit leaves over. Drawn are the lowest and the highest of each column of pixels.";
+    let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and the residual. The figure shows the lowest and the highest sample of each pixel column.";
     body.figure(&part.figure.svg(), caption);
 }
 
@@ -184,14 +182,14 @@ pub(super) fn cells(parameter: &Parameter) -> Vec<String> {
 fn calibration(body: &mut Body, subject: &Subject, level: u8) {
     body.heading(level, "Calibration");
     match &subject.calibration {
-        None => body.paragraph("The session has none: its forces are those of its file."),
+        None => body.paragraph("The session has no calibration: its forces are those of its file."),
         Some((calibration, Err(reason))) => {
             body.paragraph(&format!("{}: {reason}.", calibration.name));
         }
-        Some((calibration, Ok(told))) => {
-            body.pre(&calibrations::whole(calibration, None, told, &[]));
-            let caption = "The curve with its readings, what it misses of them, its slope, and the standard uncertainty of a force with every term that is stated.";
-            body.figure(&calibration_plot::picture(calibration, told), caption);
+        Some((calibration, Ok(details))) => {
+            body.pre(&calibrations::whole(calibration, None, details, &[]));
+            let caption = "The curve with its readings, its residuals, its slope, and the standard uncertainty of a force with every term that is stated.";
+            body.figure(&calibration_plot::picture(calibration, details), caption);
         }
     }
 }
@@ -199,7 +197,7 @@ fn calibration(body: &mut Body, subject: &Subject, level: u8) {
 fn files(body: &mut Body, subjects: &[Subject]) {
     body.heading(2, "Files that this page describes");
     body.paragraph(
-        "Each file by the SHA-256 of its bytes (FIPS 180-4). 'palpate report --check' with this page compares them with the files there are; any other program that makes these hashes can do so too.",
+        "The table has the SHA-256 (FIPS 180-4) of each file. 'palpate report --check' compares this page with the present files, and so can any program that computes SHA-256.",
     );
     let mut rows = Vec::new();
     let mut marks = Vec::new();

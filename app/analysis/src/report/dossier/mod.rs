@@ -1,9 +1,9 @@
 //! The report on one session or several: everything that is known of them, on one page that says by hashes which files
 //! it describes.
 
-mod compared;
+mod comparison;
 mod files;
-mod happened;
+mod history;
 mod html;
 
 pub use files::{Claim, Compared, claims, compare};
@@ -25,22 +25,21 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::base::FoundBase;
 use palpate_runner::fidelity::Fidelity;
 use palpate_sessions::analyses::{Analyses, Input, inputs_of};
-use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
-use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
+use palpate_sessions::{Beside, EDITS_FILE, Edits, EndRecord, Entry, Manifest, Review, Session};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
-/// A session, and which of its analyses it is read by.
+/// A session, and the analysis through which it is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Its folder.
     pub session: PathBuf,
-    /// The analysis; none for the session as its edits leave it.
+    /// `None` reads the session with its edits only.
     pub analysis: Option<String>,
 }
 
 /// One session with all that a page tells of it. Its samples are not in memory any more.
 pub struct Subject {
-    /// The name of its folder: where that is, is nobody else's business.
+    /// The name of its folder. The path is private and stays out of the page.
     pub name: String,
     pub(super) analysis: Option<String>,
     pub(super) manifest: Manifest,
@@ -49,7 +48,7 @@ pub struct Subject {
     pub(super) notes: Vec<String>,
     pub(super) entries: Vec<Entry>,
     pub(super) end: Option<EndRecord>,
-    pub(super) beside: Beside,
+    pub(super) auxiliary: Beside,
     pub(super) edits: Edits,
     pub(super) analyses: Analyses,
     pub(super) review: Option<Review>,
@@ -59,17 +58,15 @@ pub struct Subject {
     pub(super) traces: Traces,
     pub(super) cycles: Option<CyclePart>,
     pub(super) fit: Result<FitPart, String>,
-    /// Every file it is made of, with its SHA-256.
+    /// Every file of the session with its SHA-256.
     pub(super) files: Vec<Input>,
 }
 
-/// What the cycles of a session show.
 pub(super) struct CyclePart {
     pub text: String,
     pub figure: String,
 }
 
-/// What the fit of a session found.
 pub(super) struct FitPart {
     pub report: FitReport,
     pub figure: Drawing,
@@ -78,20 +75,19 @@ pub(super) struct FitPart {
 }
 
 impl Subject {
-    /// Reads a session and works out what is told of it.
     pub fn of(wanted: &Wanted) -> Result<Self, SourceError> {
         let path = &wanted.session;
         let files = inputs_of(path)?;
         let opened = analysed::open(path, wanted.analysis.as_deref())?;
         let Opened { edited, analyses, left_out_s } = opened;
         let (session, edits) = (edited.session, edited.edits);
-        // The review itself is among the edits; what came after it is told by their order.
+        // The review itself is among the edits; their order shows what came after it.
         let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
         let seen: Vec<Input> = seen.chain(analyses.input()).collect();
         let name = name_of(path);
         let calibration = source::calibration_of(&session).ok().map(|calibration| {
-            let told = Told::of(&calibration).map_err(|err| err.to_string());
-            (calibration, told)
+            let details = Told::of(&calibration).map_err(|err| err.to_string());
+            (calibration, details)
         });
         let traces = Traces::of(&name, &session, Window::WHOLE).leaving_out(&left_out_s);
         Ok(Self {
@@ -101,7 +97,7 @@ impl Subject {
             notes: session.notes.clone(),
             entries: session.entries.clone(),
             end: session.end.clone(),
-            beside: session.beside.clone(),
+            auxiliary: session.beside.clone(),
             review: edits.review(&seen),
             base: FoundBase::of_session(&session),
             fidelity: fidelity::of_session(&session).map_err(|err| err.to_string()),
@@ -121,10 +117,8 @@ impl Subject {
 /// The name of a session's folder, or of its file.
 #[must_use]
 pub fn name_of(path: &Path) -> String {
-    let whole = path.canonicalize();
-    let named = whole.as_deref().unwrap_or(path);
-    let name = named.file_name().unwrap_or(named.as_os_str());
-    name.to_string_lossy().into_owned()
+    let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    named.file_name().unwrap_or(named.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// The cycles of a session that has several, or sines.
@@ -139,13 +133,12 @@ fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
 fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart, String> {
     let source = source::of_session(session, Stretch::RampHold, left_out_s);
     let mut source = source.map_err(|err| err.to_string())?;
-    // What the reader remarked is told beside the session.
+    // The page has the notes of the reader beside the session.
     source.notes.clear();
     let options = FitOptions::default();
     let fitted = Fitted::of(source, &options).with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;
-    let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
-    let uncertainty = uncertainty.and_then(Result::ok);
+    let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of).and_then(Result::ok);
     Ok(FitPart {
         figure: picture::of_fit(name, &fitted.samples, &report, uncertainty.as_ref()),
         remarks: fitted.notes,
@@ -154,17 +147,13 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
 }
 
 palpate_model::named! {
-    /// The figures of a session, each by itself.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Figure {
-        /// Force over time.
         #[default]
         ForceTime = "force-time",
-        /// Force over depth.
         ForceDepth = "force-depth",
-        /// The fit and what it leaves over.
+        /// The fit and its residual.
         Residual = "residual",
-        /// The calibration with its uncertainty.
         Calibration = "calibration",
     }
 }
@@ -187,37 +176,32 @@ pub fn figure(
         Figure::Calibration => {
             let calibration = source::calibration_of(&session)?;
             match Told::of(&calibration) {
-                Ok(told) => Ok(calibration_plot::drawing(&calibration, &told)),
+                Ok(details) => Ok(calibration_plot::drawing(&calibration, &details)),
                 Err(err) => Err(err.to_string()),
             }
         }
     })
 }
 
-/// What a figure is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// Lines and text, at any size.
     Svg,
-    /// Pixels.
     Png,
 }
 
 impl Ending {
-    /// By the name of the file.
     pub fn of(file: &Path) -> Result<Self, String> {
         let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
             _ => Err(format!(
-                "{} is no name of a figure; let it end in .svg or .png",
+                "the figure {} has no known file type; end its name in .svg or .png",
                 file.display()
             )),
         }
     }
 
-    /// The bytes of the file.
     pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
         match self {
             Self::Svg => Ok(drawing.svg().into_bytes()),
@@ -226,29 +210,19 @@ impl Ending {
     }
 }
 
-/// When and with which version a page is made, in words.
+/// Date and program version of a page.
 #[must_use]
 pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
     let version = env!("CARGO_PKG_VERSION");
     format!("Made {} by palpate {version}", super::said::at(&now))
 }
 
-/// Nobody wants the report any more, or a session cannot be read.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum ReportError {
-    /// It was cancelled.
+    #[error("the report was cancelled")]
     Cancelled,
-    /// This session cannot be read.
+    #[error("{}: {}", .0.display(), .1)]
     Source(PathBuf, Box<SourceError>),
-}
-
-impl std::fmt::Display for ReportError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Cancelled => f.write_str("the report was cancelled"),
-            Self::Source(path, reason) => write!(f, "{}: {reason}", path.display()),
-        }
-    }
 }
 
 /// Reads every session and makes the page. `made` is when and with which version, in words; `progress` hears
@@ -264,10 +238,8 @@ pub fn write(
         if progress.tell(index, wanted.len(), &name_of(&one.session)).is_break() {
             return Err(ReportError::Cancelled);
         }
-        let subject = Subject::of(one);
-        let subject =
-            subject.map_err(|err| ReportError::Source(one.session.clone(), Box::new(err)));
-        subjects.push(subject?);
+        let failed = |err| ReportError::Source(one.session.clone(), Box::new(err));
+        subjects.push(Subject::of(one).map_err(failed)?);
     }
     Ok(html::page(&subjects, align, made))
 }

@@ -1,4 +1,4 @@
-//! What the page says of each run, and of each specimen.
+//! Rows of the page for each run and each specimen.
 
 use crate::edited::Edited;
 use crate::source::SourceError;
@@ -7,26 +7,23 @@ use palpate_sessions::Manifest;
 use serde::Serialize;
 use std::path::Path;
 
-/// One run in the table of the page.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunLine {
-    /// Its task.
     pub task: String,
     /// Which repeat, from 1.
     pub repeat: u32,
     /// Which attempt at it, from 1.
     pub attempt: u32,
-    /// Its session folder, from the programme's.
+    /// Session folder relative to that of the programme.
     pub session: String,
-    /// How it ended; none if it broke off.
+    /// `None` if the run broke off.
     pub ending: Option<String>,
     /// Whether its session is no longer what the journal says it was; none if it is.
-    pub lost: Option<Lost>,
-    /// Who ran it, as its session says.
+    #[serde(rename = "lost")]
+    pub loss: Option<SessionLoss>,
     pub operator: String,
-    /// What was indented, as its session says.
     pub specimen: String,
-    /// What it is worth, with the reason where it is not valid; none if nobody said.
+    /// Its data quality, with the reason where it is not valid.
     pub verdict: Option<String>,
     /// Session time in s, where the session could be read.
     pub duration_s: Option<f64>,
@@ -34,22 +31,18 @@ pub struct RunLine {
     pub force_peak_n: Option<f64>,
 }
 
-/// What became of a session that was recorded.
+/// Loss of a recorded session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Lost {
-    /// It is not there.
+pub enum SessionLoss {
     Missing,
-    /// It is there and not as it was written.
+    /// The files are not as they were written.
     Damaged,
 }
 
-impl Lost {
+impl SessionLoss {
     pub(super) const fn word(self) -> &'static str {
-        match self {
-            Self::Missing => "missing",
-            Self::Damaged => "damaged",
-        }
+        if matches!(self, Self::Missing) { "missing" } else { "damaged" }
     }
 
     /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
@@ -72,15 +65,14 @@ impl Lost {
     }
 }
 
-/// What sessions tell of one specimen.
+/// Metadata of one specimen from its sessions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SpecimenPart {
-    /// Its name.
     pub specimen: String,
-    /// With which probe it was indented.
     pub indenter: String,
-    /// What else is told of it, by key; not its place in the series.
-    pub told: Vec<(String, String)>,
+    /// Other metadata by key, without its place in the series.
+    #[serde(rename = "told")]
+    pub metadata: Vec<(String, String)>,
 }
 
 impl SpecimenPart {
@@ -89,7 +81,7 @@ impl SpecimenPart {
         Self {
             specimen: manifest.specimen.clone(),
             indenter: manifest.indenter.clone(),
-            told: lines
+            metadata: lines
                 .filter(|(key, _)| !key.starts_with("series."))
                 .map(|(key, value)| (key.to_owned(), value))
                 .collect(),
@@ -97,21 +89,21 @@ impl SpecimenPart {
     }
 
     pub(super) fn text(&self) -> String {
-        let told = self.told.iter();
-        let told: Vec<String> = told.map(|(key, value)| format!("  {key}: {value}")).collect();
+        let line = |(key, value): &(String, String)| format!("  {key}: {value}");
+        let metadata: Vec<String> = self.metadata.iter().map(line).collect();
         let probe = match self.indenter.as_str() {
             "" => String::new(),
             indenter => format!(", with the {indenter}"),
         };
-        format!("{}{probe}\n{}", self.specimen, told.join("\n"))
+        format!("{}{probe}\n{}", self.specimen, metadata.join("\n"))
     }
 }
 
 impl RunLine {
     pub(super) fn ended_by(&self) -> String {
         let ending = self.ending.as_deref().unwrap_or("breaking off");
-        match self.lost {
-            Some(lost) => format!("{ending}, now {}", lost.word()),
+        match self.loss {
+            Some(loss) => format!("{ending}, now {}", loss.word()),
             None => ending.to_owned(),
         }
     }

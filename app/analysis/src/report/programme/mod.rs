@@ -1,21 +1,20 @@
-//! The page that a programme leaves: what was run, what it told, with figures, in one file that any browser shows.
+//! The page of a programme: its runs, their results and figures, in one file for any browser.
 
 mod lines;
 
-pub use lines::{Lost, RunLine, SpecimenPart};
+pub use lines::{RunLine, SessionLoss, SpecimenPart};
 
 use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
 use super::fit_json::Overlay;
 use super::picture;
-use super::text::{in_columns, parameter_lines};
+use super::text::{parameter_lines, table};
 use crate::cycles::of_session;
 use crate::edited;
 use crate::fit::Fitted;
 use crate::source::{self, FitSource, Stretch};
 use palpate_figures::page::{Body, document};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
-use palpate_model::units::Seconds;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::cycles::predict;
 use palpate_rheology::fit::{FitOptions, FitReport, Systematic};
@@ -24,10 +23,8 @@ use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What one task told.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TaskPart {
-    /// Its name.
     pub task: String,
     /// Its protocol in words.
     pub title: String,
@@ -42,21 +39,16 @@ pub struct TaskPart {
     pub predictions: Vec<PredictionLine>,
 }
 
-/// The fit of one session.
 #[derive(Clone, Debug, Serialize)]
 pub struct FitLine {
-    /// Its folder.
     pub session: String,
-    /// Names, values and standard errors.
     pub parameters: Vec<palpate_rheology::fit::Parameter>,
     /// Root mean square of the residual in N.
     pub rmse_n: f64,
 }
 
-/// The error of a prediction.
 #[derive(Clone, Debug, Serialize)]
 pub struct PredictionLine {
-    /// The session that was predicted.
     pub session: String,
     /// The task whose fit predicted it.
     pub fitted: String,
@@ -70,18 +62,14 @@ pub struct PredictionLine {
     pub at_peak_percent: f64,
 }
 
-/// Everything on the page.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Page {
     /// The programme in words.
     pub title: String,
-    /// What it is for.
     pub purpose: String,
-    /// Every run.
     pub runs: Vec<RunLine>,
     /// Every specimen, in the order in which it was met.
     pub specimens: Vec<SpecimenPart>,
-    /// Every task.
     pub tasks: Vec<TaskPart>,
 }
 
@@ -96,20 +84,15 @@ impl Page {
         let mut page = Self {
             title: programme.title.clone(),
             purpose: programme.purpose.clone(),
-            runs: Vec::new(),
-            specimens: Vec::new(),
-            tasks: Vec::new(),
+            ..Self::default()
         };
-        let mut bodies = Bodies::default();
+        let mut bodies = FittedBodies::default();
         for (index, task) in programme.tasks.iter().enumerate() {
             tell(&task.name);
             let mut part = TaskPart {
                 task: task.name.clone(),
                 title: task.protocol.title.clone(),
-                text: String::new(),
-                figures: Vec::new(),
-                fits: Vec::new(),
-                predictions: Vec::new(),
+                ..TaskPart::default()
             };
             for run in progress.runs.iter().filter(|run| run.0.task == index) {
                 page.add_run(&mut part, &mut bodies, task, run, folder);
@@ -122,7 +105,7 @@ impl Page {
     fn add_run(
         &mut self,
         part: &mut TaskPart,
-        bodies: &mut Bodies,
+        bodies: &mut FittedBodies,
         task: &Task,
         (place, session, ending): &(Place, PathBuf, Option<String>),
         folder: &Path,
@@ -130,12 +113,11 @@ impl Page {
         let name = session.display().to_string();
         let path = folder.join(session);
         let opened = edited::open(&path);
-        let lost = Lost::of(&opened, &path, ending.as_deref());
+        let loss = SessionLoss::of(&opened, &path, ending.as_deref());
         // What was said of a session holds for it as it was.
-        let whole = opened.as_ref().ok().filter(|_| lost.is_none());
+        let whole = opened.as_ref().ok().filter(|_| loss.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
-        let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
-        let is_rejected = rejection.is_some();
+        let is_rejected = opened.as_ref().ok().and_then(|one| one.rejection()).is_some();
         let verdict = verdict.map(|(verdict, edit)| match verdict {
             Verdict::Valid => verdict.to_string(),
             _ => format!("{verdict}: {}", edit.reason),
@@ -145,8 +127,7 @@ impl Page {
         let peak = forces.filter_map(|row| row.force).reduce(f64::max);
         let end = opened.as_ref().ok().and_then(|session| session.rows.last());
         let manifest = opened.as_ref().ok().map(|session| &session.manifest);
-        let specimen = manifest.map(SpecimenPart::of);
-        let specimen = specimen.filter(|one| !one.specimen.is_empty());
+        let specimen = manifest.map(SpecimenPart::of).filter(|one| !one.specimen.is_empty());
         self.specimens.extend(specimen.filter(|one| !self.specimens.contains(one)));
         let word =
             |of: fn(&Manifest) -> &String| manifest.map_or(String::new(), |one| of(one).clone());
@@ -156,7 +137,7 @@ impl Page {
             attempt: place.attempt,
             session: name.clone(),
             ending: ending.clone(),
-            lost: lost.as_ref().map(|(lost, _)| *lost),
+            loss: loss.as_ref().map(|(loss, _)| *loss),
             operator: word(|manifest| &manifest.operator),
             specimen: word(|manifest| &manifest.specimen),
             verdict,
@@ -169,8 +150,8 @@ impl Page {
             part.line(&line);
         };
         match opened {
-            _ if let Some((lost, reason)) = &lost => {
-                leave_out(&format!("{} ({reason})", lost.word()));
+            _ if let Some((loss, reason)) = &loss => {
+                leave_out(&format!("{} ({reason})", loss.word()));
             }
             // It is counted, and not fitted.
             Ok(_) if is_rejected => leave_out("rejected"),
@@ -184,12 +165,7 @@ impl Page {
 
     /// The table of runs as text.
     pub fn table(&self) -> String {
-        let head = [
-            "task", "repeat", "ended by", "s", "peak N", "session", "operator", "specimen",
-            "verdict",
-        ];
-        let mut lines = vec![head.map(str::to_owned).to_vec()];
-        lines.extend(self.runs.iter().map(|run| {
+        let row = |run: &RunLine| {
             let attempt = match run.attempt {
                 1 => String::new(),
                 attempt => format!(" ({attempt}. attempt)"),
@@ -205,26 +181,27 @@ impl Page {
                 run.specimen.clone(),
                 run.verdict.clone().unwrap_or_default(),
             ]
-        }));
-        in_columns(&lines)
+        };
+        let head =
+            "task | repeat | ended by | s | peak N | session | operator | specimen | verdict";
+        table(head, self.runs.iter().map(row))
     }
 
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
     pub fn loss(&self) -> Option<String> {
-        let finished = self.runs.iter();
-        let finished = finished.filter(|run| run.ending.as_deref() == Some(FINISHED));
-        let lost: Vec<String> = finished
-            .filter_map(|run| Some(format!("{} is {}", run.session, run.lost?.word())))
+        let finished = self.runs.iter().filter(|run| run.ending.as_deref() == Some(FINISHED));
+        let loss: Vec<String> = finished
+            .filter_map(|run| Some(format!("{} is {}", run.session, run.loss?.word())))
             .collect();
-        (!lost.is_empty()).then(|| {
+        (!loss.is_empty()).then(|| {
             format!(
-                "of the finished sessions {}, so the page tells nothing of it; restore it from a backup and run the same command, or begin in a new folder",
-                lost.join(", ")
+                "of the finished sessions {}, so the page leaves it out; restore it from a backup and run the same command, or begin in a new folder",
+                loss.join(", ")
             )
         })
     }
 
-    /// The page in HTML, whole in itself.
+    /// The page as one HTML file.
     pub fn html(&self) -> String {
         let mut body = Body::default();
         body.heading(1, &self.title);
@@ -257,7 +234,7 @@ impl TaskPart {
     }
 
     /// What one session adds: a calibration, cycles, a fit or the error of a prediction.
-    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut Bodies) {
+    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut FittedBodies) {
         if task.calibrates {
             match calibration_of(session, &task.name) {
                 Ok(calibration) => self.calibration(&calibration),
@@ -276,14 +253,8 @@ impl TaskPart {
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
-            let source = FitSource {
-                samples,
-                start: Seconds(0.0),
-                notes: Vec::new(),
-                specimen: None,
-                rig: None,
-                calibration: source::calibration_of(session).ok(),
-            };
+            let calibration = source::calibration_of(session).ok();
+            let source = FitSource { samples, calibration, ..FitSource::default() };
             let fitted = Fitted::of(source, &options).with_systematic(&options);
             match &fitted.result {
                 Ok(report) => self.fit(task, name, (&fitted, report), bodies),
@@ -298,9 +269,9 @@ impl TaskPart {
 
     fn calibration(&mut self, calibration: &Calibration) {
         match Told::of(calibration) {
-            Ok(told) => {
-                self.line(&calibration_text(calibration, None, &told, &[]));
-                self.figures.push(super::calibration_plot::picture(calibration, &told));
+            Ok(details) => {
+                self.line(&calibration_text(calibration, None, &details, &[]));
+                self.figures.push(super::calibration_plot::picture(calibration, &details));
             }
             Err(err) => self.line(&err.to_string()),
         }
@@ -311,7 +282,7 @@ impl TaskPart {
         task: &Task,
         name: &str,
         (fitted, report): (&Fitted, &FitReport),
-        bodies: &mut Bodies,
+        bodies: &mut FittedBodies,
     ) {
         let samples = fitted.samples.as_slice();
         self.line(&format!("{name}:"));
@@ -353,8 +324,7 @@ impl TaskPart {
             }
         }
         if self.figures.is_empty() {
-            let calibration = fitted.calibration.as_ref();
-            let band = calibration.and_then(|one| ForceUncertainty::of(one).ok());
+            let band = fitted.calibration.as_ref().and_then(|one| ForceUncertainty::of(one).ok());
             let overlay = Overlay::of(report, samples);
             let drawn = picture::of_report(name, (samples, &overlay), report, band.as_ref());
             self.figures.push(drawn);
@@ -366,17 +336,16 @@ impl TaskPart {
     }
 }
 
-/// What fits found, for later tasks to be compared with.
+/// Fitted bodies that later tasks are compared with.
 #[derive(Default)]
-struct Bodies {
+struct FittedBodies {
     /// Name of a task and the body of its first session that was fitted.
     known: Vec<(String, ModifiedKelvin)>,
     /// Name of a task and why a session of it was not fitted.
     left_out: Vec<(String, String)>,
 }
 
-impl Bodies {
-    /// The body of a task, or why there is none.
+impl FittedBodies {
     fn of(&self, task: &str) -> Result<&(String, ModifiedKelvin), String> {
         let body = self.known.iter().find(|(known, _)| known == task);
         body.ok_or_else(|| {

@@ -1,15 +1,16 @@
-//! What happened in a session and what was said of it: deviations, events, edits and analyses, rig and program.
+//! History of a session: deviations, events, edits and analyses, rig and program.
 
+use super::super::session::{lateness, target_cells};
 use super::super::text::capital;
 use super::super::{kept, said};
 use super::Subject;
 use palpate_figures::page::Body;
 use palpate_protocols::engine::{Effect, Record};
 use palpate_runner::fidelity::{Achieved, Fidelity};
-use palpate_sessions::analyses::Analysed;
+use palpate_sessions::analyses::{Analysed, Analysis};
 use palpate_sessions::record::EntryKind;
 
-/// More events of a session than this make a page that nobody reads.
+/// Events listed at most: a page with more is not read.
 const EVENTS_MAX: usize = 1000;
 
 pub(super) fn deviations(body: &mut Body, subject: &Subject, level: u8) {
@@ -21,14 +22,11 @@ pub(super) fn deviations(body: &mut Body, subject: &Subject, level: u8) {
 }
 
 fn fidelity(body: &mut Body, found: &Fidelity) {
-    let late = match found.late {
-        0 => "none late".to_owned(),
-        late => format!("{late} late, by up to {:.0} ms", found.late_worst_s * 1e3),
-    };
+    let late = lateness(found);
     let time = &found.time_use;
     let missed = found.missed().count();
     body.facts(
-        "How well the run did what its plan said",
+        "Samples and time use of the run",
         &[
             ("samples", format!("{}, {} missing, {late}", found.samples, found.dropped)),
             ("longest gap", format!("{:.1} ms", found.longest_gap_s * 1e3)),
@@ -47,28 +45,18 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
         return;
     }
     let row = |one: &Achieved| {
-        let error = one.error_percent.map_or_else(
-            || format!("{:+.4} {}", one.achieved - one.target, one.unit),
-            |percent| format!("{percent:+.3} %"),
-        );
-        vec![
-            format!("{} {}", one.step_index + 1, one.step),
-            if one.cycle == 0 { String::new() } else { one.cycle.to_string() },
-            one.quantity.to_owned(),
-            format!("{:.4} {}", one.target, one.unit),
-            format!("{:.4} {}", one.achieved, one.unit),
-            error,
-            if one.is_within { "met" } else { "missed" }.to_owned(),
-        ]
+        let mut row = vec![format!("{} {}", one.step_index + 1, one.step)];
+        row.extend(target_cells(one));
+        row.push(if one.is_within { "met" } else { "missed" }.to_owned());
+        row
     };
     let rows: Vec<Vec<String>> = found.targets.iter().map(row).collect();
     let heads = ["step", "cycle", "quantity", "target", "achieved", "error", ""];
-    body.table("Targets and what was done", &heads, &rows);
+    body.table("Targets and achieved values", &heads, &rows);
 }
 
 pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
-    let entries = subject.entries.iter();
-    let decided = entries.filter(|entry| entry.kind == EntryKind::Decision);
+    let decided = subject.entries.iter().filter(|entry| entry.kind == EntryKind::Decision);
     let records = decided.filter_map(|entry| {
         let Ok(Effect::Record(record)) = serde_json::from_value(entry.body.clone()) else {
             return None;
@@ -88,28 +76,28 @@ pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
         body.heading(level, "Notes of the run");
         let rows: Vec<Vec<String>> = notes.into_iter().map(row).collect();
         let heads = ["session time (s)", "note"];
-        body.table("Written down while it ran", &heads, &rows);
+        body.table("Notes made during the run", &heads, &rows);
     }
     body.heading(level, "Events");
     let mut rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
-    let left = rows.len().saturating_sub(EVENTS_MAX);
+    let remaining = rows.len().saturating_sub(EVENTS_MAX);
     rows.truncate(EVENTS_MAX);
     if rows.is_empty() {
         body.paragraph("None were recorded.");
     } else {
-        let heads = ["session time (s)", "what"];
-        body.table("What was decided in the run", &heads, &rows);
+        let heads = ["session time (s)", "event"];
+        body.table("Events of the run", &heads, &rows);
     }
-    if left > 0 {
-        body.paragraph(&format!("{left} more are in the log."));
+    if remaining > 0 {
+        body.paragraph(&format!("The log has {remaining} more events."));
     }
 }
 
 pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "What was said and made of it afterwards");
+    body.heading(level, "Edits and analyses");
     let edits = &subject.edits.all;
     if edits.is_empty() {
-        body.paragraph("Nothing was said of it.");
+        body.paragraph("The session has no edits.");
     } else {
         let row = |edit: &palpate_sessions::Edit| {
             vec![
@@ -124,28 +112,25 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
         body.table("Edits, in the order made", &heads, &rows);
     }
     let analyses = &subject.analyses;
-    let made = analyses.all.iter();
-    let made: Vec<_> = made.filter(|one| one.what != Analysed::Withdrawal).collect();
+    let made: Vec<_> = analyses.all.iter().filter(|one| one.what != Analysed::Withdrawal).collect();
     if made.is_empty() {
-        body.paragraph("No analysis is kept beside it.");
+        body.paragraph("The session has no analyses.");
         return;
     }
-    let rows: Vec<Vec<String>> = made
-        .iter()
-        .map(|one| {
-            let withdrawn = kept::withdrawn(analyses, &one.name);
-            vec![
-                one.name.clone(),
-                one.what.word().to_owned(),
-                said::at(&one.at),
-                one.by.clone(),
-                one.reason.clone(),
-                kept::deed(&one.what),
-                format!("palpate {}", one.software_version),
-                withdrawn.unwrap_or_else(|| "counts".to_owned()),
-            ]
-        })
-        .collect();
+    let row = |one: &&Analysis| {
+        let withdrawn = kept::withdrawn(analyses, &one.name);
+        vec![
+            one.name.clone(),
+            one.what.word().to_owned(),
+            said::at(&one.at),
+            one.by.clone(),
+            one.reason.clone(),
+            kept::deed(&one.what),
+            format!("palpate {}", one.software_version),
+            withdrawn.unwrap_or_else(|| "counts".to_owned()),
+        ]
+    };
+    let rows: Vec<Vec<String>> = made.iter().map(row).collect();
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses, in the order made", &heads, &rows);
     for one in made {
@@ -198,7 +183,7 @@ pub(super) fn made_with(body: &mut Body, subject: &Subject, level: u8) {
     let signal = manifest.signal.as_ref().map(said::signal);
     facts.extend(signal.map(|lines| ("signal", lines.join("; "))));
     let accepted = manifest.acknowledgements.iter();
-    facts.extend(accepted.map(|line| ("accepted before the start", line.clone())));
-    facts.extend(said::health(&subject.beside.health));
-    body.facts("With what it was measured and read", &facts);
+    facts.extend(accepted.map(|line| ("acknowledged before the start", line.clone())));
+    facts.extend(said::health(&subject.auxiliary.health));
+    body.facts("Rig, settings and program", &facts);
 }

@@ -1,4 +1,4 @@
-//! Records beside a session: each is added, none is ever written over.
+//! Actions that add a record beside a session. Records are never overwritten.
 
 use super::super::edits::{SayFailure, Subject};
 use super::{Done, FitWanted};
@@ -13,59 +13,35 @@ use palpate_model::units::Position;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, add_analysis, inputs_of,
 };
-use palpate_sessions::calibrations::read_calibration;
-use palpate_sessions::edits::{Change, Edit, Verdict};
-use palpate_sessions::log::{ReadError, Summary};
-use palpate_sessions::shelf::LibraryError;
+use palpate_sessions::{Change, Edit, LibraryError, ReadError, Summary, Verdict, read_calibration};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Nothing was written beside a session.
 #[derive(Debug, Error)]
 pub enum DeedFailure {
-    /// The session, its edits or its analyses cannot be read or added to.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Nothing can be said of it.
     #[error(transparent)]
     Say(#[from] SayFailure),
-    /// The calibration cannot be read.
     #[error(transparent)]
     Calibration(#[from] LibraryError),
-    /// A mask that leaves out nothing.
-    #[error("the session has no force in these stretches, so nothing would be left out")]
+    #[error("the session has no force in these intervals, so the mask would leave out nothing")]
     NothingLeftOut,
-    /// No contact was found.
     #[error(
         "the session found no contact, so no depth counts from one; there is nothing to correct"
     )]
     NoContact,
-    /// Several were found and none is named.
-    #[error("the session found contact {0} times; say which")]
+    #[error("the session found contact {0} times; give the number of one")]
     WhichContact(usize),
-    /// The one named was not found.
-    #[error("there is no contact {number}; the session found {found}")]
-    NoSuchContact {
-        /// Which, from 1.
-        number: u32,
-        /// How many there are.
-        found: usize,
-    },
-    /// No probe was ever there.
+    #[error("the session has no contact {number}; it found contact {found} times")]
+    NoSuchContact { number: u32, found: usize },
     #[error(
         "contact at {position} is outside the rig's travel of {travel}; give the position from home"
     )]
-    OutsideTravel {
-        /// From home.
-        position: Position,
-        /// How far the rig goes.
-        travel: Position,
-    },
-    /// There is no fit to keep.
+    OutsideTravel { position: Position, travel: Position },
     #[error("{0}")]
     Fit(String),
-    /// Nobody wants it any more.
     #[error("cancelled; nothing was kept")]
     Cancelled,
 }
@@ -82,119 +58,89 @@ impl From<ReadError> for DeedFailure {
     }
 }
 
-/// Who does it, and why.
+/// Author of a record, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Who {
-    /// By name.
     pub by: String,
-    /// In a few words; some deeds need it.
+    /// In a few words; some actions require it.
     pub reason: String,
 }
 
-/// What is done to a session.
+/// An action on a session that adds a record beside it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Deed {
-    /// A fit is made and kept.
     Fit {
-        /// What it is called.
         name: String,
-        /// How.
         how: FitWanted,
     },
-    /// Forces are made anew.
     Recalibrate {
-        /// What it is called.
         name: String,
-        /// With this calibration.
         calibration: Box<Calibration>,
     },
-    /// The same with the calibration of a file.
     RecalibrateFrom {
-        /// What it is called.
         name: String,
-        /// A calibration's document.
         file: PathBuf,
     },
-    /// Forces in stretches of time do not count.
     Mask {
-        /// What it is called.
         name: String,
         /// From and to in s since the first sample.
         left_out_s: Vec<[f64; 2]>,
     },
-    /// An analysis does not count any more.
     Withdraw {
-        /// Which.
         name: String,
     },
-    /// The session is worth that.
     Judge(Verdict),
-    /// Contact was elsewhere.
     Correct {
-        /// Which of the contacts, from 1.
+        /// Number of the contact, from 1.
         number: u32,
-        /// From home.
         position: Position,
     },
 }
 
 impl Deed {
-    /// Does it to a session and keeps the record, or says why not.
+    /// Adds the record of this action to a session.
     pub fn run(
         self,
         session: &Path,
         who: &Who,
         progress: &dyn Progress,
     ) -> Result<Done, DeedFailure> {
-        match self {
-            Self::Fit { name, how } => fit(session, &name, &how, who, progress),
-            Self::Recalibrate { name, calibration } => {
-                recalibrated(session, &name, &calibration, who, progress)
+        let (sentence, name, is_edit) = match self {
+            Self::Fit { name, how } => {
+                (fit(session, &name, &how, who, progress)?, Some(name), false)
             }
             Self::RecalibrateFrom { name, file } => {
-                let calibration = read_calibration(&file)?;
-                recalibrated(session, &name, &calibration, who, progress)
+                let calibration = Box::new(read_calibration(&file)?);
+                return Self::Recalibrate { name, calibration }.run(session, who, progress);
+            }
+            Self::Recalibrate { name, calibration } => {
+                step(progress, 0, 1, "recalculating the forces")?;
+                let found = recalibrate(session, &name, &calibration, who)?;
+                (kept::change(&found.change), Some(name), false)
             }
             Self::Mask { name, left_out_s } => {
                 let masked = mask(session, &name, left_out_s, who, progress)?;
-                let (left_out, before) = (masked.left_out, masked.of);
-                let sentence = format!("{left_out} of {before} forces are left out");
-                Ok(made(session, &name, sentence))
+                let sentence = format!("{} of {} forces are left out", masked.left_out, masked.of);
+                (sentence, Some(name), false)
             }
             Self::Withdraw { name } => {
                 withdraw(session, &name, who)?;
-                let sentence = format!("analysis '{name}' does not count any more");
-                Ok(done(session, sentence, Kind::Analysis))
+                (format!("analysis '{name}' is withdrawn"), None, false)
             }
             Self::Judge(verdict) => {
                 judge(session, verdict, who)?;
-                let sentence = format!("the session is {verdict}");
-                Ok(done(session, sentence, Kind::Edit))
+                (format!("the session is {verdict}"), None, true)
             }
             Self::Correct { number, position } => {
-                let corrected = correct(session, Some(number), position, who)?;
-                Ok(done(session, corrected.sentence(), Kind::Edit))
+                (correct(session, Some(number), position, who)?.sentence(), None, true)
             }
-        }
-    }
-}
-
-/// What was written beside a session.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Analysis,
-    Edit,
-}
-
-fn done(session: &Path, sentence: String, kind: Kind) -> Done {
-    Done { sentence, changed: Some(session.to_path_buf()), is_edit: kind == Kind::Edit, made: None }
-}
-
-fn made(session: &Path, name: &str, sentence: String) -> Done {
-    let name = name.trim();
-    Done {
-        made: Some(name.to_owned()),
-        ..done(session, format!("kept as '{name}': {sentence}"), Kind::Analysis)
+        };
+        let made = name.map(|name| name.trim().to_owned());
+        let sentence = match &made {
+            Some(name) => format!("kept as '{name}': {sentence}"),
+            None => sentence,
+        };
+        Ok(Done { sentence, changed: Some(session.to_path_buf()), is_edit, made })
     }
 }
 
@@ -202,11 +148,10 @@ fn id_of(session: &Path) -> Result<String, ReadError> {
     Ok(Summary::read(session)?.manifest.session_id)
 }
 
-/// Refuses before hours of work a name that is taken.
+/// Refuses a taken name before hours of work.
 fn check_name(session: &Path, name: &str) -> Result<String, DeedFailure> {
     let (id, name) = (id_of(session)?, name.trim());
-    let there = Analyses::read(session, &id)?;
-    if there.all.iter().any(|one| one.name == name) {
+    if Analyses::read(session, &id)?.all.iter().any(|one| one.name == name) {
         let name = name.to_owned();
         return Err(AnalysisError::Taken { name }.into());
     }
@@ -236,7 +181,7 @@ fn fit(
     how: &FitWanted,
     who: &Who,
     progress: &dyn Progress,
-) -> Result<Done, DeedFailure> {
+) -> Result<String, DeedFailure> {
     check_name(session, name)?;
     let results = how.results(session, progress).map_err(DeedFailure::Fit)?;
     let fit = KeptFit {
@@ -245,24 +190,19 @@ fn fit(
         settings: how.settings(),
         results,
     };
-    let analysis = keep_fit(session, name, fit, who)?;
-    Ok(made(session, name, kept::deed(&analysis.what)))
+    Ok(kept::deed(&keep_fit(session, name, fit, who)?.what))
 }
 
-/// A fit that was made and is to be kept.
 #[derive(Clone, Debug)]
 pub struct KeptFit<'a> {
-    /// The analysis that the session was read by.
+    /// Analysis through which the session was read.
     pub based_on: Option<&'a str>,
-    /// Sessions fitted together with it.
     pub together_with: &'a [Wanted],
-    /// How it was asked for.
     pub settings: Value,
-    /// What it found.
     pub results: Value,
 }
 
-/// Keeps a fit of a session as an analysis beside it.
+/// Stores a fit of a session as an analysis beside it.
 pub fn keep_fit(
     session: &Path,
     name: &str,
@@ -273,12 +213,8 @@ pub fn keep_fit(
     let mut inputs = opened.inputs(session, fit.based_on)?;
     for one in fit.together_with {
         let id = id_of(&one.session)?;
-        let theirs = inputs_of(&one.session)?;
-        inputs.extend(
-            theirs
-                .into_iter()
-                .map(|file| Input { what: format!("{id}/{}", file.what), sha256: file.sha256 }),
-        );
+        let theirs = inputs_of(&one.session)?.into_iter();
+        inputs.extend(theirs.map(|file| Input { what: format!("{id}/{}", file.what), ..file }));
     }
     let what = Analysed::Fit {
         based_on: fit.based_on.map(str::to_owned),
@@ -289,49 +225,32 @@ pub fn keep_fit(
     keep(session, id, name, inputs, what, who)
 }
 
-/// What another calibration made of a session.
 #[derive(Clone, Debug)]
-pub struct Recalibrated {
-    /// What it did to the forces.
+pub struct RecalibrationResult {
     pub change: ForceChange,
     /// The session's rig; empty where there is none.
     pub rig: String,
 }
 
-/// Makes the forces of a session anew with another calibration, as an analysis beside it.
+/// Recalculates the forces of a session with another calibration, as an analysis beside it.
 pub fn recalibrate(
     session: &Path,
     name: &str,
     calibration: &Calibration,
     who: &Who,
-) -> Result<Recalibrated, DeedFailure> {
+) -> Result<RecalibrationResult, DeedFailure> {
     let id = check_name(session, name)?;
     let (opened, inputs, what, change) = analysed::recalibration(session, calibration)?;
     keep(session, &id, name, inputs, what, who)?;
     let rig = opened.edited.session.manifest.rig;
-    Ok(Recalibrated { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
+    Ok(RecalibrationResult { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
 }
 
-fn recalibrated(
-    session: &Path,
-    name: &str,
-    calibration: &Calibration,
-    who: &Who,
-    progress: &dyn Progress,
-) -> Result<Done, DeedFailure> {
-    step(progress, 0, 1, "making the forces anew")?;
-    let found = recalibrate(session, name, calibration, who)?;
-    Ok(made(session, name, kept::change(&found.change)))
-}
-
-/// Forces that do not count any more.
 #[derive(Clone, Debug)]
-pub struct Masked {
-    /// The record.
+pub struct MaskResult {
     pub analysis: Analysis,
-    /// Forces left out.
     pub left_out: usize,
-    /// Forces there were.
+    /// Number of forces before the mask.
     pub of: usize,
 }
 
@@ -342,14 +261,13 @@ pub fn mask(
     left_out_s: Vec<[f64; 2]>,
     who: &Who,
     progress: &dyn Progress,
-) -> Result<Masked, DeedFailure> {
+) -> Result<MaskResult, DeedFailure> {
     let id = check_name(session, name)?;
-    step(progress, 0, 1, "looking what is left out")?;
+    step(progress, 0, 1, "applying the mask")?;
     let mut opened = analysed::open(session, None)?;
     let inputs = opened.inputs(session, None)?;
     let forces = |opened: &analysed::Opened| {
-        let rows = opened.edited.session.rows.iter();
-        rows.filter(|row| row.force.is_some()).count()
+        opened.edited.session.rows.iter().filter(|row| row.force.is_some()).count()
     };
     let of = forces(&opened);
     opened.left_out_s.clone_from(&left_out_s);
@@ -358,12 +276,12 @@ pub fn mask(
     if left_out == 0 {
         return Err(DeedFailure::NothingLeftOut);
     }
-    step(progress, 1, 1, "keeping it")?;
+    step(progress, 1, 1, "storing the analysis")?;
     let what = Analysed::Mask { left_out_s };
-    Ok(Masked { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
+    Ok(MaskResult { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
 }
 
-/// Lets an analysis count no more.
+/// Withdraws an analysis: its record stays and does not count.
 pub fn withdraw(session: &Path, name: &str, who: &Who) -> Result<Analysis, DeedFailure> {
     let id = id_of(session)?;
     keep(session, &id, name, Vec::new(), Analysed::Withdrawal, who)
@@ -381,26 +299,24 @@ pub fn judge(
     Ok((was, edit))
 }
 
-/// A contact that was found elsewhere.
+/// A corrected contact point.
 #[derive(Clone, Debug)]
-pub struct Corrected {
-    /// Which of the contacts, from 1.
+pub struct ContactCorrection {
+    /// Number of the contact, from 1.
     pub number: u32,
-    /// Where it really was, from home.
+    /// Corrected position from home.
     pub position: Position,
-    /// Where the session found it.
+    /// Position that the session found, from home.
     pub was: Position,
-    /// The record.
     pub edit: Edit,
 }
 
-impl Corrected {
-    /// By how much its depths are more, in mm.
+impl ContactCorrection {
+    /// Increase of all depths from this contact in mm.
     pub fn deeper_mm(&self) -> f64 {
         self.was.depth_from(self.position).0
     }
 
-    /// In words.
     pub fn sentence(&self) -> String {
         format!(
             "contact {} at {:.3} mm instead of {:.3} mm; its depths change by {:+.3} mm",
@@ -418,7 +334,7 @@ pub fn correct(
     number: Option<u32>,
     position: Position,
     who: &Who,
-) -> Result<Corrected, DeedFailure> {
+) -> Result<ContactCorrection, DeedFailure> {
     let passing = edited::outline(session)?;
     let outline = &passing.outline;
     let found = edited::contacts(&outline.entries);
@@ -434,13 +350,12 @@ pub fn correct(
         return Err(DeedFailure::NoSuchContact { number, found });
     };
     // A session that found a contact has a rig.
-    let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel);
-    let travel = travel.unwrap_or(Position(0.0));
+    let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel).unwrap_or(Position(0.0));
     if !(0.0..=travel.0).contains(&position.0) {
         return Err(DeedFailure::OutsideTravel { position, travel });
     }
     let was = was.position;
     let change = Change::Contact { number, position_mm: position, was_mm: was };
     let edit = Subject::read(session)?.say(&who.by, &who.reason, change)?;
-    Ok(Corrected { number, position, was, edit })
+    Ok(ContactCorrection { number, position, was, edit })
 }

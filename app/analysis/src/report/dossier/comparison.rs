@@ -1,4 +1,4 @@
-//! Several sessions beside each other.
+//! Comparison of several sessions.
 
 use super::super::figures::{Align, Traces, overlays};
 use super::super::said;
@@ -8,7 +8,7 @@ use palpate_figures::page::Body;
 
 /// Table of the sessions, figures over each other, and a table of parameters.
 pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
-    body.heading(2, "Beside each other");
+    body.heading(2, "Comparison");
     let row = |one: &Subject| {
         let verdict = one.edits.verdict();
         vec![
@@ -26,19 +26,21 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
         ["session", "read by", "specimen", "operator", "started (UTC)", "protocol", "verdict"];
     body.table("Sessions compared", &heads, &rows);
     let traces: Vec<&Traces> = subjects.iter().map(|one| &one.traces).collect();
-    let ([time, depth], lost) = overlays(&traces, align);
-    let left_out = match lost.as_slice() {
+    let ([time, depth], without_origin) = overlays(&traces, align);
+    let left_out = match without_origin.as_slice() {
         [] => String::new(),
-        lost => format!(" Left out, for want of that beginning: {}.", lost.join(", ")),
+        without_origin => {
+            format!(" Left out, because they have no such start: {}.", without_origin.join(", "))
+        }
     };
     body.figure(
         &time.svg(),
         &format!(
-            "Force over time since {}. Drawn are the lowest and the highest of each column of pixels.{left_out}",
+            "Force over time since {}. The figure shows the lowest and the highest sample of each pixel column.{left_out}",
             align.word()
         ),
     );
-    let caption = "Force over depth. No sample is further than half a pixel from what is drawn.";
+    let caption = "Force over depth. Every sample is within half a pixel of the line.";
     body.figure(&depth.svg(), caption);
     parameters(body, subjects);
 }
