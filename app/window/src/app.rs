@@ -1,20 +1,20 @@
 //! The workbench's window as an eframe app: `logic` reads keys and answers, `ui` draws a snapshot.
 
-use crate::command::{Command, Commands, TextSize};
+use crate::command::{CommandQueue, TextSize, UserCommand};
 use crate::screens::run;
 use crate::screens::screen::{Screen, Screens};
-use crate::settings::{Kept, ZOOM};
+use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
-use crate::shell::dropped::push_dropped;
+use crate::shell::dropped_files::push_dropped;
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
-use crate::shell::keys::Keys;
+use crate::shell::keys::KeyReader;
 use crate::shell::pace::FramePace;
-use crate::shell::palette::{Action, Palette};
+use crate::shell::palette::{Palette, PaletteAction};
 use crate::shell::panels::frame;
 use crate::shell::rail::{self, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
-use crate::shell::sizes::{Edge, STEP, Sizes};
+use crate::shell::sizes::{PanelEdge, STEP, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::shell::tour::Tour;
 use crate::theme;
@@ -34,9 +34,9 @@ pub struct WorkbenchApp {
     events: EventLog,
     note: String,
     palette: Palette,
-    settings: Kept,
+    settings: SettingsFile,
     sizes: Sizes,
-    keys: Keys,
+    keys: KeyReader,
     meter: FrameMeter,
     pace: FramePace,
     is_zoom_set: bool,
@@ -47,7 +47,7 @@ impl WorkbenchApp {
     /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(mut options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
-        let (settings, told) = Kept::open(options.settings.take());
+        let (settings, told) = SettingsFile::open(options.settings.take());
         if settings.now.is_dark {
             theme::switch(ctx);
         }
@@ -59,7 +59,7 @@ impl WorkbenchApp {
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
         workbench.refusal = told;
         let form = &mut workbench.form;
-        form.set_told("operator", &settings.now.operator);
+        form.set_label("operator", &settings.now.operator);
         if form.folder.is_empty() {
             form.folder.clone_from(&settings.now.sessions);
         }
@@ -72,7 +72,7 @@ impl WorkbenchApp {
             palette: Palette::default(),
             sizes: Sizes::remembered([settings.now.left, settings.now.right, settings.now.log]),
             settings,
-            keys: Keys::default(),
+            keys: KeyReader::default(),
             meter: FrameMeter::from_environment(),
             pace,
             is_zoom_set: false,
@@ -98,40 +98,40 @@ impl WorkbenchApp {
     }
 
     /// Does what was asked for.
-    fn act(&mut self, ctx: &Context, commands: &mut Commands) {
+    fn act(&mut self, ctx: &Context, commands: &mut CommandQueue) {
         for command in commands.take() {
             self.act_on(ctx, command);
             ctx.request_repaint();
         }
     }
 
-    fn act_on(&mut self, ctx: &Context, command: Command) {
+    fn act_on(&mut self, ctx: &Context, command: UserCommand) {
         self.workbench.occupation = self.screens.occupation();
         match command {
-            Command::Stop => self.stop(),
-            Command::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
-            Command::CancelWork => self.screens.shown_mut().cancel(),
-            Command::Show(screen) => self.screens.show(screen),
-            Command::SwitchTheme => theme::switch(ctx),
-            Command::Resize { edge, is_larger } => {
+            UserCommand::Stop => self.stop(),
+            UserCommand::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
+            UserCommand::CancelWork => self.screens.shown_mut().cancel(),
+            UserCommand::Show(screen) => self.screens.show(screen),
+            UserCommand::SwitchTheme => theme::switch(ctx),
+            UserCommand::Resize { edge, is_larger } => {
                 self.sizes.grow(edge, if is_larger { STEP } else { -STEP });
             }
-            Command::TextSize(size) => set_text_size(ctx, size),
-            Command::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
-            Command::Palette => self.palette.toggle(),
-            Command::TourStart => {
+            UserCommand::TextSize(size) => set_text_size(ctx, size),
+            UserCommand::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
+            UserCommand::Palette => self.palette.toggle(),
+            UserCommand::TourStart => {
                 self.tour.start();
                 self.screens.show(run::SCREEN.name);
             }
-            Command::TourNext => match self.tour.go_on() {
+            UserCommand::TourNext => match self.tour.go_on() {
                 Some(screen) => self.screens.show(screen),
                 None => self.settings.now.is_tour_over = true,
             },
-            Command::TourEnd => {
+            UserCommand::TourEnd => {
                 self.tour.end();
                 self.settings.now.is_tour_over = true;
             }
-            Command::NoteTyped => {
+            UserCommand::NoteTyped => {
                 let text = match self.note.trim() {
                     "" => "mark".to_owned(),
                     text => text.to_owned(),
@@ -165,7 +165,7 @@ impl WorkbenchApp {
         let now = &mut self.settings.now;
         let form = &self.workbench.form;
         now.screen = self.screens.shown().to_owned();
-        now.operator = form.told_text("operator").to_owned();
+        now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);
         [now.left, now.right, now.log] = self.sizes.told();
     }
@@ -182,7 +182,7 @@ impl WorkbenchApp {
     }
 
     /// Reads the keys that stop nothing, and takes what was dropped.
-    fn read_input(&mut self, ctx: &Context, commands: &mut Commands) {
+    fn read_input(&mut self, ctx: &Context, commands: &mut CommandQueue) {
         if self.keys.read(ctx, commands) {
             let dropped = ctx.input(|input| input.raw.dropped_files.clone());
             let paths = dropped.iter().map(|file| file.path().to_owned());
@@ -191,7 +191,7 @@ impl WorkbenchApp {
     }
 
     /// Draws every panel. Changes nothing but what is typed and pressed.
-    fn draw(&mut self, ui: &mut Ui, commands: &mut Commands) {
+    fn draw(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
         let panel = |name: &'static str, ui: &Ui| {
             let panel = Panel::top(name).frame(frame(ui, false));
             panel.resizable(false)
@@ -214,9 +214,9 @@ impl WorkbenchApp {
             .frame(frame(ui, false))
             .show(ui, |ui| rail_ui(ui, self.screens.shown(), commands));
         let log = Panel::bottom("log").frame(frame(ui, true));
-        let log = self.sizes.of(Edge::Log, log);
+        let log = self.sizes.of(PanelEdge::Log, log);
         let log = log.show(ui, |ui| self.events.ui(ui, &snapshot, commands));
-        self.sizes.drag(ui, Edge::Log, log.response.rect);
+        self.sizes.drag(ui, PanelEdge::Log, log.response.rect);
         let screen = self.screens.shown_mut();
         screen.ui(ui, &mut self.sizes, &mut self.workbench, commands);
     }
@@ -238,14 +238,14 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut RawInput) {
-        let mut stops = Commands::default();
+        let mut stops = CommandQueue::default();
         self.keys.read_early(ctx, &raw_input.events, &mut stops);
         self.act(ctx, &mut stops);
     }
 
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
         // Stops come before anything else of a frame.
-        let mut commands = Commands::default();
+        let mut commands = CommandQueue::default();
         self.keys.read_stops(ctx, &mut commands);
         self.act(ctx, &mut commands);
         self.handle_close(ctx);
@@ -256,7 +256,7 @@ impl eframe::App for WorkbenchApp {
         }
         self.workbench.poll();
         if let Some((ask, path)) = self.workbench.dialog.poll() {
-            commands.push(Command::Chosen(ask, path));
+            commands.push(UserCommand::Chosen(ask, path));
         }
         self.workbench.occupation = self.screens.occupation();
         self.screens.poll(ctx, &mut self.workbench);
@@ -272,15 +272,13 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        let mut commands = Commands::default();
+        let mut commands = CommandQueue::default();
         self.draw(ui, &mut commands);
         if self.palette.is_open() {
             let mut actions = self.actions();
-            actions.extend(
-                places(ui.ctx())
-                    .into_iter()
-                    .map(|(name, id)| Action::new(format!("Go to {name}"), "", Command::Focus(id))),
-            );
+            actions.extend(places(ui.ctx()).into_iter().map(|(name, id)| {
+                PaletteAction::new(format!("Go to {name}"), "", UserCommand::Focus(id))
+            }));
             self.palette.ui(ui, &actions, &mut commands);
         }
         if !std::mem::replace(&mut self.are_fonts_warm, true) {

@@ -1,16 +1,16 @@
 //! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
 
-use crate::screens::run_middle::Middle;
-use crate::shell::run_strip::Wish;
-use crate::shell::sizes::Edge;
-use crate::workers::path_dialog::Ask;
+use crate::screens::run_panes::RunPane;
+use crate::shell::run_strip::RunControl;
+use crate::shell::sizes::PanelEdge;
+use crate::workers::path_dialog::PathPurpose;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// One thing the user asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Command {
+pub enum UserCommand {
     /// Start the plan in the form.
     Start,
     /// Stop motion, now.
@@ -18,7 +18,7 @@ pub enum Command {
     /// Cut the motion, now, without braking.
     Halt,
     /// Pause, resume, finish early, abort or answer a prompt, where the run allows it.
-    Wish(Wish),
+    RunControl(RunControl),
     /// After a stop: leave the tissue.
     Retract,
     /// After a stop: end the session where the probe stands.
@@ -28,9 +28,9 @@ pub enum Command {
     /// List the serial ports again.
     ListPorts,
     /// Choose a folder or a file in a dialog of its own.
-    Choose(Ask),
+    Choose(PathPurpose),
     /// Show the protocols, the expected course or what was measured.
-    View(Middle),
+    View(RunPane),
     /// Take a built-in protocol into the form.
     TakeProtocol(&'static str),
     /// Read the protocol file whose path is typed.
@@ -38,7 +38,7 @@ pub enum Command {
     /// Write down in the run in progress what stands in the field for notes; a mark if nothing does.
     NoteTyped,
     /// Move by hand: a short run beside the protocol in the form.
-    Aside(Aside),
+    ManualMove(ManualMove),
     /// Take the protocol that calibrates the load cell.
     MeasureCalibration,
     /// Store the calibration that the last run measured.
@@ -68,7 +68,7 @@ pub enum Command {
     /// Make a panel larger, or smaller.
     Resize {
         /// Which.
-        edge: Edge,
+        edge: PanelEdge,
         /// Whether larger.
         is_larger: bool,
     },
@@ -85,7 +85,7 @@ pub enum Command {
     /// Show the screen of this name. What goes on goes on, and the stop control stays.
     Show(&'static str),
     /// Take what was chosen in a dialog, or dropped on the window.
-    Chosen(Ask, PathBuf),
+    Chosen(PathPurpose, PathBuf),
     /// Import tables of other programs.
     Import(Vec<PathBuf>),
     /// Compute a recording of the haptic loop again.
@@ -94,7 +94,7 @@ pub enum Command {
     ReplayScene(PathBuf),
 }
 
-impl Command {
+impl UserCommand {
     /// Whether it stops motion: nothing may come before it.
     pub const fn is_stop(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
@@ -103,14 +103,14 @@ impl Command {
 
 /// A run beside the protocol in the form.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Aside {
+pub struct ManualMove {
     /// Name of the built-in protocol.
     pub protocol: &'static str,
     /// Its values, as they would be typed.
     pub values: BTreeMap<String, String>,
 }
 
-impl Aside {
+impl ManualMove {
     /// Move by a distance in mm, towards the tissue where it is positive, at a speed in mm/s.
     #[must_use]
     pub fn jog(distance: f64, speed: f64) -> Self {
@@ -143,20 +143,20 @@ pub enum TextSize {
 
 /// What was asked for since the app last acted.
 #[derive(Debug, Default)]
-pub struct Commands(Vec<Command>);
+pub struct CommandQueue(Vec<UserCommand>);
 
-impl Commands {
+impl CommandQueue {
     /// Asks for something.
-    pub fn push(&mut self, command: Command) {
+    pub fn push(&mut self, command: UserCommand) {
         self.0.push(command);
     }
 
     /// Everything asked for, a halt and then a stop before all else; leaves nothing behind.
-    pub fn take(&mut self) -> Vec<Command> {
+    pub fn take(&mut self) -> Vec<UserCommand> {
         let mut commands = std::mem::take(&mut self.0);
         commands.sort_by_key(|command| match command {
-            Command::Halt => 0,
-            Command::Stop => 1,
+            UserCommand::Halt => 0,
+            UserCommand::Stop => 1,
             _ => 2,
         });
         commands
@@ -169,13 +169,15 @@ mod tests {
 
     #[test]
     fn a_stop_overtakes_what_was_asked_before() {
-        let mut commands = Commands::default();
-        for command in [Command::Start, Command::ListPorts, Command::Stop, Command::Halt] {
+        let mut commands = CommandQueue::default();
+        for command in
+            [UserCommand::Start, UserCommand::ListPorts, UserCommand::Stop, UserCommand::Halt]
+        {
             commands.push(command);
         }
         assert_eq!(
             commands.take(),
-            [Command::Halt, Command::Stop, Command::Start, Command::ListPorts]
+            [UserCommand::Halt, UserCommand::Stop, UserCommand::Start, UserCommand::ListPorts]
         );
         assert!(commands.take().is_empty());
     }

@@ -14,7 +14,7 @@ pub const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=2.5;
 /// What is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Settings {
+pub struct WindowSettings {
     /// Whether the dark theme is on.
     pub is_dark: bool,
     /// Size of everything, 1 as it is made.
@@ -35,7 +35,7 @@ pub struct Settings {
     pub is_tour_over: bool,
 }
 
-impl Default for Settings {
+impl Default for WindowSettings {
     fn default() -> Self {
         Self {
             is_dark: false,
@@ -51,7 +51,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl WindowSettings {
     /// Those of a file; the usual ones where there is none.
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = match std::fs::read_to_string(path) {
@@ -96,21 +96,21 @@ fn unreadable(path: &Path, reason: &str) -> String {
 
 /// The settings and where they are kept, if anywhere.
 #[derive(Debug, Default)]
-pub struct Kept {
+pub struct SettingsFile {
     /// As they are now.
-    pub now: Settings,
+    pub now: WindowSettings,
     /// As the file has them.
-    stored: Settings,
+    stored: WindowSettings,
     path: Option<PathBuf>,
 }
 
-impl Kept {
+impl SettingsFile {
     /// Reads them; what is wrong with the file is told once, and then nothing is written there.
     pub fn open(path: Option<PathBuf>) -> (Self, Option<String>) {
         let Some(path) = path else {
             return (Self::default(), None);
         };
-        match Settings::read(&path) {
+        match WindowSettings::read(&path) {
             Ok(read) => {
                 let kept = Self { now: read.clone(), stored: read, path: Some(path) };
                 (kept, None)
@@ -146,16 +146,16 @@ mod tests {
     fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sub").join(SETTINGS_FILE);
-        let (mut kept, told) = Kept::open(Some(path.clone()));
-        assert_eq!((&kept.now, told), (&Settings::default(), None));
+        let (mut kept, told) = SettingsFile::open(Some(path.clone()));
+        assert_eq!((&kept.now, told), (&WindowSettings::default(), None));
         kept.now.zoom = 1.5;
         kept.now.operator = "Ada \"L\"".into();
         kept.store().unwrap();
-        let (again, _) = Kept::open(Some(path.clone()));
+        let (again, _) = SettingsFile::open(Some(path.clone()));
         assert_eq!(again.now, kept.now);
         for broken in ["{", "[1]", "{\"zoom\": \"large\"}"] {
             std::fs::write(&path, broken).unwrap();
-            let (mut kept, told) = Kept::open(Some(path.clone()));
+            let (mut kept, told) = SettingsFile::open(Some(path.clone()));
             assert!(told.unwrap().contains("cannot be read"), "{broken}");
             kept.now.zoom = 2.0;
             kept.store().unwrap();
@@ -163,6 +163,6 @@ mod tests {
         }
         // A newer palpate may keep more; a size that nobody can read is not taken.
         std::fs::write(&path, "{\"zoom\": 99.0, \"from_the_future\": 1}").unwrap();
-        assert_eq!(Kept::open(Some(path)).0.now.zoom, *ZOOM.end());
+        assert_eq!(SettingsFile::open(Some(path)).0.now.zoom, *ZOOM.end());
     }
 }

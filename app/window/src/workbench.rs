@@ -1,10 +1,10 @@
 //! What every screen shares: the runner and what it says, the protocol that stands ready, the calibration in use.
 
-use crate::command::{Aside, Command};
-use crate::screens::form::{Bench, ProtocolForm};
+use crate::command::{ManualMove, UserCommand};
+use crate::screens::form::{ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::window::WindowOptions;
-use crate::workers::path_dialog::{Ask, Dialog, pick};
+use crate::workers::path_dialog::{Dialog, PathPurpose, pick};
 use crate::workers::ports::Ports;
 use eframe::egui::Context;
 use palpate_haptics::surface::SceneCurves;
@@ -26,7 +26,7 @@ enum Start {
 
 /// What a screen has in front that others offer to take.
 #[derive(Debug, Default)]
-pub struct Front {
+pub struct ScreenOffers {
     /// The session on the review screen.
     pub review: Option<PathBuf>,
     /// The session chosen in the library.
@@ -50,7 +50,7 @@ pub struct Workbench {
     /// The newest snapshot taken for drawing.
     pub snapshot: Arc<Snapshot>,
     /// Calibration and limits of new sessions.
-    pub bench: Bench,
+    pub bench: RunSetup,
     /// The protocol that stands ready.
     pub form: ProtocolForm,
     /// The folder of recorded sessions, or why there is none.
@@ -58,11 +58,11 @@ pub struct Workbench {
     /// The serial ports of this computer.
     pub ports: Ports,
     /// The desktop's dialog.
-    pub dialog: Dialog<(Ask, PathBuf)>,
+    pub dialog: Dialog<(PathPurpose, PathBuf)>,
     /// Why what was asked for last was not done.
     pub refusal: Option<String>,
     /// What screens offer each other.
-    pub front: Front,
+    pub front: ScreenOffers,
     /// What screens are at.
     pub occupation: Occupation,
     start: Start,
@@ -97,7 +97,7 @@ impl Workbench {
         Ok(Self {
             snapshot: runner.snapshot(),
             runner,
-            bench: Bench {
+            bench: RunSetup {
                 calibration: options.calibration,
                 curve,
                 limits: options.limits,
@@ -108,7 +108,7 @@ impl Workbench {
             ports,
             dialog: Dialog::default(),
             refusal: None,
-            front: Front::default(),
+            front: ScreenOffers::default(),
             occupation: Occupation::default(),
             start: Start::None,
             starts: 0,
@@ -156,12 +156,12 @@ impl Workbench {
 
     /// Whether the protocol that stands ready may start now, or the reason why not.
     pub fn start_verdict(&self) -> Result<(), String> {
-        self.aside_verdict()?;
+        self.move_verdict()?;
         self.form.verdict()
     }
 
     /// Whether the axis may be moved by hand now, or why not.
-    pub fn aside_verdict(&self) -> Result<(), String> {
+    pub fn move_verdict(&self) -> Result<(), String> {
         if let Some(reason) = &self.snapshot.rig.link_error {
             return Err(format!("the link to the rig is lost ({reason})"));
         }
@@ -198,27 +198,27 @@ impl Workbench {
     }
 
     /// Does what concerns the rig and the run in progress; whether that was asked for.
-    pub fn act(&mut self, ctx: &Context, command: &Command) -> bool {
+    pub fn act(&mut self, ctx: &Context, command: &UserCommand) -> bool {
         match command {
-            Command::Halt => self.operator(Operator::Halt),
-            Command::Wish(wish) => {
+            UserCommand::Halt => self.operator(Operator::Halt),
+            UserCommand::RunControl(wish) => {
                 let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
                 if let Some(Ok(choice)) = choice {
                     self.operator(choice);
                 }
             }
-            Command::Retract => {
+            UserCommand::Retract => {
                 if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
                     self.operator(Operator::Retract);
                 }
             }
-            Command::CloseSession => self.operator(Operator::Close),
-            Command::Reconnect => {
+            UserCommand::CloseSession => self.operator(Operator::Close),
+            UserCommand::Reconnect => {
                 let asked = self.runner.request(Request::Reconnect);
                 self.heed(asked);
             }
-            Command::ListPorts => self.ports.refresh(ctx),
-            Command::Choose(ask) => {
+            UserCommand::ListPorts => self.ports.refresh(ctx),
+            UserCommand::Choose(ask) => {
                 let ask = *ask;
                 let opened = self.dialog.open(ctx, move |dialog| pick(ask, dialog));
                 self.heed(opened);
@@ -259,8 +259,8 @@ impl Workbench {
     }
 
     /// A run beside the protocol that stands ready; what keeps it from being is told.
-    pub fn aside_run(&mut self, aside: &Aside) -> Option<RunRequest> {
-        self.aside_verdict().ok()?;
+    pub fn manual_run(&mut self, aside: &ManualMove) -> Option<RunRequest> {
+        self.move_verdict().ok()?;
         match self.form.aside(aside, &self.snapshot.rig, &self.bench) {
             Ok(request) => Some(request),
             Err(reason) => {

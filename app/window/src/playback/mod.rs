@@ -3,7 +3,7 @@
 
 mod transport;
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::plots::PlotCache;
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
@@ -129,7 +129,7 @@ impl eframe::App for PlaybackApp {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        let mut commands = Commands::default();
+        let mut commands = CommandQueue::default();
         Panel::top("head")
             .exact_size(HEIGHT + 14.0)
             .resizable(false)
@@ -157,7 +157,7 @@ impl eframe::App for PlaybackApp {
             });
         CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));
         // The only thing that the events ask for here.
-        if commands.take().contains(&Command::SwitchTheme) {
+        if commands.take().contains(&UserCommand::SwitchTheme) {
             theme::switch(ui.ctx());
         }
     }

@@ -13,19 +13,19 @@ const LEAST_SHARE: f64 = 1e-9;
 
 /// A stretch of an axis and the whole it is a part of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
+pub struct AxisRange {
     whole: [f64; 2],
     /// What is shown; none while that is the whole.
     part: Option<[f64; 2]>,
 }
 
-impl Default for Span {
+impl Default for AxisRange {
     fn default() -> Self {
         Self { whole: [0.0, 1.0], part: None }
     }
 }
 
-impl Span {
+impl AxisRange {
     /// What there is; what is shown stays, or goes on to be the whole.
     pub fn set_whole(&mut self, [low, high]: [f64; 2]) {
         if low.is_finite() && high.is_finite() {
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn the_place_under_the_pointer_stays_where_it_is() {
-        let mut span = Span::default();
+        let mut span = AxisRange::default();
         span.set_whole([0.0, 100.0]);
         assert!(span.is_whole() && span.shown() == [0.0, 100.0]);
         span.zoom(4.0, 20.0);
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn nothing_is_lost_out_of_sight() {
-        let mut span = Span::default();
+        let mut span = AxisRange::default();
         span.set_whole([10.0, 20.0]);
         for _ in 0..200 {
             span.pan(0.7);

@@ -1,7 +1,7 @@
 //! Force over depth of recorded sessions. Which points are drawn is found beside the window, once for a zoom. Lines of more
 //! points than a frame can draw are found as a picture.
 
-use super::navigate::{Gesture, Span, gesture};
+use super::navigate::{AxisRange, Gesture, gesture};
 use super::style::still;
 use crate::theme::Tokens;
 use crate::workers::Job;
@@ -17,7 +17,7 @@ const POINTS_MAX: usize = 30_000;
 
 /// What of one session is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct DepthSource<'a> {
     /// Its samples.
     pub track: &'a Track,
     /// Columns of depth and force in them.
@@ -43,7 +43,7 @@ struct Key {
 
 /// The line of one session.
 #[derive(Clone, Debug, Default)]
-struct Reduced {
+struct ReducedLine {
     id: u64,
     stretches: Vec<Vec<PlotPoint>>,
     samples: u64,
@@ -51,9 +51,9 @@ struct Reduced {
 }
 
 /// The lines for a view.
-struct Made {
+struct DepthPicture {
     key: Key,
-    lines: Vec<Reduced>,
+    lines: Vec<ReducedLine>,
     /// Those of too many points, over each other.
     picture: Option<ColorImage>,
 }
@@ -61,10 +61,10 @@ struct Made {
 /// The lines last found, and the search for others.
 #[derive(Default)]
 pub struct DepthLines {
-    job: Job<Option<Made>>,
+    job: Job<Option<DepthPicture>>,
     is_unwanted: Arc<AtomicBool>,
     sought: Option<Key>,
-    made: Option<Made>,
+    made: Option<DepthPicture>,
     texture: Option<TextureHandle>,
 }
 
@@ -73,8 +73,8 @@ impl DepthLines {
     pub fn update(
         &mut self,
         ctx: &Context,
-        sources: &[Source<'_>],
-        [depth, force]: [&Span; 2],
+        sources: &[DepthSource<'_>],
+        [depth, force]: [&AxisRange; 2],
         pixels: [f64; 2],
     ) {
         if let Some(Some(mut made)) = self.job.poll() {
@@ -156,7 +156,7 @@ impl DepthLines {
     }
 }
 
-/// The same as [`Source`], for a thread.
+/// The same as [`DepthSource`], for a thread.
 struct Owned {
     track: Track,
     columns: [usize; 2],
@@ -165,7 +165,7 @@ struct Owned {
     color: Color32,
 }
 
-fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<Made> {
+fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<DepthPicture> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
@@ -197,14 +197,14 @@ fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<Made>
         let point = |[px, py]: [f64; 2]| PlotPoint::new(x[0] + px / scale[0], y[0] + py / scale[1]);
         let stretches: Vec<Vec<PlotPoint>> =
             found.into_iter().map(|stretch| stretch.into_iter().map(point).collect()).collect();
-        lines.push(Reduced {
+        lines.push(ReducedLine {
             id: source.id,
             points: stretches.iter().map(Vec::len).sum(),
             stretches,
             samples,
         });
     }
-    Some(Made { key, lines, picture })
+    Some(DepthPicture { key, lines, picture })
 }
 
 /// Lays what a line crosses over the picture.
@@ -220,7 +220,7 @@ fn paint(picture: &mut Option<ColorImage>, coverage: &Coverage, color: Color32) 
 }
 
 /// One session's line as it is drawn.
-pub struct Layer<'a> {
+pub struct DepthLayer<'a> {
     /// What it is.
     pub name: &'a str,
     /// Its colour.
@@ -235,8 +235,8 @@ pub struct Layer<'a> {
 pub fn over_depth_ui(
     ui: &mut Ui,
     lines: &DepthLines,
-    layers: &[Layer<'_>],
-    [depth, force]: [&Span; 2],
+    layers: &[DepthLayer<'_>],
+    [depth, force]: [&AxisRange; 2],
 ) -> (Gesture, [f64; 2]) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (x, y) = (depth.shown(), force.shown());
@@ -297,7 +297,7 @@ mod tests {
         track
     }
 
-    fn made(parts: &[([usize; 2], Color32)], pixels: f64) -> Made {
+    fn made(parts: &[([usize; 2], Color32)], pixels: f64) -> DepthPicture {
         let sources: Vec<Owned> = parts
             .iter()
             .enumerate()

@@ -1,6 +1,6 @@
 //! Quantities of sessions over time, above each other with one time axis.
 
-use super::navigate::{Gesture, Span, gesture};
+use super::navigate::{AxisRange, Gesture, gesture};
 use super::stretches::Stretches;
 use super::style::{round_marks, still};
 use crate::theme::Tokens;
@@ -9,7 +9,7 @@ use egui_plot::{HLine, LineStyle, Plot, PlotPoint, PlotUi, Span as Shade, Text, 
 use palpate_model::rig::Phase;
 
 /// One line.
-pub struct Layer<'a> {
+pub struct TimeLayer<'a> {
     /// What it is.
     pub name: &'a str,
     /// Its colour.
@@ -20,7 +20,7 @@ pub struct Layer<'a> {
 
 /// A moment that is marked.
 #[derive(Clone, Debug)]
-pub struct Moment {
+pub struct TimeMark {
     /// When, on the axis.
     pub t: f64,
     /// Whether it needs attention.
@@ -31,25 +31,25 @@ pub struct Moment {
 
 /// What stands behind and before the lines of every plot.
 #[derive(Clone, Debug, Default)]
-pub struct Setting {
+pub struct TimeBackdrop {
     /// Phases of the session in front: from, to, which.
     pub phases: Vec<(f64, f64, Phase)>,
     /// Stretches whose forces do not count.
     pub left_out: Vec<[f64; 2]>,
     /// What happened.
-    pub moments: Vec<Moment>,
+    pub moments: Vec<TimeMark>,
     /// Both cursors.
     pub cursors: [Option<f64>; 2],
 }
 
 /// One of the plots.
-pub struct Panel<'a> {
+pub struct TimePanel<'a> {
     /// Its name.
     pub id: &'static str,
     /// What stands at its axis.
     pub axis: &'static str,
     /// Its lines, the one in front last.
-    pub layers: Vec<Layer<'a>>,
+    pub layers: Vec<TimeLayer<'a>>,
     /// Whether the axis' zero is drawn.
     pub has_zero: bool,
 }
@@ -62,7 +62,7 @@ const NAMES: f64 = 0.1;
 const NAME_SHARE: f64 = 0.03;
 
 /// Lowest and highest of all lines with room around them.
-fn heights(panel: &Panel<'_>) -> [f64; 2] {
+fn heights(panel: &TimePanel<'_>) -> [f64; 2] {
     let known = panel.layers.iter().filter_map(|layer| layer.stretches.y());
     let ends = known.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let [low, high] = ends.unwrap_or([0.0, 1.0]);
@@ -72,7 +72,7 @@ fn heights(panel: &Panel<'_>) -> [f64; 2] {
 }
 
 /// Draws what all plots of a session have behind their lines: phases, what is left out, what happened.
-fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], tokens: &Tokens) {
+fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &TimeBackdrop, shown: [f64; 2], tokens: &Tokens) {
     for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
         if *to < shown[0] || *from > shown[1] {
             continue;
@@ -110,9 +110,9 @@ fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], toke
 /// Draws one plot in the space there is and returns what the pointer did in it. `is_last`: it has the time's name.
 pub fn over_time_ui(
     ui: &mut Ui,
-    panel: &Panel<'_>,
-    span: &Span,
-    setting: &Setting,
+    panel: &TimePanel<'_>,
+    span: &AxisRange,
+    setting: &TimeBackdrop,
     time_axis: Option<&str>,
 ) -> Gesture {
     let tokens = Tokens::of(ui.visuals().dark_mode);

@@ -2,7 +2,7 @@
 
 use super::figure::{PlacedPlot, PlotLook};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
@@ -76,7 +76,7 @@ impl PlotCache {
         ui.horizontal(|ui| {
             ui.label(RichText::new(&self.force_time.plot.title).heading().strong());
             for (view, name) in [(false, "Whole run"), (true, "From ramp")] {
-                ui.selectable_value(&mut self.is_from_ramp, view, name).place(name);
+                ui.selectable_value(&mut self.is_from_ramp, view, name).named(name);
             }
             if let Some(remark) = &self.remark {
                 ui.label(RichText::new(remark).color(tokens.text_quiet).small());

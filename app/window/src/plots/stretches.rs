@@ -17,7 +17,7 @@ struct Key {
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted {
+pub struct LineWindow {
     /// The stretch of the axis shown, in s.
     pub window: [f64; 2],
     /// Pixels across it.
@@ -41,7 +41,7 @@ pub struct Stretches {
 
 impl Stretches {
     /// Finds the points again where something changed.
-    pub fn update(&mut self, track: &Track, column: usize, wanted: Wanted) {
+    pub fn update(&mut self, track: &Track, column: usize, wanted: LineWindow) {
         let key = Key {
             window: wanted.window,
             pixels: wanted.pixels,
@@ -126,7 +126,7 @@ mod tests {
         let mut track = Track::default();
         track.push(Arc::new(Segment::new(times, &[values.collect()])));
         let mut stretches = Stretches::default();
-        let mut wanted = Wanted { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
+        let mut wanted = LineWindow { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
         for _ in 0..3 {
             stretches.update(&track, 0, wanted);
         }

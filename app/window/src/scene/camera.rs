@@ -45,7 +45,7 @@ pub struct Camera {
 
 /// A point as it is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct ProjectedPoint {
     /// Where in the picture.
     pub at: Pos2,
     /// How far along the line of sight, in mm.
@@ -124,7 +124,7 @@ pub struct Lens {
 
 impl Lens {
     /// Where a point is seen; `None` for one beside or behind the eye.
-    pub fn see(&self, point: Vec3) -> Option<Seen> {
+    pub fn see(&self, point: Vec3) -> Option<ProjectedPoint> {
         let from = along(point, self.eye, -1.0);
         let [right, up, distance] = self.axes.map(|axis| dot(from, axis));
         if distance.is_nan() || distance <= self.near {
@@ -134,7 +134,7 @@ impl Lens {
             self.centre.x + (self.scale * right / distance) as f32,
             self.centre.y - (self.scale * up / distance) as f32,
         );
-        Some(Seen { at, distance })
+        Some(ProjectedPoint { at, distance })
     }
 
     /// How many points of the picture a millimetre across the line of sight takes at a distance in mm.

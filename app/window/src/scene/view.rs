@@ -1,10 +1,10 @@
 //! The picture of a scene: surface, contact point, stylus and force, and what the pointer and the keys do in it.
 
 use super::camera::{Camera, Lens, Vec3, along};
-use super::facets::{Look, colour_depth, facets};
-use super::hand::{Hand, stylus};
+use super::facets::{SurfaceStyle, colour_depth, facets};
+use super::hand::{HandTarget, stylus};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use eframe::egui::epaint::Mesh;
 use eframe::egui::{
     Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
@@ -34,7 +34,7 @@ const EDGE: f32 = 12.0;
 
 /// What is shown at one moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown<'a> {
+pub struct ScenePicture<'a> {
     /// The surface.
     pub now: Heights<'a>,
     /// Its heights at rest, in mm.
@@ -54,7 +54,7 @@ pub struct Shown<'a> {
 pub struct SceneView {
     camera: Camera,
     extent: [f64; 2],
-    hand: Hand,
+    hand: HandTarget,
     /// Whether the lines of the mesh are drawn.
     pub has_lines: bool,
     /// The deepest depth since the scene began: colours do not change their meaning while one looks.
@@ -68,14 +68,14 @@ impl SceneView {
         Self {
             camera: Camera::of(extent),
             extent,
-            hand: Hand::above(extent),
+            hand: HandTarget::above(extent),
             has_lines: false,
             deepest: 0.0,
         }
     }
 
     /// Where the pointer and the keys want the tool.
-    pub fn hand(&self) -> &Hand {
+    pub fn hand(&self) -> &HandTarget {
         &self.hand
     }
 
@@ -85,10 +85,10 @@ impl SceneView {
     }
 
     /// Draws the scene in the space there is; the hand follows pointer and keys.
-    pub fn ui(&mut self, ui: &mut Ui, shown: &Shown) -> Response {
+    pub fn ui(&mut self, ui: &mut Ui, shown: &ScenePicture) -> Response {
         let size = ui.available_size().max(vec2(80.0, 80.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
-        let response = response.place(NAME);
+        let response = response.named(NAME);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, NAME));
         self.take_pointer(ui, &response, rect);
         self.take_keys(ui, &response);
@@ -108,7 +108,7 @@ impl SceneView {
             ui.input(|input| (f64::from(input.smooth_scroll_delta.y), input.stable_dt));
         let presses = response.is_pointer_button_down_on()
             && ui.input(|input| input.pointer.button_down(PointerButton::Primary));
-        let turns = [PointerButton::Secondary, PointerButton::Middle];
+        let turns = [PointerButton::Secondary, PointerButton::RunPane];
         if turns.iter().any(|&button| response.dragged_by(button)) {
             let by = response.drag_delta();
             self.camera.orbit(-ORBIT[0] * f64::from(by.x), ORBIT[0] * f64::from(by.y));
@@ -174,12 +174,12 @@ impl SceneView {
         }
     }
 
-    fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &Shown) {
+    fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &ScenePicture) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let font = TextStyle::Small.resolve(ui.style());
         let lens = self.camera.lens(rect);
         let size = self.extent[0].max(self.extent[1]);
-        let look = Look {
+        let look = SurfaceStyle {
             deepest: colour_depth(self.deepest),
             // White in both themes: the colours before which they stand are the same.
             lines: self.has_lines.then_some(tokens.on_alarm.gamma_multiply(0.5)),
@@ -206,7 +206,7 @@ impl SceneView {
 }
 
 /// A stylus: a cone from the tip, its button to one side.
-fn stylus_shape(painter: &Painter, lens: &Lens, shown: &Shown, size: f64, tokens: &Tokens) {
+fn stylus_shape(painter: &Painter, lens: &Lens, shown: &ScenePicture, size: f64, tokens: &Tokens) {
     let [length, button] = stylus(shown.turn);
     let end = along(shown.device, length, STYLUS * size);
     let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else {
@@ -234,7 +234,7 @@ fn stylus_shape(painter: &Painter, lens: &Lens, shown: &Shown, size: f64, tokens
 fn force_shape(
     painter: &Painter,
     lens: &Lens,
-    shown: &Shown,
+    shown: &ScenePicture,
     size: f64,
     tokens: &Tokens,
     font: &FontId,
@@ -304,7 +304,7 @@ mod tests {
     fn frame(ctx: &Context, view: &mut SceneView, time: f64, events: Vec<Event>) -> Response {
         let grid = Grid::new(31, 31, 2.0).unwrap();
         let heights = vec![0.0; grid.nodes()];
-        let shown = Shown {
+        let shown = ScenePicture {
             now: Heights::new(grid, &heights).unwrap(),
             rest: &heights,
             device: view.hand().at(),

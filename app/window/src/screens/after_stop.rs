@@ -1,7 +1,7 @@
 //! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
 
 use super::calibration::can_keep;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::shell::activity::is_planned;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
@@ -11,13 +11,13 @@ use palpate_protocols::engine::Outcome;
 use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
-pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
     if let Some(outcome) = &run.outcome {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
         if can_keep(Some(run)).is_ok() && ui.button("Keep this calibration").clicked() {
-            commands.push(Command::KeepCalibration);
+            commands.push(UserCommand::KeepCalibration);
         }
     } else if let Some(ending) = &run.holding {
         section_ui(ui, "Run stopped, axis holds");
@@ -27,14 +27,14 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
 }
 
 /// The two ways on, with the reason if one of them is closed.
-fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
     let button = |text: &'static str| Button::new(text).min_size(vec2(112.0, 28.0));
     ui.horizontal(|ui| {
         if ui.add_enabled(run.can_retract.is_ok(), button("Retract  F8")).clicked() {
-            commands.push(Command::Retract);
+            commands.push(UserCommand::Retract);
         }
         if ui.add(button("Close session")).clicked() {
-            commands.push(Command::CloseSession);
+            commands.push(UserCommand::CloseSession);
         }
     });
     if let Err(reason) = &run.can_retract {

@@ -1,14 +1,14 @@
 //! The daily checks of the rig over time: how far its zero and a known weight were off, and what was allowed.
 
 use super::screen::{Screen, ScreenEntry};
-use crate::command::Commands;
+use crate::command::CommandQueue;
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
 use crate::widgets::task_bar::work_ui;
 use crate::workbench::Workbench;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, RichText, Ui, vec2};
 use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
@@ -24,7 +24,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
         Box::new(ChecksScreen {
             library: workbench.library.clone(),
             rig: workbench.snapshot.rig.description.name.clone(),
-            task: Task::default(),
+            task: BackgroundTask::default(),
             is_read: false,
         })
     },
@@ -52,7 +52,7 @@ const PLOTS: [(&str, Measured); 2] = [
 pub struct ChecksScreen {
     library: Result<PathBuf, String>,
     rig: String,
-    task: Task<Vec<PastCheck>>,
+    task: BackgroundTask<Vec<PastCheck>>,
     is_read: bool,
 }
 
@@ -71,7 +71,7 @@ impl ChecksScreen {
 }
 
 impl Screen for ChecksScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         section_ui(ui, &format!("Daily checks of {}", self.rig));
         quiet_ui(
             ui,
@@ -83,7 +83,7 @@ impl Screen for ChecksScreen {
         quiet_ui(ui, &format!("Run '{HOW}' on the command line."));
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let checks = match self.task.answer() {
             Some(Ok(checks)) => checks,
             Some(Err(reason)) => return alarm_ui(ui, reason),
@@ -114,11 +114,11 @@ impl Screen for ChecksScreen {
             Column::numbers("allowed (N)", 78.0),
             Column::words("calibration", 160.0),
         ];
-        let rows: Vec<Row> = checks.iter().rev().map(row).collect();
+        let rows: Vec<TableRow> = checks.iter().rev().map(row).collect();
         table_ui(ui, "daily_checks", &columns, &rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         section_ui(ui, "Last check");
         let Some(Ok(checks)) = self.task.answer() else {
             return;
@@ -159,7 +159,7 @@ impl Screen for ChecksScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.state().is_some()
     }
 }
 
@@ -187,7 +187,7 @@ fn deviations_ui(ui: &mut Ui, head: &str, checks: &[PastCheck], measured: Measur
     plot_ui(ui, head, &deviations(head, &known), look);
 }
 
-fn row(past: &PastCheck) -> Row {
+fn row(past: &PastCheck) -> TableRow {
     let check = &past.check;
     let force = |one: Option<Deviation>| {
         let newtons = one.map(|one| format!("{:+.4}", one.newtons));
@@ -198,7 +198,7 @@ fn row(past: &PastCheck) -> Row {
         limit.unwrap_or_else(|| "-".into())
     };
     let sentences = check.parts.iter().map(|part| part.sentence.as_str());
-    Row {
+    TableRow {
         cells: vec![
             time_text(check.at),
             check.by.clone(),
@@ -210,8 +210,8 @@ fn row(past: &PastCheck) -> Row {
             check.calibration.clone(),
         ],
         look: match check.is_passed {
-            true => RowLook::Plain,
-            false => RowLook::Alarm,
+            true => RowStyle::Plain,
+            false => RowStyle::Alarm,
         },
         hint: Some(sentences.collect::<Vec<_>>().join("\n")),
     }

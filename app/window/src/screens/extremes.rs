@@ -1,15 +1,15 @@
 //! What is right and what is refused at the ends of every range.
 
 use super::screen::{Screen, ScreenEntry};
-use crate::command::Commands;
+use crate::command::CommandQueue;
 use crate::theme::Tokens;
 use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
+use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
 use crate::widgets::task_bar::work_ui;
 use crate::workbench::Workbench;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{GroupSummary, summary};
@@ -28,7 +28,7 @@ const EXTENTS: [(Extent, &str); 2] =
     [(Extent::Quick, "corners: seconds"), (Extent::Whole, "everything: minutes")];
 
 /// What was found.
-pub struct Found {
+pub struct ExtremesResult {
     rows: Vec<Row>,
     groups: Vec<GroupSummary>,
 }
@@ -40,12 +40,12 @@ pub struct ExtremesScreen {
     group: Option<&'static str>,
     /// Shown alone; all verdicts if none.
     verdict: Option<Verdict>,
-    task: Task<Found>,
+    task: BackgroundTask<ExtremesResult>,
 }
 
 impl Default for ExtremesScreen {
     fn default() -> Self {
-        Self { extent: Extent::Quick, group: None, verdict: None, task: Task::default() }
+        Self { extent: Extent::Quick, group: None, verdict: None, task: BackgroundTask::default() }
     }
 }
 
@@ -58,7 +58,7 @@ impl ExtremesScreen {
 }
 
 impl Screen for ExtremesScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         section_ui(ui, "Test");
         ui.add(
             Label::new(
@@ -81,7 +81,7 @@ impl Screen for ExtremesScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let found = match self.task.answer() {
             Some(Ok(found)) => found,
@@ -114,7 +114,7 @@ impl Screen for ExtremesScreen {
         table_ui(ui, "extremes_table", &columns, &rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {
@@ -154,7 +154,7 @@ impl Screen for ExtremesScreen {
         self.task.start("extremes", ctx, move |progress| {
             let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
             let rows = rows.ok_or("ended before it was done")?;
-            Ok(Found { groups: summary(&rows), rows })
+            Ok(ExtremesResult { groups: summary(&rows), rows })
         });
     }
 
@@ -163,7 +163,7 @@ impl Screen for ExtremesScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.state().is_some()
     }
 }
 
@@ -178,9 +178,9 @@ fn table_row(row: &Row) -> TableRow {
             row.group.to_owned(),
         ],
         look: match row.verdict {
-            Verdict::Wrong => RowLook::Alarm,
-            Verdict::Right => RowLook::Plain,
-            Verdict::Refused | Verdict::Flagged => RowLook::Quiet,
+            Verdict::Wrong => RowStyle::Alarm,
+            Verdict::Right => RowStyle::Plain,
+            Verdict::Refused | Verdict::Flagged => RowStyle::Quiet,
         },
         hint: (!row.sentence.is_empty()).then(|| row.sentence.clone()),
     }

@@ -1,17 +1,17 @@
 //! The protocol that was chosen: its parameters, what it asks for, where sessions go; and the start.
 
-use super::form::{ParamField, ProtocolForm, ToldField};
+use super::form::{LabelField, ParamField, ProtocolForm};
 use super::preview_view::{acknowledgement_ui, preview_ui};
-use super::run_middle::Middle;
-use crate::command::{Command, Commands};
+use super::run_panes::RunPane;
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::path_dialog::Ask;
+use crate::workers::path_dialog::PathPurpose;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
 use palpate_protocols::file::{Kind, What};
 
@@ -38,7 +38,7 @@ pub fn protocol_ui(
     ui: &mut Ui,
     form: &mut ProtocolForm,
     facts: &ProtocolFacts<'_>,
-    commands: &mut Commands,
+    commands: &mut CommandQueue,
 ) {
     head_ui(ui, form, facts, commands);
     ui.scope(|ui| {
@@ -59,7 +59,12 @@ pub fn protocol_ui(
     preview_ui(ui, form);
 }
 
-fn head_ui(ui: &mut Ui, form: &ProtocolForm, facts: &ProtocolFacts<'_>, commands: &mut Commands) {
+fn head_ui(
+    ui: &mut Ui,
+    form: &ProtocolForm,
+    facts: &ProtocolFacts<'_>,
+    commands: &mut CommandQueue,
+) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let title = match (&form.protocol, &form.file) {
         (Ok(protocol), _) => protocol.title.clone(),
@@ -73,7 +78,7 @@ fn head_ui(ui: &mut Ui, form: &ProtocolForm, facts: &ProtocolFacts<'_>, commands
     }
     let button = Button::new("Change protocol...");
     if ui.add_enabled(!facts.is_busy, button).clicked() {
-        commands.push(Command::View(Middle::Choose));
+        commands.push(UserCommand::View(RunPane::Choose));
     }
 }
 
@@ -103,7 +108,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             let input = ui
                 .add(input)
                 .labelled_by(label.id)
-                .place(&field.parameter.name)
+                .named(&field.parameter.name)
                 .on_hover_text(&hint);
             if !is_wide {
                 ui.label(RichText::new(field.unit_beside()).color(tokens.text_quiet));
@@ -120,13 +125,13 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
 }
 
 /// Whether it stands in the form: it always does, or the protocol asks for it.
-fn is_shown(field: &ToldField) -> bool {
+fn is_shown(field: &LabelField) -> bool {
     field.is_asked || ALWAYS.contains(&field.key.name)
 }
 
 /// What else can be told, folded away.
-fn more_told_ui(ui: &mut Ui, told: &mut [ToldField]) {
-    let is_told = |one: &ToldField| !is_shown(one) && !one.text.is_empty();
+fn more_told_ui(ui: &mut Ui, told: &mut [LabelField]) {
+    let is_told = |one: &LabelField| !is_shown(one) && !one.text.is_empty();
     let count = told.iter().filter(|one| is_told(one)).count();
     let title = match count {
         0 => "More about specimen, probe and series".into(),
@@ -139,7 +144,7 @@ fn more_told_ui(ui: &mut Ui, told: &mut [ToldField]) {
     });
 }
 
-fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
+fn one_told_ui(ui: &mut Ui, field: &mut LabelField) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         let label = if ALWAYS.contains(&field.key.name) {
@@ -153,7 +158,7 @@ fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
             true => input.hint_text("asked for"),
             false => input,
         };
-        ui.add(input).labelled_by(label.id).place(field.key.name).on_hover_text(field.key.meaning);
+        ui.add(input).labelled_by(label.id).named(field.key.name).on_hover_text(field.key.meaning);
     });
     if let Some(reason) = &field.error {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
@@ -163,7 +168,7 @@ fn folder_ui(
     ui: &mut Ui,
     form: &mut ProtocolForm,
     facts: &ProtocolFacts<'_>,
-    commands: &mut Commands,
+    commands: &mut CommandQueue,
 ) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
@@ -177,10 +182,10 @@ fn folder_ui(
             .desired_width(width)
             .char_limit(4096)
             .hint_text(hint.to_owned());
-        ui.add(input).labelled_by(label.id).place("sessions in");
+        ui.add(input).labelled_by(label.id).named("sessions in");
         let button = Button::new("Choose...");
         if ui.add_enabled(!facts.is_dialog_open, button).clicked() {
-            commands.push(Command::Choose(Ask::NewSessions));
+            commands.push(UserCommand::Choose(PathPurpose::NewSessions));
         }
     });
     if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {
@@ -212,7 +217,7 @@ pub fn start_ui(
     ui: &mut Ui,
     form: &mut ProtocolForm,
     facts: &StartFacts<'_>,
-    commands: &mut Commands,
+    commands: &mut CommandQueue,
 ) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     if !facts.is_busy {
@@ -220,14 +225,14 @@ pub fn start_ui(
     }
     ui.horizontal(|ui| {
         if reason_button(ui, "Start  F5", vec2(104.0, 34.0), facts.verdict) {
-            commands.push(Command::Start);
+            commands.push(UserCommand::Start);
         }
     });
     if facts.is_link_lost {
         let hint = "opens the devices again and stops the axis; nothing moves, and position zero has to be found again";
         let button = ui.add_enabled(!facts.is_busy, Button::new("Connect again"));
         if button.on_hover_text(hint).clicked() {
-            commands.push(Command::Reconnect);
+            commands.push(UserCommand::Reconnect);
         }
     }
     if let Some(refusal) = facts.refusal {

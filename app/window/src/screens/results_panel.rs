@@ -3,7 +3,7 @@
 use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
-use crate::command::Commands;
+use crate::command::CommandQueue;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::alarm_ui;
@@ -23,7 +23,7 @@ pub fn results_ui(
     snapshot: &Snapshot,
     refit: Refit<'_>,
     cycles: &[Cycle],
-    commands: &mut Commands,
+    commands: &mut CommandQueue,
 ) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {

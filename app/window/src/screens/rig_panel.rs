@@ -1,6 +1,6 @@
 //! The rig: what it is, what it says now, and the serial ports of this computer.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::workers::ports::Ports;
@@ -10,7 +10,7 @@ use palpate_model::rig::{AxisStatus, Reading};
 use palpate_runner::{RigView, Snapshot};
 
 /// Draws the panel.
-pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Commands) {
+pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut CommandQueue) {
     let rig = &snapshot.rig;
     section_ui(ui, &format!("Rig {}", rig.description.name));
     fact_ui(ui, "identity", &rig.description.identity);
@@ -69,14 +69,14 @@ fn axis_words(status: AxisStatus) -> String {
     words.join(", ")
 }
 
-fn ports_ui(ui: &mut Ui, ports: &Ports, commands: &mut Commands) {
+fn ports_ui(ui: &mut Ui, ports: &Ports, commands: &mut CommandQueue) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.add_space(2.0);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Serial ports found").color(tokens.text_quiet));
         let button = Button::new("Refresh").small();
         if ui.add_enabled(!ports.is_busy(), button).clicked() {
-            commands.push(Command::ListPorts);
+            commands.push(UserCommand::ListPorts);
         }
     });
     match ports.found() {

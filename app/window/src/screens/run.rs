@@ -1,22 +1,22 @@
 //! The run screen: rig and protocol on the left, what is expected or measured in the middle, what is known on the right.
 
 use super::approach::Approach;
-use super::form::Checked;
+use super::form::CheckedPlan;
 use super::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
-use super::run_middle::{Chooser, Middle, expected_ui, first_view, is_offered, views_ui};
-use super::screen::{Reply, Screen, ScreenEntry};
+use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
 use super::weighing::weighing_ui;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
-use crate::shell::palette::Action;
+use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{Edge, Sizes};
+use crate::shell::sizes::{PanelEdge, Sizes};
 use crate::workbench::Workbench;
 use crate::workers::fit::{Refit, Refitter};
-use crate::workers::path_dialog::Ask;
+use crate::workers::path_dialog::PathPurpose;
 use crate::workers::recovery::Recovery;
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
@@ -34,7 +34,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 /// The screen's state. What runs belongs to the runner.
 pub struct RunScreen {
     chooser: Chooser,
-    middle: Middle,
+    middle: RunPane,
     approach: Approach,
     plots: PlotCache,
     /// The start that the plots are of.
@@ -50,7 +50,7 @@ impl RunScreen {
     fn new(workbench: &Workbench) -> Self {
         Self {
             chooser: Chooser::default(),
-            middle: Middle::default(),
+            middle: RunPane::default(),
             approach: Approach::default(),
             plots: PlotCache::for_calibration(&workbench.bench.calibration),
             plotted: 0,
@@ -72,7 +72,7 @@ impl RunScreen {
     fn take_protocol(&mut self, name: &str, workbench: &mut Workbench) {
         if !workbench.is_busy() {
             workbench.form.choose_built_in(name);
-            self.middle = Middle::Course;
+            self.middle = RunPane::Course;
         }
     }
 
@@ -109,14 +109,14 @@ impl Screen for RunScreen {
         ui: &mut Ui,
         sizes: &mut Sizes,
         workbench: &mut Workbench,
-        commands: &mut Commands,
+        commands: &mut CommandQueue,
     ) {
         // The start strip on the left never scrolls away, so that panel scrolls by itself.
         let left = Panel::left("rig_and_protocol").frame(frame(ui, false));
-        let left = sizes.of(Edge::Left, left);
+        let left = sizes.of(PanelEdge::Left, left);
         let left = left.show(ui, |ui| self.left_ui(ui, workbench, commands));
-        sizes.drag(ui, Edge::Left, left.response.rect);
-        side_ui(ui, sizes, Edge::Right, |ui| {
+        sizes.drag(ui, PanelEdge::Left, left.response.rect);
+        side_ui(ui, sizes, PanelEdge::Right, |ui| {
             self.right_ui(ui, workbench, commands);
         });
         CentralPanel::default()
@@ -124,7 +124,7 @@ impl Screen for RunScreen {
             .show(ui, |ui| self.middle_ui(ui, workbench, commands));
     }
 
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let verdict = workbench.start_verdict();
         let facts = self.facts(workbench);
         Panel::bottom("start")
@@ -147,18 +147,18 @@ impl Screen for RunScreen {
         });
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let run = workbench.run();
         views_ui(ui, self.middle, run, commands);
         let limits = &workbench.bench.limits;
         match (self.middle, run) {
-            (Middle::Weighing, Some(run)) => {
+            (RunPane::Weighing, Some(run)) => {
                 let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
                 weighing_ui(ui, run, signal, &workbench.bench, commands);
             }
-            (Middle::Approach, Some(run)) => self.approach.ui(ui, run),
-            (Middle::Weighing | Middle::Approach, None) => {}
-            (Middle::Choose, _) => {
+            (RunPane::Approach, Some(run)) => self.approach.ui(ui, run),
+            (RunPane::Weighing | RunPane::Approach, None) => {}
+            (RunPane::Choose, _) => {
                 let facts = ProtocolFacts {
                     is_busy: workbench.is_busy(),
                     library: &self.library,
@@ -167,16 +167,16 @@ impl Screen for RunScreen {
                 };
                 self.chooser.ui(ui, &workbench.form, &facts, commands);
             }
-            (Middle::Course, _) => {
+            (RunPane::Course, _) => {
                 let checked = workbench.form.checked();
-                let tight = |checked: &Checked| checked.plan.limits.tighten(*limits);
+                let tight = |checked: &CheckedPlan| checked.plan.limits.tighten(*limits);
                 let limits = CourseLimits {
                     force: checked.map_or(*limits, tight).force_max,
                     speed: workbench.snapshot.rig.description.speed_max,
                 };
                 expected_ui(ui, checked, limits);
             }
-            (Middle::Measured, _) => {
+            (RunPane::Measured, _) => {
                 let exact = match self.refitter.of(run) {
                     Refit::Done(exact) => Some(exact),
                     _ => None,
@@ -186,7 +186,7 @@ impl Screen for RunScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let refit = self.refit(workbench.run());
         results_ui(ui, &workbench.snapshot, refit, self.plots.cycles(), commands);
     }
@@ -204,75 +204,86 @@ impl Screen for RunScreen {
         {
             workbench.form.choose_file(&path, text);
             self.middle = match workbench.form.protocol {
-                Ok(_) => Middle::Course,
-                Err(_) => Middle::Choose,
+                Ok(_) => RunPane::Course,
+                Err(_) => RunPane::Choose,
             };
         }
         if self.plotted != workbench.starts() {
             self.plotted = workbench.starts();
             self.plots = PlotCache::for_calibration(&workbench.bench.calibration);
         }
-        let depth = workbench.form.checked().map_or(0.0, Checked::deepest_mm);
+        let depth = workbench.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
         self.plots.update(workbench.run(), workbench.bench.limits.force_max, depth);
         self.refitter.update(ctx, workbench.run());
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        ctx: &Context,
+        command: &UserCommand,
+        workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::Start => {
+            UserCommand::Start => {
                 let request = workbench.ready_run();
                 self.begin(request, workbench);
             }
-            Command::Aside(aside) => {
-                let request = workbench.aside_run(aside);
+            UserCommand::ManualMove(aside) => {
+                let request = workbench.manual_run(aside);
                 self.begin(request, workbench);
             }
-            Command::View(view) => {
+            UserCommand::View(view) => {
                 self.middle = *view;
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            Command::TakeProtocol(name) => {
+            UserCommand::TakeProtocol(name) => {
                 self.take_protocol(name, workbench);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            Command::MeasureCalibration => {
+            UserCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            Command::OpenProtocol => self.read(None, ctx, workbench),
-            Command::Chosen(Ask::Protocol, path) => self.read(Some(path), ctx, workbench),
-            Command::Chosen(Ask::NewSessions, folder) => {
+            UserCommand::OpenProtocol => self.read(None, ctx, workbench),
+            UserCommand::Chosen(PathPurpose::Protocol, path) => {
+                self.read(Some(path), ctx, workbench)
+            }
+            UserCommand::Chosen(PathPurpose::NewSessions, folder) => {
                 workbench.form.folder = folder.display().to_string();
             }
-            _ => return Reply::NotMine,
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Done
+        ScreenReply::Done
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let views = [
-            (Middle::Choose, "View: protocols"),
-            (Middle::Course, "View: expected course"),
-            (Middle::Measured, "View: measured"),
-            (Middle::Weighing, "View: weights"),
-            (Middle::Approach, "View: search for the surface"),
+            (RunPane::Choose, "View: protocols"),
+            (RunPane::Course, "View: expected course"),
+            (RunPane::Measured, "View: measured"),
+            (RunPane::Weighing, "View: weights"),
+            (RunPane::Approach, "View: search for the surface"),
         ];
-        let mut actions: Vec<Action> = views
+        let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
                 let verdict = match is_offered(view, workbench.run()) {
                     true => Ok(()),
                     false => Err("the run has no such thing".to_owned()),
                 };
-                Action::new(name, "", Command::View(view)).if_ok(verdict)
+                PaletteAction::new(name, "", UserCommand::View(view)).if_ok(verdict)
             })
             .collect();
         let is_free = workbench.free_verdict();
         actions.extend(BUILT_IN.iter().map(|(name, _)| {
             let words = format!("Protocol {name}");
-            Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone())
+            PaletteAction::new(words, "", UserCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
-        actions.push(Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)));
+        actions.push(PaletteAction::new(
+            "Open a protocol file",
+            "",
+            UserCommand::Choose(PathPurpose::Protocol),
+        ));
         actions
     }
 }

@@ -1,10 +1,10 @@
 //! What a screen is: the one way in which the window reaches each of them.
 
 use super::table::SCREENS;
-use crate::command::{Command, Commands};
-use crate::shell::palette::Action;
+use crate::command::{CommandQueue, UserCommand};
+use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{Edge, Sizes};
+use crate::shell::sizes::{PanelEdge, Sizes};
 use crate::workbench::{Occupation, Workbench};
 use eframe::egui::{CentralPanel, Context, Key, Ui};
 use std::any::Any;
@@ -24,7 +24,7 @@ pub struct ScreenEntry {
 
 /// What a screen makes of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reply {
+pub enum ScreenReply {
     /// It is none of its own.
     NotMine,
     /// Done, or refused with its reason on the screen.
@@ -39,13 +39,14 @@ pub enum Reply {
 /// whose answer [`Self::poll`] fetches.
 pub trait Screen: Any {
     /// Draws what is asked for.
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue);
 
     /// Draws what it is about.
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue);
 
     /// Draws what is known.
-    fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {}
+    fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    }
 
     /// Whether there is a panel on the right.
     fn has_right(&self) -> bool {
@@ -58,13 +59,13 @@ pub trait Screen: Any {
         ui: &mut Ui,
         sizes: &mut Sizes,
         workbench: &mut Workbench,
-        commands: &mut Commands,
+        commands: &mut CommandQueue,
     ) {
-        side_ui(ui, sizes, Edge::Left, |ui| {
+        side_ui(ui, sizes, PanelEdge::Left, |ui| {
             self.left_ui(ui, workbench, commands);
         });
         if self.has_right() {
-            side_ui(ui, sizes, Edge::Right, |ui| {
+            side_ui(ui, sizes, PanelEdge::Right, |ui| {
                 self.right_ui(ui, workbench, commands);
             });
         }
@@ -80,8 +81,13 @@ pub trait Screen: Any {
     fn shown(&mut self, _ctx: &Context) {}
 
     /// Does what was asked for, if it is for this screen.
-    fn act(&mut self, _ctx: &Context, _command: &Command, _workbench: &mut Workbench) -> Reply {
-        Reply::NotMine
+    fn act(
+        &mut self,
+        _ctx: &Context,
+        _command: &UserCommand,
+        _workbench: &mut Workbench,
+    ) -> ScreenReply {
+        ScreenReply::NotMine
     }
 
     /// Begins the work of the screen (F6).
@@ -112,7 +118,7 @@ pub trait Screen: Any {
     }
 
     /// What can be asked of it by name, and of the rest why not.
-    fn actions(&self, _workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, _workbench: &Workbench) -> Vec<PaletteAction> {
         Vec::new()
     }
 }
@@ -165,12 +171,12 @@ impl Screens {
     }
 
     /// Has the screen do a command whose own it is.
-    pub fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) {
+    pub fn act(&mut self, ctx: &Context, command: &UserCommand, workbench: &mut Workbench) {
         for (index, (_, screen)) in self.all.iter_mut().enumerate() {
             match screen.act(ctx, command, workbench) {
-                Reply::NotMine => {}
-                Reply::Done => return,
-                Reply::Show => {
+                ScreenReply::NotMine => {}
+                ScreenReply::Done => return,
+                ScreenReply::Show => {
                     self.shown = index;
                     return;
                 }
@@ -198,7 +204,7 @@ impl Screens {
     }
 
     /// What can be asked of them by name.
-    pub fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    pub fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let each = self.all.iter().map(|(_, one)| one.actions(workbench));
         each.flatten().collect()
     }

@@ -6,7 +6,7 @@ use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Ui};
 use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::{Ended, Replayed, ended_words};
@@ -26,7 +26,7 @@ pub(super) struct TapePanel {
     /// The end of a recording, which waits for the disk.
     ending: Job<Ended>,
     told: Option<Result<String, String>>,
-    task: Task<Replayed>,
+    task: BackgroundTask<Replayed>,
 }
 
 impl TapePanel {
@@ -97,7 +97,7 @@ impl TapePanel {
 
     /// Whether a recording is computed again.
     pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.state().is_some()
     }
 
     /// Fetches answers that have come.

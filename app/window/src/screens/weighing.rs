@@ -1,13 +1,13 @@
 //! One weight after the other: what is asked for, whether the signal is steady, what was read against what the
 //! calibration in use expects, and how far both are apart.
 
-use super::form::Bench;
-use crate::command::{Command, Commands};
+use super::form::RunSetup;
+use crate::command::{CommandQueue, UserCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
-use crate::shell::run_strip::{Wish, is_controllable};
+use crate::shell::run_strip::{RunControl, is_controllable};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::reason_button::reason_button;
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
 use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing;
 use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
@@ -23,8 +23,8 @@ pub fn weighing_ui(
     ui: &mut Ui,
     run: &RunView,
     signal: Option<Volts>,
-    bench: &Bench,
-    commands: &mut Commands,
+    bench: &RunSetup,
+    commands: &mut CommandQueue,
 ) {
     let next = next_of(run);
     now_ui(ui, run, next, signal, &bench.curve);
@@ -34,11 +34,11 @@ pub fn weighing_ui(
     };
     ui.horizontal(|ui| {
         if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
-            commands.push(Command::Wish(Wish::Redo));
+            commands.push(UserCommand::RunControl(RunControl::Redo));
         }
     });
     ui.add_space(4.0);
-    let rows: Vec<Row> =
+    let rows: Vec<TableRow> =
         run.to_weigh.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
     let columns = [
         Column::numbers("pass", 34.0),
@@ -133,43 +133,45 @@ fn steady_words(settling: &SettlingNow) -> String {
     }
 }
 
-fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> Row {
+fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> TableRow {
     let taken = run.weighed.iter().find(|one| one.step_index == planned.step_index);
     let is_next = next == Some(planned);
     let expected = curve.volts_from_newtons(newtons_of(planned.mass_g));
-    let apart = taken.map(|one| Apart::of(one, curve));
+    let deviation = taken.map(|one| WeightDeviation::of(one, curve));
     let cells = vec![
         planned.repeat.to_string(),
         if planned.is_loading { "up" } else { "down" }.into(),
         planned.mass_g.to_string(),
         format!("{:.4}", expected.0),
         taken.map_or_else(String::new, |one| format!("{:.4}", one.volts().0)),
-        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.1}", apart.mv)),
-        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.3}", apart.newtons)),
+        deviation.as_ref().map_or_else(String::new, |deviation| format!("{:+.1}", deviation.mv)),
+        deviation
+            .as_ref()
+            .map_or_else(String::new, |deviation| format!("{:+.3}", deviation.newtons)),
         match (taken, is_next) {
             (Some(_), _) => "read".into(),
             (None, true) => "now".into(),
             (None, false) => String::new(),
         },
     ];
-    Row {
+    TableRow {
         cells,
         look: match (taken, is_next) {
-            (_, true) => RowLook::Marked,
-            (None, false) => RowLook::Quiet,
-            (Some(_), false) => RowLook::Plain,
+            (_, true) => RowStyle::Marked,
+            (None, false) => RowStyle::Quiet,
+            (Some(_), false) => RowStyle::Plain,
         },
         hint: None,
     }
 }
 
 /// A reading against what the calibration in use expects.
-struct Apart {
+struct WeightDeviation {
     mv: f64,
     newtons: f64,
 }
 
-impl Apart {
+impl WeightDeviation {
     fn of(one: &Weighed, curve: &Curve) -> Self {
         let known = newtons_of(one.mass_g());
         Self {
@@ -179,7 +181,7 @@ impl Apart {
     }
 }
 
-fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
+fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
     let words =
         format!("Force by the calibration in use ({}) less the weight's", bench.calibration.name);
     ui.label(RichText::new(words).strong());

@@ -23,7 +23,7 @@ pub enum Shape {
 
 /// How loud the state is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
+pub enum StateTone {
     /// Nothing to look at.
     Quiet,
     /// Under way as planned.
@@ -42,11 +42,11 @@ pub struct Activity {
     /// Its shape.
     pub shape: Shape,
     /// Its tone.
-    pub tone: Tone,
+    pub tone: StateTone,
 }
 
 impl Activity {
-    fn new(word: impl Into<String>, shape: Shape, tone: Tone) -> Self {
+    fn new(word: impl Into<String>, shape: Shape, tone: StateTone) -> Self {
         Self { word: word.into(), shape, tone }
     }
 }
@@ -85,33 +85,35 @@ pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
 pub fn activity(snapshot: &Snapshot, intent: Intent) -> Activity {
     use palpate_model::rig::Phase;
     if snapshot.rig.link_error.is_some() {
-        return Activity::new("LINK LOST", Shape::Diamond, Tone::Alarm);
+        return Activity::new("LINK LOST", Shape::Diamond, StateTone::Alarm);
     }
     if intent == Intent::Closing {
-        return Activity::new("CLOSING", Shape::Square, Tone::Notice);
+        return Activity::new("CLOSING", Shape::Square, StateTone::Notice);
     }
     let Some(run) = run_in_progress(snapshot) else {
         return if intent == Intent::Starting {
-            Activity::new("STARTING", Shape::Triangle, Tone::Active)
+            Activity::new("STARTING", Shape::Triangle, StateTone::Active)
         } else if is_motion_possible(snapshot) {
-            Activity::new("MOVING", Shape::Triangle, Tone::Active)
+            Activity::new("MOVING", Shape::Triangle, StateTone::Active)
         } else {
-            Activity::new("IDLE", Shape::Ring, Tone::Quiet)
+            Activity::new("IDLE", Shape::Ring, StateTone::Quiet)
         };
     };
     match (&run.holding, run.phase) {
         (Some(ending), _) if is_planned(ending.ending) => {
-            Activity::new("STOPPED", Shape::Square, Tone::Notice)
+            Activity::new("STOPPED", Shape::Square, StateTone::Notice)
         }
-        (Some(_), _) => Activity::new("STOPPED", Shape::Diamond, Tone::Alarm),
-        (None, Phase::Stopped) => Activity::new("STOPPING", Shape::Square, Tone::Notice),
+        (Some(_), _) => Activity::new("STOPPED", Shape::Diamond, StateTone::Alarm),
+        (None, Phase::Stopped) => Activity::new("STOPPING", Shape::Square, StateTone::Notice),
         (None, _) if matches!(run.pause, PauseView::Paused { .. }) => {
-            Activity::new("PAUSED", Shape::Bars, Tone::Notice)
+            Activity::new("PAUSED", Shape::Bars, StateTone::Notice)
         }
         (None, _) if run.prompt.is_some() => {
-            Activity::new("YOUR TURN", Shape::Question, Tone::Notice)
+            Activity::new("YOUR TURN", Shape::Question, StateTone::Notice)
         }
-        (None, phase) => Activity::new(phase.name().to_uppercase(), Shape::Triangle, Tone::Active),
+        (None, phase) => {
+            Activity::new(phase.name().to_uppercase(), Shape::Triangle, StateTone::Active)
+        }
     }
 }
 

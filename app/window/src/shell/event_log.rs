@@ -1,8 +1,8 @@
 //! What happened, newest last, with a filter and a copy of what is shown.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, Snapshot};
 
@@ -14,7 +14,7 @@ pub struct EventLog {
 
 impl EventLog {
     /// Draws the log in the space there is.
-    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut CommandQueue) {
         let events = snapshot.run.as_ref().map_or(&[][..], |run| run.events.as_slice());
         let shown: Vec<&LogLine> =
             events.iter().filter(|line| is_shown(line, &self.filter)).collect();
@@ -43,14 +43,14 @@ impl EventLog {
             });
     }
 
-    fn head_ui(&mut self, ui: &mut Ui, shown: &[&LogLine], commands: &mut Commands) {
+    fn head_ui(&mut self, ui: &mut Ui, shown: &[&LogLine], commands: &mut CommandQueue) {
         ui.horizontal(|ui| {
             ui.label(RichText::new("Events").heading().strong());
             ui.add_space(8.0);
             let label = ui.label("filter");
             ui.add(TextEdit::singleline(&mut self.filter).desired_width(160.0).char_limit(100))
                 .labelled_by(label.id)
-                .place("filter of the events");
+                .named("filter of the events");
             if ui.button("Copy").clicked() {
                 let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
                 ui.ctx().copy_text(lines.join("\n"));
@@ -58,7 +58,7 @@ impl EventLog {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
                 if ui.button(name).clicked() {
-                    commands.push(Command::SwitchTheme);
+                    commands.push(UserCommand::SwitchTheme);
                 }
             });
         });

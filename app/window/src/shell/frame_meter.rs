@@ -25,7 +25,7 @@ pub struct FrameMeter {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct FrameReport {
     /// CPU seconds of all threads, graphics driver included, until the first frame was painted.
     first_frame_cpu_s: Option<f64>,
     /// CPU seconds of the window's own thread until then.
@@ -130,7 +130,7 @@ impl FrameMeter {
         let Some(path) = &self.report_path else {
             return Ok(());
         };
-        let report = Report {
+        let report = FrameReport {
             first_frame_cpu_s: self.first_frame_cpu_s,
             first_frame_main_thread_cpu_s: self.first_frame_main_thread_cpu_s,
             frames: self.frames,

@@ -1,40 +1,40 @@
 //! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
 
-use super::run_strip::Wish;
+use super::run_strip::RunControl;
 use super::top_bar::push_stop_buttons;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Context, Event, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
-pub const KEYS: [(Key, Command); 13] = [
-    (Key::F1, Command::Palette),
-    (Key::F12, Command::Stop),
-    (Key::Escape, Command::Stop),
-    (Key::F11, Command::Halt),
-    (Key::F2, Command::Wish(Wish::Confirm)),
-    (Key::F3, Command::NoteTyped),
-    (Key::F4, Command::Wish(Wish::PauseAfter)),
-    (Key::F5, Command::Start),
-    (Key::F6, Command::Work),
-    (Key::F7, Command::Wish(Wish::Pause)),
-    (Key::F8, Command::Retract),
-    (Key::F9, Command::Wish(Wish::Resume)),
-    (Key::F10, Command::Wish(Wish::Finish)),
+pub const KEYS: [(Key, UserCommand); 13] = [
+    (Key::F1, UserCommand::Palette),
+    (Key::F12, UserCommand::Stop),
+    (Key::Escape, UserCommand::Stop),
+    (Key::F11, UserCommand::Halt),
+    (Key::F2, UserCommand::RunControl(RunControl::Confirm)),
+    (Key::F3, UserCommand::NoteTyped),
+    (Key::F4, UserCommand::RunControl(RunControl::PauseAfter)),
+    (Key::F5, UserCommand::Start),
+    (Key::F6, UserCommand::Work),
+    (Key::F7, UserCommand::RunControl(RunControl::Pause)),
+    (Key::F8, UserCommand::Retract),
+    (Key::F9, UserCommand::RunControl(RunControl::Resume)),
+    (Key::F10, UserCommand::RunControl(RunControl::Finish)),
 ];
 
 /// Reads the keys once per frame, those that stop before all others.
 #[derive(Debug, Default)]
-pub struct Keys {
+pub struct KeyReader {
     frame_read: Option<u64>,
     /// The frame whose events were looked at before it began, and how many of them.
     looked_at: Option<(u64, usize)>,
     frame_stopped: Option<u64>,
 }
 
-impl Keys {
+impl KeyReader {
     /// Asks for the stops among the events of a frame that is about to begin: the earliest that they can be seen.
-    pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut Commands) {
+    pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut CommandQueue) {
         let frame = ctx.cumulative_frame_nr();
         // Events that wait while the window is hidden come again, before those that are new.
         let known = match self.looked_at {
@@ -53,7 +53,7 @@ impl Keys {
 
     /// Asks for the stops of this frame: keys that nobody looked at before it began, and the buttons of the top bar,
     /// which are asked before anything is drawn.
-    pub fn read_stops(&mut self, ctx: &Context, commands: &mut Commands) {
+    pub fn read_stops(&mut self, ctx: &Context, commands: &mut CommandQueue) {
         // A frame may have several passes, and while the window is hidden its input is that of the last frame
         // shown: pressing once must not act again and again.
         let frame = ctx.cumulative_frame_nr();
@@ -67,7 +67,7 @@ impl Keys {
     }
 
     /// Asks for what else was pressed since the last frame; whether this frame is read for the first time.
-    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) -> bool {
+    pub fn read(&mut self, ctx: &Context, commands: &mut CommandQueue) -> bool {
         let frame = ctx.cumulative_frame_nr();
         if self.frame_read.replace(frame) == Some(frame) {
             return false;
@@ -75,11 +75,11 @@ impl Keys {
         ctx.input(|input| {
             push_keys(&input.events, false, commands);
             if is_pressed(&input.events, Key::K, true) {
-                commands.push(Command::Palette);
+                commands.push(UserCommand::Palette);
             }
             for screen in SCREENS {
                 if is_pressed(&input.events, screen.key, true) {
-                    commands.push(Command::Show(screen.name));
+                    commands.push(UserCommand::Show(screen.name));
                 }
             }
         });
@@ -88,7 +88,7 @@ impl Keys {
 }
 
 /// Asks for the keys of [`KEYS`] among events: for those that stop, or for the others.
-fn push_keys(events: &[Event], are_stops: bool, commands: &mut Commands) {
+fn push_keys(events: &[Event], are_stops: bool, commands: &mut CommandQueue) {
     for (key, command) in KEYS {
         if command.is_stop() == are_stops && is_pressed(events, key, false) {
             commands.push(command);

@@ -1,6 +1,6 @@
 //! Everything that can be asked for, by name: the command palette, which is the list of keys too.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use eframe::egui::{
     Align, Align2, Area, Button, Frame, Id, Key, Label, Layout, Margin, Modifiers, Order, RichText,
@@ -9,21 +9,21 @@ use eframe::egui::{
 
 /// One thing that can be asked for.
 #[derive(Clone, Debug)]
-pub struct Action {
+pub struct PaletteAction {
     /// What it does, as a person would say it.
     pub name: String,
     /// Its keys; empty if it has none.
     pub keys: String,
     /// What is sent.
-    pub command: Command,
+    pub command: UserCommand,
     /// Whether it can be asked for now, or why not.
     pub verdict: Result<(), String>,
 }
 
-impl Action {
+impl PaletteAction {
     /// One that is always possible.
     #[must_use]
-    pub fn new(name: impl Into<String>, keys: &str, command: Command) -> Self {
+    pub fn new(name: impl Into<String>, keys: &str, command: UserCommand) -> Self {
         Self { name: name.into(), keys: keys.into(), command, verdict: Ok(()) }
     }
 
@@ -61,7 +61,7 @@ impl Palette {
     }
 
     /// Draws it over everything but in nobody's way: what is beneath can still be pressed.
-    pub fn ui(&mut self, ui: &Ui, actions: &[Action], commands: &mut Commands) {
+    pub fn ui(&mut self, ui: &Ui, actions: &[PaletteAction], commands: &mut CommandQueue) {
         if !self.is_open {
             return;
         }
@@ -82,7 +82,7 @@ impl Palette {
             });
     }
 
-    fn content_ui(&mut self, ui: &mut Ui, actions: &[Action], commands: &mut Commands) {
+    fn content_ui(&mut self, ui: &mut Ui, actions: &[PaletteAction], commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let (mut moved, mut is_taken) = (0_isize, false);
         ui.input_mut(|input| {
@@ -110,7 +110,7 @@ impl Palette {
                 self.is_open = false;
             }
         });
-        let found: Vec<&Action> =
+        let found: Vec<&PaletteAction> =
             actions.iter().filter(|one| is_found(&one.name, &self.typed)).collect();
         let last = found.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(moved).min(last);
@@ -132,7 +132,7 @@ impl Palette {
             });
     }
 
-    fn take(&mut self, action: &Action, commands: &mut Commands) {
+    fn take(&mut self, action: &PaletteAction, commands: &mut CommandQueue) {
         if action.verdict.is_ok() {
             commands.push(action.command.clone());
             self.is_open = false;
@@ -141,7 +141,7 @@ impl Palette {
 }
 
 /// One line; true when it is pressed.
-fn action_ui(ui: &mut Ui, action: &Action, is_chosen: bool, is_followed: bool) -> bool {
+fn action_ui(ui: &mut Ui, action: &PaletteAction, is_chosen: bool, is_followed: bool) -> bool {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         let button = Button::selectable(is_chosen, &action.name);

@@ -1,6 +1,6 @@
 //! The panels of a screen.
 
-use super::sizes::{Edge, Sizes};
+use super::sizes::{PanelEdge, Sizes};
 use crate::theme::Tokens;
 use eframe::egui::{Color32, Frame, Margin, Panel, ScrollArea, Stroke, Ui};
 
@@ -16,9 +16,14 @@ pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
 }
 
 /// A panel beside the middle that scrolls.
-pub(crate) fn side_ui(ui: &mut Ui, sizes: &mut Sizes, edge: Edge, content: impl FnOnce(&mut Ui)) {
+pub(crate) fn side_ui(
+    ui: &mut Ui,
+    sizes: &mut Sizes,
+    edge: PanelEdge,
+    content: impl FnOnce(&mut Ui),
+) {
     let panel = match edge {
-        Edge::Left => Panel::left("left"),
+        PanelEdge::Left => Panel::left("left"),
         _ => Panel::right("right"),
     };
     let scrolled = |ui: &mut Ui| {

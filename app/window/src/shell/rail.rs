@@ -1,6 +1,6 @@
 //! The rail that switches between the screens.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Button, Ui, vec2};
 
@@ -8,14 +8,14 @@ use eframe::egui::{Button, Ui, vec2};
 pub const WIDTH: f32 = 100.0;
 
 /// Draws the rail.
-pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
+pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut CommandQueue) {
     for screen in SCREENS {
         let button = Button::selectable(screen.name == shown, screen.name)
             .min_size(vec2(ui.available_width(), 32.0));
         let keys = screen.key.symbol_or_name();
         let hint = format!("{} (Ctrl+{keys})", screen.purpose);
         if ui.add(button).on_hover_text(hint).clicked() {
-            commands.push(Command::Show(screen.name));
+            commands.push(UserCommand::Show(screen.name));
         }
     }
 }

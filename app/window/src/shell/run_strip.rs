@@ -1,9 +1,9 @@
 //! What an operator may ask of the run in progress, on every screen: pause, resume, finish early, abort, and the
 //! answer to a prompt. Stop and halt have their own place in the top bar.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
 };
@@ -14,7 +14,7 @@ use palpate_runner::{PromptView, RunView};
 
 /// Something to ask of a run that goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish {
+pub enum RunControl {
     /// Pause as soon as it is sound.
     Pause,
     /// Pause at the next place where that spoils nothing.
@@ -33,7 +33,7 @@ pub enum Wish {
     Redo,
 }
 
-impl Wish {
+impl RunControl {
     /// The operator's choice that asks for it, or why it cannot be asked for now.
     pub fn operator(self, run: &RunView) -> Result<Operator, String> {
         let is_paused = matches!(run.pause, PauseView::Paused { .. });
@@ -72,7 +72,7 @@ pub fn is_controllable(run: &RunView) -> bool {
 }
 
 /// Draws the buttons, the state of the pause in words, and the prompt if there is one.
-pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
+pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut CommandQueue) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         let after = match &run.next_checkpoint {
@@ -81,11 +81,11 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mu
             None => "Pause at a checkpoint  F4".into(),
         };
         for (wish, text) in [
-            (Wish::Pause, "Pause  F7"),
-            (Wish::PauseAfter, after.as_str()),
-            (Wish::Resume, "Resume  F9"),
-            (Wish::Finish, "Finish early  F10"),
-            (Wish::Abort, "Abort"),
+            (RunControl::Pause, "Pause  F7"),
+            (RunControl::PauseAfter, after.as_str()),
+            (RunControl::Resume, "Resume  F9"),
+            (RunControl::Finish, "Finish early  F10"),
+            (RunControl::Abort, "Abort"),
         ] {
             wish_ui(ui, run, wish, text, commands);
         }
@@ -104,26 +104,26 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mu
 const NOTE_MAX: usize = 300;
 
 /// What somebody at the rig wants to have written down, at the time at which it is.
-fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
+fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut CommandQueue) {
     let name = match note.trim().is_empty() {
         true => "Mark  F3",
         false => "Note  F3",
     };
     if ui.add(Button::new(name).min_size(vec2(74.0, 28.0))).clicked() {
-        commands.push(Command::NoteTyped);
+        commands.push(UserCommand::NoteTyped);
     }
     let input = TextEdit::singleline(note).desired_width(180.0).char_limit(NOTE_MAX);
     // Drawn from the right, so the label comes after its field.
-    let input = ui.add(input).place("note");
+    let input = ui.add(input).named("note");
     let label = ui.label("note");
     let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     input.labelled_by(label.id);
     if is_taken {
-        commands.push(Command::NoteTyped);
+        commands.push(UserCommand::NoteTyped);
     }
 }
 
-fn wish_ui(ui: &mut Ui, run: &RunView, wish: Wish, text: &str, commands: &mut Commands) {
+fn wish_ui(ui: &mut Ui, run: &RunView, wish: RunControl, text: &str, commands: &mut CommandQueue) {
     let verdict = wish.operator(run);
     let button = Button::new(text).min_size(vec2(0.0, 28.0));
     let response = ui.add_enabled(verdict.is_ok(), button);
@@ -132,7 +132,7 @@ fn wish_ui(ui: &mut Ui, run: &RunView, wish: Wish, text: &str, commands: &mut Co
         Ok(_) => response,
     };
     if response.clicked() {
-        commands.push(Command::Wish(wish));
+        commands.push(UserCommand::RunControl(wish));
     }
 }
 
@@ -159,7 +159,7 @@ fn pause_words(run: &RunView) -> String {
 }
 
 /// The question, not in the way of anything: motion can still be stopped and panels still be used.
-fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Commands) {
+fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut CommandQueue) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     Frame::new()
         .fill(tokens.canvas)
@@ -167,10 +167,10 @@ fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Com
         .inner_margin(Margin::symmetric(10, 8))
         .show(ui, |ui| {
             ui.horizontal(|ui| {
-                wish_ui(ui, run, Wish::Confirm, "Done  F2", commands);
-                wish_ui(ui, run, Wish::Decline, "Not done", commands);
+                wish_ui(ui, run, RunControl::Confirm, "Done  F2", commands);
+                wish_ui(ui, run, RunControl::Decline, "Not done", commands);
                 if run.can_redo.is_ok() {
-                    wish_ui(ui, run, Wish::Redo, "Last weight again", commands);
+                    wish_ui(ui, run, RunControl::Redo, "Last weight again", commands);
                 }
                 let left = match run.pause {
                     PauseView::Paused { .. } => "the pause stops this clock".into(),

@@ -1,7 +1,7 @@
 //! The bar that stands on every screen: state, run, progress, the numbers, the stop control.
 
 use super::activity::{Activity, is_motion_possible, run_in_progress};
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::state_badge::badge_ui;
 use eframe::egui::{
@@ -42,12 +42,12 @@ struct StopButtons {
 
 /// Asks for what the two buttons say, where they were pressed since they were drawn last: before anything of a frame
 /// is drawn, so that no screen can hold up a stop.
-pub fn push_stop_buttons(ctx: &Context, commands: &mut Commands) {
+pub fn push_stop_buttons(ctx: &Context, commands: &mut CommandQueue) {
     let drawn = ctx.data(|data| data.get_temp::<StopButtons>(Id::unique("stop buttons")));
     let Some(StopButtons { stop, halt }) = drawn else {
         return;
     };
-    for (button, command) in [(stop, Command::Stop), (halt, Command::Halt)] {
+    for (button, command) in [(stop, UserCommand::Stop), (halt, UserCommand::Halt)] {
         if ctx.read_response(button).is_some_and(|one| one.clicked()) {
             commands.push(command);
         }

@@ -1,6 +1,6 @@
 //! The first-run tour: a strip of a few sentences, each about what is on the screen, in nobody's way.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::screens::{calibration, library, review, rig, run};
 use crate::theme::Tokens;
 use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
@@ -65,7 +65,7 @@ impl Tour {
     }
 
     /// Draws the strip.
-    pub fn ui(&self, ui: &mut Ui, commands: &mut Commands) {
+    pub fn ui(&self, ui: &mut Ui, commands: &mut CommandQueue) {
         let Some((at, (_, words))) = self.0.and_then(|at| Some((at, STOPS.get(at)?))) else {
             return;
         };
@@ -80,10 +80,10 @@ impl Tour {
                     ui.label(RichText::new(place).strong());
                     let name = if at + 1 == STOPS.len() { "Done with the tour" } else { "Next" };
                     if ui.button(name).clicked() {
-                        commands.push(Command::TourNext);
+                        commands.push(UserCommand::TourNext);
                     }
                     if at + 1 < STOPS.len() && ui.button("End the tour").clicked() {
-                        commands.push(Command::TourEnd);
+                        commands.push(UserCommand::TourEnd);
                     }
                     ui.add(Label::new(*words).wrap());
                 });

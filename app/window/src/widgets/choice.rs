@@ -1,6 +1,6 @@
 //! One of a few things, chosen from a list.
 
-use super::places::Place;
+use super::places::NamedControl;
 use super::quantity_input::form_label;
 use eframe::egui::{ComboBox, Ui};
 
@@ -24,6 +24,6 @@ pub fn choice_ui<T: Clone + PartialEq>(
             })
             .response
             .labelled_by(label.id)
-            .place(name);
+            .named(name);
     });
 }

@@ -1,6 +1,6 @@
 //! One of many names, or any: a list with a field that narrows it; only names in sight are laid out.
 
-use super::places::Place;
+use super::places::NamedControl;
 use super::quantity_input::form_label;
 use eframe::egui::{ComboBox, PopupCloseBehavior, ScrollArea, TextEdit, Ui};
 
@@ -64,7 +64,7 @@ pub fn choice_box_ui(
             })
             .response
             .labelled_by(label.id)
-            .place(name);
+            .named(name);
     });
     *chosen != before
 }

@@ -1,6 +1,6 @@
 //! A long table whose rows can be chosen, by pointer and by keys: only rows in sight are made and laid out.
 
-use super::mark::{self, Mark, mark_at};
+use super::glyph::{self, Glyph, glyph_at};
 use super::table::{Column, GAP, ROW, row_ui};
 use crate::theme::Tokens;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// How a text stands out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tone {
+pub enum TextTone {
     /// As the others.
     #[default]
     Plain,
@@ -24,16 +24,16 @@ pub enum Tone {
 
 /// One cell.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cell {
+pub struct TableCell {
     /// Shape before the text.
-    pub mark: Option<Mark>,
+    pub mark: Option<Glyph>,
     /// The text.
     pub text: String,
     /// How it stands out.
-    pub tone: Tone,
+    pub tone: TextTone,
 }
 
-impl Cell {
+impl TableCell {
     /// A plain text.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
@@ -42,23 +42,23 @@ impl Cell {
 
     /// A shape and its word.
     #[must_use]
-    pub fn marked(mark: Mark, text: impl Into<String>, tone: Tone) -> Self {
+    pub fn marked(mark: Glyph, text: impl Into<String>, tone: TextTone) -> Self {
         Self { mark: Some(mark), text: text.into(), tone }
     }
 }
 
 /// One row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
+pub struct TableLine {
     /// What it is called where it is not seen.
     pub name: String,
     /// A cell for each column.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<TableCell>,
 }
 
 /// A column that rows may be sorted by.
 #[derive(Clone, Debug)]
-pub struct Head {
+pub struct SortableColumn {
     /// The column.
     pub column: Column,
     /// Whether its head sorts.
@@ -67,7 +67,7 @@ pub struct Head {
 
 /// Where the table is scrolled to.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Scrolled {
+pub struct ScrollPosition {
     offset: f32,
     height: f32,
     wanted: Option<f32>,
@@ -75,7 +75,7 @@ pub struct Scrolled {
 
 /// How a row is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum How {
+pub enum SelectionMode {
     /// That one alone.
     Only,
     /// That one too, or that one no more.
@@ -86,9 +86,9 @@ pub enum How {
 
 /// What was done with the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
+pub enum TableAction {
     /// A row was chosen.
-    Choose(usize, How),
+    Choose(usize, SelectionMode),
     /// All were chosen.
     All,
     /// Those chosen are wanted.
@@ -102,7 +102,7 @@ pub struct ChoiceTable<'a> {
     /// What it is called.
     pub name: &'a str,
     /// Its columns.
-    pub heads: &'a [Head],
+    pub heads: &'a [SortableColumn],
     /// Column that the rows are sorted by, and whether the other way round.
     pub sorted: Option<(usize, bool)>,
     /// Rows in all.
@@ -110,14 +110,18 @@ pub struct ChoiceTable<'a> {
     /// The row that keys go from.
     pub at: Option<usize>,
     /// Makes a row.
-    pub line: &'a dyn Fn(usize) -> Line,
+    pub line: &'a dyn Fn(usize) -> TableLine,
     /// Whether a row is chosen.
     pub is_chosen: &'a dyn Fn(usize) -> bool,
 }
 
 impl ChoiceTable<'_> {
     /// Draws the table in the space there is; tells what was done and which rows are in sight.
-    pub fn ui(&self, ui: &mut Ui, scrolled: &mut Scrolled) -> (Vec<Act>, Range<usize>) {
+    pub fn ui(
+        &self,
+        ui: &mut Ui,
+        scrolled: &mut ScrollPosition,
+    ) -> (Vec<TableAction>, Range<usize>) {
         let (mut acts, mut shown) = (Vec::new(), 0..0);
         let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
         let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
@@ -148,7 +152,7 @@ impl ChoiceTable<'_> {
         (acts, shown)
     }
 
-    fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<Act>) {
+    fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<TableAction>) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
         row_ui(ui, &columns, width, |ui, index, column| {
@@ -160,13 +164,13 @@ impl ChoiceTable<'_> {
             ui.spacing_mut().button_padding.x = 0.0;
             let head = ui.add(Button::new(text).frame(false));
             if let Some((_, is_reversed)) = self.sorted.filter(|(by, _)| *by == index) {
-                let mark = if is_reversed { Mark::Up } else { Mark::Down };
+                let mark = if is_reversed { Glyph::Up } else { Glyph::Down };
                 let place = head.rect.right_center() + vec2(8.0, 0.0);
-                mark_at(ui.painter(), mark, place, tokens.text_quiet);
+                glyph_at(ui.painter(), mark, place, tokens.text_quiet);
             }
             let head = head.accessible_name(format!("sort by {}", column.head));
             if head.on_hover_text("sort; once more for the other way round").clicked() {
-                acts.push(Act::Sort(index));
+                acts.push(TableAction::Sort(index));
             }
         });
     }
@@ -176,8 +180,8 @@ impl ChoiceTable<'_> {
         ui: &mut Ui,
         width: f32,
         id: eframe::egui::Id,
-        scrolled: &mut Scrolled,
-        acts: &mut Vec<Act>,
+        scrolled: &mut ScrollPosition,
+        acts: &mut Vec<TableAction>,
     ) -> Range<usize> {
         let mut area = ScrollArea::vertical().id_salt((self.name, "rows")).auto_shrink(false);
         if let Some(offset) = scrolled.wanted.take() {
@@ -200,7 +204,7 @@ impl ChoiceTable<'_> {
         width: f32,
         id: eframe::egui::Id,
         index: usize,
-        acts: &mut Vec<Act>,
+        acts: &mut Vec<TableAction>,
     ) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let (line, is_chosen) = ((self.line)(index), (self.is_chosen)(index));
@@ -226,44 +230,44 @@ impl ChoiceTable<'_> {
             left += head.column.width + GAP;
         }
         if row.double_clicked() {
-            acts.extend([Act::Choose(index, How::Only), Act::Open]);
+            acts.extend([TableAction::Choose(index, SelectionMode::Only), TableAction::Open]);
         } else if row.clicked() {
             ui.memory_mut(|memory| memory.request_focus(id));
             let how = ui.input(|input| match input.modifiers {
-                held if held.command => How::Toggle,
-                held if held.shift => How::Extend,
-                _ => How::Only,
+                held if held.command => SelectionMode::Toggle,
+                held if held.shift => SelectionMode::Extend,
+                _ => SelectionMode::Only,
             });
-            acts.push(Act::Choose(index, how));
+            acts.push(TableAction::Choose(index, how));
         }
-        if row.hovered() && line.cells.iter().any(|cell| cell.tone == Tone::Alarm) {
+        if row.hovered() && line.cells.iter().any(|cell| cell.tone == TextTone::Alarm) {
             row.on_hover_text(&line.name);
         }
     }
 
-    fn keys(&self, ui: &Ui, scrolled: &mut Scrolled, acts: &mut Vec<Act>) {
+    fn keys(&self, ui: &Ui, scrolled: &mut ScrollPosition, acts: &mut Vec<TableAction>) {
         if self.count == 0 {
             return;
         }
         let page = ((scrolled.height / ROW) as usize).max(1);
-        let (mut went, mut how) = (None, How::Only);
+        let (mut went, mut how) = (None, SelectionMode::Only);
         ui.input(|input| {
             went = self.gone_to(input, page);
             if input.modifiers.shift {
-                how = How::Extend;
+                how = SelectionMode::Extend;
             }
             if input.modifiers.command && input.key_pressed(Key::A) {
-                acts.push(Act::All);
+                acts.push(TableAction::All);
             }
             if let Some(at) = self.at.filter(|_| input.key_pressed(Key::Space)) {
-                acts.push(Act::Choose(at, How::Toggle));
+                acts.push(TableAction::Choose(at, SelectionMode::Toggle));
             }
             if input.key_pressed(Key::Enter) {
-                acts.push(Act::Open);
+                acts.push(TableAction::Open);
             }
         });
         if let Some(to) = went {
-            acts.push(Act::Choose(to, how));
+            acts.push(TableAction::Choose(to, how));
             let (top, bottom) = (to as f32 * ROW, (to + 1) as f32 * ROW);
             if top < scrolled.offset {
                 scrolled.wanted = Some(top);
@@ -294,20 +298,20 @@ impl ChoiceTable<'_> {
     }
 }
 
-fn cell_ui(ui: &Ui, cell: &Cell, place: Rect, is_number: bool, is_chosen: bool) {
+fn cell_ui(ui: &Ui, cell: &TableCell, place: Rect, is_number: bool, is_chosen: bool) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let ink: Color32 = match cell.tone {
         // A chosen row's ground is darker: only full ink is readable on it.
         _ if is_chosen => tokens.text,
-        Tone::Plain => tokens.text,
-        Tone::Quiet => tokens.text_quiet,
-        Tone::Alarm => tokens.alarm_text,
+        TextTone::Plain => tokens.text,
+        TextTone::Quiet => tokens.text_quiet,
+        TextTone::Alarm => tokens.alarm_text,
     };
     let mut left = place.left();
     if let Some(mark) = cell.mark {
-        let center = pos2(left + mark::WIDTH * 0.4, place.center().y);
-        mark_at(ui.painter(), mark, center, ink);
-        left += mark::WIDTH;
+        let center = pos2(left + glyph::WIDTH * 0.4, place.center().y);
+        glyph_at(ui.painter(), mark, center, ink);
+        left += glyph::WIDTH;
     }
     let font = TextStyle::Body.resolve(ui.style());
     let mut job = LayoutJob::single_section(cell.text.clone(), TextFormat::simple(font, ink));

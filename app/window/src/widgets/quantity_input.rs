@@ -1,6 +1,6 @@
 //! A number with a unit, checked on every change, with its error sentence beside it.
 
-use super::places::Place;
+use super::places::NamedControl;
 use super::steady::steady;
 use crate::theme::Tokens;
 use eframe::egui::{Align, Align2, RichText, TextEdit, Ui};
@@ -57,7 +57,7 @@ pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityFiel
                 .align(Align2::RIGHT_CENTER),
         );
         ui.label(RichText::new(unit).color(tokens.text_quiet));
-        input.labelled_by(label.id).place(name).changed()
+        input.labelled_by(label.id).named(name).changed()
     };
     let has_changed = steady(ui, name, |ui| ui.horizontal(row).inner);
     if let Err(reason) = &field.value {

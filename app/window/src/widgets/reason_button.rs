@@ -1,6 +1,6 @@
 //! A button that, when it cannot be pressed, says why in words beside it.
 
-use super::places::Place;
+use super::places::NamedControl;
 use super::steady::steady;
 use crate::theme::Tokens;
 use eframe::egui::{Button, Label, RichText, Ui, Vec2};
@@ -14,7 +14,7 @@ pub fn reason_button(
 ) -> bool {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let is_pressed = steady(ui, text, |ui| {
-        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size)).place(text).clicked()
+        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size)).named(text).clicked()
     });
     if let Err(reason) = verdict {
         let reason = RichText::new(reason).color(tokens.text_quiet).small();

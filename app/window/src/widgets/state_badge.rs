@@ -1,6 +1,6 @@
 //! The state as word, shape and colour in one box.
 
-use crate::shell::activity::{Activity, Shape, Tone};
+use crate::shell::activity::{Activity, Shape, StateTone};
 use crate::theme::Tokens;
 use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Role, Sense, Shape as Ink, Stroke,
@@ -11,10 +11,10 @@ use eframe::egui::{
 pub fn badge_ui(ui: &mut Ui, activity: &Activity, size: eframe::egui::Vec2) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (fill, ink) = match activity.tone {
-        Tone::Quiet => (tokens.control, tokens.text),
-        Tone::Active => (tokens.active_fill, tokens.on_active),
-        Tone::Notice => (tokens.notice_fill, tokens.on_notice),
-        Tone::Alarm => (tokens.alarm_fill, tokens.on_alarm),
+        StateTone::Quiet => (tokens.control, tokens.text),
+        StateTone::Active => (tokens.active_fill, tokens.on_active),
+        StateTone::Notice => (tokens.notice_fill, tokens.on_notice),
+        StateTone::Alarm => (tokens.alarm_fill, tokens.on_alarm),
     };
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| {

@@ -36,7 +36,7 @@ impl Column {
 
 /// How a row stands out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RowLook {
+pub enum RowStyle {
     /// As the others.
     #[default]
     Plain,
@@ -50,17 +50,17 @@ pub enum RowLook {
 
 /// One row.
 #[derive(Clone, Debug, Default)]
-pub struct Row {
+pub struct TableRow {
     /// A text for each column.
     pub cells: Vec<String>,
     /// How it stands out.
-    pub look: RowLook,
+    pub look: RowStyle,
     /// What is said of it under the pointer.
     pub hint: Option<String>,
 }
 
 /// Draws the table in the space there is; scrolls both ways.
-pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
+pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
     ScrollArea::horizontal().id_salt((name, "across")).auto_shrink(false).show(ui, |ui| {
@@ -79,21 +79,21 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
             |ui, shown| {
                 for row in &rows[shown] {
                     let ink = match row.look {
-                        RowLook::Plain | RowLook::Marked => tokens.text,
-                        RowLook::Quiet => tokens.text_quiet,
-                        RowLook::Alarm => tokens.alarm_text,
+                        RowStyle::Plain | RowStyle::Marked => tokens.text,
+                        RowStyle::Quiet => tokens.text_quiet,
+                        RowStyle::Alarm => tokens.alarm_text,
                     };
                     let rect = row_ui(ui, &columns, width, |ui, index, _| {
                         let Some(cell) = row.cells.get(index) else {
                             return;
                         };
                         let mut text = RichText::new(cell).color(ink);
-                        if row.look == RowLook::Marked {
+                        if row.look == RowStyle::Marked {
                             text = text.strong();
                         }
                         ui.add(Label::new(text).truncate());
                     });
-                    if row.look == RowLook::Marked {
+                    if row.look == RowStyle::Marked {
                         let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
                         ui.painter().rect_filled(mark, 0.0, tokens.text);
                     }

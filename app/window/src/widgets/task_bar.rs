@@ -1,9 +1,9 @@
 //! Start of a longer piece of work, how far it is, and its end.
 
 use super::reason_button::reason_button;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
-use crate::workers::task::{Standing, Task};
+use crate::workers::task::{BackgroundTask, TaskState};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 use palpate_figures::uncertain::clock;
 
@@ -12,13 +12,13 @@ use palpate_figures::uncertain::clock;
 pub fn task_ui<T: Send + 'static>(
     ui: &mut Ui,
     start: &str,
-    task: &Task<T>,
+    task: &BackgroundTask<T>,
     verdict: &Result<(), String>,
 ) -> bool {
-    let Some(standing) = task.standing() else {
+    let Some(state) = task.state() else {
         return reason_button(ui, start, vec2(170.0, 34.0), verdict);
     };
-    bar_ui(ui, &standing);
+    bar_ui(ui, &state);
     if task.is_ending() {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.label(RichText::new("ending").color(tokens.text_quiet));
@@ -32,18 +32,18 @@ pub fn task_ui<T: Send + 'static>(
 pub fn work_ui<T: Send + 'static>(
     ui: &mut Ui,
     start: &str,
-    task: &Task<T>,
+    task: &BackgroundTask<T>,
     verdict: &Result<(), String>,
-    commands: &mut Commands,
+    commands: &mut CommandQueue,
 ) {
     if task_ui(ui, start, task, verdict) {
-        commands.push(Command::Work);
+        commands.push(UserCommand::Work);
     }
 }
 
 /// Draws the progress of work that began by itself, and a button that ends it; true when that is pressed.
-pub fn standing_ui(ui: &mut Ui, standing: &Standing, cancel: &str) -> bool {
-    bar_ui(ui, standing);
+pub fn progress_ui(ui: &mut Ui, state: &TaskState, cancel: &str) -> bool {
+    bar_ui(ui, state);
     cancel_ui(ui, cancel)
 }
 
@@ -51,17 +51,17 @@ fn cancel_ui(ui: &mut Ui, text: &str) -> bool {
     ui.add(Button::new(text).min_size(vec2(84.0, 26.0))).clicked()
 }
 
-fn bar_ui(ui: &mut Ui, standing: &Standing) {
+fn bar_ui(ui: &mut Ui, state: &TaskState) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.add(
-        ProgressBar::new(standing.fraction as f32)
+        ProgressBar::new(state.fraction as f32)
             .desired_height(10.0)
             .corner_radius(2)
             .fill(tokens.text_quiet),
     );
-    let left = standing.seconds_left.map_or_else(
-        || format!("{} so far", clock(standing.seconds)),
+    let left = state.seconds_left.map_or_else(
+        || format!("{} so far", clock(state.seconds)),
         |left| format!("{} left", clock(left)),
     );
-    ui.add(Label::new(RichText::new(format!("{left}: {}", standing.what)).small()).truncate());
+    ui.add(Label::new(RichText::new(format!("{left}: {}", state.what)).small()).truncate());
 }

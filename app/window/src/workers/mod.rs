@@ -1,15 +1,15 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
-pub mod feel;
 pub mod fit;
+pub mod haptic_loop;
 pub mod latest;
+pub mod live_scene;
 pub mod path_dialog;
 pub mod player;
 pub mod ports;
 pub mod recovery;
 pub mod review;
 pub mod task;
-pub mod touch;
 pub mod trail;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ask {
+pub enum PathPurpose {
     /// Where new sessions go.
     NewSessions,
     /// A recorded session to compare models on.
@@ -81,17 +81,19 @@ impl<T: Send + 'static> Dialog<T> {
 
 /// Chooses what is asked for.
 #[must_use]
-pub fn pick(ask: Ask, dialog: FileDialog) -> Option<(Ask, PathBuf)> {
+pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBuf)> {
     let of_kind = |title: &str, kind: &str, endings: &[&str]| {
         let dialog = dialog.clone().set_title(title);
         dialog.add_filter(kind, endings).pick_file()
     };
     let path = match ask {
-        Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-        Ask::Session | Ask::Body => dialog.set_title("Folder of a session").pick_folder(),
-        Ask::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
-        Ask::Scene => of_kind("Scene", "scenes", &["toml"]),
-        Ask::Protocol => of_kind("Protocol", "protocols", &["toml"]),
+        PathPurpose::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
+        PathPurpose::Session | PathPurpose::Body => {
+            dialog.set_title("Folder of a session").pick_folder()
+        }
+        PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
+        PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
+        PathPurpose::Protocol => of_kind("Protocol", "protocols", &["toml"]),
     };
     Some((ask, path?))
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// How far a task is, for drawing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing {
+pub struct TaskState {
     /// Share done, 0 to 1.
     pub fraction: f64,
     /// What it is at.
@@ -20,20 +20,20 @@ pub struct Standing {
 }
 
 /// One task at a time and its last answer.
-pub struct Task<T> {
+pub struct BackgroundTask<T> {
     job: Job<Result<T, String>>,
     progress: Arc<TaskProgress>,
     since: Option<Stopwatch>,
     answer: Option<Result<T, String>>,
 }
 
-impl<T> Default for Task<T> {
+impl<T> Default for BackgroundTask<T> {
     fn default() -> Self {
         Self { job: Job::default(), progress: Arc::default(), since: None, answer: None }
     }
 }
 
-impl<T: Send + 'static> Task<T> {
+impl<T: Send + 'static> BackgroundTask<T> {
     /// Starts work, unless some is under way. The last answer stays until the new one is there.
     pub fn start(
         &mut self,
@@ -95,11 +95,11 @@ impl<T: Send + 'static> Task<T> {
     }
 
     /// How far it is; none when nothing is under way.
-    pub fn standing(&self) -> Option<Standing> {
+    pub fn state(&self) -> Option<TaskState> {
         let seconds = self.since.as_ref()?.seconds();
         let (done, of, what) = self.progress.read();
         let (done, of) = (done as f64, of as f64);
-        Some(Standing {
+        Some(TaskState {
             fraction: if of > 0.0 { (done / of).min(1.0) } else { 0.0 },
             what,
             seconds,
@@ -127,16 +127,16 @@ mod tests {
     use std::sync::mpsc::{Receiver, sync_channel};
     use std::time::Duration;
 
-    fn finish<T: Send + 'static>(task: &mut Task<T>) {
+    fn finish<T: Send + 'static>(task: &mut BackgroundTask<T>) {
         let is_done = || {
             task.poll();
-            task.standing().is_none().then_some(())
+            task.state().is_none().then_some(())
         };
         until(is_done, || "the end of the task".into());
     }
 
     /// A task that does `of` pieces, each when `go` says so.
-    fn stepwise(task: &mut Task<usize>, of: usize, go: Receiver<()>) {
+    fn stepwise(task: &mut BackgroundTask<usize>, of: usize, go: Receiver<()>) {
         task.start("test", &Context::default(), move |progress| {
             for done in 0..of {
                 if progress.tell(done, of, "a piece").is_break() {
@@ -151,20 +151,20 @@ mod tests {
     #[test]
     fn progress_is_told_and_the_answer_stays() {
         let (step, go) = sync_channel(8);
-        let mut task = Task::default();
+        let mut task = BackgroundTask::default();
         stepwise(&mut task, 4, go);
         for _ in 0..2 {
             step.send(()).unwrap();
         }
-        let standing = loop {
-            let standing = task.standing().unwrap();
-            if standing.fraction == 0.5 {
-                break standing;
+        let state = loop {
+            let state = task.state().unwrap();
+            if state.fraction == 0.5 {
+                break state;
             }
             std::thread::sleep(Duration::from_millis(1));
         };
-        assert_eq!(standing.what, "a piece");
-        assert!(standing.seconds_left.is_some());
+        assert_eq!(state.what, "a piece");
+        assert!(state.seconds_left.is_some());
         for _ in 0..2 {
             step.send(()).unwrap();
         }
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn a_cancelled_task_keeps_the_answer_before() {
-        let mut task = Task::default();
+        let mut task = BackgroundTask::default();
         task.start("test", &Context::default(), |_| Ok(7));
         finish(&mut task);
         let (step, go) = sync_channel(8);
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn a_task_that_dies_says_so() {
-        let mut task: Task<u32> = Task::default();
+        let mut task: BackgroundTask<u32> = BackgroundTask::default();
         task.start("test", &Context::default(), |_| panic!("on purpose"));
         finish(&mut task);
         assert!(matches!(task.answer(), Some(Err(text)) if text.contains("unexpectedly")));

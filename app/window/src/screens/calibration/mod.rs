@@ -3,12 +3,12 @@
 
 mod plots;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
-use crate::shell::palette::Action;
+use super::screen::{Screen, ScreenEntry, ScreenReply};
+use crate::command::{CommandQueue, UserCommand};
+use crate::shell::palette::PaletteAction;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::alarm_ui;
@@ -120,7 +120,7 @@ impl CalibrationScreen {
 }
 
 impl Screen for CalibrationScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Calibrations");
         let quiet = |text: String| RichText::new(text).color(tokens.text_quiet).small();
@@ -153,19 +153,19 @@ impl Screen for CalibrationScreen {
         ui.add_space(8.0);
         let verdict = self.usable(workbench).map(|_| ());
         if reason_button(ui, "Use this one  F6", vec2(150.0, 30.0), &verdict) {
-            commands.push(Command::Work);
+            commands.push(UserCommand::Work);
         }
         section_ui(ui, "A new one");
         let button = Button::new("Measure...").min_size(vec2(150.0, 28.0));
         if ui.add_enabled(!workbench.is_busy(), button).clicked() {
-            commands.push(Command::MeasureCalibration);
+            commands.push(UserCommand::MeasureCalibration);
         }
         ui.horizontal(|ui| {
             let label = form_label(ui, "name");
             let input = TextEdit::singleline(&mut self.name)
                 .desired_width(ui.available_width() - 10.0)
                 .char_limit(80);
-            ui.add(input).labelled_by(label.id).place("name");
+            ui.add(input).labelled_by(label.id).named("name");
         });
         let verdict = match (can_keep(workbench.run()), self.name.trim().is_empty()) {
             (Err(reason), _) => Err(reason),
@@ -173,7 +173,7 @@ impl Screen for CalibrationScreen {
             (Ok(_), false) => Ok(()),
         };
         if reason_button(ui, "Keep the last run's", vec2(150.0, 28.0), &verdict) {
-            commands.push(Command::KeepCalibration);
+            commands.push(UserCommand::KeepCalibration);
         }
         if let Some(Ok(shelved)) = &self.shelved {
             match &shelved.kept {
@@ -188,13 +188,13 @@ impl Screen for CalibrationScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         if let Some(Shown { told: Ok((_, curves)), .. }) = self.shown_one() {
             plots::curves_ui(ui, curves);
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Chosen calibration");
         let Some(one) = self.shown_one() else {
@@ -255,12 +255,17 @@ impl Screen for CalibrationScreen {
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        ctx: &Context,
+        command: &UserCommand,
+        workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::KeepCalibration => self.keep(workbench.run(), ctx),
-            _ => return Reply::NotMine,
+            UserCommand::KeepCalibration => self.keep(workbench.run(), ctx),
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Show
+        ScreenReply::Show
     }
 
     /// New sessions are read with the calibration that is chosen.
@@ -276,13 +281,13 @@ impl Screen for CalibrationScreen {
         }
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let can_keep = can_keep(workbench.run()).map(|_| ());
         let keep = "Keep the calibration that was measured";
         vec![
-            Action::new("Measure a calibration", "", Command::MeasureCalibration)
+            PaletteAction::new("Measure a calibration", "", UserCommand::MeasureCalibration)
                 .if_ok(workbench.free_verdict()),
-            Action::new(keep, "", Command::KeepCalibration).if_ok(can_keep),
+            PaletteAction::new(keep, "", UserCommand::KeepCalibration).if_ok(can_keep),
         ]
     }
 }

@@ -122,7 +122,7 @@ fn split(given: &Given, kind: Kind) -> (String, &'static str) {
 
 /// Something that is told about the session.
 #[derive(Clone, Debug)]
-pub struct ToldField {
+pub struct LabelField {
     /// What.
     pub key: &'static Key,
     /// As typed; empty where nothing is told.

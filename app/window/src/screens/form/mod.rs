@@ -2,9 +2,9 @@
 
 mod field;
 
-pub use field::{ParamField, ToldField};
+pub use field::{LabelField, ParamField};
 
-use crate::command::Aside;
+use crate::command::ManualMove;
 use palpate_analysis::daily::is_gated;
 use palpate_model::about::KEYS;
 use palpate_model::about::Labels;
@@ -25,7 +25,7 @@ const SESSIONS_MAX: u32 = 9_999;
 
 /// What is known about the load cell and its limits.
 #[derive(Clone, Debug)]
-pub struct Bench {
+pub struct RunSetup {
     /// Volts to newtons, as recorded in each session.
     pub calibration: Calibration,
     /// The same as a curve.
@@ -46,12 +46,12 @@ pub struct ProtocolForm {
     /// Its parameters.
     pub fields: Vec<ParamField>,
     /// What can be told about the session, in the order of [`KEYS`].
-    pub told: Vec<ToldField>,
+    pub told: Vec<LabelField>,
     /// Folder for new sessions; empty for the library.
     pub folder: String,
     labels: Labels,
     acknowledged: Vec<String>,
-    checked: Option<(CheckKey, Result<Checked, Vec<Problem>>)>,
+    checked: Option<(CheckKey, Result<CheckedPlan, Vec<Problem>>)>,
 }
 
 /// What a preview depends on beside the protocol: values by name and whether the axis is homed. `None` while a
@@ -60,7 +60,7 @@ type CheckKey = (Option<BTreeMap<String, String>>, bool);
 
 /// A plan written out for what was typed, with its preview.
 #[derive(Clone, Debug)]
-pub struct Checked {
+pub struct CheckedPlan {
     /// The plan.
     pub plan: Plan,
     /// What to look at before the start.
@@ -71,7 +71,7 @@ pub struct Checked {
     pub outline: Vec<OutlinePoint>,
 }
 
-impl Checked {
+impl CheckedPlan {
     /// Greatest depth in mm.
     pub fn deepest_mm(&self) -> f64 {
         let depths = self.outline.iter().map(|point| point.depth.0);
@@ -81,7 +81,7 @@ impl Checked {
 
 impl Default for ProtocolForm {
     fn default() -> Self {
-        let told = KEYS.iter().map(|key| ToldField {
+        let told = KEYS.iter().map(|key| LabelField {
             key,
             text: match key.name {
                 "indenter" => "blunt 12 mm probe".into(),
@@ -141,7 +141,7 @@ impl ProtocolForm {
     }
 
     /// Checks what was typed and previews the plan again, if anything it depends on changed.
-    pub fn refresh(&mut self, rig: &RigDescription, bench: &Bench, is_homed: bool) {
+    pub fn refresh(&mut self, rig: &RigDescription, bench: &RunSetup, is_homed: bool) {
         self.tell();
         for field in &mut self.fields {
             field.check(rig);
@@ -166,7 +166,7 @@ impl ProtocolForm {
             let mut preview = preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed);
             let beside = bench.to_acknowledge.iter().cloned();
             preview.acknowledgements.extend(beside);
-            Checked {
+            CheckedPlan {
                 preview,
                 outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
                 warnings: written.warnings,
@@ -188,7 +188,7 @@ impl ProtocolForm {
     }
 
     /// Writes into a field of what is told; a name that is none changes nothing.
-    pub fn set_told(&mut self, name: &str, text: &str) {
+    pub fn set_label(&mut self, name: &str, text: &str) {
         let field = self.told.iter_mut().find(|field| field.key.name == name);
         if let Some(field) = field {
             text.clone_into(&mut field.text);
@@ -196,13 +196,18 @@ impl ProtocolForm {
     }
 
     /// What stands in a field of what is told.
-    pub fn told_text(&self, name: &str) -> &str {
+    pub fn label_text(&self, name: &str) -> &str {
         let field = self.told.iter().find(|field| field.key.name == name);
         field.map_or("", |field| &field.text)
     }
 
     /// The request for a run beside what stands in the form, or why there is none.
-    pub fn aside(&self, aside: &Aside, rig: &RigView, bench: &Bench) -> Result<RunRequest, String> {
+    pub fn aside(
+        &self,
+        aside: &ManualMove,
+        rig: &RigView,
+        bench: &RunSetup,
+    ) -> Result<RunRequest, String> {
         let words =
             |problems: &[Problem]| problems.first().map_or_else(String::new, ToString::to_string);
         let protocol = built_in(aside.protocol)
@@ -238,7 +243,7 @@ impl ProtocolForm {
     }
 
     /// The plan and its preview; `None` while something is wrong.
-    pub fn checked(&self) -> Option<&Checked> {
+    pub fn checked(&self) -> Option<&CheckedPlan> {
         self.checked.as_ref()?.1.as_ref().ok()
     }
 
@@ -300,7 +305,7 @@ impl ProtocolForm {
     }
 
     /// The request to run what stands in the form; `None` while it may not start.
-    pub fn request(&self, bench: &Bench) -> Option<RunRequest> {
+    pub fn request(&self, bench: &RunSetup) -> Option<RunRequest> {
         self.verdict().ok()?;
         let checked = self.checked()?;
         Some(RunRequest {

@@ -3,11 +3,11 @@ use palpate_drivers::sim::SimSettings;
 use palpate_model::units::MmPerS;
 use palpate_protocols::plans::{Hold, RampHold, Step, Unload};
 
-fn bench() -> (RigDescription, Bench) {
+fn bench() -> (RigDescription, RunSetup) {
     let settings = SimSettings::default();
     let rig = palpate_drivers::open("sim", &settings).unwrap();
     let calibration = palpate_drivers::sim::calibration(settings.profile);
-    let bench = Bench {
+    let bench = RunSetup {
         curve: calibration.curve().unwrap(),
         calibration,
         limits: Limits::for_travel(rig.description().travel),
@@ -32,7 +32,7 @@ fn type_into(form: &mut ProtocolForm, pairs: &[(&str, &str)]) {
     form.refresh(&rig, &bench, false);
 }
 
-fn form_with(pairs: &[(&str, &str)]) -> (ProtocolForm, Bench) {
+fn form_with(pairs: &[(&str, &str)]) -> (ProtocolForm, RunSetup) {
     let mut form = ProtocolForm::default();
     type_into(&mut form, pairs);
     (form, bench().1)

@@ -1,9 +1,9 @@
 //! The body, the device, the loop and the hand as typed.
 
-use crate::screens::haptics::Offered;
+use crate::screens::haptics::OfferedSessions;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::text_row::text_row;
 use eframe::egui::{Button, RichText, Ui};
@@ -107,7 +107,7 @@ impl HapticsForm {
     }
 
     /// Draws the fields; true when a dialog for a session is wanted.
-    pub fn ui(&mut self, ui: &mut Ui, offered: &Offered<'_>) -> bool {
+    pub fn ui(&mut self, ui: &mut Ui, offered: &OfferedSessions<'_>) -> bool {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Body");
         text_row(ui, "body", "a session's folder, a table, or thesis", &mut self.body);
@@ -128,8 +128,8 @@ impl HapticsForm {
         section_ui(ui, "Device");
         ui.horizontal(|ui| {
             form_label(ui, "drive");
-            ui.radio_value(&mut self.is_current, false, "voltage").place("voltage");
-            ui.radio_value(&mut self.is_current, true, "current").place("current");
+            ui.radio_value(&mut self.is_current, false, "voltage").named("voltage");
+            ui.radio_value(&mut self.is_current, true, "current").named("current");
         });
         let damps = match self.is_current {
             false => "the motor's back-EMF damps",

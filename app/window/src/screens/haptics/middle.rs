@@ -1,12 +1,12 @@
 //! The margin and the buzz, or the loop as it runs.
 
-use super::{HapticsScreen, Looked};
+use super::{HapticsCheck, HapticsScreen};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui, strip_ui};
 use crate::plots::margin::{MarginPicture, margin_ui};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::remark::alarm_ui;
-use crate::workers::feel::Feel;
+use crate::workers::haptic_loop::HapticLoop;
 use crate::workers::trail::PAST_S;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::haptics::Tried;
@@ -32,7 +32,7 @@ impl HapticsScreen {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (view, name) in [(View::Margin, "Before play"), (View::Live, "Live")] {
-                ui.selectable_value(&mut self.view, view, name).place(name);
+                ui.selectable_value(&mut self.view, view, name).named(name);
             }
         });
         let quiet = |ui: &mut Ui, words: &str| {
@@ -53,7 +53,7 @@ impl HapticsScreen {
     }
 }
 
-fn before_ui(ui: &mut Ui, looked: &Looked, running: Option<&Feel>) {
+fn before_ui(ui: &mut Ui, looked: &HapticsCheck, running: Option<&HapticLoop>) {
     let checked = &looked.checked;
     let height = (ui.available_height() - 2.0 * HEAD) / 2.0;
     ui.label(RichText::new("Damping needed over depth").heading().strong());
@@ -101,7 +101,7 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
     plot_ui(ui, id, &plot, PlotLook { shown: Some([from, to]), ..PlotLook::default() });
 }
 
-fn live_ui(ui: &mut Ui, feel: &Feel) {
+fn live_ui(ui: &mut Ui, feel: &HapticLoop) {
     let end = feel.last().t.0.max(PAST_S);
     let curve = |name, ink: Ink, of: fn(&TrailPoint) -> f64| {
         Series::line(name, ink, 1.4, feel.trail().map(|point| [point.t, of(point)]).collect())

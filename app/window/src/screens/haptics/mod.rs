@@ -4,21 +4,21 @@ mod form;
 mod middle;
 mod right;
 
-use super::screen::{Reply, Screen, ScreenEntry};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
 use super::tape::TapePanel;
-use crate::command::{Command, Commands};
-use crate::shell::palette::Action;
+use crate::command::{CommandQueue, UserCommand};
+use crate::shell::palette::PaletteAction;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::work_ui;
 use crate::widgets::tick_box::tick_box;
 use crate::workbench::Workbench;
-use crate::workers::feel::Feel;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
+use crate::workers::haptic_loop::HapticLoop;
+use crate::workers::path_dialog::PathPurpose;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Button, Context, Key, Slider, Ui, vec2};
 use form::HapticsForm;
 use middle::View;
@@ -33,7 +33,7 @@ const ABOVE: f64 = 2.0;
 
 /// Sessions that other screens have in front.
 #[derive(Clone, Copy, Debug)]
-pub struct Offered<'a> {
+pub struct OfferedSessions<'a> {
     /// On the review screen.
     pub review: Option<&'a Path>,
     /// In the library.
@@ -41,7 +41,7 @@ pub struct Offered<'a> {
 }
 
 /// A body on a device, looked at.
-pub struct Looked {
+pub struct HapticsCheck {
     source: PathBuf,
     setting: Setting,
     notes: Vec<String>,
@@ -62,8 +62,8 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 pub struct HapticsScreen {
     form: HapticsForm,
     is_open: bool,
-    task: Task<Looked>,
-    feel: Option<Feel>,
+    task: BackgroundTask<HapticsCheck>,
+    feel: Option<HapticLoop>,
     refusal: Option<String>,
     tape: TapePanel,
     view: View,
@@ -72,16 +72,16 @@ pub struct HapticsScreen {
 impl HapticsScreen {
     /// Whether the loop runs.
     pub fn is_running(&self) -> bool {
-        self.feel.as_ref().is_some_and(Feel::is_running)
+        self.feel.as_ref().is_some_and(HapticLoop::is_running)
     }
 
     /// What was found of the body and device checked last.
-    pub fn looked(&self) -> Option<&Result<Looked, String>> {
+    pub fn looked(&self) -> Option<&Result<HapticsCheck, String>> {
         self.task.answer()
     }
 
     /// The loop that runs or ran last.
-    pub fn feel(&self) -> Option<&Feel> {
+    pub fn feel(&self) -> Option<&HapticLoop> {
         self.feel.as_ref()
     }
 
@@ -91,7 +91,7 @@ impl HapticsScreen {
     }
 
     /// The check of what stands in the form, or why the loop may not start.
-    fn checked(&self) -> Result<&Looked, String> {
+    fn checked(&self) -> Result<&HapticsCheck, String> {
         let wanted = self.form.wanted()?;
         match self.task.answer() {
             Some(Ok(looked)) if (&looked.source, &looked.setting) == (&wanted.0, &wanted.1) => {
@@ -113,7 +113,7 @@ impl HapticsScreen {
             let begin = |folder: &Path| led_recorder(folder, body, &setting, is_guarded);
             let recorder = self.tape.begin(ctx, begin)?;
             let settings = setting.simulation(body, is_guarded);
-            Feel::start(&settings, setting.speed, recorder)
+            HapticLoop::start(&settings, setting.speed, recorder)
         });
         match started {
             Ok(feel) => {
@@ -128,7 +128,7 @@ impl HapticsScreen {
         }
     }
 
-    fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
+    fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut CommandQueue) {
         section_ui(ui, "Feel");
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
@@ -140,13 +140,13 @@ impl HapticsScreen {
         let size = vec2(170.0, 34.0);
         if is_running {
             let stop = Button::new("Stop the loop").min_size(size);
-            if ui.add(stop).place("Stop the loop").clicked() {
-                commands.push(Command::LoopStop);
+            if ui.add(stop).named("Stop the loop").clicked() {
+                commands.push(UserCommand::LoopStop);
             }
         } else {
             let may = verdict.clone().and_then(|()| self.checked().map(|_| ()));
             if reason_button(ui, "Start the loop", size, &may) {
-                commands.push(Command::LoopStart);
+                commands.push(UserCommand::LoopStart);
             }
         }
         let (Some(feel), Some(Ok(looked))) = (&self.feel, self.task.answer()) else {
@@ -160,14 +160,14 @@ impl HapticsScreen {
         ui.horizontal(|ui| {
             let label = form_label(ui, "hand");
             let slider = Slider::new(&mut place, -ABOVE..=deepest).step_by(0.1).suffix(" mm");
-            let slider = ui.add(slider).labelled_by(label.id).place("hand");
+            let slider = ui.add(slider).labelled_by(label.id).named("hand");
             if slider.changed() {
                 feel.lead(place);
             }
         });
         ui.horizontal(|ui| {
             for (name, place) in [("Ramp and hold", deepest), ("Lift off", -ABOVE)] {
-                if ui.button(name).place(name).clicked() {
+                if ui.button(name).named(name).clicked() {
                     feel.lead(place);
                 }
             }
@@ -179,8 +179,8 @@ impl HapticsScreen {
 }
 
 impl Screen for HapticsScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let offered = Offered {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+        let offered = OfferedSessions {
             review: workbench.front.review.as_deref(),
             library: workbench.front.library.as_deref(),
         };
@@ -188,7 +188,7 @@ impl Screen for HapticsScreen {
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
             if self.form.ui(ui, &offered) {
-                commands.push(Command::Choose(Ask::Body));
+                commands.push(UserCommand::Choose(PathPurpose::Body));
             }
         });
         ui.add_space(6.0);
@@ -201,11 +201,11 @@ impl Screen for HapticsScreen {
         self.tape.ui(ui, is_running, replay);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         self.draw_right(ui);
     }
 
@@ -213,28 +213,33 @@ impl Screen for HapticsScreen {
         self.task.poll();
         self.form.check();
         self.tape.poll();
-        if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
+        if let Some(Err(reason)) = self.feel.as_mut().map(HapticLoop::poll) {
             self.refusal = Some(reason);
             self.tape.cut_off();
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        ctx: &Context,
+        command: &UserCommand,
+        workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
+            UserCommand::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
                 self.start_loop(ctx);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            Command::LoopStart => {}
-            Command::LoopStop => self.stop(),
-            Command::Chosen(Ask::Body, path) => self.form.take(path),
-            Command::ReplayLoop(folder) => {
+            UserCommand::LoopStart => {}
+            UserCommand::LoopStop => self.stop(),
+            UserCommand::Chosen(PathPurpose::Body, path) => self.form.take(path),
+            UserCommand::ReplayLoop(folder) => {
                 self.tape.take(folder);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            _ => return Reply::NotMine,
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Done
+        ScreenReply::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -250,7 +255,7 @@ impl Screen for HapticsScreen {
                 check(body.body, &setting, &mut |share| tell(share, "the simulated device"))?;
             let mut notes = body.notes.clone();
             notes.extend(body.beyond(setting.deepest));
-            Ok(Looked { source, setting, notes, checked })
+            Ok(HapticsCheck { source, setting, notes, checked })
         });
     }
 
@@ -259,7 +264,7 @@ impl Screen for HapticsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.tape.is_busy() || self.is_running()
+        self.task.state().is_some() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -267,7 +272,7 @@ impl Screen for HapticsScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
+        if let Some(beat) = self.feel.as_mut().and_then(HapticLoop::stop) {
             self.tape.end(move || beat.end().and_then(recorded));
         }
     }
@@ -277,15 +282,16 @@ impl Screen for HapticsScreen {
         self.tape.settle();
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let can_stop = match self.is_running() {
             true => Ok(()),
             false => Err("the loop does not run".to_owned()),
         };
         let can_start = workbench.loop_verdict(SCREEN.name);
         vec![
-            Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(can_start),
-            Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(can_stop),
+            PaletteAction::new("Start the haptic loop", "", UserCommand::LoopStart)
+                .if_ok(can_start),
+            PaletteAction::new("Stop the haptic loop", "", UserCommand::LoopStop).if_ok(can_stop),
         ]
     }
 }

@@ -1,11 +1,11 @@
 //! How the loop does, and why there is no force.
 
-use super::{HapticsScreen, Looked};
+use super::{HapticsCheck, HapticsScreen};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::loop_times::loop_times_ui;
 use crate::widgets::remark::quiet_ui;
-use crate::workers::feel::Feel;
+use crate::workers::haptic_loop::HapticLoop;
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::{margin_text, tried_text, why_less};
 
@@ -19,7 +19,7 @@ impl HapticsScreen {
         }
         section_ui(ui, "Before play");
         match self.task.answer() {
-            Some(Ok(looked)) => looked_ui(ui, looked),
+            Some(Ok(looked)) => check_ui(ui, looked),
             Some(Err(_)) => {
                 ui.label(RichText::new("the check failed").color(tokens.alarm_text));
             }
@@ -30,7 +30,7 @@ impl HapticsScreen {
     }
 }
 
-fn force_ui(ui: &mut Ui, feel: &Feel) {
+fn force_ui(ui: &mut Ui, feel: &HapticLoop) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let seen = &feel.last().snapshot;
     section_ui(ui, "Force");
@@ -53,7 +53,7 @@ fn force_ui(ui: &mut Ui, feel: &Feel) {
     }
 }
 
-fn loop_ui(ui: &mut Ui, feel: &Feel) {
+fn loop_ui(ui: &mut Ui, feel: &HapticLoop) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let seen = &feel.last().snapshot;
     section_ui(ui, "Margin and guard");
@@ -77,7 +77,7 @@ fn loop_ui(ui: &mut Ui, feel: &Feel) {
     loop_times_ui(ui, kept);
 }
 
-fn looked_ui(ui: &mut Ui, looked: &Looked) {
+fn check_ui(ui: &mut Ui, looked: &HapticsCheck) {
     for (index, sentence) in looked.checked.sentences.iter().enumerate() {
         let mut text = RichText::new(sentence);
         if index == 0 {

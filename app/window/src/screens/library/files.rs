@@ -1,12 +1,12 @@
 //! Sessions chosen written as tables or into a lake.
 
-use super::say::sentence;
+use super::edits::sentence;
 use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Ui};
 use palpate_analysis::exports::{Destination, Exported, export_all};
 use palpate_tables::export::Format;
@@ -41,7 +41,7 @@ pub(super) struct FilesPanel {
     kind: Kind,
     to: String,
     dialog: Dialog<PathBuf>,
-    task: Task<Exported>,
+    task: BackgroundTask<Exported>,
 }
 
 impl FilesPanel {
@@ -80,7 +80,7 @@ impl FilesPanel {
             self.task
                 .start("export", &ctx, move |progress| Ok(export_all(sessions, &to, progress)));
         }
-        if self.task.standing().is_none() {
+        if self.task.state().is_none() {
             match self.task.answer() {
                 Some(Ok(done)) => {
                     sentence(ui, &done.sentence, false);

@@ -16,12 +16,12 @@ const REVIEWS: [&str; 5] = ["accepted", "rejected", "repeat", "outdated", "none"
 
 /// A name that may be chosen.
 #[derive(Clone, Debug, Default)]
-struct Pick {
+struct NamePick {
     chosen: Option<String>,
     narrow: String,
 }
 
-impl Pick {
+impl NamePick {
     fn ui(&mut self, ui: &mut Ui, name: &str, choices: &[String]) {
         choice_box_ui(ui, name, &mut self.chosen, choices, &mut self.narrow);
     }
@@ -31,12 +31,12 @@ impl Pick {
 #[derive(Clone, Debug, Default)]
 pub(super) struct SearchForm {
     line: String,
-    specimen: Pick,
-    operator: Pick,
-    protocol: Pick,
-    tag: Pick,
-    verdict: Pick,
-    review: Pick,
+    specimen: NamePick,
+    operator: NamePick,
+    protocol: NamePick,
+    tag: NamePick,
+    verdict: NamePick,
+    review: NamePick,
     since: String,
     until: String,
     pub order: Order,
@@ -59,7 +59,7 @@ impl SearchForm {
     pub fn query(&self) -> Result<Query, String> {
         let (words, conditions) =
             words_and_conditions(&self.line).map_err(|err| err.to_string())?;
-        let read = |pick: &Pick| pick.chosen.as_deref().map(str::to_owned);
+        let read = |pick: &NamePick| pick.chosen.as_deref().map(str::to_owned);
         let verdict = self.verdict.chosen.as_deref().map(str::parse);
         let review = self.review.chosen.as_deref().map(str::parse);
         Ok(Query {

@@ -1,11 +1,11 @@
 //! Files of other programs made into sessions of the library.
 
-use super::say::sentence;
+use super::edits::sentence;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::task_bar::standing_ui;
+use crate::widgets::task_bar::progress_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
 use palpate_analysis::imports::{Request, import_and_tell};
 use palpate_model::about::Labels;
@@ -21,7 +21,7 @@ pub(super) struct ImportPanel {
     specimen: String,
     operator: String,
     dialog: Dialog<Vec<PathBuf>>,
-    task: Task<Vec<String>>,
+    task: BackgroundTask<Vec<String>>,
     was_dry_run: bool,
 }
 
@@ -31,9 +31,9 @@ impl ImportPanel {
         if let Some(files) = self.dialog.poll() {
             self.add(&files);
         }
-        let was_busy = self.task.standing().is_some();
+        let was_busy = self.task.state().is_some();
         self.task.poll();
-        let has_ended = was_busy && self.task.standing().is_none();
+        let has_ended = was_busy && self.task.state().is_none();
         has_ended && !self.was_dry_run
     }
 
@@ -54,7 +54,7 @@ impl ImportPanel {
     }
 
     fn verdict(&self) -> Result<(), String> {
-        if self.task.standing().is_some() {
+        if self.task.state().is_some() {
             return Err("files are being read".into());
         }
         match self.paths().is_empty() {
@@ -110,8 +110,8 @@ impl ImportPanel {
         if let Some(is_dry_run) = wanted {
             self.start(&ctx, library, is_dry_run);
         }
-        if let Some(standing) = self.task.standing() {
-            if standing_ui(ui, &standing, "Cancel import") {
+        if let Some(state) = self.task.state() {
+            if progress_ui(ui, &state, "Cancel import") {
                 self.task.cancel();
             }
             return;

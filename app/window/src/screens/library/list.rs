@@ -1,7 +1,10 @@
 //! The sessions found: what is known of those in sight, and which are chosen.
 
-use crate::widgets::choice_table::{Act, Cell, ChoiceTable, Head, How, Line, Scrolled, Tone};
-use crate::widgets::mark::Mark;
+use crate::widgets::choice_table::{
+    ChoiceTable, ScrollPosition, SelectionMode, SortableColumn, TableAction, TableCell, TableLine,
+    TextTone,
+};
+use crate::widgets::glyph::Glyph;
 use crate::widgets::table::Column;
 use eframe::egui::Ui;
 use palpate_analysis::find::Found;
@@ -32,7 +35,7 @@ const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
 
 /// The list.
 #[derive(Debug, Default)]
-pub(super) struct List {
+pub(super) struct SessionList {
     folders: Vec<String>,
     entries: BTreeMap<String, (Entry, u64)>,
     generation: u64,
@@ -41,20 +44,20 @@ pub(super) struct List {
     choice: u64,
     at: Option<String>,
     anchor: Option<String>,
-    scrolled: Scrolled,
+    scrolled: ScrollPosition,
     in_sight: Range<usize>,
 }
 
 /// What was done with the list that others must do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wanted {
+pub(super) enum ListRequest {
     /// Those chosen are to be looked at.
     Open,
     /// Another order.
     Sort(Order),
 }
 
-impl List {
+impl SessionList {
     /// Takes what a search found. What is found no more is chosen no more.
     pub fn take(&mut self, found: &mut Found) {
         self.folders = std::mem::take(&mut found.folders);
@@ -125,7 +128,7 @@ impl List {
         Some((entry, *of))
     }
 
-    fn choose(&mut self, row: usize, how: How) {
+    fn choose(&mut self, row: usize, how: SelectionMode) {
         let Some(folder) = self.folders.get(row).cloned() else {
             return;
         };
@@ -135,27 +138,27 @@ impl List {
             self.folders.iter().position(|folder| folder == one)
         };
         match how {
-            How::Only => self.chosen = BTreeSet::from([folder.clone()]),
-            How::Toggle => {
+            SelectionMode::Only => self.chosen = BTreeSet::from([folder.clone()]),
+            SelectionMode::Toggle => {
                 if !self.chosen.remove(&folder) {
                     self.chosen.insert(folder.clone());
                 }
             }
-            How::Extend => {
+            SelectionMode::Extend => {
                 let from = place(&self.anchor).unwrap_or(row);
                 let rows = from.min(row)..=from.max(row);
                 self.chosen = self.folders[rows].iter().cloned().collect();
             }
         }
-        if how != How::Extend || self.anchor.is_none() {
+        if how != SelectionMode::Extend || self.anchor.is_none() {
             self.anchor = Some(folder.clone());
         }
         self.at = Some(folder);
     }
 
     /// Draws the list; tells what is wanted of others.
-    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<Wanted> {
-        let heads = COLUMNS.map(|(head, width, is_number, order)| Head {
+    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<ListRequest> {
+        let heads = COLUMNS.map(|(head, width, is_number, order)| SortableColumn {
             column: match is_number {
                 true => Column::numbers(head, width),
                 false => Column::words(head, width),
@@ -186,13 +189,15 @@ impl List {
         let mut wanted = Vec::new();
         for act in acts {
             match act {
-                Act::Choose(row, how) => self.choose(row, how),
-                Act::All => {
+                TableAction::Choose(row, how) => self.choose(row, how),
+                TableAction::All => {
                     self.choice += 1;
                     self.chosen = self.folders.iter().cloned().collect();
                 }
-                Act::Open => wanted.push(Wanted::Open),
-                Act::Sort(column) => wanted.extend(COLUMNS[column].3.map(Wanted::Sort)),
+                TableAction::Open => wanted.push(ListRequest::Open),
+                TableAction::Sort(column) => {
+                    wanted.extend(COLUMNS[column].3.map(ListRequest::Sort))
+                }
             }
         }
         wanted
@@ -200,43 +205,43 @@ impl List {
 }
 
 /// A row of which nothing is known yet.
-fn unread(folder: &str) -> Line {
-    let mut cells = vec![Cell::default(); COLUMNS.len()];
+fn unread(folder: &str) -> TableLine {
+    let mut cells = vec![TableCell::default(); COLUMNS.len()];
     if let Some(last) = cells.last_mut() {
-        *last = Cell { text: folder.to_owned(), tone: Tone::Quiet, mark: None };
+        *last = TableCell { text: folder.to_owned(), tone: TextTone::Quiet, mark: None };
     }
-    Line { name: format!("Session {folder}"), cells }
+    TableLine { name: format!("Session {folder}"), cells }
 }
 
 /// In which state a session's files are, as far as the catalog looks: a shape, a word, and what is wrong.
-pub(super) fn health(entry: &Entry) -> (Mark, &'static str, Option<&str>) {
+pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
     match (&entry.trouble, &entry.ending) {
-        (Some(trouble), _) => (Mark::Diamond, "damaged", Some(trouble)),
-        (None, None) => (Mark::Half, "unfinished", None),
-        (None, Some(_)) => (Mark::Disc, "whole", None),
+        (Some(trouble), _) => (Glyph::Diamond, "damaged", Some(trouble)),
+        (None, None) => (Glyph::Half, "unfinished", None),
+        (None, Some(_)) => (Glyph::Disc, "whole", None),
     }
 }
 
 /// What a session is worth, as a shape and a word.
-pub(super) fn verdict(entry: &Entry) -> (Mark, &'static str) {
+pub(super) fn verdict(entry: &Entry) -> (Glyph, &'static str) {
     match entry.verdict {
-        Some(Verdict::Valid) => (Mark::Tick, "valid"),
-        Some(Verdict::Suspect) => (Mark::Question, "suspect"),
-        Some(Verdict::Rejected) => (Mark::Cross, "rejected"),
-        None if entry.trouble.is_some() => (Mark::Dash, "unknown"),
-        None => (Mark::Dash, "none"),
+        Some(Verdict::Valid) => (Glyph::Tick, "valid"),
+        Some(Verdict::Suspect) => (Glyph::Question, "suspect"),
+        Some(Verdict::Rejected) => (Glyph::Cross, "rejected"),
+        None if entry.trouble.is_some() => (Glyph::Dash, "unknown"),
+        None => (Glyph::Dash, "none"),
     }
 }
 
 /// What its review came to, as a shape and a word.
-pub(super) fn review(entry: &Entry) -> (Mark, &'static str) {
+pub(super) fn review(entry: &Entry) -> (Glyph, &'static str) {
     let review = ReviewIs::of(entry.review.as_ref());
     let mark = match review {
-        ReviewIs::Given(Decision::Accepted) => Mark::Tick,
-        ReviewIs::Given(Decision::Rejected) => Mark::Cross,
-        ReviewIs::Given(Decision::Repeat) => Mark::Again,
-        ReviewIs::Outdated => Mark::Question,
-        ReviewIs::None => Mark::Dash,
+        ReviewIs::Given(Decision::Accepted) => Glyph::Tick,
+        ReviewIs::Given(Decision::Rejected) => Glyph::Cross,
+        ReviewIs::Given(Decision::Repeat) => Glyph::Repeat,
+        ReviewIs::Outdated => Glyph::Question,
+        ReviewIs::None => Glyph::Dash,
     };
     match review {
         ReviewIs::None if entry.trouble.is_some() => (mark, "unknown"),
@@ -249,7 +254,7 @@ pub(super) fn second(at: &str) -> String {
     at.get(..19).unwrap_or(at).replace('T', " ")
 }
 
-fn line(entry: &Entry) -> Line {
+fn line(entry: &Entry) -> TableLine {
     let or_dash = |text: &str| match one_line(text) {
         text if text.is_empty() => "-".to_owned(),
         text => text,
@@ -258,12 +263,12 @@ fn line(entry: &Entry) -> Line {
     let (health_mark, health, trouble) = health(entry);
     let ((verdict_mark, verdict), (review_mark, review)) = (verdict(entry), review(entry));
     let tone = match trouble {
-        Some(_) => Tone::Alarm,
-        None => Tone::Plain,
+        Some(_) => TextTone::Alarm,
+        None => TextTone::Plain,
     };
     let quiet = |word: &str| match word {
-        "none" | "unknown" => Tone::Quiet,
-        _ => Tone::Plain,
+        "none" | "unknown" => TextTone::Quiet,
+        _ => TextTone::Plain,
     };
     let why = trouble.map_or(String::new(), |why| format!(": {}", one_line(why)));
     let name = format!(
@@ -274,18 +279,18 @@ fn line(entry: &Entry) -> Line {
         one_line(&entry.folder)
     );
     let cells = vec![
-        Cell::text(started),
-        Cell::text(or_dash(&entry.specimen)),
-        Cell::marked(verdict_mark, verdict, quiet(verdict)),
-        Cell::marked(review_mark, review, quiet(review)),
-        Cell::marked(health_mark, health, tone),
-        Cell::text(or_dash(&entry.protocol)),
-        Cell::text(or_dash(&entry.operator)),
-        Cell::text(format!("{:.1} s", entry.duration_s)),
-        Cell::text(one_line(&entry.tags.join(", "))),
-        Cell { tone: Tone::Quiet, ..Cell::text(one_line(&entry.folder)) },
+        TableCell::text(started),
+        TableCell::text(or_dash(&entry.specimen)),
+        TableCell::marked(verdict_mark, verdict, quiet(verdict)),
+        TableCell::marked(review_mark, review, quiet(review)),
+        TableCell::marked(health_mark, health, tone),
+        TableCell::text(or_dash(&entry.protocol)),
+        TableCell::text(or_dash(&entry.operator)),
+        TableCell::text(format!("{:.1} s", entry.duration_s)),
+        TableCell::text(one_line(&entry.tags.join(", "))),
+        TableCell { tone: TextTone::Quiet, ..TableCell::text(one_line(&entry.folder)) },
     ];
-    Line { name, cells }
+    TableLine { name, cells }
 }
 
 #[cfg(test)]
@@ -303,16 +308,16 @@ mod tests {
 
     #[test]
     fn rows_are_chosen_one_several_and_from_to() {
-        let mut list = List::default();
+        let mut list = SessionList::default();
         list.take(&mut found(&["a", "b", "c", "d", "e"]));
-        list.choose(1, How::Only);
+        list.choose(1, SelectionMode::Only);
         assert_eq!(list.chosen(), ["b"]);
-        list.choose(3, How::Extend);
+        list.choose(3, SelectionMode::Extend);
         assert_eq!(list.chosen(), ["b", "c", "d"]);
-        list.choose(0, How::Extend);
+        list.choose(0, SelectionMode::Extend);
         assert_eq!(list.chosen(), ["a", "b"]);
-        list.choose(4, How::Toggle);
-        list.choose(0, How::Toggle);
+        list.choose(4, SelectionMode::Toggle);
+        list.choose(0, SelectionMode::Toggle);
         assert_eq!(list.chosen(), ["b", "e"]);
         // Another search: what is gone is chosen no more, the rest stays, in the new order.
         list.take(&mut found(&["e", "x", "b"]));
@@ -320,13 +325,13 @@ mod tests {
         list.take(&mut found(&["e"]));
         assert_eq!(list.chosen(), ["e"]);
         assert_eq!(list.only().map(|(entry, _)| entry.folder.as_str()), Some("e"));
-        list.choose(9, How::Only);
+        list.choose(9, SelectionMode::Only);
         assert_eq!(list.chosen(), ["e"]);
     }
 
     #[test]
     fn what_is_in_sight_and_old_is_asked_for() {
-        let mut list = List::default();
+        let mut list = SessionList::default();
         list.take(&mut found(&["a", "b", "c"]));
         list.in_sight = 0..3;
         assert_eq!(list.unknown(), ["c"]);
@@ -347,10 +352,10 @@ mod tests {
             ..Entry::default()
         };
         assert_eq!(health(&entry).1, "whole");
-        assert_eq!(verdict(&entry), (Mark::Question, "suspect"));
-        assert_eq!(review(&entry), (Mark::Dash, "none"));
+        assert_eq!(verdict(&entry), (Glyph::Question, "suspect"));
+        assert_eq!(review(&entry), (Glyph::Dash, "none"));
         entry.ending = None;
-        assert_eq!(health(&entry), (Mark::Half, "unfinished", None));
+        assert_eq!(health(&entry), (Glyph::Half, "unfinished", None));
         entry.trouble = Some("chunk 3 is\ndamaged".into());
         entry.verdict = None;
         let name = line(&entry).name;

@@ -2,29 +2,29 @@
 //!
 //! A search asks what the catalog knows already; reading what is new goes on beside it, and what it finds is searched again.
 
+mod edits;
 mod files;
 mod form;
 mod import;
 mod list;
-mod say;
 mod session;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
+use crate::command::{CommandQueue, UserCommand};
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
-use crate::widgets::task_bar::standing_ui;
+use crate::widgets::task_bar::progress_ui;
 use crate::workbench::Workbench;
-use crate::workers::latest::Latest;
-use crate::workers::task::Task;
+use crate::workers::latest::LatestAnswer;
+use crate::workers::task::BackgroundTask;
+use edits::{EditPanel, sentence};
 use eframe::egui::{Context, Key, Label, RichText, TextStyle, Ui, vec2};
 use files::FilesPanel;
 use form::SearchForm;
 use import::ImportPanel;
-use list::{List, Wanted};
+use list::{ListRequest, SessionList};
 use palpate_analysis::find::{Found, Search, Told, entries, search, told, update};
 use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
-use say::{SayPanel, sentence};
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -55,7 +55,7 @@ struct Heading {
 }
 
 /// What was said of the session chosen.
-struct Known {
+struct SessionDetails {
     folder: String,
     /// Of which reading of the catalog it is.
     generation: u64,
@@ -67,20 +67,20 @@ pub struct LibraryScreen {
     library: Result<PathBuf, String>,
     form: SearchForm,
     asked: Option<Query>,
-    search: Latest<Search, Found>,
-    pages: Latest<(PathBuf, Vec<String>), Vec<Entry>>,
+    search: LatestAnswer<Search, Found>,
+    pages: LatestAnswer<(PathBuf, Vec<String>), Vec<Entry>>,
     last_page: (u64, Vec<String>),
     searches: u64,
-    told: Latest<(PathBuf, Entry), Told>,
-    known: Option<Known>,
-    update: Task<Changes>,
+    told: LatestAnswer<(PathBuf, Entry), Told>,
+    known: Option<SessionDetails>,
+    update: BackgroundTask<Changes>,
     is_update_wanted: bool,
     choices: Choices,
     heading: Option<Result<Heading, String>>,
-    list: List,
+    list: SessionList,
     /// Folders of those chosen, and of which choice they are: a list of thousands is not made in every frame.
     chosen: (u64, Rc<Vec<PathBuf>>),
-    say: SayPanel,
+    edits: EditPanel,
     files: FilesPanel,
     import: ImportPanel,
     was_shown: bool,
@@ -93,19 +93,19 @@ impl LibraryScreen {
             library,
             form: SearchForm::default(),
             asked: None,
-            search: Latest::new("search", search),
-            pages: Latest::new("entries", entries),
+            search: LatestAnswer::new("search", search),
+            pages: LatestAnswer::new("entries", entries),
             last_page: (0, Vec::new()),
             searches: 0,
-            told: Latest::new("told", told),
+            told: LatestAnswer::new("told", told),
             known: None,
-            update: Task::default(),
+            update: BackgroundTask::default(),
             is_update_wanted: false,
             choices: Choices::default(),
             heading: None,
-            list: List::default(),
+            list: SessionList::default(),
             chosen: (0, Rc::default()),
-            say: SayPanel::default(),
+            edits: EditPanel::default(),
             files: FilesPanel::default(),
             import: ImportPanel::default(),
             was_shown: false,
@@ -115,17 +115,17 @@ impl LibraryScreen {
 
     /// Whether sessions are being read or searched.
     fn is_busy(&self) -> bool {
-        self.search.is_busy() || self.is_update_wanted || self.update.standing().is_some()
+        self.search.is_busy() || self.is_update_wanted || self.update.state().is_some()
     }
 
     fn poll_update(&mut self, ctx: &Context) {
-        let was_busy = self.update.standing().is_some();
+        let was_busy = self.update.state().is_some();
         self.update.poll();
-        if was_busy && self.update.standing().is_none() {
+        if was_busy && self.update.state().is_none() {
             self.ask(ctx);
         }
         if self.is_update_wanted
-            && self.update.standing().is_none()
+            && self.update.state().is_none()
             && let Ok(library) = self.library.clone()
         {
             self.is_update_wanted = false;
@@ -154,7 +154,7 @@ impl LibraryScreen {
             // What was read before stays until the new is there.
             let before = self.known.take();
             let before = before.filter(|known| known.folder == entry.folder);
-            self.known = Some(Known {
+            self.known = Some(SessionDetails {
                 folder: entry.folder.clone(),
                 generation,
                 told: before.and_then(|known| known.told),
@@ -202,9 +202,9 @@ impl LibraryScreen {
         }
     }
 
-    fn review(&mut self, commands: &mut Commands) {
+    fn review(&mut self, commands: &mut CommandQueue) {
         if self.may_review().is_ok() {
-            commands.push(Command::Review(self.chosen().to_vec()));
+            commands.push(UserCommand::Review(self.chosen().to_vec()));
         }
     }
 
@@ -241,7 +241,7 @@ impl LibraryScreen {
 }
 
 impl Screen for LibraryScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Find sessions");
         if let Err(err) = &self.library {
@@ -257,9 +257,9 @@ impl Screen for LibraryScreen {
                 self.look_again(&ctx);
             }
         });
-        match self.update.standing() {
-            Some(standing) if standing.seconds > SHORT_S => {
-                if standing_ui(ui, &standing, "Stop reading") {
+        match self.update.state() {
+            Some(state) if state.seconds > SHORT_S => {
+                if progress_ui(ui, &state, "Stop reading") {
                     self.update.cancel();
                 }
             }
@@ -285,15 +285,15 @@ impl Screen for LibraryScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         self.heading_ui(ui);
         let help = "Arrows choose, Shift extends, Space and Ctrl with a click add, Ctrl+A takes all, Enter reviews.";
         ui.add(Label::new(RichText::new(help).small().weak()).truncate());
         let sorted = (self.form.order, self.form.is_reversed);
         for wanted in self.list.ui(ui, sorted) {
             match wanted {
-                Wanted::Open => self.review(commands),
-                Wanted::Sort(order) => {
+                ListRequest::Open => self.review(commands),
+                ListRequest::Sort(order) => {
                     self.form.sort(order);
                     self.ask(&ui.ctx().clone());
                 }
@@ -301,7 +301,7 @@ impl Screen for LibraryScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         let chosen = self.chosen();
         if chosen.is_empty() {
             section_ui(ui, "Session");
@@ -317,13 +317,13 @@ impl Screen for LibraryScreen {
             (Some((entry, _)), [folder]) => {
                 let told = self.known.as_ref().and_then(|known| known.told.as_ref());
                 session::session_ui(ui, entry, told);
-                self.say.ui(ui, &chosen);
+                self.edits.ui(ui, &chosen);
                 session::replay_ui(ui, folder);
             }
-            (_, []) => self.say.ui(ui, &chosen),
+            (_, []) => self.edits.ui(ui, &chosen),
             _ => {
                 session::several_ui(ui, chosen.len(), self.list.chosen_entries());
-                self.say.ui(ui, &chosen);
+                self.edits.ui(ui, &chosen);
             }
         }
     }
@@ -353,7 +353,7 @@ impl Screen for LibraryScreen {
         {
             known.told = Some(told);
         }
-        self.is_update_wanted |= self.say.poll() | self.import.poll();
+        self.is_update_wanted |= self.edits.poll() | self.import.poll();
         self.files.poll();
         self.poll_update(ctx);
         self.ask_for_more(ctx);
@@ -368,14 +368,19 @@ impl Screen for LibraryScreen {
         if std::mem::take(&mut self.is_back) {
             self.look_again(ctx);
         }
-        self.say.keys(ctx);
+        self.edits.keys(ctx);
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        _ctx: &Context,
+        command: &UserCommand,
+        _workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::Import(files) => self.import.add(files),
-            _ => return Reply::NotMine,
+            UserCommand::Import(files) => self.import.add(files),
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Show
+        ScreenReply::Show
     }
 }

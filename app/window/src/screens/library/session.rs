@@ -1,10 +1,10 @@
 //! What is known of the sessions chosen.
 
+use super::edits::sentence;
 use super::list::{health, review, second, verdict};
-use super::say::sentence;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{NAME_WIDTH, fact_ui, section_ui};
-use crate::widgets::mark::{self, Mark, mark_at};
+use crate::widgets::glyph::{self, Glyph, glyph_at};
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_analysis::find::Told;
 use palpate_analysis::report::catalog::one_line;
@@ -28,7 +28,7 @@ fn name_ui(ui: &mut Ui, name: &str) {
 }
 
 /// A fact with its shape before its word.
-fn marked_ui(ui: &mut Ui, name: &str, mark: Mark, word: &str, is_wrong: bool) {
+fn marked_ui(ui: &mut Ui, name: &str, mark: Glyph, word: &str, is_wrong: bool) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let ink = match is_wrong {
         true => tokens.alarm_text,
@@ -37,8 +37,8 @@ fn marked_ui(ui: &mut Ui, name: &str, mark: Mark, word: &str, is_wrong: bool) {
     ui.horizontal_top(|ui| {
         name_ui(ui, name);
         let height = ui.text_style_height(&eframe::egui::TextStyle::Body);
-        let (place, _) = ui.allocate_exact_size(vec2(mark::WIDTH * 0.6, height), Sense::hover());
-        mark_at(ui.painter(), mark, place.center(), ink);
+        let (place, _) = ui.allocate_exact_size(vec2(glyph::WIDTH * 0.6, height), Sense::hover());
+        glyph_at(ui.painter(), mark, place.center(), ink);
         ui.add(Label::new(RichText::new(word).color(ink)).wrap());
     });
 }

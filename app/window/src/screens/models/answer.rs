@@ -4,7 +4,7 @@ use crate::plots::figure::{PlotLook, plot_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::quiet_ui;
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
 use palpate_analysis::report::selection_plot::plot;
@@ -48,19 +48,19 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
         .collect();
     let columns: Vec<Column> =
         places.iter().map(|&(place, width)| column(&heads[place], width)).collect();
-    let mut rows: Vec<Row> = selection
+    let mut rows: Vec<TableRow> = selection
         .candidates
         .iter()
         .zip(table)
-        .map(|(one, cells)| Row {
+        .map(|(one, cells)| TableRow {
             cells: places.iter().map(|&(place, _)| cells[place].clone()).collect(),
             look: look(selection, one),
             hint: Some(hint(one)),
         })
         .collect();
-    rows.extend(selection.refused.iter().map(|one| Row {
+    rows.extend(selection.refused.iter().map(|one| TableRow {
         cells: vec![one.family.clone(), "refused".into()],
-        look: RowLook::Quiet,
+        look: RowStyle::Quiet,
         hint: Some(one.reason.clone()),
     }));
     table_ui(ui, "families_table", &columns, &rows);
@@ -73,11 +73,11 @@ fn column(head: &str, width: f32) -> Column {
     }
 }
 
-fn look(selection: &Selection, one: &Candidate) -> RowLook {
+fn look(selection: &Selection, one: &Candidate) -> RowStyle {
     match (&selection.verdict.family, one.is_within) {
-        (Some(chosen), _) if *chosen == one.family => RowLook::Marked,
-        (_, Some(false)) => RowLook::Quiet,
-        _ => RowLook::Plain,
+        (Some(chosen), _) if *chosen == one.family => RowStyle::Marked,
+        (_, Some(false)) => RowStyle::Quiet,
+        _ => RowStyle::Plain,
     }
 }
 

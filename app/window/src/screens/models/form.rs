@@ -1,12 +1,12 @@
 //! What is compared, and how.
 
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use crate::widgets::choice::choice_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::path_dialog::Ask;
+use crate::workers::path_dialog::PathPurpose;
 use eframe::egui::{Button, Label, RichText, TextEdit, Ui};
 use palpate_analysis::select::SelectRequest;
 use palpate_analysis::source::Stretch;
@@ -86,7 +86,7 @@ impl ModelsForm {
         &mut self,
         ui: &mut Ui,
         last_run: Option<&Path>,
-        commands: &mut Commands,
+        commands: &mut CommandQueue,
     ) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let mut dropped = None;
@@ -121,7 +121,7 @@ impl ModelsForm {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("session folder or table");
-            let typed = ui.add(input).labelled_by(label.id).place("path");
+            let typed = ui.add(input).labelled_by(label.id).named("path");
             let is_entered =
                 typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
             let is_pressed = ui.button("Add").clicked();
@@ -133,10 +133,10 @@ impl ModelsForm {
         });
         ui.horizontal_wrapped(|ui| {
             if ui.button("Choose table...").clicked() {
-                commands.push(Command::Choose(Ask::Table));
+                commands.push(UserCommand::Choose(PathPurpose::Table));
             }
             if ui.button("Choose session...").clicked() {
-                commands.push(Command::Choose(Ask::Session));
+                commands.push(UserCommand::Choose(PathPurpose::Session));
             }
             let button = Button::new("Add the last run");
             if ui.add_enabled(last_run.is_some(), button).clicked()
@@ -159,7 +159,7 @@ impl ModelsForm {
                 .desired_width(96.0)
                 .char_limit(24)
                 .hint_text("none");
-            ui.add(input).labelled_by(label.id).place("tolerance");
+            ui.add(input).labelled_by(label.id).named("tolerance");
         });
         match self.tolerance() {
             Err(reason) => {

@@ -6,14 +6,14 @@ mod form;
 
 pub use form::ModelsForm;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
+use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::work_ui;
 use crate::workbench::Workbench;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
+use crate::workers::path_dialog::PathPurpose;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::select::{Selected, select_sources};
 
@@ -29,7 +29,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 #[derive(Default)]
 pub struct ModelsScreen {
     form: ModelsForm,
-    task: Task<Selected>,
+    task: BackgroundTask<Selected>,
 }
 
 impl ModelsScreen {
@@ -40,7 +40,7 @@ impl ModelsScreen {
 }
 
 impl Screen for ModelsScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let run = workbench.run().filter(|run| run.outcome.is_some());
         let last_run = run.map(|run| run.folder.as_path());
         section_ui(ui, "Recordings compared");
@@ -52,7 +52,7 @@ impl Screen for ModelsScreen {
         work_ui(ui, "Compare models  F6", &self.task, &verdict, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         match self.task.answer() {
             Some(Ok(selected)) => answer::families_ui(ui, &selected.selection),
             Some(Err(reason)) => sentence_ui(ui, reason, true),
@@ -64,7 +64,7 @@ impl Screen for ModelsScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         match self.task.answer() {
             Some(Ok(selected)) => answer::choice_ui(ui, selected),
             _ => {
@@ -78,12 +78,19 @@ impl Screen for ModelsScreen {
         self.task.poll();
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        _ctx: &Context,
+        command: &UserCommand,
+        _workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::Chosen(Ask::Session | Ask::Table, path) => self.form.add(path),
-            _ => return Reply::NotMine,
+            UserCommand::Chosen(PathPurpose::Session | PathPurpose::Table, path) => {
+                self.form.add(path)
+            }
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Done
+        ScreenReply::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -100,7 +107,7 @@ impl Screen for ModelsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.state().is_some()
     }
 }
 

@@ -2,29 +2,29 @@
 
 mod form;
 mod list;
-mod papers;
-mod said;
+mod quality;
+mod report;
 
 use super::Looked;
-use crate::command::Commands;
+use crate::command::CommandQueue;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Ui};
-use form::Form;
+use form::AnalysisForm;
 use palpate_analysis::analyses::{Deed, Done, Known, Who, own, read};
 use palpate_analysis::edits::author;
 use palpate_analysis::report::dossier::Wanted;
 use palpate_rheology::fit::Parameter;
-use papers::Papers;
-use said::Said;
+use quality::QualityForm;
+use report::ReportPanel;
 use std::path::{Path, PathBuf};
 
 /// The session's own fit: whose it is, its parameters and its sentences.
-struct Own {
+struct OwnFit {
     session: PathBuf,
     parameters: Vec<Parameter>,
     sentences: Vec<String>,
@@ -37,12 +37,12 @@ pub struct AnalysesPanel {
     known: Option<Result<Known, String>>,
     asked: Option<PathBuf>,
     reading: Job<(PathBuf, Result<Known, String>)>,
-    work: Task<Done>,
+    work: BackgroundTask<Done>,
     is_working: bool,
-    own: Task<Own>,
-    form: Form,
-    said: Said,
-    papers: Papers,
+    own: BackgroundTask<OwnFit>,
+    form: AnalysisForm,
+    quality: QualityForm,
+    report: ReportPanel,
     by: String,
     reason: String,
     /// An analysis just made: the session is read by it once it is known.
@@ -67,12 +67,12 @@ impl AnalysesPanel {
             known: None,
             asked: None,
             reading: Job::default(),
-            work: Task::default(),
+            work: BackgroundTask::default(),
             is_working: false,
-            own: Task::default(),
-            form: Form::default(),
-            said: Said::default(),
-            papers: Papers::default(),
+            own: BackgroundTask::default(),
+            form: AnalysisForm::default(),
+            quality: QualityForm::default(),
+            report: ReportPanel::default(),
             by: author(None),
             reason: String::new(),
             made: None,
@@ -84,9 +84,9 @@ impl AnalysesPanel {
     /// Fetches what threads have answered.
     pub fn poll(&mut self, ctx: &Context) {
         self.own.poll();
-        self.papers.poll();
+        self.report.poll();
         self.work.poll();
-        if self.is_working && self.work.standing().is_none() {
+        if self.is_working && self.work.state().is_none() {
             self.is_working = false;
             if let Some(Ok(done)) = self.work.answer() {
                 self.made.clone_from(&done.made);
@@ -124,7 +124,7 @@ impl AnalysesPanel {
     /// Where the two cursors stand on the session, in s since its first sample, once both are set.
     pub fn set_cursors(&mut self, cursors: Option<[f64; 2]>) {
         self.form.cursors = cursors;
-        self.papers.span = cursors.map(|[a, b]| [a.min(b), a.max(b)]);
+        self.report.span = cursors.map(|[a, b]| [a.min(b), a.max(b)]);
     }
 
     /// Puts a stretch of time, in s since the first sample, into the form that leaves stretches out.
@@ -152,12 +152,12 @@ impl AnalysesPanel {
     }
 
     /// Draws the analyses of a session; which of them it is read by can be chosen.
-    pub fn ui(&mut self, ui: &mut Ui, looked: &mut Looked, _commands: &mut Commands) {
+    pub fn ui(&mut self, ui: &mut Ui, looked: &mut Looked, _commands: &mut CommandQueue) {
         if self.asked.as_ref() != Some(&looked.session) {
             self.asked = Some(looked.session.clone());
             self.known = None;
             self.made = None;
-            self.own = Task::default();
+            self.own = BackgroundTask::default();
             self.read_again(ui.ctx());
         }
         section_ui(ui, "Analyses");
@@ -204,11 +204,11 @@ impl AnalysesPanel {
         }
         self.answer_ui(ui);
         let taken = list::withdraw_ui(ui, known, looked, &self.reason_verdict());
-        let said = self.said.ui(ui, known, &self.reason_verdict());
+        let said = self.quality.ui(ui, known, &self.reason_verdict());
         if let Some(deed) = taken.or(said) {
             self.start(ui.ctx(), &known.session, deed);
         }
-        self.papers.ui(ui, looked, &self.shown);
+        self.report.ui(ui, looked, &self.shown);
     }
 
     /// By whom and why: one pair of fields for all that is done to a session.
@@ -218,7 +218,7 @@ impl AnalysesPanel {
     }
 
     fn free(&self) -> Result<(), String> {
-        if self.work.standing().is_some() {
+        if self.work.state().is_some() {
             return Err("other work is under way".to_owned());
         }
         match self.by.trim() {
@@ -250,14 +250,14 @@ impl AnalysesPanel {
         let is_rejected_included = self.form.is_rejected_included();
         self.own.start("own-fit", ctx, move |progress| {
             let (parameters, sentences) = own(&session, is_rejected_included, progress)?;
-            Ok(Own { session, parameters, sentences })
+            Ok(OwnFit { session, parameters, sentences })
         });
     }
 
     /// How far the session's own fit is, or why there is none.
     fn own_ui(&self, ui: &mut Ui) {
-        if let Some(standing) = self.own.standing() {
-            quiet_ui(ui, &format!("the session's own fit: {}", standing.what));
+        if let Some(state) = self.own.state() {
+            quiet_ui(ui, &format!("the session's own fit: {}", state.what));
         } else if let Some(Err(reason)) = self.own.answer() {
             quiet_ui(ui, &format!("no fit of its own was made: {reason}"));
         }
@@ -266,7 +266,7 @@ impl AnalysesPanel {
     /// The last answer, in one sentence.
     fn answer_ui(&self, ui: &mut Ui) {
         match self.work.answer() {
-            _ if self.work.standing().is_some() => {}
+            _ if self.work.state().is_some() => {}
             None => {}
             Some(Ok(done)) => quiet_ui(ui, &done.sentence),
             Some(Err(reason)) => alarm_ui(ui, reason),

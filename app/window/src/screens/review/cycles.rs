@@ -3,11 +3,11 @@
 
 use super::ReviewScreen;
 use super::middle::head_ui;
-use super::subject::Subject;
-use crate::plots::over_depth::{Layer, Source, over_depth_ui};
+use super::subject::ReviewSubject;
+use crate::plots::over_depth::{DepthLayer, DepthSource, over_depth_ui};
 use crate::theme::Tokens;
 use crate::widgets::remark::quiet_ui;
-use crate::widgets::table::{Column, Row, table_ui};
+use crate::widgets::table::{Column, TableRow, table_ui};
 use crate::widgets::tick_box::tick_box;
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};
@@ -30,7 +30,7 @@ pub(super) struct Cycle {
 }
 
 /// The cycles of a session, as far as it was read.
-pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
+pub(super) fn cycles(subject: &ReviewSubject) -> Vec<Cycle> {
     let recording = &subject.recording;
     let track = &recording.track;
     let mut found = Vec::new();
@@ -62,11 +62,11 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
 #[derive(Debug, Default)]
 pub(super) struct CycleRows {
     key: Vec<(u64, u64)>,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
 }
 
 impl CycleRows {
-    fn update(&mut self, subjects: &[Subject]) {
+    fn update(&mut self, subjects: &[ReviewSubject]) {
         let versions = subjects.iter().map(|one| (one.id, one.recording.version));
         if versions.clone().eq(self.key.iter().copied()) {
             return;
@@ -76,7 +76,7 @@ impl CycleRows {
     }
 }
 
-fn rows_of(subject: &Subject) -> Vec<Row> {
+fn rows_of(subject: &ReviewSubject) -> Vec<TableRow> {
     let own = cycles(subject);
     let first = own.first().map(|cycle| cycle.peak_n);
     let row = |cycle: &Cycle| {
@@ -91,7 +91,7 @@ fn rows_of(subject: &Subject) -> Vec<Row> {
             cycle.depth_mm.map_or("-".into(), |depth| format!("{depth:.4}")),
             share.map_or("-".into(), |share| format!("{share:.2}")),
         ];
-        Row { cells, ..Row::default() }
+        TableRow { cells, ..TableRow::default() }
     };
     own.iter().map(row).collect()
 }
@@ -155,9 +155,9 @@ impl ReviewScreen {
             .filter(|(index, _)| is_drawn(*index))
             .map(|(_, one)| one)
             .collect();
-        let sources: Vec<Source<'_>> = drawn
+        let sources: Vec<DepthSource<'_>> = drawn
             .iter()
-            .map(|(cycle, color)| Source {
+            .map(|(cycle, color)| DepthSource {
                 track: &front.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
                 rows: cycle.rows,
@@ -168,9 +168,9 @@ impl ReviewScreen {
             .collect();
         let spans = [&self.depth, &self.force];
         self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<Layer<'_>> = drawn
+        let layers: Vec<DepthLayer<'_>> = drawn
             .iter()
-            .map(|(cycle, color)| Layer {
+            .map(|(cycle, color)| DepthLayer {
                 name: &front.name,
                 color: *color,
                 id: id(cycle),

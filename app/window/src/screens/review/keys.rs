@@ -11,7 +11,7 @@ const CURSOR_STEP: f64 = 1.0 / 400.0;
 
 /// What can be asked of the plots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Move {
+pub enum ViewMove {
     /// See less, larger.
     ZoomIn,
     /// See more.
@@ -30,30 +30,30 @@ pub enum Move {
 
 impl ReviewScreen {
     /// Does what a button or a key asks for.
-    pub(super) fn go(&mut self, to: Move) {
+    pub(super) fn go(&mut self, to: ViewMove) {
         let spans = match self.view {
             View::OverDepth | View::Cycles => vec![&mut self.depth, &mut self.force],
             _ => vec![&mut self.time],
         };
         match to {
-            Move::ZoomIn | Move::ZoomOut => {
+            ViewMove::ZoomIn | ViewMove::ZoomOut => {
                 let factor = match to {
-                    Move::ZoomIn => ZOOM_STEP,
+                    ViewMove::ZoomIn => ZOOM_STEP,
                     _ => 1.0 / ZOOM_STEP,
                 };
                 for span in spans {
                     span.zoom(factor, span.at(0.5));
                 }
             }
-            Move::Back | Move::On => {
-                let share = if to == Move::On { PAN_STEP } else { -PAN_STEP };
+            ViewMove::Back | ViewMove::On => {
+                let share = if to == ViewMove::On { PAN_STEP } else { -PAN_STEP };
                 spans.into_iter().take(1).for_each(|span| span.pan(share));
             }
-            Move::All => spans.into_iter().for_each(|span| span.show_all()),
-            Move::Cursor(number) => {
+            ViewMove::All => spans.into_iter().for_each(|span| span.show_all()),
+            ViewMove::Cursor(number) => {
                 self.cursors[number] = Some(self.time.at(CURSOR_SHARES[number]));
             }
-            Move::NoCursors => self.cursors = [None; 2],
+            ViewMove::NoCursors => self.cursors = [None; 2],
         }
     }
 
@@ -74,8 +74,8 @@ impl ReviewScreen {
         });
         for (key, modifiers) in pressed {
             match asked(key, modifiers) {
-                Some(Asked::Go(to)) => self.go(to),
-                Some(Asked::Step(number, way)) => self.step_cursor(number, way),
+                Some(KeyAction::Go(to)) => self.go(to),
+                Some(KeyAction::Step(number, way)) => self.step_cursor(number, way),
                 None => {}
             }
         }
@@ -91,31 +91,31 @@ impl ReviewScreen {
 
 /// What a key asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
-    Go(Move),
+enum KeyAction {
+    Go(ViewMove),
     /// A cursor moves: which, and to which side.
     Step(usize, f64),
 }
 
 /// What a key asks for with the modifiers held; with Ctrl it belongs to the window.
-fn asked(key: Key, modifiers: Modifiers) -> Option<Asked> {
+fn asked(key: Key, modifiers: Modifiers) -> Option<KeyAction> {
     if modifiers.command || modifiers.ctrl {
         return None;
     }
     Some(match (key, modifiers.alt, modifiers.shift) {
-        (Key::ArrowLeft, true, _) => Asked::Step(0, -1.0),
-        (Key::ArrowRight, true, _) => Asked::Step(0, 1.0),
-        (Key::ArrowLeft, _, true) => Asked::Step(1, -1.0),
-        (Key::ArrowRight, _, true) => Asked::Step(1, 1.0),
-        (Key::ArrowLeft, ..) => Asked::Go(Move::Back),
-        (Key::ArrowRight, ..) => Asked::Go(Move::On),
+        (Key::ArrowLeft, true, _) => KeyAction::Step(0, -1.0),
+        (Key::ArrowRight, true, _) => KeyAction::Step(0, 1.0),
+        (Key::ArrowLeft, _, true) => KeyAction::Step(1, -1.0),
+        (Key::ArrowRight, _, true) => KeyAction::Step(1, 1.0),
+        (Key::ArrowLeft, ..) => KeyAction::Go(ViewMove::Back),
+        (Key::ArrowRight, ..) => KeyAction::Go(ViewMove::On),
         // On many keyboards the plus is the shifted equals sign.
-        (Key::Plus | Key::Equals, ..) => Asked::Go(Move::ZoomIn),
-        (Key::Minus, ..) => Asked::Go(Move::ZoomOut),
-        (Key::Home, ..) => Asked::Go(Move::All),
-        (Key::A, ..) => Asked::Go(Move::Cursor(0)),
-        (Key::B, ..) => Asked::Go(Move::Cursor(1)),
-        (Key::Delete, ..) => Asked::Go(Move::NoCursors),
+        (Key::Plus | Key::Equals, ..) => KeyAction::Go(ViewMove::ZoomIn),
+        (Key::Minus, ..) => KeyAction::Go(ViewMove::ZoomOut),
+        (Key::Home, ..) => KeyAction::Go(ViewMove::All),
+        (Key::A, ..) => KeyAction::Go(ViewMove::Cursor(0)),
+        (Key::B, ..) => KeyAction::Go(ViewMove::Cursor(1)),
+        (Key::Delete, ..) => KeyAction::Go(ViewMove::NoCursors),
         _ => return None,
     })
 }
@@ -127,10 +127,10 @@ mod tests {
     #[test]
     fn arrows_move_the_picture_and_with_alt_or_shift_a_cursor() {
         for (key, modifiers, wanted) in [
-            (Key::ArrowLeft, Modifiers::NONE, Some(Asked::Go(Move::Back))),
-            (Key::ArrowRight, Modifiers::ALT, Some(Asked::Step(0, 1.0))),
-            (Key::ArrowLeft, Modifiers::SHIFT, Some(Asked::Step(1, -1.0))),
-            (Key::Equals, Modifiers::SHIFT, Some(Asked::Go(Move::ZoomIn))),
+            (Key::ArrowLeft, Modifiers::NONE, Some(KeyAction::Go(ViewMove::Back))),
+            (Key::ArrowRight, Modifiers::ALT, Some(KeyAction::Step(0, 1.0))),
+            (Key::ArrowLeft, Modifiers::SHIFT, Some(KeyAction::Step(1, -1.0))),
+            (Key::Equals, Modifiers::SHIFT, Some(KeyAction::Go(ViewMove::ZoomIn))),
             (Key::Plus, Modifiers::COMMAND, None),
             (Key::F5, Modifiers::NONE, None),
         ] {

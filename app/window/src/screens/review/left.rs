@@ -1,22 +1,22 @@
 //! The sessions shown, and how they are laid over each other.
 
-use super::{ReviewScreen, Subject, View};
-use crate::command::{Command, Commands};
+use super::{ReviewScreen, ReviewSubject, View};
+use crate::command::{CommandQueue, UserCommand};
 use crate::screens::library;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::review::{Leader, Quantity, Stage};
+use crate::workers::review::{Quantity, Stage, TimeOrigin};
 use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, Ui, vec2};
 use std::path::PathBuf;
 
 /// What was pressed at a session.
-enum Asked {
+enum SessionAction {
     Front(usize),
     Remove(usize),
     Cancel(usize),
@@ -34,7 +34,7 @@ fn small(text: &str) -> Button<'_> {
 }
 
 /// Draws how far a session is read; what was pressed there.
-fn stage_ui(ui: &mut Ui, index: usize, subject: &Subject) -> Option<Asked> {
+fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<SessionAction> {
     let recording = &subject.recording;
     let share = recording.share();
     let mut asked = None;
@@ -49,7 +49,7 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &Subject) -> Option<Asked> {
                 quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
                 let cancel = format!("cancel: {}", subject.name);
                 if ui.add(small(&cancel)).clicked() {
-                    asked = Some(Asked::Cancel(index));
+                    asked = Some(SessionAction::Cancel(index));
                 }
             });
             return asked;
@@ -59,22 +59,23 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &Subject) -> Option<Asked> {
     }
     let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
     let again = format!("read again: {}", subject.name);
-    (can_read && ui.small_button(again).clicked()).then_some(Asked::Again(index))
+    (can_read && ui.small_button(again).clicked()).then_some(SessionAction::Again(index))
 }
 
 impl ReviewScreen {
-    pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
+    pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
         section_ui(ui, "Sessions shown");
         self.sessions_ui(ui);
         self.add_ui(ui);
         if ui.button("Find sessions in the library").clicked() {
-            commands.push(Command::Show(library::SCREEN.name));
+            commands.push(UserCommand::Show(library::SCREEN.name));
         }
         section_ui(ui, "Time zero at");
-        for leader in Leader::ALL {
-            ui.radio_value(&mut self.leader, leader, leader.name()).place(leader.name());
+        for time_origin in TimeOrigin::ALL {
+            ui.radio_value(&mut self.time_origin, time_origin, time_origin.name())
+                .named(time_origin.name());
         }
-        self.leaders_missing_ui(ui);
+        self.missing_origins_ui(ui);
         section_ui(ui, "Shown over time");
         for quantity in Quantity::ALL {
             let mut is_shown = self.quantities.contains(&quantity);
@@ -100,7 +101,7 @@ impl ReviewScreen {
         if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
             self.start_fits(ui.ctx());
         }
-        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.standing()) {
+        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.state()) {
             alarm_ui(ui, reason);
         }
     }
@@ -125,24 +126,24 @@ impl ReviewScreen {
                 if index == 0 {
                     quiet_ui(ui, "in front");
                 } else if ui.add(small(&format!("front: {}", subject.name))).clicked() {
-                    asked = Some(Asked::Front(index));
+                    asked = Some(SessionAction::Front(index));
                 }
             });
             ui.horizontal(|ui| {
                 if ui.add(small(&format!("remove: {}", subject.name))).clicked() {
-                    asked = Some(Asked::Remove(index));
+                    asked = Some(SessionAction::Remove(index));
                 }
             });
             asked = asked.or(stage_ui(ui, index, subject));
             ui.add_space(4.0);
         }
         match asked {
-            Some(Asked::Front(index)) => self.subjects[..=index].rotate_right(1),
-            Some(Asked::Remove(index)) => {
+            Some(SessionAction::Front(index)) => self.subjects[..=index].rotate_right(1),
+            Some(SessionAction::Remove(index)) => {
                 self.subjects.remove(index);
             }
-            Some(Asked::Cancel(index)) => self.subjects[index].recording.cancel(),
-            Some(Asked::Again(index)) => self.subjects[index].read_again(),
+            Some(SessionAction::Cancel(index)) => self.subjects[index].recording.cancel(),
+            Some(SessionAction::Again(index)) => self.subjects[index].read_again(),
             None => {}
         }
     }
@@ -164,11 +165,14 @@ impl ReviewScreen {
     }
 
     /// Which sessions have no such moment.
-    fn leaders_missing_ui(&self, ui: &mut Ui) {
+    fn missing_origins_ui(&self, ui: &mut Ui) {
         for subject in &self.subjects {
-            if subject.is_settled() && subject.moment(self.leader).is_none() {
-                let words =
-                    format!("{} has no {}; it lies at its start", subject.name, self.leader.name());
+            if subject.is_settled() && subject.moment(self.time_origin).is_none() {
+                let words = format!(
+                    "{} has no {}; it lies at its start",
+                    subject.name,
+                    self.time_origin.name()
+                );
                 quiet_ui(ui, &words);
             }
         }
@@ -177,7 +181,7 @@ impl ReviewScreen {
     /// Draws the names of the views.
     pub(super) fn views_ui(&mut self, ui: &mut Ui) {
         for view in View::ALL {
-            ui.selectable_value(&mut self.view, view, view.name()).place(view.name());
+            ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
         }
     }
 }

@@ -1,15 +1,15 @@
 //! The plots: over time above each other, over depth, and the tables.
 
-use super::keys::Move;
+use super::keys::ViewMove;
 use super::left::color_of;
-use super::subject::{LINE_MODELLED, LINE_RESIDUAL, Subject};
+use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
-use crate::plots::over_depth::{self, Source, over_depth_ui};
-use crate::plots::over_time::{Layer, Moment, Panel, Setting, over_time_ui};
+use crate::plots::over_depth::{DepthLayer, DepthSource, over_depth_ui};
+use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
 use crate::theme::Tokens;
 use crate::widgets::remark::quiet_ui;
-use crate::workers::review::{Quantity, Recording};
+use crate::workers::review::{Quantity, ReviewRecording};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 
 /// Points that the axes beside and below a plot take of it.
@@ -48,16 +48,16 @@ impl ReviewScreen {
         ui.horizontal_wrapped(|ui| {
             let mut asked = None;
             for (text, key, to) in [
-                ("Zoom in", "+", Move::ZoomIn),
-                ("Zoom out", "-", Move::ZoomOut),
-                ("Back", "left arrow", Move::Back),
-                ("On", "right arrow", Move::On),
-                ("Everything", "Home", Move::All),
-                ("Cursor A", "A, or a click", Move::Cursor(0)),
-                ("Cursor B", "B, or a click with Shift", Move::Cursor(1)),
-                ("No cursors", "Delete", Move::NoCursors),
+                ("Zoom in", "+", ViewMove::ZoomIn),
+                ("Zoom out", "-", ViewMove::ZoomOut),
+                ("Back", "left arrow", ViewMove::Back),
+                ("On", "right arrow", ViewMove::On),
+                ("Everything", "Home", ViewMove::All),
+                ("Cursor A", "A, or a click", ViewMove::Cursor(0)),
+                ("Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
+                ("No cursors", "Delete", ViewMove::NoCursors),
             ] {
-                let is_of_time = matches!(to, Move::Cursor(_) | Move::NoCursors);
+                let is_of_time = matches!(to, ViewMove::Cursor(_) | ViewMove::NoCursors);
                 if is_of_time && self.view == View::Cycles {
                     continue;
                 }
@@ -98,21 +98,21 @@ impl ReviewScreen {
     }
 
     /// The setting of the plots over time, as the session in front has it.
-    fn setting(&self, front: &Subject) -> Setting {
-        let shift = front.shift(self.leader);
+    fn setting(&self, front: &ReviewSubject) -> TimeBackdrop {
+        let shift = front.shift(self.time_origin);
         let recording = &front.recording;
         let end = recording.track.span().map_or(0.0, |span| span[1]);
-        let phases = Recording::ended(&recording.phases, end);
-        let mut setting = Setting {
+        let phases = ReviewRecording::ended(&recording.phases, end);
+        let mut setting = TimeBackdrop {
             phases: phases.map(|(from, to, phase)| (from - shift, to - shift, phase)).collect(),
             cursors: self.cursors,
-            ..Setting::default()
+            ..TimeBackdrop::default()
         };
         if let Some(facts) = &recording.facts {
             let left_out = facts.left_out_s.iter();
             setting.left_out = left_out.map(|ends| ends.map(|end| end - shift)).collect();
             let moments = facts.events.iter().filter_map(|event| {
-                Some(Moment {
+                Some(TimeMark {
                     t: recording.track.time_of(event.after_sample)? - shift,
                     is_alarm: event.is_alarm,
                     is_note: event.is_note,
@@ -140,7 +140,7 @@ impl ReviewScreen {
         let window = self.time.shown();
         self.thinned = 1;
         for subject in &mut self.subjects {
-            let wanted = subject.wanted(window, pixels, self.leader);
+            let wanted = subject.wanted(window, pixels, self.time_origin);
             for quantity in &self.quantities {
                 subject.update(*quantity, wanted);
                 let drawn = subject.lines[*quantity as usize].drawn();
@@ -152,7 +152,7 @@ impl ReviewScreen {
             return;
         };
         let setting = self.setting(front);
-        let time_axis = format!("time from {} (s)", self.leader.name());
+        let time_axis = format!("time from {} (s)", self.time_origin.name());
         let height = ((ui.available_height() - AXIS_HEIGHT) / count as f32).max(40.0);
         let mut gestures = Vec::new();
         for number in 0..count {
@@ -164,20 +164,20 @@ impl ReviewScreen {
                 if quantity.is_none() && subject.fitted().is_none() {
                     continue;
                 }
-                layers.push(Layer {
+                layers.push(TimeLayer {
                     name: &subject.name,
                     color: color_of(tokens, subject.id),
                     stretches: &subject.lines[place],
                 });
             }
             if quantity == Some(Quantity::Force) && front.fitted().is_some() {
-                layers.push(Layer {
+                layers.push(TimeLayer {
                     name: "fitted",
                     color: tokens.limit,
                     stretches: &front.lines[LINE_MODELLED],
                 });
             }
-            let panel = Panel {
+            let panel = TimePanel {
                 id: quantity.map_or("Residual", Quantity::name),
                 axis: quantity.map_or("residual (mN)", Quantity::axis),
                 layers,
@@ -212,10 +212,10 @@ impl ReviewScreen {
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let sources: Vec<Source<'_>> = self
+        let sources: Vec<DepthSource<'_>> = self
             .subjects
             .iter()
-            .map(|subject| Source {
+            .map(|subject| DepthSource {
                 track: &subject.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
                 rows: [0, subject.recording.track.len()],
@@ -226,17 +226,17 @@ impl ReviewScreen {
             .collect();
         let spans = [&self.depth, &self.force];
         self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<over_depth::Layer<'_>> = self
+        let layers: Vec<DepthLayer<'_>> = self
             .subjects
             .iter()
             .rev()
-            .map(|subject| over_depth::Layer {
+            .map(|subject| DepthLayer {
                 name: &subject.name,
                 color: color_of(tokens, subject.id),
                 id: subject.id,
                 cursors: self.cursors.map(|cursor| {
                     let track = &subject.recording.track;
-                    let place = track.place(cursor? + subject.shift(self.leader))?;
+                    let place = track.place(cursor? + subject.shift(self.time_origin))?;
                     let value = |quantity: Quantity| track.value(quantity as usize, place);
                     Some([value(Quantity::Depth)?, value(Quantity::Force)?])
                 }),

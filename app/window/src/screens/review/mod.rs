@@ -14,17 +14,17 @@ mod subject;
 
 pub use parameters::{ParameterRow, parameter_rows};
 pub use shown::{Shown, ShownSeries, ShownSession};
-pub use subject::Subject;
+pub use subject::ReviewSubject;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
-use crate::plots::navigate::Span;
+use super::screen::{Screen, ScreenEntry, ScreenReply};
+use crate::command::{CommandQueue, UserCommand};
+use crate::plots::navigate::AxisRange;
 use crate::plots::over_depth::DepthLines;
 use crate::widgets::model_choice::ModelChoice;
 use crate::workbench::Workbench;
-use crate::workers::review::fit::{FitAnswer, Prediction};
-use crate::workers::review::{Leader, Quantity};
-use crate::workers::task::Task;
+use crate::workers::review::fit::{FitAnswer, SessionPrediction};
+use crate::workers::review::{Quantity, TimeOrigin};
+use crate::workers::task::BackgroundTask;
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Key, Ui};
 use std::path::{Path, PathBuf};
@@ -70,24 +70,24 @@ const READING_MAX: usize = 2;
 /// The sessions and how they are looked at.
 pub struct ReviewScreen {
     /// The one in front comes first.
-    subjects: Vec<Subject>,
+    subjects: Vec<ReviewSubject>,
     analyses: AnalysesPanel,
     view: View,
-    leader: Leader,
+    time_origin: TimeOrigin,
     quantities: Vec<Quantity>,
     has_residuals: bool,
-    time: Span,
-    depth: Span,
-    force: Span,
+    time: AxisRange,
+    depth: AxisRange,
+    force: AxisRange,
     cursors: [Option<f64>; 2],
     depth_lines: DepthLines,
     depth_pixels: [f64; 2],
-    fits: Task<Vec<FitAnswer>>,
+    fits: BackgroundTask<Vec<FitAnswer>>,
     /// What sessions are fitted with here.
     model: ModelChoice,
     /// Whether the last answer of the fits is handed out.
     are_fits_taken: bool,
-    prediction: Task<Prediction>,
+    prediction: BackgroundTask<SessionPrediction>,
     prediction_of: Option<[String; 2]>,
     prediction_lines: [crate::plots::stretches::Stretches; 2],
     cycle_rows: cycles::CycleRows,
@@ -107,19 +107,19 @@ impl ReviewScreen {
             subjects: Vec::new(),
             analyses: AnalysesPanel::new(library),
             view: View::default(),
-            leader: Leader::default(),
+            time_origin: TimeOrigin::default(),
             quantities: vec![Quantity::Force, Quantity::Depth, Quantity::Volts],
             has_residuals: false,
-            time: Span::default(),
-            depth: Span::default(),
-            force: Span::default(),
+            time: AxisRange::default(),
+            depth: AxisRange::default(),
+            force: AxisRange::default(),
             cursors: [None; 2],
             depth_lines: DepthLines::default(),
             depth_pixels: [800.0, 500.0],
-            fits: Task::default(),
+            fits: BackgroundTask::default(),
             model: ModelChoice::default(),
             are_fits_taken: true,
-            prediction: Task::default(),
+            prediction: BackgroundTask::default(),
             prediction_of: None,
             prediction_lines: Default::default(),
             cycle_rows: cycles::CycleRows::default(),
@@ -148,7 +148,7 @@ impl ReviewScreen {
             return;
         }
         let looked = Looked { session, analysis: None };
-        self.subjects.push(Subject::new(looked, self.next_id));
+        self.subjects.push(ReviewSubject::new(looked, self.next_id));
         self.next_id += 1;
         self.fetch(ctx);
     }
@@ -165,8 +165,8 @@ impl ReviewScreen {
 
     /// Whether nothing is being read, fitted or looked for.
     pub fn is_settled(&self) -> bool {
-        let is_working = self.fits.standing().is_some() || self.prediction.standing().is_some();
-        let is_read = self.subjects.iter().all(Subject::is_settled);
+        let is_working = self.fits.state().is_some() || self.prediction.state().is_some();
+        let is_read = self.subjects.iter().all(ReviewSubject::is_settled);
         is_read && !is_working && !self.depth_lines.is_busy()
     }
 
@@ -174,7 +174,7 @@ impl ReviewScreen {
     pub fn fetch(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
         if let Some(changed) = self.analyses.take_changed() {
-            let is_it = |one: &&mut Subject| one.looked.session == changed;
+            let is_it = |one: &&mut ReviewSubject| one.looked.session == changed;
             if let Some(subject) = self.subjects.iter_mut().find(is_it) {
                 subject.fit = None;
                 subject.read_again();
@@ -198,7 +198,7 @@ impl ReviewScreen {
 
     /// Hands the fits that were made to their sessions, where these are still read in the same way.
     fn take_fits(&mut self) {
-        if self.are_fits_taken || self.fits.standing().is_some() {
+        if self.are_fits_taken || self.fits.state().is_some() {
             return;
         }
         self.are_fits_taken = true;
@@ -206,7 +206,7 @@ impl ReviewScreen {
             return;
         };
         for (of, answer) in answers {
-            let is_own = |one: &&mut Subject| {
+            let is_own = |one: &&mut ReviewSubject| {
                 one.looked.session == of.path && one.looked.analysis == of.analysis
             };
             if let Some(subject) = self.subjects.iter_mut().find(is_own) {
@@ -237,7 +237,7 @@ impl ReviewScreen {
     fn set_wholes(&mut self) {
         let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let times = self.subjects.iter().map(|one| {
-            let shift = one.shift(self.leader);
+            let shift = one.shift(self.time_origin);
             one.recording.span().map(|end| end - shift)
         });
         if let Some([low, high]) = times.reduce(join) {
@@ -256,25 +256,25 @@ impl ReviewScreen {
     }
 
     /// The session in front.
-    fn front(&self) -> Option<&Subject> {
+    fn front(&self) -> Option<&ReviewSubject> {
         self.subjects.first()
     }
 }
 
 impl Screen for ReviewScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         self.draw_left(ui, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
         self.draw_right(ui);
         let shown: Vec<Looked> = self.subjects.iter().map(|one| one.looked.clone()).collect();
         self.analyses.set_shown(&shown);
-        let shift = self.front().map_or(0.0, |one| one.shift(self.leader));
+        let shift = self.front().map_or(0.0, |one| one.shift(self.time_origin));
         let cursors = match self.cursors {
             [Some(a), Some(b)] => Some([a + shift, b + shift]),
             _ => None,
@@ -292,16 +292,21 @@ impl Screen for ReviewScreen {
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        ctx: &Context,
+        command: &UserCommand,
+        _workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::Review(sessions) => self.open(sessions.clone(), ctx),
-            _ => return Reply::NotMine,
+            UserCommand::Review(sessions) => self.open(sessions.clone(), ctx),
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Show
+        ScreenReply::Show
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        if self.fits.standing().is_none() && self.fit_verdict().is_ok() {
+        if self.fits.state().is_none() && self.fit_verdict().is_ok() {
             self.start_fits(ctx);
         }
     }

@@ -3,13 +3,13 @@
 use super::ReviewScreen;
 use super::left::color_of;
 use super::middle::head_ui;
-use crate::plots::navigate::Span;
-use crate::plots::over_time::{Layer, Panel, Setting, over_time_ui};
+use crate::plots::navigate::AxisRange;
+use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
 use crate::theme::Tokens;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::task_ui;
 use crate::workers::review::Quantity;
-use crate::workers::review::fit::{MODELLED, Prediction, RESIDUAL, predict};
+use crate::workers::review::fit::{MODELLED, RESIDUAL, SessionPrediction, predict};
 use eframe::egui::{Ui, vec2};
 
 impl ReviewScreen {
@@ -50,15 +50,15 @@ impl ReviewScreen {
         self.prediction_plots(ui, &found, index);
     }
 
-    fn prediction_plots(&mut self, ui: &mut Ui, found: &Prediction, index: usize) {
+    fn prediction_plots(&mut self, ui: &mut Ui, found: &SessionPrediction, index: usize) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let mut span = Span::default();
+        let mut span = AxisRange::default();
         let Some(whole) = found.track.span() else {
             return;
         };
         span.set_whole(whole);
         let pixels = f64::from(ui.available_width() * ui.ctx().pixels_per_point()).round();
-        let wanted = crate::plots::stretches::Wanted {
+        let wanted = crate::plots::stretches::LineWindow {
             window: whole,
             pixels,
             shift: 0.0,
@@ -72,18 +72,18 @@ impl ReviewScreen {
         let mut own = wanted;
         own.version = subject.recording.version;
         subject.update(Quantity::Force, own);
-        let measured = Layer {
+        let measured = TimeLayer {
             name: "measured",
             color: color_of(tokens, subject.id),
             stretches: &subject.lines[Quantity::Force as usize],
         };
-        let foretold = Layer { name: "foretold", color: tokens.limit, stretches: &*modelled };
+        let foretold = TimeLayer { name: "foretold", color: tokens.limit, stretches: &*modelled };
         let left =
-            Layer { name: "left", color: color_of(tokens, subject.id), stretches: &*residual };
+            TimeLayer { name: "left", color: color_of(tokens, subject.id), stretches: &*residual };
         let (width, height) = (ui.available_width(), ui.available_height());
         for (panel, share, axis) in [
             (
-                Panel {
+                TimePanel {
                     id: "Foretold force",
                     axis: Quantity::Force.axis(),
                     layers: vec![measured, foretold],
@@ -93,7 +93,7 @@ impl ReviewScreen {
                 None,
             ),
             (
-                Panel {
+                TimePanel {
                     id: "Left of it",
                     axis: "measured less foretold (mN)",
                     layers: vec![left],
@@ -104,14 +104,14 @@ impl ReviewScreen {
             ),
         ] {
             ui.allocate_ui(vec2(width, share * height), |ui| {
-                let _ = over_time_ui(ui, &panel, &span, &Setting::default(), axis);
+                let _ = over_time_ui(ui, &panel, &span, &TimeBackdrop::default(), axis);
             });
         }
     }
 }
 
 /// What came of it, in one sentence.
-fn sentence(found: &Prediction, known: &str, other: &str) -> String {
+fn sentence(found: &SessionPrediction, known: &str, other: &str) -> String {
     let share = |part: f64| 100.0 * part / found.peak_n;
     format!(
         "the fit of {known} foretells {other} within {:.1} mN rms, {:.2} % of its peak force of {:.3} N, over {} samples; the peak is foretold as {:.3} N, {:+.2} %",

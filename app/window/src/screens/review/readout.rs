@@ -1,7 +1,7 @@
 //! What stands at the two cursors and between them, as labels that can be read aloud and copied.
 
 use super::ReviewScreen;
-use super::subject::Subject;
+use super::subject::ReviewSubject;
 use crate::widgets::remark::quiet_ui;
 use crate::workers::review::Quantity;
 use eframe::egui::{RichText, Ui};
@@ -25,7 +25,7 @@ pub(super) struct Reading {
 
 impl Reading {
     /// Reads a session laid so many seconds earlier.
-    pub fn of(subject: &Subject, cursors: [Option<f64>; 2], shift: f64) -> Self {
+    pub fn of(subject: &ReviewSubject, cursors: [Option<f64>; 2], shift: f64) -> Self {
         let track = &subject.recording.track;
         let places = cursors.map(|cursor| track.place(cursor? + shift));
         Self {
@@ -73,7 +73,7 @@ impl ReviewScreen {
             quiet_ui(ui, "set cursors A and B to read values and differences");
             return;
         }
-        let words = Reading::of(front, self.cursors, front.shift(self.leader)).words();
+        let words = Reading::of(front, self.cursors, front.shift(self.time_origin)).words();
         ui.horizontal_wrapped(|ui| {
             for word in &words {
                 ui.label(RichText::new(word).monospace());

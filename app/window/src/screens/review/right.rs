@@ -1,12 +1,12 @@
 //! What is known of the session in front: verdict, health, how it ended, calibration, hashes, events, the fit.
 
 use super::ReviewScreen;
-use super::subject::Subject;
+use super::subject::ReviewSubject;
 use crate::screens::exact_fit::exact_ui;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::workers::review::Facts;
+use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_figures::uncertain::{interval, plain};
@@ -49,12 +49,12 @@ impl ReviewScreen {
             None => {}
         }
         if let Some(t) = moved {
-            self.cursors[0] = Some(t - self.front().map_or(0.0, |one| one.shift(self.leader)));
+            self.cursors[0] = Some(t - self.front().map_or(0.0, |one| one.shift(self.time_origin)));
         }
     }
 }
 
-fn facts_ui(ui: &mut Ui, facts: &Facts) {
+fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     for (name, value) in [
         ("specimen", &facts.specimen),
@@ -103,7 +103,7 @@ fn facts_ui(ui: &mut Ui, facts: &Facts) {
 }
 
 /// Draws what happened; the time of what was pressed, for cursor A.
-fn events_ui(ui: &mut Ui, front: &Subject) -> Option<f64> {
+fn events_ui(ui: &mut Ui, front: &ReviewSubject) -> Option<f64> {
     let facts = front.recording.facts.as_ref()?;
     let tokens = Tokens::of(ui.visuals().dark_mode);
     section_ui(ui, "Events and notes");

@@ -1,8 +1,8 @@
 //! What is on the screen, for exports of exactly that.
 
 use super::{Looked, ReviewScreen, View};
-use crate::plots::stretches::{Stretches, Wanted};
-use crate::workers::review::{Leader, Quantity};
+use crate::plots::stretches::{LineWindow, Stretches};
+use crate::workers::review::{Quantity, TimeOrigin};
 
 /// A session as it is shown.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +38,7 @@ pub struct Shown {
     /// Which view.
     pub view: View,
     /// What stands at time zero.
-    pub leader: Leader,
+    pub time_origin: TimeOrigin,
     /// The sessions, the one in front first.
     pub sessions: Vec<ShownSession>,
     /// Quantities over time, from above.
@@ -57,16 +57,16 @@ impl ReviewScreen {
     /// What is on the screen.
     pub fn shown(&self) -> Shown {
         let colors = palpate_figures::tokens::LIGHT.sessions.len() as u64;
-        let session = |subject: &super::Subject| ShownSession {
+        let session = |subject: &super::ReviewSubject| ShownSession {
             looked: subject.looked.clone(),
             name: subject.name.clone(),
             color: (subject.id % colors) as usize,
-            shift_s: subject.shift(self.leader),
+            shift_s: subject.shift(self.time_origin),
             is_whole: subject.recording.share() >= 1.0,
         };
         Shown {
             view: self.view,
-            leader: self.leader,
+            time_origin: self.time_origin,
             sessions: self.subjects.iter().map(session).collect(),
             quantities: self.quantities.clone(),
             time_s: self.time.shown(),
@@ -82,10 +82,10 @@ impl ReviewScreen {
         for quantity in &self.quantities {
             for (session, subject) in self.subjects.iter().enumerate() {
                 let mut lines = Stretches::default();
-                let wanted = Wanted {
+                let wanted = LineWindow {
                     window: self.time.shown(),
                     pixels: columns as f64,
-                    shift: subject.shift(self.leader),
+                    shift: subject.shift(self.time_origin),
                     version: 0,
                 };
                 lines.update(&subject.recording.track, *quantity as usize, wanted);

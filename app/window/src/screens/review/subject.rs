@@ -1,16 +1,16 @@
 //! One session of those shown: what was read of it, its fit, and the points drawn.
 
 use super::Looked;
-use crate::plots::stretches::{Stretches, Wanted};
+use crate::plots::stretches::{LineWindow, Stretches};
 use crate::widgets::model_choice::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
-use crate::workers::review::{Leader, Quantity, Recording, Stage};
+use crate::workers::review::{Quantity, ReviewRecording, Stage, TimeOrigin};
 use eframe::egui::Context;
 use palpate_model::rig::Phase;
 use std::sync::Arc;
 
 /// A session that is shown.
-pub struct Subject {
+pub struct ReviewSubject {
     /// Which, and how it is read.
     pub looked: Looked,
     /// Tells it from the others as long as it is shown; its colour follows from it.
@@ -18,7 +18,7 @@ pub struct Subject {
     /// What it is called.
     pub name: String,
     /// What was read of it.
-    pub recording: Recording,
+    pub recording: ReviewRecording,
     /// Its fit, or why there is none; none before it was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
     /// The points of each quantity, of the modelled force and of what is left.
@@ -32,11 +32,11 @@ pub const LINE_MODELLED: usize = 4;
 /// What is left.
 pub const LINE_RESIDUAL: usize = 5;
 
-impl Subject {
+impl ReviewSubject {
     /// A session that is still to be read.
     #[must_use]
     pub fn new(looked: Looked, id: u64) -> Self {
-        let recording = Recording::new(&looked.session, looked.analysis.as_deref());
+        let recording = ReviewRecording::new(&looked.session, looked.analysis.as_deref());
         Self {
             name: recording.name(),
             looked,
@@ -53,7 +53,7 @@ impl Subject {
         if self.recording.analysis != self.looked.analysis {
             let analysis = self.looked.analysis.as_deref();
             let version = self.recording.version + 1;
-            self.recording = Recording::new(&self.looked.session, analysis);
+            self.recording = ReviewRecording::new(&self.looked.session, analysis);
             self.recording.version = version;
             self.fit = None;
         }
@@ -87,7 +87,7 @@ impl Subject {
     pub fn read_again(&mut self) {
         let version = self.recording.version + 1;
         let analysis = self.looked.analysis.as_deref();
-        self.recording = Recording::new(&self.looked.session, analysis);
+        self.recording = ReviewRecording::new(&self.looked.session, analysis);
         self.recording.version = version;
     }
 
@@ -121,27 +121,27 @@ impl Subject {
     }
 
     /// Time of the session that stands at zero; none where it has no such moment.
-    pub fn moment(&self, leader: Leader) -> Option<f64> {
-        match leader {
-            Leader::Start => Some(0.0),
-            Leader::Contact => {
+    pub fn moment(&self, time_origin: TimeOrigin) -> Option<f64> {
+        match time_origin {
+            TimeOrigin::Start => Some(0.0),
+            TimeOrigin::Contact => {
                 let facts = self.recording.facts.as_ref()?;
                 facts.contact_time(&self.recording.track)
             }
-            Leader::Ramp => self.recording.phase_start(Phase::Ramp),
+            TimeOrigin::Ramp => self.recording.phase_start(Phase::Ramp),
         }
     }
 
     /// By how much it is laid earlier, in s.
-    pub fn shift(&self, leader: Leader) -> f64 {
-        self.moment(leader).unwrap_or(0.0)
+    pub fn shift(&self, time_origin: TimeOrigin) -> f64 {
+        self.moment(time_origin).unwrap_or(0.0)
     }
 
     /// What a fit takes of it.
-    pub fn for_fit(&self, model: &ModelChoice) -> fit::Subject {
+    pub fn for_fit(&self, model: &ModelChoice) -> fit::FitSubject {
         let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
         let first = begins.into_iter().flatten().reduce(f64::min);
-        fit::Subject {
+        fit::FitSubject {
             path: self.looked.session.clone(),
             analysis: self.looked.analysis.clone(),
             family: model.family.clone(),
@@ -151,13 +151,13 @@ impl Subject {
     }
 
     /// Finds the points of a quantity again where something changed.
-    pub fn update(&mut self, quantity: Quantity, wanted: Wanted) {
+    pub fn update(&mut self, quantity: Quantity, wanted: LineWindow) {
         let place = quantity as usize;
         self.lines[place].update(&self.recording.track, place, wanted);
     }
 
     /// The same of its fit.
-    pub fn update_fit(&mut self, wanted: Wanted) {
+    pub fn update_fit(&mut self, wanted: LineWindow) {
         let Some(Ok(fit)) = &self.fit else {
             return;
         };
@@ -168,7 +168,12 @@ impl Subject {
 
     /// What a shown session wants of the plots.
     #[must_use]
-    pub fn wanted(&self, window: [f64; 2], pixels: f64, leader: Leader) -> Wanted {
-        Wanted { window, pixels, shift: self.shift(leader), version: self.recording.version }
+    pub fn wanted(&self, window: [f64; 2], pixels: f64, time_origin: TimeOrigin) -> LineWindow {
+        LineWindow {
+            window,
+            pixels,
+            shift: self.shift(time_origin),
+            version: self.recording.version,
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::rig_panel::rig_ui;
 use super::screen::{Screen, ScreenEntry};
-use crate::command::{Aside, Command, Commands};
+use crate::command::{CommandQueue, ManualMove, UserCommand};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::reason_button::reason_button;
@@ -51,17 +51,17 @@ struct Facts<'a> {
 }
 
 impl Screen for RigScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let curve = &workbench.bench.curve;
         let rig = &workbench.snapshot.rig;
         let facts = Facts {
             limits: &workbench.bench.limits,
             force: rig.reading.map(|reading| curve.newtons_from_volts(reading.volts)),
-            verdict: &workbench.aside_verdict(),
+            verdict: &workbench.move_verdict(),
             refusal: workbench.refusal.as_deref(),
         };
         ScrollArea::vertical().id_salt("rig").auto_shrink(false).show(ui, |ui| {
@@ -85,7 +85,13 @@ impl Screen for RigScreen {
 }
 
 impl RigScreen {
-    fn move_ui(&mut self, ui: &mut Ui, rig: &RigView, facts: &Facts<'_>, commands: &mut Commands) {
+    fn move_ui(
+        &mut self,
+        ui: &mut Ui,
+        rig: &RigView,
+        facts: &Facts<'_>,
+        commands: &mut CommandQueue,
+    ) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let fastest = rig.description.speed_max.0;
         let furthest = rig.description.travel.0;
@@ -111,7 +117,7 @@ impl RigScreen {
             if reason_button(ui, "Jog", vec2(80.0, 34.0), &verdict)
                 && let Ok((distance, speed)) = typed
             {
-                commands.push(Command::Aside(Aside::jog(distance, speed)));
+                commands.push(UserCommand::ManualMove(ManualMove::jog(distance, speed)));
             }
         });
         ui.horizontal_wrapped(|ui| {
@@ -122,7 +128,7 @@ impl RigScreen {
                 if ui.add_enabled(is_possible, button).clicked()
                     && let Ok(speed) = speed
                 {
-                    commands.push(Command::Aside(Aside::jog(distance, speed)));
+                    commands.push(UserCommand::ManualMove(ManualMove::jog(distance, speed)));
                 }
             }
         });
@@ -131,7 +137,7 @@ impl RigScreen {
         ui.add_space(6.0);
         ui.horizontal_wrapped(|ui| {
             if reason_button(ui, "Find home", vec2(110.0, 34.0), facts.verdict) {
-                commands.push(Command::Aside(Aside::home()));
+                commands.push(UserCommand::ManualMove(ManualMove::home()));
             }
             let words = if rig.is_homed {
                 "Position zero is known. Home is touched once more and compared."

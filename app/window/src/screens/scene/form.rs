@@ -1,7 +1,7 @@
 //! The scene as typed.
 
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::text_row::text_row;
@@ -20,7 +20,7 @@ const NODES: [f64; 2] = [3.0, 1601.0];
 
 /// What is asked for beside the fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Asked {
+pub(super) enum FileAction {
     /// A dialog for a scene file.
     Dialog,
     /// The file that is named.
@@ -130,22 +130,22 @@ impl SceneForm {
     }
 
     /// Draws which scene it is, and what leads the hand.
-    pub fn ui(&mut self, ui: &mut Ui) -> Option<Asked> {
+    pub fn ui(&mut self, ui: &mut Ui) -> Option<FileAction> {
         let mut asked = None;
         section_ui(ui, "Scene");
         if text_row(ui, "file", "a scene file; built in without", &mut self.file) {
-            asked = Some(Asked::Read);
+            asked = Some(FileAction::Read);
         }
         ui.horizontal_wrapped(|ui| {
             if ui.button("Built in").clicked() {
                 self.file.clear();
-                asked = Some(Asked::Read);
+                asked = Some(FileAction::Read);
             }
             if ui.button("Open").clicked() {
-                asked = Some(Asked::Read);
+                asked = Some(FileAction::Read);
             }
             if ui.button("Choose a scene...").clicked() {
-                asked = Some(Asked::Dialog);
+                asked = Some(FileAction::Dialog);
             }
         });
         quiet_ui(ui, &self.read.name);
@@ -155,9 +155,9 @@ impl SceneForm {
         section_ui(ui, "Hand");
         ui.horizontal_wrapped(|ui| {
             for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name()).place(path.name());
+                ui.radio_value(&mut self.path, Some(path), path.name()).named(path.name());
             }
-            ui.radio_value(&mut self.path, None, "pointer and keys").place("pointer and keys");
+            ui.radio_value(&mut self.path, None, "pointer and keys").named("pointer and keys");
         });
         asked
     }

@@ -6,30 +6,30 @@ mod middle;
 mod plan;
 mod right;
 
-use super::screen::{Reply, Screen, ScreenEntry};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
 use super::tape::TapePanel;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::scene::view::SceneView;
-use crate::shell::palette::Action;
+use crate::shell::palette::PaletteAction;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::work_ui;
 use crate::workbench::Workbench;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
-use crate::workers::touch::{Ahead, Moment, Touch, ahead};
+use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, ahead};
+use crate::workers::path_dialog::PathPurpose;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Button, Context, Key, Ui, vec2};
 use form::SceneForm;
-use middle::Side;
+use middle::PictureSource;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::Replayed;
 use palpate_analysis::scene::{recorded, replay, scene_of};
 use palpate_haptics::scene::{Hand6, SceneSettings};
 use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
-use plan::Planned;
+use plan::PlannedScene;
 use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
@@ -47,18 +47,18 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 /// The screen's state.
 pub struct SceneScreen {
     form: SceneForm,
-    reading: Task<(SceneFile, Vec<String>)>,
+    reading: BackgroundTask<(SceneFile, Vec<String>)>,
     /// Whether the file asked for has not come yet.
     is_reading: bool,
-    ahead: Task<Ahead>,
+    ahead: BackgroundTask<ComputedPath>,
     is_shown: bool,
-    touch: Option<Touch>,
+    touch: Option<LiveScene>,
     /// What it is made of.
     touched: SceneFile,
     refusal: Option<String>,
     tape: TapePanel,
-    planned: Option<Planned>,
-    side: Side,
+    planned: Option<PlannedScene>,
+    side: PictureSource,
     view: SceneView,
     /// The length of the side that the view was made for, in mm.
     viewed_mm: f64,
@@ -70,16 +70,16 @@ impl Default for SceneScreen {
         let side = SceneFile::default().side_mm;
         Self {
             form,
-            reading: Task::default(),
+            reading: BackgroundTask::default(),
             is_reading: false,
-            ahead: Task::default(),
+            ahead: BackgroundTask::default(),
             is_shown: false,
             touch: None,
             touched: SceneFile::default(),
             refusal: None,
             tape: TapePanel::default(),
             planned: None,
-            side: Side::Ahead,
+            side: PictureSource::Computed,
             view: SceneView::of([side; 2]),
             viewed_mm: side,
         }
@@ -89,16 +89,16 @@ impl Default for SceneScreen {
 impl SceneScreen {
     /// Whether the scene runs.
     pub fn is_running(&self) -> bool {
-        self.touch.as_ref().is_some_and(Touch::is_running)
+        self.touch.as_ref().is_some_and(LiveScene::is_running)
     }
 
     /// The scene that runs or ran last.
-    pub fn touch(&self) -> Option<&Touch> {
+    pub fn touch(&self) -> Option<&LiveScene> {
         self.touch.as_ref()
     }
 
     /// The path that was computed last.
-    pub fn ahead(&self) -> Option<&Result<Ahead, String>> {
+    pub fn ahead(&self) -> Option<&Result<ComputedPath, String>> {
         self.ahead.answer()
     }
 
@@ -134,7 +134,7 @@ impl SceneScreen {
             return;
         };
         let path = self.form.path.unwrap_or(form::FIRST_PATH);
-        self.side = Side::Ahead;
+        self.side = PictureSource::Computed;
         self.look_at(&settings);
         self.ahead.start("scene-ahead", ctx, move |progress| {
             ahead(settings, path, &mut |share| progress.share(share, "the path"))
@@ -152,14 +152,14 @@ impl SceneScreen {
             let text = file.text();
             let begin = |folder: &Path| SceneRecorder::start(folder, &text, COLUMNS);
             let recorder = self.tape.begin(ctx, begin)?;
-            let touch = Touch::start(settings, self.form.path, recorder)?;
+            let touch = LiveScene::start(settings, self.form.path, recorder)?;
             Ok((touch, file))
         });
         match started {
             Ok((touch, file)) => {
                 self.touch = Some(touch);
                 self.touched = file;
-                self.side = Side::Live;
+                self.side = PictureSource::Live;
                 self.refusal = None;
             }
             Err(reason) => {
@@ -180,22 +180,26 @@ impl SceneScreen {
     }
 
     /// What is on the screen: the scene that runs or ran, or the path computed ahead.
-    fn seen(&self) -> Option<(&SceneSettings, &Moment)> {
+    fn seen(&self) -> Option<(&SceneSettings, &SceneInstant)> {
         match (self.side, &self.touch, self.ahead.answer()) {
-            (Side::Live, Some(touch), _) => Some((touch.settings(), touch.moment())),
-            (Side::Ahead, _, Some(Ok(ahead))) => Some((&ahead.settings, &ahead.deepest)),
+            (PictureSource::Live, Some(touch), _) => Some((touch.settings(), touch.moment())),
+            (PictureSource::Computed, _, Some(Ok(ahead))) => {
+                Some((&ahead.settings, &ahead.deepest))
+            }
             _ => None,
         }
     }
 }
 
 impl Screen for SceneScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         // What runs is not to be changed under a hand.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
-            Some(form::Asked::Dialog) => commands.push(Command::Choose(Ask::Scene)),
-            Some(form::Asked::Read) => commands.push(Command::OpenScene),
+            Some(form::FileAction::Dialog) => {
+                commands.push(UserCommand::Choose(PathPurpose::Scene))
+            }
+            Some(form::FileAction::Read) => commands.push(UserCommand::OpenScene),
             None => {}
         });
         if let Some(reason) = &self.refusal {
@@ -211,13 +215,13 @@ impl Screen for SceneScreen {
         let size = vec2(170.0, 34.0);
         if is_running {
             let stop = Button::new("Stop the scene").min_size(size);
-            if ui.add(stop).place("Stop the scene").clicked() {
-                commands.push(Command::SceneStop);
+            if ui.add(stop).named("Stop the scene").clicked() {
+                commands.push(UserCommand::SceneStop);
             }
         } else if reason_button(ui, "Start the scene", size, &self.verdict(workbench)) {
-            commands.push(Command::SceneStart);
+            commands.push(UserCommand::SceneStart);
         }
-        let words = match self.touch.as_ref().is_some_and(Touch::is_led) {
+        let words = match self.touch.as_ref().is_some_and(LiveScene::is_led) {
             true => "the path leads the hand; after it the pointer and the keys do",
             false => {
                 "in the picture: hold the left button to press, with the wheel deeper; drag with the right button to \
@@ -231,11 +235,11 @@ impl Screen for SceneScreen {
         self.tape.ui(ui, is_running, replay);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         self.draw_right(ui);
     }
 
@@ -244,7 +248,7 @@ impl Screen for SceneScreen {
         self.tape.poll();
         self.ahead.poll();
         self.reading.poll();
-        if self.is_reading && self.reading.standing().is_none() {
+        if self.is_reading && self.reading.state().is_none() {
             self.is_reading = false;
             match self.reading.answer() {
                 Some(Ok((file, notes))) => {
@@ -270,26 +274,31 @@ impl Screen for SceneScreen {
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        ctx: &Context,
+        command: &UserCommand,
+        workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::SceneStart if self.verdict(workbench).is_ok() => {
+            UserCommand::SceneStart if self.verdict(workbench).is_ok() => {
                 self.start(ctx);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            Command::SceneStart => {}
-            Command::SceneStop => self.stop(),
-            Command::OpenScene => self.read(ctx),
-            Command::Chosen(Ask::Scene, path) => {
+            UserCommand::SceneStart => {}
+            UserCommand::SceneStop => self.stop(),
+            UserCommand::OpenScene => self.read(ctx),
+            UserCommand::Chosen(PathPurpose::Scene, path) => {
                 self.form.file = path.display().to_string();
                 self.read(ctx);
             }
-            Command::ReplayScene(folder) => {
+            UserCommand::ReplayScene(folder) => {
                 self.tape.take(folder);
-                return Reply::Show;
+                return ScreenReply::Show;
             }
-            _ => return Reply::NotMine,
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Done
+        ScreenReply::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -301,7 +310,7 @@ impl Screen for SceneScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.ahead.standing().is_some() || self.tape.is_busy() || self.is_running()
+        self.ahead.state().is_some() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -309,7 +318,7 @@ impl Screen for SceneScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
+        if let Some(live) = self.touch.as_mut().and_then(LiveScene::stop) {
             self.tape.end(move || live.stop().and_then(recorded));
         }
     }
@@ -319,15 +328,15 @@ impl Screen for SceneScreen {
         self.tape.settle();
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let can_stop = match self.is_running() {
             true => Ok(()),
             false => Err("the scene does not run".to_owned()),
         };
         let can_start = self.verdict(workbench);
         vec![
-            Action::new("Start the scene", "", Command::SceneStart).if_ok(can_start),
-            Action::new("Stop the scene", "", Command::SceneStop).if_ok(can_stop),
+            PaletteAction::new("Start the scene", "", UserCommand::SceneStart).if_ok(can_start),
+            PaletteAction::new("Stop the scene", "", UserCommand::SceneStop).if_ok(can_stop),
         ]
     }
 }

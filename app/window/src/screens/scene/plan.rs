@@ -1,12 +1,12 @@
 //! What the scene tolerates, and the cheapest way to play it that does.
 
 use super::SceneScreen;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::workers::touch::Touch;
+use crate::workers::live_scene::LiveScene;
 use eframe::egui::{Ui, vec2};
 use palpate_analysis::report::scene::plan_text;
 use palpate_analysis::scene_bench::{made_after, planned, planned_again};
@@ -14,13 +14,13 @@ use palpate_haptics::surface::{NoPlan, SceneCurves, ScenePlan};
 use palpate_runner::haptics::scene_file::SceneFile;
 
 /// A plan, what it was made of, and what it answers.
-pub(super) struct Planned {
+pub(super) struct PlannedScene {
     file: SceneFile,
     curves: SceneCurves,
     plan: Result<ScenePlan, NoPlan>,
 }
 
-impl Planned {
+impl PlannedScene {
     fn of(file: SceneFile, curves: &SceneCurves) -> Self {
         Self { plan: planned(&file, curves, 1.0), curves: curves.clone(), file }
     }
@@ -38,12 +38,12 @@ impl SceneScreen {
             return;
         };
         if !self.planned.as_ref().is_some_and(|one| one.is_of(&file, curves)) {
-            self.planned = Some(Planned::of(file, curves));
+            self.planned = Some(PlannedScene::of(file, curves));
         }
     }
 
     /// Draws it; the plan can be taken.
-    pub(super) fn plan_ui(&mut self, ui: &mut Ui, is_running: bool, commands: &mut Commands) {
+    pub(super) fn plan_ui(&mut self, ui: &mut Ui, is_running: bool, commands: &mut CommandQueue) {
         section_ui(ui, "Tolerances and plan");
         if let Ok(file) = self.form.scene_file() {
             let one = &file.tolerances;
@@ -54,18 +54,18 @@ impl SceneScreen {
         }
         let verdict = match &self.planned {
             None => Err("measure what a scene costs on the screen Trade first".to_owned()),
-            Some(Planned { plan: Err(none), .. }) => Err(none.why.clone()),
+            Some(PlannedScene { plan: Err(none), .. }) => Err(none.why.clone()),
             Some(_) if is_running => Err("the scene runs".to_owned()),
-            Some(Planned { plan: Ok(_), .. }) => Ok(()),
+            Some(PlannedScene { plan: Ok(_), .. }) => Ok(()),
         };
         if self.planned.is_none() {
             const NAME: &str = "Measure on Trade...";
-            if ui.button(NAME).place(NAME).clicked() {
-                commands.push(Command::MeasureScene);
+            if ui.button(NAME).named(NAME).clicked() {
+                commands.push(UserCommand::MeasureScene);
             }
         }
         let is_taken = reason_button(ui, "Take the plan", vec2(170.0, 26.0), &verdict);
-        if let Some(Planned { file, plan: Ok(plan), .. }) = &self.planned {
+        if let Some(PlannedScene { file, plan: Ok(plan), .. }) = &self.planned {
             for line in plan_text(plan).lines() {
                 quiet_ui(ui, line);
             }
@@ -78,7 +78,7 @@ impl SceneScreen {
 
     /// That ticks of the scene that runs or ran take longer than it grants them, if they do, and what follows for its plan.
     fn late_ui(&self, ui: &mut Ui) {
-        let kept = self.touch.as_ref().map(Touch::kept);
+        let kept = self.touch.as_ref().map(LiveScene::kept);
         let Some(kept) = kept.filter(|kept| kept.work.count > 0) else {
             return;
         };
@@ -93,7 +93,7 @@ impl SceneScreen {
             &format!("one tick in a thousand took {took:.0} µs, over the budget of {budget} µs"),
         );
         let planned = self.planned.as_ref();
-        if let Some(Planned { curves, .. }) = planned {
+        if let Some(PlannedScene { curves, .. }) = planned {
             alarm_ui(ui, &after_miss(file, curves, took));
         }
     }

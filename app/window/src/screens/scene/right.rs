@@ -1,11 +1,11 @@
 //! What is felt, why it is not more, and how the loop does.
 
 use super::SceneScreen;
-use super::middle::Side;
+use super::middle::PictureSource;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::loop_times::loop_times_ui;
-use crate::workers::touch::{Touch, force_of, margin_of};
+use crate::workers::live_scene::{LiveScene, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::margin_text;
 use palpate_haptics::scene::{SceneSettings, SceneTick};
@@ -20,7 +20,7 @@ impl SceneScreen {
         };
         force_ui(ui, &moment.tick);
         guard_ui(ui, settings, &moment.tick);
-        let live = self.touch.as_ref().filter(|_| self.side == Side::Live);
+        let live = self.touch.as_ref().filter(|_| self.side == PictureSource::Live);
         if let Some(touch) = live {
             loop_ui(ui, touch);
         }
@@ -63,7 +63,7 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
     }
 }
 
-fn loop_ui(ui: &mut Ui, touch: &Touch) {
+fn loop_ui(ui: &mut Ui, touch: &LiveScene) {
     section_ui(ui, "Loop");
     let rate = touch.settings().period.hz();
     fact_ui(ui, "wanted", format!("{rate:.0} ticks a second"));

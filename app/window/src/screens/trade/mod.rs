@@ -1,21 +1,21 @@
 //! What accuracy costs on this machine: what is wanted on the left, error over time in the middle, what to
 //! use on the right.
 
-mod shown;
+mod tables;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
+use super::screen::{Screen, ScreenEntry, ScreenReply};
+use crate::command::{CommandQueue, UserCommand};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::remark::alarm_ui;
 use crate::widgets::table::table_ui;
 use crate::widgets::task_bar::work_ui;
 use crate::widgets::tick_box::tick_box;
 use crate::workbench::Workbench;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, TextEdit, Ui, vec2};
 use palpate_analysis::report::scatter::Scatter;
 use palpate_analysis::report::text::capital;
@@ -26,9 +26,9 @@ use palpate_haptics::surface::{Needs, NoPlan, SceneCurves, ScenePlan, plan};
 use palpate_model::units::Newtons;
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use palpate_rheology::trade::{Recommendation, TradeCurves};
-use shown::{Shown, cuts, families, fits, integrators, meshes, plan_lines, steps};
 use std::path::PathBuf;
 use std::sync::Arc;
+use tables::{TradeTable, cuts, families, fits, integrators, meshes, plan_lines, steps};
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.5;
@@ -67,7 +67,7 @@ impl View {
 }
 
 /// Curves measured or read.
-pub struct Known {
+pub struct TradeMeasurement {
     curves: TradeCurves,
     /// Why not to rely on them.
     doubts: Vec<String>,
@@ -91,11 +91,11 @@ pub struct TradeScreen {
     share: QuantityField,
     is_quick: bool,
     view: View,
-    task: Task<Known>,
+    task: BackgroundTask<TradeMeasurement>,
     is_read: bool,
     shape: QuantityField,
     budget: QuantityField,
-    scene: Task<Arc<SceneCurves>>,
+    scene: BackgroundTask<Arc<SceneCurves>>,
 }
 
 impl TradeScreen {
@@ -107,18 +107,18 @@ impl TradeScreen {
             share: QuantityField::new(10.0),
             is_quick: false,
             view: View::Integrators,
-            task: Task::default(),
+            task: BackgroundTask::default(),
             is_read: false,
             shape: QuantityField::new(0.5),
             budget: QuantityField::new(100.0),
-            scene: Task::default(),
+            scene: BackgroundTask::default(),
         }
     }
 
     /// The curves on the screen.
     pub fn curves(&self) -> Option<&TradeCurves> {
-        let known = self.task.answer()?.as_ref().ok()?;
-        Some(&known.curves)
+        let measured = self.task.answer()?.as_ref().ok()?;
+        Some(&measured.curves)
     }
 
     /// The curves of a scene.
@@ -153,7 +153,7 @@ impl TradeScreen {
     }
 
     /// What the view shows and the level not to exceed in it, once that is measured.
-    fn drawn(&self) -> Result<Option<(Shown, Option<f64>)>, String> {
+    fn drawn(&self) -> Result<Option<(TradeTable, Option<f64>)>, String> {
         if self.view.is_scene() {
             let planned = self.planned().and_then(Result::ok);
             let curves = self.scene.answer().map(|answer| answer.as_ref());
@@ -170,11 +170,11 @@ impl TradeScreen {
                 _ => (meshes(curves, planned), shape),
             }));
         }
-        let known = self.task.answer().map(|answer| answer.as_ref());
-        let Some(known) = known.transpose().map_err(Clone::clone)? else {
+        let measured = self.task.answer().map(|answer| answer.as_ref());
+        let Some(measured) = measured.transpose().map_err(Clone::clone)? else {
             return Ok(None);
         };
-        let curves = &known.curves;
+        let curves = &measured.curves;
         let peak = Newtons(curves.peak.ramp_hold_n);
         let level = self.tolerance.parse::<Tolerance>().ok();
         let level = level.map(|tolerance| 100.0 * tolerance.in_newtons(peak).0 / peak.0);
@@ -217,14 +217,14 @@ impl TradeScreen {
 }
 
 impl Screen for TradeScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Wanted");
         ui.horizontal(|ui| {
             let label = form_label(ui, "tolerance");
             let input =
                 TextEdit::singleline(&mut self.tolerance).desired_width(96.0).char_limit(24);
-            ui.add(input).labelled_by(label.id).place("tolerance");
+            ui.add(input).labelled_by(label.id).named("tolerance");
         });
         match self.tolerance.parse::<Tolerance>() {
             Ok(tolerance) => {
@@ -255,38 +255,38 @@ impl Screen for TradeScreen {
         if is_scene {
             return;
         }
-        let Some(Ok(known)) = self.task.answer() else {
+        let Some(Ok(measured)) = self.task.answer() else {
             return;
         };
         section_ui(ui, "Measured");
         let facts = [
-            known.curves.machine.words(),
-            format!("{} by palpate {}", known.curves.measured_at, known.curves.version),
+            measured.curves.machine.words(),
+            format!("{} by palpate {}", measured.curves.measured_at, measured.curves.version),
             format!(
                 "even and odd rounds differ by {} at most",
-                percent(known.curves.worst_halves())
+                percent(measured.curves.worst_halves())
             ),
         ];
         for fact in facts {
             ui.add(Label::new(RichText::new(fact).small()).wrap());
         }
-        for doubt in &known.doubts {
+        for doubt in &measured.doubts {
             let text = RichText::new(doubt).color(tokens.alarm_text);
             ui.add(Label::new(text.small()).wrap());
         }
-        let (text, ink) = match &known.stored {
+        let (text, ink) = match &measured.stored {
             Ok(file) => (format!("stored in {file}"), tokens.text_quiet),
             Err(reason) => (format!("not stored: {reason}"), tokens.alarm_text),
         };
         ui.add(Label::new(RichText::new(text).small().color(ink)).wrap());
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             ui.label(RichText::new("Error over time").heading().strong());
             for (view, name) in VIEWS {
-                ui.selectable_value(&mut self.view, view, name).place(name);
+                ui.selectable_value(&mut self.view, view, name).named(name);
             }
         });
         let (shown, level) = match self.drawn() {
@@ -315,7 +315,7 @@ impl Screen for TradeScreen {
         table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "What to use");
         if self.view.is_scene() {
@@ -363,16 +363,25 @@ impl Screen for TradeScreen {
         }
         self.task.start("trade-read", ctx, move |_| {
             let curves = read_trade(&file).map_err(|err| err.to_string())?;
-            Ok(Known { doubts: doubts(&curves), stored: Ok(file.display().to_string()), curves })
+            Ok(TradeMeasurement {
+                doubts: doubts(&curves),
+                stored: Ok(file.display().to_string()),
+                curves,
+            })
         });
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(
+        &mut self,
+        _ctx: &Context,
+        command: &UserCommand,
+        _workbench: &mut Workbench,
+    ) -> ScreenReply {
         match command {
-            Command::MeasureScene => self.view = View::Mesh,
-            _ => return Reply::NotMine,
+            UserCommand::MeasureScene => self.view = View::Mesh,
+            _ => return ScreenReply::NotMine,
         }
-        Reply::Show
+        ScreenReply::Show
     }
 
     fn work(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -392,7 +401,7 @@ impl Screen for TradeScreen {
             let curves = trade::measure(extent, progress)?.ok_or("ended before it was done")?;
             let stored = library
                 .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
-            Ok(Known {
+            Ok(TradeMeasurement {
                 doubts: doubts(&curves),
                 stored: stored.map(|file| file.display().to_string()),
                 curves,
@@ -408,7 +417,7 @@ impl Screen for TradeScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.scene.standing().is_some()
+        self.task.state().is_some() || self.scene.state().is_some()
     }
 }
 

@@ -15,7 +15,7 @@ use std::path::Path;
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Event {
+pub struct SessionEvent {
     /// Samples before it.
     pub after_sample: usize,
     /// What, in words.
@@ -29,7 +29,7 @@ pub struct Event {
 palpate_model::named! {
     /// Where sessions laid over each other have their time zero.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Leader {
+    pub enum TimeOrigin {
         /// The first sample.
         #[default]
         Start = "session start",
@@ -42,7 +42,7 @@ palpate_model::named! {
 
 /// What is known.
 #[derive(Clone, Debug)]
-pub struct Facts {
+pub struct SessionFacts {
     /// Who measured.
     pub operator: String,
     /// What was indented.
@@ -64,7 +64,7 @@ pub struct Facts {
     /// How the computer kept up.
     pub health: HealthSummary,
     /// What happened, in order; phases are told elsewhere.
-    pub events: Vec<Event>,
+    pub events: Vec<SessionEvent>,
     /// Samples before the first contact found.
     pub contact: Option<usize>,
     /// Stretches whose forces do not count: from and to in s since the first sample.
@@ -77,7 +77,7 @@ pub struct Facts {
     pub analyses: Vec<(String, &'static str)>,
 }
 
-impl Facts {
+impl SessionFacts {
     /// What a session that was read through says.
     #[must_use]
     pub fn of(path: &Path, passing: &Passing) -> Self {
@@ -137,9 +137,9 @@ impl Facts {
 }
 
 /// An entry in words; none for what stands elsewhere in the picture.
-fn event(entry: &Entry) -> Option<Event> {
+fn event(entry: &Entry) -> Option<SessionEvent> {
     let made = |text: String, is_alarm: bool, is_note: bool| {
-        Some(Event {
+        Some(SessionEvent {
             after_sample: usize::try_from(entry.after_sample).unwrap_or(usize::MAX),
             text,
             is_alarm,
@@ -163,7 +163,7 @@ fn event(entry: &Entry) -> Option<Event> {
             Effect::Finished(outcome) => {
                 made(format!("{}: {}", outcome.ending, outcome.reason), false, false)
             }
-            Effect::Command(_) | Effect::ByHand(_) => None,
+            Effect::UserCommand(_) | Effect::ByHand(_) => None,
         },
         EntryKind::Input => {
             let body = &entry.body;

@@ -16,7 +16,7 @@ pub const RESIDUAL: usize = 1;
 
 /// Which session, how it is read, and when its ramp begins in s since its first sample.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Subject {
+pub struct FitSubject {
     /// Its folder.
     pub path: PathBuf,
     /// The analysis it is read by.
@@ -29,7 +29,7 @@ pub struct Subject {
     pub ramp_t: f64,
 }
 
-impl Subject {
+impl FitSubject {
     fn options(&self) -> Result<FitOptions, String> {
         match &self.family {
             Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
@@ -53,7 +53,7 @@ pub struct SessionFit {
 
 /// What the fit of one session says of another.
 #[derive(Clone, Debug)]
-pub struct Prediction {
+pub struct SessionPrediction {
     /// The fit of the first, its track over the second's time: the force foretold, and what is left.
     pub fit: FitReport,
     /// The force foretold and what is left of the measured one.
@@ -68,7 +68,7 @@ pub struct Prediction {
     pub samples: usize,
 }
 
-fn samples_of(subject: &Subject) -> Result<Fitted, String> {
+fn samples_of(subject: &FitSubject) -> Result<Fitted, String> {
     let is_rejected_included = subject.is_rejected_included;
     let wanted = Wanted { is_rejected_included, ..Wanted::default() };
     let recipe =
@@ -92,7 +92,7 @@ fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
 }
 
 /// Fits one session.
-pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
+pub fn fit_session(subject: &FitSubject) -> Result<SessionFit, String> {
     let fitted = samples_of(subject)?;
     let report = fitted.result.clone().map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
@@ -109,11 +109,11 @@ pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
 }
 
 /// What became of the fit of one session.
-pub type FitAnswer = (Subject, Result<Arc<SessionFit>, String>);
+pub type FitAnswer = (FitSubject, Result<Arc<SessionFit>, String>);
 
 /// Fits several, one after the other.
 pub fn fit_sessions(
-    subjects: &[Subject],
+    subjects: &[FitSubject],
     progress: &dyn Progress,
 ) -> Result<Vec<FitAnswer>, String> {
     let mut answers = Vec::with_capacity(subjects.len());
@@ -129,7 +129,10 @@ pub fn fit_sessions(
 }
 
 /// Fits the first session and lays what its body would answer to the second's depths over the second.
-pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Prediction, String> {
+pub fn predict(
+    pair: &[FitSubject; 2],
+    progress: &dyn Progress,
+) -> Result<SessionPrediction, String> {
     let [known, other] = pair;
     if progress.tell(0, 2, "fitting the first").is_break() {
         return Err("cancelled".into());
@@ -147,7 +150,7 @@ pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Predictio
     }
     let squares: f64 = pairs().map(|(one, fit)| (one.force.0 - fit.0).powi(2)).sum();
     let highest = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::NEG_INFINITY, f64::max);
-    Ok(Prediction {
+    Ok(SessionPrediction {
         track: track_of(&samples, &modelled, other.ramp_t),
         rms_n: (squares / count as f64).sqrt(),
         peak_n: highest(&mut pairs().map(|(one, _)| one.force.0)),
@@ -165,8 +168,8 @@ mod tests {
     use palpate_sessions::edits::Verdict;
     use std::path::Path;
 
-    fn recorded() -> Subject {
-        Subject {
+    fn recorded() -> FitSubject {
+        FitSubject {
             path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab"),
             analysis: None,
             family: None,
@@ -199,7 +202,7 @@ mod tests {
         }
         let who = Who { by: "Ada".into(), reason: "a hair".into() };
         judge(&path, Verdict::Rejected, &who).unwrap();
-        let mut subject = Subject { path, ..recorded() };
+        let mut subject = FitSubject { path, ..recorded() };
         assert!(fit_session(&subject).unwrap_err().contains("a hair"));
         let pair = [recorded(), subject.clone()];
         assert!(predict(&pair, &Unwatched).unwrap_err().contains("a hair"));
@@ -213,7 +216,7 @@ mod tests {
         let found = predict(&pair, &Unwatched).unwrap();
         assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
         assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
-        let gone = Subject { path: "/nowhere/at-all".into(), ..recorded() };
+        let gone = FitSubject { path: "/nowhere/at-all".into(), ..recorded() };
         let refused = predict(&[gone.clone(), recorded()], &Unwatched);
         assert!(refused.unwrap_err().contains("/nowhere/at-all"));
         let answers = fit_sessions(&[gone, recorded()], &Unwatched).unwrap();

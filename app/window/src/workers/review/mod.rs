@@ -4,7 +4,7 @@ mod facts;
 pub mod fit;
 mod read;
 
-pub use facts::{Event, Facts, Leader};
+pub use facts::{SessionEvent, SessionFacts, TimeOrigin};
 pub use read::read;
 
 use eframe::egui::Context;
@@ -55,7 +55,7 @@ impl Quantity {
 
 /// Samples that have something in common, up to where the next ones begin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch<T> {
+pub struct TrackStretch<T> {
     /// Number of the first sample.
     pub first: usize,
     /// Its time in s since the first sample of the session.
@@ -65,7 +65,7 @@ pub struct Stretch<T> {
 }
 
 /// What a reader tells while it reads.
-pub enum News {
+pub enum ReadUpdate {
     /// What the first and the last chunk say.
     Head(Box<Summary>),
     /// The next samples.
@@ -73,12 +73,12 @@ pub enum News {
         /// Those.
         segment: Arc<Segment>,
         /// Phases that begin in it.
-        phases: Vec<Stretch<Phase>>,
+        phases: Vec<TrackStretch<Phase>>,
         /// Cycles that begin in it; 0 is none.
-        cycles: Vec<Stretch<u32>>,
+        cycles: Vec<TrackStretch<u32>>,
     },
     /// Everything was there, and this is what is known besides.
-    Whole(Box<Facts>),
+    Whole(Box<SessionFacts>),
     /// The session cannot be read.
     Failed(String),
 }
@@ -99,7 +99,7 @@ pub enum Stage {
 }
 
 /// A session as far as it has been read.
-pub struct Recording {
+pub struct ReviewRecording {
     /// Its folder.
     pub path: PathBuf,
     /// The analysis it is read by.
@@ -107,24 +107,24 @@ pub struct Recording {
     /// Every sample so far.
     pub track: Track,
     /// Phases so far.
-    pub phases: Vec<Stretch<Phase>>,
+    pub phases: Vec<TrackStretch<Phase>>,
     /// Cycles so far.
-    pub cycles: Vec<Stretch<u32>>,
+    pub cycles: Vec<TrackStretch<u32>>,
     /// What its ends say.
     pub head: Option<Box<Summary>>,
     /// What is known once all was read.
-    pub facts: Option<Box<Facts>>,
+    pub facts: Option<Box<SessionFacts>>,
     /// How far it is.
     pub stage: Stage,
     /// Raised with everything that came.
     pub version: u64,
-    news: Option<Receiver<News>>,
+    news: Option<Receiver<ReadUpdate>>,
 }
 
 /// Pieces that may wait for the window; the reader waits then.
 const QUEUE: usize = 64;
 
-impl Recording {
+impl ReviewRecording {
     /// A session that is not yet read.
     #[must_use]
     pub fn new(path: &Path, analysis: Option<&str>) -> Self {
@@ -149,7 +149,7 @@ impl Recording {
         let work = move || {
             let tell = |news| told(&sender, news, &wake);
             if let Err(reason) = read(&path, analysis.as_deref(), &tell) {
-                let _ = tell(News::Failed(reason));
+                let _ = tell(ReadUpdate::Failed(reason));
             }
         };
         let started = std::thread::Builder::new().name("review-read".into()).spawn(work);
@@ -182,17 +182,17 @@ impl Recording {
             };
             self.version += 1;
             match piece {
-                News::Head(head) => self.head = Some(head),
-                News::Samples { segment, phases, cycles } => {
+                ReadUpdate::Head(head) => self.head = Some(head),
+                ReadUpdate::Samples { segment, phases, cycles } => {
                     self.track.push(segment);
                     self.phases.extend(phases);
                     self.cycles.extend(cycles);
                 }
-                News::Whole(facts) => {
+                ReadUpdate::Whole(facts) => {
                     self.facts = Some(facts);
                     self.stage = Stage::Whole;
                 }
-                News::Failed(reason) => self.stage = Stage::Failed(reason),
+                ReadUpdate::Failed(reason) => self.stage = Stage::Failed(reason),
             }
         }
     }
@@ -247,7 +247,7 @@ impl Recording {
 
     /// Stretches with their ends, the last one up to what has come.
     pub fn ended<T: Copy>(
-        stretches: &[Stretch<T>],
+        stretches: &[TrackStretch<T>],
         end: f64,
     ) -> impl Iterator<Item = (f64, f64, T)> {
         let ends = stretches.iter().skip(1).map(|next| next.t).chain([end]);
@@ -256,7 +256,7 @@ impl Recording {
 }
 
 /// Hands a piece over; false once nobody listens.
-fn told(sender: &SyncSender<News>, news: News, wake: &Context) -> bool {
+fn told(sender: &SyncSender<ReadUpdate>, news: ReadUpdate, wake: &Context) -> bool {
     let is_heard = sender.send(news).is_ok();
     if is_heard {
         wake.request_repaint();

@@ -4,8 +4,8 @@
 //! What a sample costs in memory is told at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
 //! force, depth, signal and position, 267 MB for ten million samples.
 
-use super::facts::Facts;
-use super::{News, Quantity, Stretch};
+use super::facts::SessionFacts;
+use super::{Quantity, ReadUpdate, TrackStretch};
 use palpate_analysis::analysed;
 use palpate_model::rig::Phase;
 use palpate_model::signal::track::{SEGMENT, Segment};
@@ -24,14 +24,14 @@ const FIRST: usize = 1 << 12;
 pub fn read(
     path: &Path,
     analysis: Option<&str>,
-    tell: &dyn Fn(News) -> bool,
+    tell: &dyn Fn(ReadUpdate) -> bool,
 ) -> Result<(), String> {
     let summary = Summary::read(path).map_err(|err| err.to_string())?;
     let manifest = summary.manifest.clone();
     let edits = Edits::read(path, &manifest.session_id).map_err(|err| err.to_string())?;
     let is_moved = |change: &Change| matches!(change, Change::Contact { .. });
     let is_as_recorded = analysis.is_none() && !edits.all.iter().any(|edit| is_moved(&edit.change));
-    if !tell(News::Head(Box::new(summary))) {
+    if !tell(ReadUpdate::Head(Box::new(summary))) {
         return Ok(());
     }
     let builder = RefCell::new(Builder::new(&manifest, tell));
@@ -53,7 +53,7 @@ pub fn read(
     let mut builder = builder.into_inner();
     builder.hand_over();
     if builder.is_heard {
-        tell(News::Whole(Box::new(Facts::of(path, &passing))));
+        tell(ReadUpdate::Whole(Box::new(SessionFacts::of(path, &passing))));
     }
     Ok(())
 }
@@ -61,13 +61,13 @@ pub fn read(
 /// Rows on their way into segments.
 struct Builder<'a> {
     manifest: &'a Manifest,
-    tell: &'a dyn Fn(News) -> bool,
+    tell: &'a dyn Fn(ReadUpdate) -> bool,
     mm_per_pulse: f64,
     first_tick: Option<u64>,
     times: Vec<f64>,
     columns: Vec<Vec<f32>>,
-    phases: Vec<Stretch<Phase>>,
-    cycles: Vec<Stretch<u32>>,
+    phases: Vec<TrackStretch<Phase>>,
+    cycles: Vec<TrackStretch<u32>>,
     phase: Option<Phase>,
     cycle: Option<u32>,
     samples: usize,
@@ -77,7 +77,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(manifest: &'a Manifest, tell: &'a dyn Fn(News) -> bool) -> Self {
+    fn new(manifest: &'a Manifest, tell: &'a dyn Fn(ReadUpdate) -> bool) -> Self {
         Self {
             manifest,
             tell,
@@ -104,10 +104,10 @@ impl<'a> Builder<'a> {
         let t = self.manifest.time_of(row.tick.wrapping_sub(first) as i64).0;
         let (number, gap) = (self.samples, f64::NAN);
         if self.phase.replace(row.phase) != Some(row.phase) {
-            self.phases.push(Stretch { first: number, t, what: row.phase });
+            self.phases.push(TrackStretch { first: number, t, what: row.phase });
         }
         if self.cycle.replace(row.cycle) != Some(row.cycle) {
-            self.cycles.push(Stretch { first: number, t, what: row.cycle });
+            self.cycles.push(TrackStretch { first: number, t, what: row.cycle });
         }
         self.samples += 1;
         self.times.push(t);
@@ -130,7 +130,7 @@ impl<'a> Builder<'a> {
         let times = std::mem::take(&mut self.times);
         let segment = Arc::new(Segment::new(times, &self.columns));
         self.columns.iter_mut().for_each(Vec::clear);
-        self.is_heard = (self.tell)(News::Samples {
+        self.is_heard = (self.tell)(ReadUpdate::Samples {
             segment,
             phases: std::mem::take(&mut self.phases),
             cycles: std::mem::take(&mut self.cycles),
@@ -140,7 +140,7 @@ impl<'a> Builder<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Recording;
+    use super::super::ReviewRecording;
     use super::*;
     use eframe::egui::Context;
     use palpate_model::signal::track::Track;
@@ -164,13 +164,13 @@ mod tests {
         let mut facts = None;
         for piece in news.into_inner() {
             match piece {
-                News::Samples { segment, phases: own, .. } => {
+                ReadUpdate::Samples { segment, phases: own, .. } => {
                     track.push(segment);
                     phases.extend(own);
                 }
-                News::Whole(whole) => facts = Some(whole),
-                News::Head(head) => assert_eq!(head.samples, session.rows.len() as u64),
-                News::Failed(reason) => panic!("{reason}"),
+                ReadUpdate::Whole(whole) => facts = Some(whole),
+                ReadUpdate::Head(head) => assert_eq!(head.samples, session.rows.len() as u64),
+                ReadUpdate::Failed(reason) => panic!("{reason}"),
             }
         }
         assert_eq!(track.len(), session.rows.len());
@@ -205,26 +205,26 @@ mod tests {
     #[test]
     fn what_cannot_be_read_says_why_and_what_nobody_wants_ends() {
         let ctx = Context::default();
-        let finish = |recording: &mut Recording| {
+        let finish = |recording: &mut ReviewRecording| {
             let is_read = || {
                 recording.poll();
                 (!recording.is_reading()).then_some(())
             };
             palpate_test_support::wait::until(is_read, || "the end of reading".into());
         };
-        let mut missing = Recording::new(Path::new("/nowhere/at-all"), None);
+        let mut missing = ReviewRecording::new(Path::new("/nowhere/at-all"), None);
         missing.start(&ctx);
         finish(&mut missing);
         assert!(
             matches!(&missing.stage, super::super::Stage::Failed(reason) if reason.contains("/nowhere/at-all"))
         );
-        let mut unknown = Recording::new(&recorded("ramp-hold-lab"), Some("no such"));
+        let mut unknown = ReviewRecording::new(&recorded("ramp-hold-lab"), Some("no such"));
         unknown.start(&ctx);
         finish(&mut unknown);
         assert!(
             matches!(&unknown.stage, super::super::Stage::Failed(reason) if reason.contains("no such"))
         );
-        let mut left = Recording::new(&recorded("ramp-hold-lab"), None);
+        let mut left = ReviewRecording::new(&recorded("ramp-hold-lab"), None);
         left.start(&ctx);
         left.cancel();
         assert!(left.stage == super::super::Stage::Cancelled && left.share() < 1.0);

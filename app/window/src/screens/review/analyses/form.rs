@@ -1,7 +1,7 @@
 //! The analysis to be made, as typed.
 
 use crate::widgets::model_choice::ModelChoice;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::text_row::text_row;
@@ -26,7 +26,7 @@ impl Kind {
 }
 
 /// The form.
-pub(super) struct Form {
+pub(super) struct AnalysisForm {
     kind: Kind,
     name: String,
     model: ModelChoice,
@@ -41,7 +41,7 @@ pub(super) struct Form {
     span: [QuantityField; 2],
 }
 
-impl Default for Form {
+impl Default for AnalysisForm {
     fn default() -> Self {
         Self {
             kind: Kind::default(),
@@ -58,7 +58,7 @@ impl Default for Form {
     }
 }
 
-impl Form {
+impl AnalysisForm {
     /// Whether fits take a session though it was rejected.
     pub fn is_rejected_included(&self) -> bool {
         self.model.is_rejected_included
@@ -87,7 +87,7 @@ impl Form {
     ) -> Result<Deed, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
-                ui.selectable_value(&mut self.kind, kind, words).place(words);
+                ui.selectable_value(&mut self.kind, kind, words).named(words);
             }
         });
         text_row(ui, "name", "of the new analysis", &mut self.name);
@@ -148,7 +148,7 @@ impl Form {
                 })
                 .response
                 .labelled_by(label.id)
-                .place("from library");
+                .named("from library");
         });
         text_row(ui, "or file", "a calibration's document", &mut self.file);
     }

@@ -1,10 +1,10 @@
 //! The analyses there are, and what the one chosen found.
 
 use super::super::Looked;
-use super::Own;
+use super::OwnFit;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
 use eframe::egui::{Label, RichText, Ui, vec2};
@@ -17,8 +17,13 @@ use palpate_sessions::analyses::{Analysed, Analysis};
 const AS_MEASURED: &str = "as measured";
 
 /// Draws the list and the analysis chosen; true when the session's own fit is asked for.
-pub(super) fn list_ui(ui: &mut Ui, known: &Known, looked: &mut Looked, own: Option<&Own>) -> bool {
-    ui.radio_value(&mut looked.analysis, None, AS_MEASURED).place(AS_MEASURED);
+pub(super) fn list_ui(
+    ui: &mut Ui,
+    known: &Known,
+    looked: &mut Looked,
+    own: Option<&OwnFit>,
+) -> bool {
+    ui.radio_value(&mut looked.analysis, None, AS_MEASURED).named(AS_MEASURED);
     for one in &known.analyses.all {
         if one.what != Analysed::Withdrawal {
             line_ui(ui, known, one, looked);
@@ -34,7 +39,7 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, looked: &mut Looked) {
     match kept::withdrawn(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());
-            ui.radio_value(&mut looked.analysis, choice, &one.name).place(&one.name);
+            ui.radio_value(&mut looked.analysis, choice, &one.name).named(&one.name);
         }
         Some(words) => {
             let name = RichText::new(&one.name).strikethrough();
@@ -51,7 +56,7 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, looked: &mut Looked) {
 }
 
 /// What an analysis found, beside the session's own fit; true when that is asked for.
-fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
+fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.add_space(4.0);
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
     quiet_ui(ui, &kept::deed(&one.what));

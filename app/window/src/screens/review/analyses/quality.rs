@@ -11,19 +11,19 @@ use palpate_model::units::Position;
 use palpate_sessions::edits::Verdict;
 
 /// The form.
-pub(super) struct Said {
+pub(super) struct QualityForm {
     verdict: Verdict,
     contact: usize,
     position: QuantityField,
 }
 
-impl Default for Said {
+impl Default for QualityForm {
     fn default() -> Self {
         Self { verdict: Verdict::Valid, contact: 0, position: QuantityField::new(0.0) }
     }
 }
 
-impl Said {
+impl QualityForm {
     /// Draws the form; `verdict` says whether something can be done that needs a reason.
     pub fn ui(&mut self, ui: &mut Ui, known: &Known, verdict: &Result<(), String>) -> Option<Deed> {
         section_ui(ui, "What it is worth");

@@ -8,7 +8,7 @@ use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::Ui;
 use palpate_analysis::analyses::{Done, Paper, paper};
 use palpate_analysis::report::dossier::{Figure, Wanted, name_of};
@@ -25,7 +25,7 @@ enum Field {
 
 /// The form and its work.
 #[derive(Default)]
-pub(super) struct Papers {
+pub(super) struct ReportPanel {
     report: String,
     is_of_all: bool,
     figure: String,
@@ -36,11 +36,11 @@ pub(super) struct Papers {
     is_of_span: bool,
     dialog: Dialog<PathBuf>,
     asked: Option<Field>,
-    pages: Task<Done>,
-    figures: Task<Done>,
+    pages: BackgroundTask<Done>,
+    figures: BackgroundTask<Done>,
 }
 
-impl Papers {
+impl ReportPanel {
     /// Fetches what threads have answered.
     pub fn poll(&mut self) {
         self.pages.poll();
@@ -133,9 +133,9 @@ fn path_verdict(path: &str, endings: &[&str]) -> Result<(), String> {
     }
 }
 
-fn answer_ui(ui: &mut Ui, task: &Task<Done>) {
+fn answer_ui(ui: &mut Ui, task: &BackgroundTask<Done>) {
     match task.answer() {
-        _ if task.standing().is_some() => {}
+        _ if task.state().is_some() => {}
         None => {}
         Some(Ok(done)) => quiet_ui(ui, &done.sentence),
         Some(Err(reason)) => alarm_ui(ui, reason),

@@ -4,9 +4,9 @@
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
-use crate::widgets::task_bar::standing_ui;
+use crate::widgets::task_bar::progress_ui;
 use crate::widgets::text_row::text_row;
-use crate::workers::task::Task;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Key, Label, Modifiers, Popup, RichText, Ui, vec2};
 use palpate_analysis::edits::{Act, Said, Saying, author, say, take_back};
 use palpate_sessions::edits::{Decision, Verdict};
@@ -20,33 +20,33 @@ const BUTTON: f32 = 24.0;
 
 /// What is under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Doing {
+enum EditStep {
     Say,
     Undo,
     Redo,
 }
 
 /// The panel.
-pub(super) struct SayPanel {
+pub(super) struct EditPanel {
     by: String,
     tags: String,
     note: String,
     reason: String,
-    task: Task<Said>,
-    doing: Doing,
+    task: BackgroundTask<Said>,
+    doing: EditStep,
     undo: Vec<Act>,
     redo: Vec<Act>,
 }
 
-impl Default for SayPanel {
+impl Default for EditPanel {
     fn default() -> Self {
         Self {
             by: author(None),
             tags: String::new(),
             note: String::new(),
             reason: String::new(),
-            task: Task::default(),
-            doing: Doing::Say,
+            task: BackgroundTask::default(),
+            doing: EditStep::Say,
             undo: Vec::new(),
             redo: Vec::new(),
         }
@@ -65,12 +65,12 @@ fn tags(line: &str) -> (Vec<String>, Vec<String>) {
     (add, remove)
 }
 
-impl SayPanel {
+impl EditPanel {
     /// Fetches what came of an edit; true when something was written.
     pub fn poll(&mut self) -> bool {
-        let was_busy = self.task.standing().is_some();
+        let was_busy = self.task.state().is_some();
         self.task.poll();
-        if !was_busy || self.task.standing().is_some() {
+        if !was_busy || self.task.state().is_some() {
             return false;
         }
         let Some(Ok(said)) = self.task.answer() else {
@@ -78,19 +78,19 @@ impl SayPanel {
         };
         if let Some(act) = said.act.clone() {
             match self.doing {
-                Doing::Say => {
+                EditStep::Say => {
                     self.undo.push(act);
                     // What was taken back before is another story now.
                     self.redo.clear();
                 }
-                Doing::Undo => self.redo.push(act),
-                Doing::Redo => self.undo.push(act),
+                EditStep::Undo => self.redo.push(act),
+                EditStep::Redo => self.undo.push(act),
             }
             if self.undo.len() > KEPT {
                 self.undo.remove(0);
             }
         }
-        if self.doing == Doing::Say && said.failed.is_empty() {
+        if self.doing == EditStep::Say && said.failed.is_empty() {
             self.tags.clear();
             self.note.clear();
             self.reason.clear();
@@ -99,7 +99,7 @@ impl SayPanel {
     }
 
     fn may(&self, chosen: usize) -> Result<(), String> {
-        if self.task.standing().is_some() {
+        if self.task.state().is_some() {
             return Err("an edit is being written".into());
         }
         if chosen == 0 {
@@ -113,17 +113,17 @@ impl SayPanel {
 
     fn say(&mut self, ctx: &Context, sessions: &[PathBuf], saying: Saying) {
         let (sessions, by) = (sessions.to_vec(), self.by.trim().to_owned());
-        self.doing = Doing::Say;
+        self.doing = EditStep::Say;
         self.task.start("edits", ctx, move |progress| Ok(say(&saying, &sessions, &by, progress)));
     }
 
-    fn turn_back(&mut self, ctx: &Context, doing: Doing) {
+    fn turn_back(&mut self, ctx: &Context, doing: EditStep) {
         if self.may(1).is_err() {
             return;
         }
         let stack = match doing {
-            Doing::Redo => &mut self.redo,
-            Doing::Say | Doing::Undo => &mut self.undo,
+            EditStep::Redo => &mut self.redo,
+            EditStep::Say | EditStep::Undo => &mut self.undo,
         };
         let Some(act) = stack.pop() else { return };
         let by = self.by.trim().to_owned();
@@ -140,9 +140,9 @@ impl SayPanel {
             |modifiers: Modifiers, key| ctx.input_mut(|input| input.consume_key(modifiers, key));
         let both = Modifiers::COMMAND | Modifiers::SHIFT;
         if pressed(both, Key::Z) || pressed(Modifiers::COMMAND, Key::Y) {
-            self.turn_back(ctx, Doing::Redo);
+            self.turn_back(ctx, EditStep::Redo);
         } else if pressed(Modifiers::COMMAND, Key::Z) {
-            self.turn_back(ctx, Doing::Undo);
+            self.turn_back(ctx, EditStep::Undo);
         }
     }
 
@@ -201,16 +201,16 @@ impl SayPanel {
 
     fn back_ui(&mut self, ui: &mut Ui, ctx: &Context) {
         ui.add_space(6.0);
-        if let Some(standing) = self.task.standing() {
-            if standing.seconds > 1.0 && standing_ui(ui, &standing, "Cancel edits") {
+        if let Some(state) = self.task.state() {
+            if state.seconds > 1.0 && progress_ui(ui, &state, "Cancel edits") {
                 self.task.cancel();
             }
         } else {
             match self.task.answer() {
                 Some(Ok(said)) => {
                     let done = match self.doing {
-                        Doing::Undo if said.act.is_some() => "taken back: ",
-                        Doing::Redo if said.act.is_some() => "done again: ",
+                        EditStep::Undo if said.act.is_some() => "taken back: ",
+                        EditStep::Redo if said.act.is_some() => "done again: ",
                         _ => "",
                     };
                     sentence(ui, &format!("{done}{}", said.words), false);
@@ -225,9 +225,10 @@ impl SayPanel {
             let act = stack.last()?;
             Some(format!("{name}: {}", act.words))
         };
-        for (text, doing) in
-            [(words("Undo", &self.undo), Doing::Undo), (words("Redo", &self.redo), Doing::Redo)]
-        {
+        for (text, doing) in [
+            (words("Undo", &self.undo), EditStep::Undo),
+            (words("Redo", &self.redo), EditStep::Redo),
+        ] {
             let Some(text) = text else { continue };
             // The words may be many; under the pointer stands all of it.
             let button = eframe::egui::Button::new(&text).truncate();

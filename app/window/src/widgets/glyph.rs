@@ -6,7 +6,7 @@ use eframe::egui::{
 
 /// A shape of about ten points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mark {
+pub enum Glyph {
     /// Good.
     Tick,
     /// Bad.
@@ -14,7 +14,7 @@ pub enum Mark {
     /// Doubtful.
     Question,
     /// To be done again.
-    Again,
+    Repeat,
     /// Damaged.
     Diamond,
     /// Whole.
@@ -33,7 +33,7 @@ pub enum Mark {
 pub const WIDTH: f32 = 16.0;
 
 /// Draws the mark around its centre.
-pub fn mark_at(painter: &Painter, mark: Mark, center: Pos2, ink: Color32) {
+pub fn glyph_at(painter: &Painter, mark: Glyph, center: Pos2, ink: Color32) {
     let r = 4.0;
     let at = |x: f32, y: f32| center + vec2(x * r, y * r);
     let stroke = Stroke::new(1.8, ink);
@@ -45,39 +45,39 @@ pub fn mark_at(painter: &Painter, mark: Mark, center: Pos2, ink: Color32) {
         Shape::convex_polygon(points, ink, Stroke::NONE)
     };
     match mark {
-        Mark::Tick => {
+        Glyph::Tick => {
             painter.add(line(&[(-1.1, 0.1), (-0.3, 0.9), (1.1, -0.9)]));
         }
-        Mark::Cross => {
+        Glyph::Cross => {
             painter.add(line(&[(-0.9, -0.9), (0.9, 0.9)]));
             painter.add(line(&[(-0.9, 0.9), (0.9, -0.9)]));
         }
-        Mark::Question => {
+        Glyph::Question => {
             let font = FontId::proportional(14.0);
             painter.text(center, Align2::CENTER_CENTER, "?", font, ink);
         }
-        Mark::Again => {
+        Glyph::Repeat => {
             painter.add(line(&[(-0.9, -0.3), (-0.9, 0.9), (0.9, 0.9), (0.9, -0.5), (0.0, -0.5)]));
             painter.add(area(&[(0.2, -1.2), (0.2, 0.2), (-0.7, -0.5)]));
         }
-        Mark::Diamond => {
+        Glyph::Diamond => {
             painter.add(area(&[(-1.2, 0.0), (0.0, -1.2), (1.2, 0.0), (0.0, 1.2)]));
         }
-        Mark::Disc => {
+        Glyph::Disc => {
             painter.circle_filled(center, r, ink);
         }
-        Mark::Half => {
+        Glyph::Half => {
             painter.circle_stroke(center, r, Stroke::new(1.4, ink));
             let half = Rect::from_min_max(at(-0.9, 0.0), at(0.9, 0.9));
             painter.rect_filled(half, CornerRadius::same(3), ink);
         }
-        Mark::Dash => {
+        Glyph::Dash => {
             painter.add(line(&[(-0.9, 0.0), (0.9, 0.0)]));
         }
-        Mark::Down => {
+        Glyph::Down => {
             painter.add(area(&[(-1.0, -0.6), (1.0, -0.6), (0.0, 0.8)]));
         }
-        Mark::Up => {
+        Glyph::Up => {
             painter.add(area(&[(-1.0, 0.6), (1.0, 0.6), (0.0, -0.8)]));
         }
     }

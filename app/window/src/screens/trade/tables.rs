@@ -1,22 +1,22 @@
 //! Tables of what was measured, as points and as rows.
 
-use crate::widgets::table::{Column, Row, RowLook};
+use crate::widgets::table::{Column, RowStyle, TableRow};
 use palpate_analysis::report::scatter::Mark;
 use palpate_analysis::trade::text::{digits, plain, time};
 use palpate_haptics::surface::{SceneCurves, ScenePlan};
 use palpate_rheology::trade::{TradeCurves, front};
 
 /// One table as points and rows.
-pub(super) struct Shown {
+pub(super) struct TradeTable {
     pub axes: [&'static str; 2],
     pub marks: Vec<Mark>,
     pub columns: Vec<Column>,
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// The mark of what is recommended.
     pub chosen: Option<usize>,
 }
 
-impl Shown {
+impl TradeTable {
     fn new(axes: [&'static str; 2], heads: &[&str]) -> Self {
         let column = |(index, head): (usize, &&str)| match index {
             0 => Column::words(head, 250.0),
@@ -43,22 +43,22 @@ impl Shown {
             self.marks.push(Mark { at: [cost, error], label: [String::new(), cells.join("\n")] });
         }
         let look = match (is_front, at[1]) {
-            (true, _) => RowLook::Marked,
-            (false, None) => RowLook::Quiet,
-            (false, Some(_)) => RowLook::Plain,
+            (true, _) => RowStyle::Marked,
+            (false, None) => RowStyle::Quiet,
+            (false, Some(_)) => RowStyle::Plain,
         };
-        self.rows.push(Row { cells, look, hint });
+        self.rows.push(TableRow { cells, look, hint });
     }
 
     /// With the front's rows first.
     fn finished(mut self) -> Self {
-        self.rows.sort_by_key(|row| row.look != RowLook::Marked);
+        self.rows.sort_by_key(|row| row.look != RowStyle::Marked);
         self
     }
 }
 
-pub(super) fn integrators(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
+pub(super) fn integrators(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
         ["ns a second of simulated time", "error (% of peak force)"],
         &["integrator", "step (ms)", "a step", "error (%)"],
     );
@@ -75,8 +75,8 @@ pub(super) fn integrators(curves: &TradeCurves) -> Shown {
     shown.finished()
 }
 
-pub(super) fn families(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
+pub(super) fn families(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
         ["ns a step", "error (% of peak force)"],
         &["family and what it stands for", "a step", "error (%)"],
     );
@@ -87,15 +87,17 @@ pub(super) fn families(curves: &TradeCurves) -> Shown {
         // Fronts belong to one target each and would cross in one picture.
         shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
         if let Some(last) = shown.rows.last_mut().filter(|_| row.front) {
-            last.look = RowLook::Marked;
+            last.look = RowStyle::Marked;
         }
     }
     shown.finished()
 }
 
-pub(super) fn fits(curves: &TradeCurves) -> Shown {
-    let mut shown =
-        Shown::new(["ns a fit", "error of tau (%)"], &["recording or live fit", "time", "tau (%)"]);
+pub(super) fn fits(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
+        ["ns a fit", "error of tau (%)"],
+        &["recording or live fit", "time", "tau (%)"],
+    );
     for row in &curves.fit {
         let error = 100.0 * row.tau_error;
         let cells = vec![
@@ -127,8 +129,8 @@ struct ScenePoint {
 }
 
 /// Draws points of a scene: those exact to the last digit have no place over a logarithm and stand in the table alone.
-fn scene_shown(axes: [&'static str; 2], head: &str, points: &[ScenePoint]) -> Shown {
-    let mut shown = Shown::new(axes, &[head, axes[0], axes[1]]);
+fn scene_shown(axes: [&'static str; 2], head: &str, points: &[ScenePoint]) -> TradeTable {
+    let mut shown = TradeTable::new(axes, &[head, axes[0], axes[1]]);
     let places: Vec<[f64; 2]> = points.iter().map(|one| [one.cost, one.error]).collect();
     let best = front(&places);
     for (index, one) in points.iter().enumerate() {
@@ -147,7 +149,7 @@ fn scene_shown(axes: [&'static str; 2], head: &str, points: &[ScenePoint]) -> Sh
 }
 
 /// Meshes of a scene.
-pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.meshes.iter().map(|point| ScenePoint {
         words: format!("{0} x {0} nodes", point.nodes),
         cost: point.cost_us,
@@ -159,7 +161,7 @@ pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown
 }
 
 /// Cuts of the influence of a contact.
-pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.cuts.iter().map(|point| ScenePoint {
         words: match (point.range, point.threshold_mm > 0.0) {
             (None, false) => "no cut".to_owned(),
@@ -174,7 +176,7 @@ pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
 }
 
 /// Integrators and steps of a scene.
-pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.steps.iter().map(|point| ScenePoint {
         words: format!("{}, {} ms", point.scheme.name(), plain(1e3 * point.step_s)),
         cost: point.cost_us,
@@ -237,8 +239,8 @@ mod tests {
         let all = curves(&[(51, 0.5, 1.0), (101, 0.4, 5.0), (201, 0.2, 4.0), (401, 0.0, 9.0)]);
         let shown = meshes(&all, None);
         assert_eq!(shown.marks.len(), 3);
-        let looks: Vec<RowLook> = shown.rows.iter().map(|row| row.look).collect();
-        let marked = looks.iter().filter(|look| **look == RowLook::Marked).count();
+        let looks: Vec<RowStyle> = shown.rows.iter().map(|row| row.look).collect();
+        let marked = looks.iter().filter(|look| **look == RowStyle::Marked).count();
         assert_eq!(marked, 3, "{:?}", shown.rows);
         assert!(shown.rows[3].cells[0].starts_with("101 x 101"));
         assert_eq!(shown.chosen, None);

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 const CAUSE_S: f64 = 0.3;
 
 /// A loop that runs or ran, and what was seen of it.
-pub struct Feel {
+pub struct HapticLoop {
     beat: Option<Beat<TapedLed>>,
     lead: Lead,
     known: u64,
@@ -27,7 +27,7 @@ pub struct Feel {
     priority: String,
 }
 
-impl Feel {
+impl HapticLoop {
     /// Starts the loop; the hand moves at `speed` where it is led.
     pub fn start(
         settings: &SimulationSettings,

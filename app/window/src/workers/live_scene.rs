@@ -16,7 +16,7 @@ const AHEAD_TICKS: u64 = 10;
 
 /// Force and depth at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TouchPoint {
+pub struct ForcePoint {
     /// Since the start, in s.
     pub t: f64,
     /// Length of the force on the hand in N.
@@ -25,7 +25,7 @@ pub struct TouchPoint {
     pub depth: f64,
 }
 
-impl TouchPoint {
+impl ForcePoint {
     fn of(tick: &SceneTick, settings: &SceneSettings) -> Self {
         Self {
             t: settings.period.time_of(tick.tick).seconds().0,
@@ -44,7 +44,7 @@ pub fn force_of(tick: &SceneTick) -> f64 {
 
 /// A scene at one moment.
 #[derive(Clone, Debug)]
-pub struct Moment {
+pub struct SceneInstant {
     /// Its tick.
     pub tick: SceneTick,
     grid: Grid,
@@ -52,7 +52,7 @@ pub struct Moment {
     rest: Vec<f64>,
 }
 
-impl Moment {
+impl SceneInstant {
     fn of(scene: &Scene) -> Self {
         let field = scene.field();
         Self {
@@ -95,36 +95,36 @@ pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
 
 /// A scene that was computed along a path, and not in real time.
 #[derive(Clone, Debug)]
-pub struct Ahead {
+pub struct ComputedPath {
     /// What it is made of.
     pub settings: SceneSettings,
     /// The path.
     pub path: ScenePath,
     /// Where it was deepest.
-    pub deepest: Moment,
+    pub deepest: SceneInstant,
     /// Force and depth over time.
-    pub trail: Vec<TouchPoint>,
+    pub trail: Vec<ForcePoint>,
 }
 
 /// Computes a scene along a path. `is_going` hears the share done and ends it early.
-pub fn ahead(
+pub fn compute_path(
     settings: SceneSettings,
     path: ScenePath,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Ahead, String> {
+) -> Result<ComputedPath, String> {
     let mut led = LedScene::new(settings).map_err(|err| err.to_string())?;
-    let mut deepest = Moment::of(&led.scene);
+    let mut deepest = SceneInstant::of(&led.scene);
     let mut trail = Vec::new();
     let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
     for tick in 1..=ticks {
         let t = settings.period.time_of(tick).seconds().0;
-        let told = led.tick(path.at(t, &settings));
+        let tick_now = led.tick(path.at(t, &settings));
         if !tick.is_multiple_of(AHEAD_TICKS) {
             continue;
         }
-        trail.push(TouchPoint::of(&told, &settings));
-        if told.depth > deepest.tick.depth {
-            deepest.tick = told;
+        trail.push(ForcePoint::of(&tick_now, &settings));
+        if tick_now.depth > deepest.tick.depth {
+            deepest.tick = tick_now;
             let now = led.scene.field().heights();
             deepest.heights.copy_from_slice(now);
         }
@@ -132,23 +132,23 @@ pub fn ahead(
             return Err("ended before it was done".into());
         }
     }
-    Ok(Ahead { settings, path, deepest, trail })
+    Ok(ComputedPath { settings, path, deepest, trail })
 }
 
 /// A scene that runs or ran, and what was seen of it.
 #[derive(Debug)]
-pub struct Touch {
+pub struct LiveScene {
     live: Option<SceneLoop>,
     settings: SceneSettings,
-    moment: Moment,
-    trail: VecDeque<TouchPoint>,
+    moment: SceneInstant,
+    trail: VecDeque<ForcePoint>,
     kept: Kept,
     looked: f64,
     is_led: bool,
     priority: String,
 }
 
-impl Touch {
+impl LiveScene {
     /// Starts the loop; the hand goes along `path` and then where it is pointed.
     pub fn start(
         settings: SceneSettings,
@@ -156,7 +156,7 @@ impl Touch {
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
         let scene = Scene::new(settings).map_err(|err| err.to_string())?;
-        let moment = Moment::of(&scene);
+        let moment = SceneInstant::of(&scene);
         let live = SceneLoop::start(scene, path, recorder)?;
         Ok(Self {
             settings,
@@ -187,7 +187,7 @@ impl Touch {
             let heights = frame.heights.iter().copied().map(f64::from);
             self.moment.heights.extend(heights);
             self.moment.rest.resize(frame.heights.len(), 0.0);
-            self.trail.push_back(TouchPoint::of(&frame.tick, &self.settings));
+            self.trail.push_back(ForcePoint::of(&frame.tick, &self.settings));
         }
         let period = self.settings.period;
         let now = period.time_of(self.moment.tick.tick).seconds().0;
@@ -227,7 +227,7 @@ impl Touch {
     }
 
     /// What was seen last.
-    pub fn moment(&self) -> &Moment {
+    pub fn moment(&self) -> &SceneInstant {
         &self.moment
     }
 
@@ -238,7 +238,7 @@ impl Touch {
     }
 
     /// The past as it was seen.
-    pub fn trail(&self) -> impl Iterator<Item = &TouchPoint> + Clone {
+    pub fn trail(&self) -> impl Iterator<Item = &ForcePoint> + Clone {
         self.trail.iter()
     }
 

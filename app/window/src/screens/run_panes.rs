@@ -1,13 +1,13 @@
 //! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
 
-use super::form::{Checked, ProtocolForm};
+use super::form::{CheckedPlan, ProtocolForm};
 use super::protocol_panel::ProtocolFacts;
-use crate::command::{Command, Commands};
+use crate::command::{CommandQueue, UserCommand};
 use crate::plots::course::{CourseLimits, course_ui};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::places::NamedControl;
 use crate::workers::Job;
-use crate::workers::path_dialog::Ask;
+use crate::workers::path_dialog::PathPurpose;
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
 use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// What stands in the middle of the run screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Middle {
+pub enum RunPane {
     /// The list of protocols.
     Choose,
     /// Depth and force as they are expected.
@@ -33,23 +33,23 @@ pub enum Middle {
 }
 
 /// Views and their names.
-const VIEWS: [(Middle, &str); 5] = [
-    (Middle::Choose, "Protocols"),
-    (Middle::Course, "Expected course"),
-    (Middle::Measured, "Measured"),
-    (Middle::Weighing, "Weights"),
-    (Middle::Approach, "Surface"),
+const VIEWS: [(RunPane, &str); 5] = [
+    (RunPane::Choose, "Protocols"),
+    (RunPane::Course, "Expected course"),
+    (RunPane::Measured, "Measured"),
+    (RunPane::Weighing, "Weights"),
+    (RunPane::Approach, "Surface"),
 ];
 
 /// Draws the switch between the views.
-pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mut Commands) {
+pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &mut CommandQueue) {
     ui.horizontal(|ui| {
         for (view, name) in VIEWS {
             if !is_offered(view, run) {
                 continue;
             }
-            if ui.selectable_label(shown == view, name).place(name).clicked() {
-                commands.push(Command::View(view));
+            if ui.selectable_label(shown == view, name).named(name).clicked() {
+                commands.push(UserCommand::View(view));
             }
         }
     });
@@ -58,11 +58,11 @@ pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mu
 
 /// Whether a view has anything to show.
 #[must_use]
-pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
+pub fn is_offered(view: RunPane, run: Option<&RunView>) -> bool {
     match view {
-        Middle::Choose | Middle::Course | Middle::Measured => true,
-        Middle::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
-        Middle::Approach => {
+        RunPane::Choose | RunPane::Course | RunPane::Measured => true,
+        RunPane::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
+        RunPane::Approach => {
             run.is_some_and(|run| run.phase == Phase::Contact || !run.touches.is_empty())
         }
     }
@@ -70,17 +70,17 @@ pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
 
 /// The view that shows most of a run that begins.
 #[must_use]
-pub fn first_view(plan: &Plan) -> Middle {
+pub fn first_view(plan: &Plan) -> RunPane {
     let has = |is: fn(&Step) -> bool| plan.steps.iter().any(|planned| is(&planned.step));
     if has(|step| matches!(step, Step::Weigh(_))) {
-        Middle::Weighing
+        RunPane::Weighing
     } else if has(|step| matches!(step, Step::FindContact(_) | Step::FindBase(_)))
         && !has(|step| matches!(step, Step::Ramp(_) | Step::LoadTo(_) | Step::Sine(_)))
     {
         // It looks for the surface and no more.
-        Middle::Approach
+        RunPane::Approach
     } else {
-        Middle::Measured
+        RunPane::Measured
     }
 }
 
@@ -141,7 +141,7 @@ impl Chooser {
         ui: &mut Ui,
         form: &ProtocolForm,
         facts: &ProtocolFacts<'_>,
-        commands: &mut Commands,
+        commands: &mut CommandQueue,
     ) {
         if facts.is_busy {
             ui.label("A run is in progress; another protocol can be chosen when it has ended.");
@@ -165,7 +165,7 @@ impl Chooser {
         });
     }
 
-    fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut Commands) {
+    fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut CommandQueue) {
         ui.label(RichText::new("A protocol of your own").heading().strong());
         ui.horizontal(|ui| {
             let label = ui.label("protocol file");
@@ -174,14 +174,14 @@ impl Chooser {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("a TOML file");
-            ui.add(input).labelled_by(label.id).place("protocol file");
+            ui.add(input).labelled_by(label.id).named("protocol file");
             let can_open = !self.typed.trim().is_empty() && !self.reading.is_busy();
             if ui.add_enabled(can_open, Button::new("Open")).clicked() {
-                commands.push(Command::OpenProtocol);
+                commands.push(UserCommand::OpenProtocol);
             }
             let button = Button::new("Open a protocol file...");
             if ui.add_enabled(!is_dialog_open, button).clicked() {
-                commands.push(Command::Choose(Ask::Protocol));
+                commands.push(UserCommand::Choose(PathPurpose::Protocol));
             }
         });
     }
@@ -199,21 +199,21 @@ fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
     ui.label(RichText::new(words).color(tokens.text_quiet));
 }
 
-fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut Commands) {
+fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut CommandQueue) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let name = BUILT_IN.iter().find(|(name, _)| *name == protocol.name);
     ui.add_space(4.0);
     let button = Button::selectable(is_chosen, RichText::new(&protocol.title).strong())
         .min_size(vec2(280.0, 24.0));
     if let (true, Some((name, _))) = (ui.add(button).clicked(), name) {
-        commands.push(Command::TakeProtocol(name));
+        commands.push(UserCommand::TakeProtocol(name));
     }
     let about = RichText::new(&protocol.about).color(tokens.text_quiet);
     ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
 }
 
 /// Draws what the plan is expected to do.
-pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>, limits: CourseLimits) {
+pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLimits) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     match checked {
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
