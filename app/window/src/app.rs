@@ -1,4 +1,4 @@
-//! The workbench's window as an eframe app: `logic` reads keys and answers, `ui` draws a snapshot.
+//! The workbench's window as an eframe app: `logic` reads keys and the answers of workers, `ui` draws a snapshot.
 
 use crate::command::{CommandQueue, TextSize, UserCommand};
 use crate::screens::run;
@@ -18,12 +18,13 @@ use crate::shell::sizes::{PanelEdge, STEP, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::shell::tour::Tour;
 use crate::theme;
-use crate::widgets::places::places;
+use crate::widgets::places;
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_protocols::engine::Operator;
 use palpate_runner::Snapshot;
+use std::io::Write;
 use std::sync::Arc;
 
 /// The window's own state. The rig, the run and its data belong to the runner.
@@ -47,17 +48,17 @@ impl WorkbenchApp {
     /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(mut options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
-        let (settings, told) = SettingsFile::open(options.settings.take());
+        let (settings, refusal) = SettingsFile::open(options.settings.take());
         if settings.now.is_dark {
             theme::switch(ctx);
         }
         let mut tour = Tour::default();
-        if settings.is_kept() && !settings.now.is_tour_over {
+        if settings.has_file() && !settings.now.is_tour_over {
             tour.start();
         }
         let pace = FramePace::default();
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
-        workbench.refusal = told;
+        workbench.refusal = refusal;
         let form = &mut workbench.form;
         form.set_label("operator", &settings.now.operator);
         if form.folder.is_empty() {
@@ -70,7 +71,7 @@ impl WorkbenchApp {
             events: EventLog::default(),
             note: String::new(),
             palette: Palette::default(),
-            sizes: Sizes::remembered([settings.now.left, settings.now.right, settings.now.log]),
+            sizes: Sizes::from_changes([settings.now.left, settings.now.right, settings.now.log]),
             settings,
             keys: KeyReader::default(),
             meter: FrameMeter::from_environment(),
@@ -80,7 +81,6 @@ impl WorkbenchApp {
         })
     }
 
-    /// The newest snapshot taken for drawing.
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.workbench.snapshot
     }
@@ -90,14 +90,13 @@ impl WorkbenchApp {
         self.screens.get()
     }
 
-    /// Stops the rig, and then what else moves: that may take its time.
+    /// Stops the rig first: the loops of screens may take longer.
     fn stop(&mut self) {
         self.workbench.operator(Operator::Stop);
         self.screens.stop();
         self.palette.close();
     }
 
-    /// Does what was asked for.
     fn act(&mut self, ctx: &Context, commands: &mut CommandQueue) {
         for command in commands.take() {
             self.act_on(ctx, command);
@@ -146,31 +145,24 @@ impl WorkbenchApp {
                 }
             }
         }
-        if self.workbench.is_run_wanted() {
-            // Nothing comes between a rig and its runner.
+        if self.workbench.has_next_run() {
+            // A loop on this computer would disturb the runner.
             self.screens.stop();
-            self.workbench.begin_wanted_run();
+            self.workbench.begin_next_run();
         }
     }
 
-    /// Takes over what is remembered until the window is opened again.
-    fn remember(&mut self, ctx: &Context) {
-        let now = &mut self.settings.now;
-        now.is_dark = ctx.theme() == Theme::Dark;
-        now.zoom = ctx.zoom_factor();
-    }
-
-    /// The rest of it, when the window closes.
-    fn remember_last(&mut self) {
+    /// Copies into the settings what is only needed when the window closes.
+    fn update_settings(&mut self) {
         let now = &mut self.settings.now;
         let form = &self.workbench.form;
         now.screen = self.screens.shown().to_owned();
         now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);
-        [now.left, now.right, now.log] = self.sizes.told();
+        [now.left, now.right, now.log] = self.sizes.changes();
     }
 
-    /// Closing stops first: the window stays until the axis rests.
+    /// Closing stops motion first: the window stays until the axis is at rest.
     fn handle_close(&mut self, ctx: &Context) {
         if ctx.input(|input| input.viewport().close_requested()) {
             if !self.workbench.begin_to_close() {
@@ -190,7 +182,7 @@ impl WorkbenchApp {
         }
     }
 
-    /// Draws every panel. Changes nothing but what is typed and pressed.
+    /// Draws every panel.
     fn draw(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
         let panel = |name: &'static str, ui: &Ui| {
             let panel = Panel::top(name).frame(frame(ui, false));
@@ -265,7 +257,8 @@ impl eframe::App for WorkbenchApp {
             self.meter.run(run);
         }
         self.act(ctx, &mut commands);
-        self.remember(ctx);
+        self.settings.now.is_dark = ctx.theme() == Theme::Dark;
+        self.settings.now.zoom = ctx.zoom_factor();
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
         self.pace.next(ctx, !self.workbench.is_quiet(), is_watched);
@@ -292,17 +285,12 @@ impl eframe::App for WorkbenchApp {
 
     fn on_exit(&mut self) {
         self.screens.close();
-        self.remember_last();
-        if let Err(err) = self.settings.store() {
-            let _ =
-                std::io::Write::write_all(&mut std::io::stderr(), format!("{err}\n").as_bytes());
-        }
-        if let Err(err) = self.meter.write_report() {
-            // Nobody is left to read a screen; standard error is the last place to say it.
-            let _ = std::io::Write::write_all(
-                &mut std::io::stderr(),
-                format!("the frame report cannot be written: {err}\n").as_bytes(),
-            );
+        self.update_settings();
+        let report = self.meter.write_report();
+        let report = report.map_err(|err| format!("the frame report cannot be written: {err}"));
+        for err in [self.settings.store(), report].into_iter().filter_map(Result::err) {
+            // The window is gone; standard error is the last place to say it.
+            let _ = writeln!(std::io::stderr(), "{err}");
         }
     }
 }

@@ -1,5 +1,4 @@
 use super::*;
-use eframe::App;
 use eframe::egui::{Event, Key, Modifiers};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent};
@@ -9,10 +8,10 @@ use palpate_runner::TimeScale;
 use palpate_test_support::wait::{Deadline, until};
 use std::sync::Mutex;
 
-/// What a rig was told to do, in order.
+/// Commands that a rig received, in order.
 type CommandLog = Arc<Mutex<Vec<RigCommand>>>;
 
-/// A simulated rig that does nothing of what it is told, and writes it down.
+/// A simulated rig that obeys no command and records all.
 struct Recorder(SimRig, CommandLog);
 
 impl Rig for Recorder {
@@ -58,7 +57,7 @@ fn pressed(key: Key) -> RawInput {
     }
 }
 
-/// Waits until the rig was told something, and gives all of it.
+/// Waits until the last command of the rig is this one, and returns all.
 fn all_up_to(commanded: &CommandLog, last: RigCommand) -> Vec<RigCommand> {
     until(
         || {
@@ -105,7 +104,7 @@ fn a_stop_key_is_sent_before_its_frame_begins_and_once() {
     assert_eq!(all, [Stop, Halt, Stop, Halt]);
 }
 
-/// A screen that notes of everything a frame does to it whether the rig had been told to stop by then.
+/// A screen that records, for every call, whether the rig had received a stop by then.
 struct Witness(CommandLog, Arc<Mutex<Vec<(&'static str, bool)>>>);
 
 impl Witness {

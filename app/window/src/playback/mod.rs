@@ -11,7 +11,7 @@ use crate::shell::event_log::EventLog;
 use crate::shell::panels::frame;
 use crate::shell::top_bar::{HEIGHT, numbers_ui};
 use crate::theme::{self, Tokens};
-use crate::widgets::state_badge::badge_ui;
+use crate::widgets::badge_ui;
 use crate::window::open_window;
 use crate::workers::fit::Refit;
 use crate::workers::player::PlayerThread;

@@ -2,7 +2,7 @@
 
 use super::figure::{PlacedPlot, PlotLook};
 use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
+use crate::widgets::{NamedControl, heading_ui};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
@@ -99,7 +99,7 @@ impl PlotCache {
                 exact.residual.ui(ui, "residual", look);
             });
         }
-        ui.label(RichText::new(&self.force_depth.plot.title).heading().strong());
+        heading_ui(ui, &self.force_depth.plot.title);
         self.force_depth.ui(ui, "force_depth", PlotLook::default());
     }
 }

@@ -4,7 +4,7 @@ use super::camera::{Camera, Lens, Vec3, along};
 use super::facets::{SurfaceStyle, colour_depth, facets};
 use super::hand::{HandTarget, stylus};
 use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
+use crate::widgets::NamedControl;
 use eframe::egui::epaint::Mesh;
 use eframe::egui::{
     Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
@@ -108,7 +108,7 @@ impl SceneView {
             ui.input(|input| (f64::from(input.smooth_scroll_delta.y), input.stable_dt));
         let presses = response.is_pointer_button_down_on()
             && ui.input(|input| input.pointer.button_down(PointerButton::Primary));
-        let turns = [PointerButton::Secondary, PointerButton::RunPane];
+        let turns = [PointerButton::Secondary, PointerButton::Middle];
         if turns.iter().any(|&button| response.dragged_by(button)) {
             let by = response.drag_delta();
             self.camera.orbit(-ORBIT[0] * f64::from(by.x), ORBIT[0] * f64::from(by.y));

@@ -1,11 +1,10 @@
 //! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
 
-use super::calibration::can_keep;
+use super::calibration::calibration_session;
 use crate::command::{CommandQueue, UserCommand};
 use crate::shell::activity::is_planned;
 use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 use palpate_protocols::engine::Outcome;
 use palpate_runner::RunView;
@@ -16,7 +15,7 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
-        if can_keep(Some(run)).is_ok() && ui.button("Keep this calibration").clicked() {
+        if calibration_session(Some(run)).is_ok() && ui.button("Save this calibration").clicked() {
             commands.push(UserCommand::KeepCalibration);
         }
     } else if let Some(ending) = &run.holding {
@@ -38,8 +37,7 @@ fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
         }
     });
     if let Err(reason) = &run.can_retract {
-        let text = format!("No retract: {reason}");
-        quiet_ui(ui, &text);
+        quiet_ui(ui, format!("No retract: {reason}"));
     }
 }
 
@@ -51,24 +49,18 @@ fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
 }
 
 fn log_ui(ui: &mut Ui, run: &RunView) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let alarm = match (&run.log_error, &run.verdict_error) {
         (Some(reason), _) => Some(format!(
-            "The session was not kept as it was recorded: {reason}; 'palpate doctor {}' tells what is missing",
+            "The session on disk differs from what was recorded: {reason}; run 'palpate doctor {}' to see what is missing",
             run.folder.display()
         )),
-        (None, Some(reason)) => Some(format!(
-            "The recording is whole, but the verdict could not be written beside it: {reason}"
-        )),
+        (None, Some(reason)) => {
+            Some(format!("The recording is complete, but its verdict cannot be written: {reason}"))
+        }
         (None, None) => None,
     };
     match alarm {
-        Some(text) => {
-            alarm_ui(ui, &text);
-        }
-        None => {
-            let text = format!("Session in {}", run.folder.display());
-            ui.add(Label::new(RichText::new(text).color(tokens.text_quiet)).wrap());
-        }
+        Some(text) => alarm_ui(ui, text),
+        None => placeholder_ui(ui, format!("Session in {}", run.folder.display())),
     }
 }

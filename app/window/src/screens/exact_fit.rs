@@ -2,7 +2,7 @@
 
 use super::parameters::{cell, tight};
 use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
+use crate::widgets::section_ui;
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::text::{ParameterText, quality};
 use palpate_rheology::fit::FitReport;

@@ -1,13 +1,12 @@
-//! What is right and what is refused at the ends of every range.
+//! Which cases at the ends of every range are right and which are refused.
 
 use super::screen::{Screen, ScreenEntry};
 use crate::command::CommandQueue;
 use crate::theme::Tokens;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
-use crate::widgets::task_bar::work_ui;
+use crate::widgets::{
+    Column, Emphasis, TableRow, answer_ui, choice_ui, heading_ui, placeholder_ui, quiet_ui,
+    section_ui, table_ui, work_ui,
+};
 use crate::workbench::Workbench;
 use crate::workers::task::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
@@ -23,12 +22,10 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(ExtremesScreen::default()),
 };
 
-/// How much is run, in words.
 const EXTENTS: [(Extent, &str); 2] =
     [(Extent::Quick, "corners: seconds"), (Extent::Whole, "everything: minutes")];
 
-/// What was found.
-pub struct ExtremesResult {
+struct ExtremesResult {
     rows: Vec<Row>,
     groups: Vec<GroupSummary>,
 }
@@ -36,9 +33,9 @@ pub struct ExtremesResult {
 /// The screen's state.
 pub struct ExtremesScreen {
     extent: Extent,
-    /// Shown alone; all groups if none.
+    /// All groups if none.
     group: Option<&'static str>,
-    /// Shown alone; all verdicts if none.
+    /// All verdicts if none.
     verdict: Option<Verdict>,
     task: BackgroundTask<ExtremesResult>,
 }
@@ -82,18 +79,8 @@ impl Screen for ExtremesScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let found = match self.task.answer() {
-            Some(Ok(found)) => found,
-            Some(Err(reason)) => {
-                alarm_ui(ui, reason);
-                return;
-            }
-            None => {
-                ui.label(RichText::new("nothing tested yet").color(tokens.text_quiet));
-                return;
-            }
-        };
+        let before = "nothing tested yet";
+        let Some(found) = answer_ui(ui, &self.task, before) else { return };
         let rows: Vec<TableRow> = found
             .rows
             .iter()
@@ -102,7 +89,7 @@ impl Screen for ExtremesScreen {
             .map(table_row)
             .collect();
         let title = format!("Cases, {} of {}", rows.len(), found.rows.len());
-        ui.label(RichText::new(title).heading().strong());
+        heading_ui(ui, title);
         let columns = [
             Column::words("subject", 130.0),
             Column::words("case", 240.0),
@@ -118,7 +105,7 @@ impl Screen for ExtremesScreen {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {
-            ui.label(RichText::new("nothing tested yet").color(tokens.text_quiet));
+            placeholder_ui(ui, "nothing tested yet");
             return;
         };
         let wrong: usize = found.groups.iter().map(|one| one.counts[3]).sum();
@@ -139,8 +126,7 @@ impl Screen for ExtremesScreen {
                 .collect();
             ui.label(counts.join(", "));
             if let Some(tightest) = &facts.tightest {
-                let text = format!("closest to its tolerance: {tightest}");
-                quiet_ui(ui, &text);
+                quiet_ui(ui, format!("closest to its tolerance: {tightest}"));
             }
         }
     }
@@ -153,7 +139,7 @@ impl Screen for ExtremesScreen {
         let extent = self.extent;
         self.task.start("extremes", ctx, move |progress| {
             let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
-            let rows = rows.ok_or("ended before it was done")?;
+            let rows = rows.ok_or("cancelled before it was done")?;
             Ok(ExtremesResult { groups: summary(&rows), rows })
         });
     }
@@ -163,7 +149,7 @@ impl Screen for ExtremesScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.state().is_some()
+        self.task.is_busy()
     }
 }
 
@@ -177,10 +163,10 @@ fn table_row(row: &Row) -> TableRow {
             format!("{:.0e}", row.tolerance),
             row.group.to_owned(),
         ],
-        look: match row.verdict {
-            Verdict::Wrong => RowStyle::Alarm,
-            Verdict::Right => RowStyle::Plain,
-            Verdict::Refused | Verdict::Flagged => RowStyle::Quiet,
+        emphasis: match row.verdict {
+            Verdict::Wrong => Emphasis::Alarm,
+            Verdict::Right => Emphasis::Plain,
+            Verdict::Refused | Verdict::Flagged => Emphasis::Quiet,
         },
         hint: (!row.sentence.is_empty()).then(|| row.sentence.clone()),
     }

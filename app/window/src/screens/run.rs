@@ -2,7 +2,7 @@
 
 use super::approach::Approach;
 use super::form::CheckedPlan;
-use super::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
+use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
@@ -14,13 +14,15 @@ use crate::plots::course::CourseLimits;
 use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
 use crate::shell::sizes::{PanelEdge, Sizes};
+use crate::widgets::require;
 use crate::workbench::Workbench;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::PathPurpose;
-use crate::workers::recovery::Recovery;
+use crate::workers::task::BackgroundTask;
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
-use palpate_runner::{RunRequest, RunView};
+use palpate_runner::{RunRequest, RunView, wall_now};
+use palpate_sessions::recover::recover_library;
 use std::path::Path;
 
 /// The screen's line in the table.
@@ -40,7 +42,8 @@ pub struct RunScreen {
     /// The start that the plots are of.
     plotted: u64,
     refitter: Refitter,
-    recovery: Recovery,
+    /// Sessions recovered after a crash, a line each.
+    recovery: BackgroundTask<Vec<String>>,
     is_recovery_begun: bool,
     /// Where sessions go if no folder is chosen, or why nowhere.
     library: Result<String, String>,
@@ -55,7 +58,7 @@ impl RunScreen {
             plots: PlotCache::for_calibration(&workbench.bench.calibration),
             plotted: 0,
             refitter: Refitter::default(),
-            recovery: Recovery::default(),
+            recovery: BackgroundTask::default(),
             is_recovery_begun: false,
             library: palpate_sessions::library_folder()
                 .map(|path| path.display().to_string())
@@ -63,12 +66,12 @@ impl RunScreen {
         }
     }
 
-    /// Where the exact fit of this run stands.
+    /// How far the exact fit of this run is.
     pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
         self.refitter.of(run)
     }
 
-    /// Takes a built-in protocol into the form, unless what stands there runs.
+    /// Takes a built-in protocol into the form, unless a run is in progress.
     fn take_protocol(&mut self, name: &str, workbench: &mut Workbench) {
         if !workbench.is_busy() {
             workbench.form.choose_built_in(name);
@@ -79,7 +82,7 @@ impl RunScreen {
     fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
-            workbench.want_run(request);
+            workbench.set_next_run(request);
         }
     }
 
@@ -93,13 +96,13 @@ impl RunScreen {
         }
     }
 
-    fn facts<'a>(&'a self, workbench: &Workbench) -> ProtocolFacts<'a> {
-        ProtocolFacts {
-            is_busy: workbench.is_busy(),
-            library: &self.library,
-            recovered: self.recovery.told(),
-            is_dialog_open: workbench.dialog.is_open(),
-        }
+    fn facts(&self) -> ProtocolFacts<'_> {
+        let recovered = match self.recovery.answer() {
+            None => &[],
+            Some(Ok(lines)) => lines.as_slice(),
+            Some(Err(reason)) => std::slice::from_ref(reason),
+        };
+        ProtocolFacts { library: &self.library, recovered }
     }
 }
 
@@ -125,23 +128,13 @@ impl Screen for RunScreen {
     }
 
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
-        let verdict = workbench.start_verdict();
-        let facts = self.facts(workbench);
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
-            .show(ui, |ui| {
-                let facts = StartFacts {
-                    is_busy: facts.is_busy,
-                    verdict: &verdict,
-                    refusal: workbench.refusal.as_deref(),
-                    is_link_lost: workbench.snapshot.rig.link_error.is_some(),
-                };
-                start_ui(ui, &mut workbench.form, &facts, commands);
-            });
+            .show(ui, |ui| start_ui(ui, workbench, commands));
         CentralPanel::no_frame().show(ui, |ui| {
             ScrollArea::vertical().id_salt("rig_and_protocol").auto_shrink(false).show(ui, |ui| {
-                protocol_ui(ui, &mut workbench.form, &facts, commands);
+                protocol_ui(ui, workbench, &self.facts(), commands);
                 rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
             });
         });
@@ -158,15 +151,7 @@ impl Screen for RunScreen {
             }
             (RunPane::Approach, Some(run)) => self.approach.ui(ui, run),
             (RunPane::Weighing | RunPane::Approach, None) => {}
-            (RunPane::Choose, _) => {
-                let facts = ProtocolFacts {
-                    is_busy: workbench.is_busy(),
-                    library: &self.library,
-                    recovered: self.recovery.told(),
-                    is_dialog_open: workbench.dialog.is_open(),
-                };
-                self.chooser.ui(ui, &workbench.form, &facts, commands);
-            }
+            (RunPane::Choose, _) => self.chooser.ui(ui, workbench, commands),
             (RunPane::Course, _) => {
                 let checked = workbench.form.checked();
                 let tight = |checked: &CheckedPlan| checked.plan.limits.tighten(*limits);
@@ -193,12 +178,14 @@ impl Screen for RunScreen {
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         if !std::mem::replace(&mut self.is_recovery_begun, true)
-            && let Ok(library) = &workbench.library
+            && let Ok(library) = workbench.library.clone()
         {
-            self.recovery.start(library.clone(), ctx);
+            self.recovery.start("recovery", ctx, move |_| {
+                Ok(recover_library(&library, env!("CARGO_PKG_VERSION"), wall_now().into()))
+            });
         }
         self.recovery.poll();
-        // What runs stands in the form until it has ended.
+        // The form keeps the protocol of a run in progress.
         if let Some((path, text)) = self.chooser.poll()
             && !workbench.is_busy()
         {
@@ -228,8 +215,8 @@ impl Screen for RunScreen {
                 let request = workbench.ready_run();
                 self.begin(request, workbench);
             }
-            UserCommand::ManualMove(aside) => {
-                let request = workbench.manual_run(aside);
+            UserCommand::ManualMove(manual) => {
+                let request = workbench.manual_run(manual);
                 self.begin(request, workbench);
             }
             UserCommand::View(view) => {
@@ -267,10 +254,8 @@ impl Screen for RunScreen {
         let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
-                let verdict = match is_offered(view, workbench.run()) {
-                    true => Ok(()),
-                    false => Err("the run has no such thing".to_owned()),
-                };
+                let is_offered = is_offered(view, workbench.run());
+                let verdict = require(is_offered, "the run has no such view");
                 PaletteAction::new(name, "", UserCommand::View(view)).if_ok(verdict)
             })
             .collect();

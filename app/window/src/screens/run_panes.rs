@@ -1,11 +1,11 @@
 //! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
 
 use super::form::{CheckedPlan, ProtocolForm};
-use super::protocol_panel::ProtocolFacts;
 use crate::command::{CommandQueue, UserCommand};
 use crate::plots::course::{CourseLimits, course_ui};
 use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
+use crate::widgets::{NamedControl, heading_ui, placeholder_ui};
+use crate::workbench::Workbench;
 use crate::workers::Job;
 use crate::workers::path_dialog::PathPurpose;
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
@@ -16,19 +16,14 @@ use palpate_runner::RunView;
 use palpate_sessions::text::read_if_present;
 use std::path::{Path, PathBuf};
 
-/// What stands in the middle of the run screen.
+/// A view in the middle of the run screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPane {
-    /// The list of protocols.
     Choose,
-    /// Depth and force as they are expected.
     #[default]
     Course,
-    /// What was measured.
     Measured,
-    /// One weight after the other.
     Weighing,
-    /// The search for the surface.
     Approach,
 }
 
@@ -117,12 +112,11 @@ impl Chooser {
         self.typed = path.display().to_string();
         let (path, ctx) = (path.to_owned(), ctx.clone());
         let work = move || {
+            let name = path.display();
             let text = match read_if_present(&path) {
                 Ok(Some(text)) => Ok(text),
-                Ok(None) => Err(format!("there is no file {}; choose another", path.display())),
-                Err(err) => {
-                    Err(format!("{} cannot be read ({err}); give a text file", path.display()))
-                }
+                Ok(None) => Err(format!("there is no file {name}; choose another")),
+                Err(err) => Err(format!("{name} cannot be read ({err}); choose a text file")),
             };
             (path, text)
         };
@@ -136,21 +130,16 @@ impl Chooser {
     }
 
     /// Draws the list, the field for a file and what is wrong with the file chosen.
-    pub fn ui(
-        &mut self,
-        ui: &mut Ui,
-        form: &ProtocolForm,
-        facts: &ProtocolFacts<'_>,
-        commands: &mut CommandQueue,
-    ) {
-        if facts.is_busy {
-            ui.label("A run is in progress; another protocol can be chosen when it has ended.");
+    pub fn ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut CommandQueue) {
+        let (form, is_busy) = (&workbench.form, workbench.is_busy());
+        if is_busy {
+            ui.label("A run is in progress. Choose another protocol when it has ended.");
         }
         ScrollArea::vertical().id_salt("protocols").auto_shrink(false).show(ui, |ui| {
-            if facts.is_busy {
+            if is_busy {
                 ui.disable();
             }
-            self.file_ui(ui, facts.is_dialog_open, commands);
+            self.file_ui(ui, workbench.dialog.is_open(), commands);
             if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
                 mistakes_ui(ui, file, form);
             }
@@ -166,7 +155,7 @@ impl Chooser {
     }
 
     fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut CommandQueue) {
-        ui.label(RichText::new("A protocol of your own").heading().strong());
+        heading_ui(ui, "Your own protocol");
         ui.horizontal(|ui| {
             let label = ui.label("protocol file");
             let width = (ui.available_width() - 250.0).max(120.0);
@@ -189,14 +178,14 @@ impl Chooser {
 
 fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let head = format!("{} cannot run as it is:", file.display());
+    let head = format!("{} cannot run:", file.display());
     ui.label(RichText::new(head).strong());
     for problem in form.problems() {
         let text = RichText::new(problem.to_string()).color(tokens.alarm_text);
         ui.add(Label::new(text).wrap());
     }
     let words = "Correct the file and press Open again.";
-    ui.label(RichText::new(words).color(tokens.text_quiet));
+    placeholder_ui(ui, words);
 }
 
 fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut CommandQueue) {
@@ -212,18 +201,13 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
     ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
 }
 
-/// Draws what the plan is expected to do.
+/// Draws the expected course of the plan.
 pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLimits) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     match checked {
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
-            let words = "this protocol does not indent; there is no depth or force to draw";
-            ui.label(RichText::new(words).color(tokens.text_quiet));
+            placeholder_ui(ui, "this protocol does not indent; there is no depth or force to draw");
         }
         Some(checked) => course_ui(ui, &checked.outline, limits),
-        None => {
-            let words = "nothing to draw until the protocol and its values are right";
-            ui.label(RichText::new(words).color(tokens.text_quiet));
-        }
+        None => placeholder_ui(ui, "correct the protocol and its values to see the course"),
     }
 }

@@ -1,13 +1,12 @@
-//! One weight after the other: what is asked for, whether the signal is steady, what was read against what the
-//! calibration in use expects, and how far both are apart.
+//! Calibration weights one by one: the next weight, whether the signal is steady, and each reading next to the value that
+//! the calibration in use expects.
 
 use super::form::RunSetup;
 use crate::command::{CommandQueue, UserCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::shell::run_strip::{RunControl, is_controllable};
 use crate::theme::{Tokens, reading_style};
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::table::{Column, RowStyle, TableRow, table_ui};
+use crate::widgets::{Column, Emphasis, TableRow, heading_ui, reason_button, require, table_ui};
 use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing;
 use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
@@ -28,10 +27,8 @@ pub fn weighing_ui(
 ) {
     let next = next_of(run);
     now_ui(ui, run, next, signal, &bench.curve);
-    let verdict = match is_controllable(run) {
-        true => run.can_redo.clone(),
-        false => Err("the run does not go on".into()),
-    };
+    let verdict = require(is_controllable(run), "the run has stopped");
+    let verdict = verdict.and(run.can_redo.clone());
     ui.horizontal(|ui| {
         if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
             commands.push(UserCommand::RunControl(RunControl::Redo));
@@ -85,7 +82,7 @@ fn now_ui(
         }
         None => format!("{} of {} readings taken", run.weighed.len(), run.to_weigh.len()),
     };
-    ui.label(RichText::new(place).heading().strong());
+    heading_ui(ui, place);
     ui.horizontal(|ui| {
         let signal = signal.map_or_else(|| "--".to_owned(), |volts| format!("{volts:.4}"));
         ui.label(RichText::new(signal).text_style(reading_style()));
@@ -93,14 +90,14 @@ fn now_ui(
         match &run.settling {
             Some(settling) => steady_ui(ui, settling),
             None => {
-                let words = "The signal is watched once the weight lies on the cell and Done F2 is pressed.";
+                let words = "Put the weight on the load cell and press Done F2; the signal is then checked.";
                 ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
             }
         }
     });
 }
 
-/// The stability indicator: how full the window is that must be steady, and what keeps it from being so.
+/// The stability indicator: how full the window is that must be steady, and what is not steady yet.
 fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.vertical(|ui| {
@@ -121,12 +118,12 @@ fn steady_words(settling: &SettlingNow) -> String {
     match &settling.last {
         None => format!("watching for {:.1} s; {left:.0} s left", settling.waited.0),
         Some(last) if last.noise.0 > settling.noise_max.0 => format!(
-            "it scatters by {:.2} mV, {:.2} mV are steady; {left:.0} s left",
+            "noise of {:.2} mV, steady at {:.2} mV; {left:.0} s left",
             last.noise.0 * 1e3,
             settling.noise_max.0 * 1e3
         ),
         Some(last) => format!(
-            "it moves by {:+.2} mV/s, {:.2} mV/s are steady; {left:.0} s left",
+            "drift of {:+.2} mV/s, steady at {:.2} mV/s; {left:.0} s left",
             last.slope_v_per_s * 1e3,
             settling.slope_max_v_per_s * 1e3
         ),
@@ -156,10 +153,10 @@ fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) 
     ];
     TableRow {
         cells,
-        look: match (taken, is_next) {
-            (_, true) => RowStyle::Marked,
-            (None, false) => RowStyle::Quiet,
-            (Some(_), false) => RowStyle::Plain,
+        emphasis: match (taken, is_next) {
+            (_, true) => Emphasis::Marked,
+            (None, false) => Emphasis::Quiet,
+            (Some(_), false) => Emphasis::Plain,
         },
         hint: None,
     }
@@ -182,8 +179,7 @@ impl WeightDeviation {
 }
 
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
-    let words =
-        format!("Force by the calibration in use ({}) less the weight's", bench.calibration.name);
+    let words = format!("Force by the calibration in use ({}) - weight", bench.calibration.name);
     ui.label(RichText::new(words).strong());
     let plot = weighing(run, &bench.curve);
     legend_ui(ui, &[&plot]);
@@ -215,9 +211,9 @@ mod tests {
             waited: Seconds(2.5),
         };
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("it scatters by 20.00 mV, 5.00 mV are"));
+        assert!(steady_words(&settling).starts_with("noise of 20.00 mV, steady at 5.00 mV"));
         steady.noise = Volts(0.001);
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("it moves by +4.00 mV/s"));
+        assert!(steady_words(&settling).starts_with("drift of +4.00 mV/s"));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
+use crate::widgets::{NamedControl, placeholder_ui};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, Snapshot};
 
@@ -26,7 +26,7 @@ impl EventLog {
             } else {
                 "no event matches the filter"
             };
-            ui.label(RichText::new(text).color(tokens.text_quiet));
+            placeholder_ui(ui, text);
             return;
         }
         let height = ui.text_style_height(&TextStyle::Monospace);

@@ -2,6 +2,7 @@
 
 use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
+use crate::widgets::placeholder_ui;
 use eframe::egui::{
     Align, Align2, Area, Button, Frame, Id, Key, Label, Layout, Margin, Modifiers, Order, RichText,
     ScrollArea, Stroke, TextEdit, Ui, vec2,
@@ -83,7 +84,6 @@ impl Palette {
     }
 
     fn content_ui(&mut self, ui: &mut Ui, actions: &[PaletteAction], commands: &mut CommandQueue) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let (mut moved, mut is_taken) = (0_isize, false);
         ui.input_mut(|input| {
             for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
@@ -116,7 +116,7 @@ impl Palette {
         self.chosen = self.chosen.saturating_add_signed(moved).min(last);
         ui.add_space(4.0);
         if found.is_empty() {
-            ui.label(RichText::new("nothing is called so").color(tokens.text_quiet));
+            placeholder_ui(ui, "nothing is called so");
         }
         ScrollArea::vertical()
             .id_salt("actions")

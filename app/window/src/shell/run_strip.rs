@@ -3,7 +3,7 @@
 
 use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
+use crate::widgets::NamedControl;
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
 };

@@ -7,11 +7,8 @@ palpate_model::named! {
     /// A panel whose size can be changed.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum PanelEdge {
-        /// What is asked for.
         Left = "left panel",
-        /// What is known.
         Right = "right panel",
-        /// The event log.
         Log = "event log",
     }
 }
@@ -34,7 +31,6 @@ pub const STEP: f32 = 40.0;
 /// Half the width in points of what can be dragged.
 const GRIP: f32 = 3.0;
 
-/// The sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes([f32; 3]);
 
@@ -45,9 +41,9 @@ impl Default for Sizes {
 }
 
 impl Sizes {
-    /// Those remembered, the usual ones where there is none.
+    /// The usual sizes where there is none.
     #[must_use]
-    pub fn remembered(sizes: [Option<f32>; 3]) -> Self {
+    pub fn from_changes(sizes: [Option<f32>; 3]) -> Self {
         let mut all = Self::default();
         for (edge, size) in PanelEdge::ALL.into_iter().zip(sizes) {
             all.set(edge, size.unwrap_or(f32::NAN));
@@ -71,8 +67,8 @@ impl Sizes {
         self.set(edge, self.get(edge) + by);
     }
 
-    /// What is to be remembered: none where a size is the usual one.
-    pub fn told(&self) -> [Option<f32>; 3] {
+    /// Sizes in points; none for the usual ones.
+    pub fn changes(&self) -> [Option<f32>; 3] {
         PanelEdge::ALL.map(|edge| Some(self.get(edge)).filter(|size| *size != edge.sizes()[1]))
     }
 
@@ -126,13 +122,13 @@ mod tests {
     use super::{PanelEdge, STEP, Sizes};
 
     #[test]
-    fn sizes_stay_within_their_bounds_and_the_usual_ones_are_not_told() {
-        let mut sizes = Sizes::remembered([None, Some(1.0), Some(f32::NAN)]);
-        assert_eq!(sizes.told(), [None, Some(280.0), None]);
+    fn sizes_stay_within_their_bounds_and_the_usual_ones_are_not_changes() {
+        let mut sizes = Sizes::from_changes([None, Some(1.0), Some(f32::NAN)]);
+        assert_eq!(sizes.changes(), [None, Some(280.0), None]);
         sizes.grow(PanelEdge::Left, 1e9);
         sizes.grow(PanelEdge::Log, -1e9);
-        assert_eq!(sizes.told(), [Some(460.0), Some(280.0), Some(70.0)]);
+        assert_eq!(sizes.changes(), [Some(460.0), Some(280.0), Some(70.0)]);
         sizes.grow(PanelEdge::Left, -STEP);
-        assert_eq!(Sizes::remembered(sizes.told()), sizes);
+        assert_eq!(Sizes::from_changes(sizes.changes()), sizes);
     }
 }

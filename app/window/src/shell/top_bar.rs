@@ -3,7 +3,7 @@
 use super::activity::{Activity, is_motion_possible, run_in_progress};
 use crate::command::{CommandQueue, UserCommand};
 use crate::theme::{Tokens, reading_style};
-use crate::widgets::state_badge::badge_ui;
+use crate::widgets::{badge_ui, quiet_ui};
 use eframe::egui::{
     Align, Button, Context, Id, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2,
 };
@@ -147,12 +147,11 @@ fn number(value: Option<f64>, decimals: usize) -> String {
 }
 
 fn number_ui(ui: &mut Ui, name: &str, unit: &str, text: String, width: f32) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.allocate_ui_with_layout(vec2(width, HEIGHT), Layout::top_down(Align::Max), |ui| {
         ui.set_width(width);
         ui.spacing_mut().item_spacing.y = 0.0;
         let head = format!("{name} ({unit})");
-        ui.label(RichText::new(head).color(tokens.text_quiet).small());
+        quiet_ui(ui, head);
         ui.label(RichText::new(text).text_style(reading_style()));
     });
 }

@@ -1,7 +1,7 @@
 //! One of many names, or any: a list with a field that narrows it; only names in sight are laid out.
 
+use super::fields::form_label;
 use super::places::NamedControl;
-use super::quantity_input::form_label;
 use eframe::egui::{ComboBox, PopupCloseBehavior, ScrollArea, TextEdit, Ui};
 
 /// More names than this have a field that narrows them.

@@ -1,117 +1,84 @@
 //! A long table whose rows can be chosen, by pointer and by keys: only rows in sight are made and laid out.
 
-use super::glyph::{self, Glyph, glyph_at};
-use super::table::{Column, GAP, ROW, row_ui};
+use super::glyph::{GLYPH_RADIUS, GLYPH_WIDTH, Glyph, glyph_at};
+use super::table::{Column, Emphasis, GAP, ROW, row_ui, width_of};
 use crate::theme::Tokens;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
 use eframe::egui::{
-    Align2, Button, Color32, EventFilter, InputState, Key, Popup, Rect, Role, ScrollArea, Sense,
-    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Button, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
+    ScrollArea, Sense, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 use std::ops::Range;
 
-/// How a text stands out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum TextTone {
-    /// As the others.
-    #[default]
-    Plain,
-    /// Of less use.
-    Quiet,
-    /// Wrong.
-    Alarm,
-}
-
-/// One cell.
+/// One cell, with a glyph before its text where it has one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableCell {
-    /// Shape before the text.
-    pub mark: Option<Glyph>,
-    /// The text.
+    pub glyph: Option<Glyph>,
     pub text: String,
-    /// How it stands out.
-    pub tone: TextTone,
+    pub emphasis: Emphasis,
 }
 
 impl TableCell {
-    /// A plain text.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), ..Self::default() }
     }
 
-    /// A shape and its word.
     #[must_use]
-    pub fn marked(mark: Glyph, text: impl Into<String>, tone: TextTone) -> Self {
-        Self { mark: Some(mark), text: text.into(), tone }
+    pub fn marked(glyph: Glyph, text: impl Into<String>, emphasis: Emphasis) -> Self {
+        Self { glyph: Some(glyph), text: text.into(), emphasis }
     }
 }
 
-/// One row.
+/// One row: a cell for each column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableLine {
-    /// What it is called where it is not seen.
+    /// Read aloud in the place of the cells.
     pub name: String,
-    /// A cell for each column.
     pub cells: Vec<TableCell>,
 }
 
-/// A column that rows may be sorted by.
-#[derive(Clone, Debug)]
-pub struct SortableColumn {
-    /// The column.
-    pub column: Column,
-    /// Whether its head sorts.
-    pub can_sort: bool,
-}
-
-/// Where the table is scrolled to.
+/// How far a table is scrolled.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ScrollPosition {
     offset: f32,
     height: f32,
-    wanted: Option<f32>,
+    target: Option<f32>,
 }
 
 /// How a row is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SelectionMode {
-    /// That one alone.
     Only,
-    /// That one too, or that one no more.
+    /// Adds the row, or takes it away.
     Toggle,
-    /// All from where it began.
+    /// All rows from the one that was chosen first.
     Extend,
 }
 
 /// What was done with the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableAction {
-    /// A row was chosen.
     Choose(usize, SelectionMode),
-    /// All were chosen.
-    All,
-    /// Those chosen are wanted.
+    ChooseAll,
+    /// Opens the rows that are chosen.
     Open,
-    /// A head was pressed.
+    /// Sorts by the column of this number.
     Sort(usize),
 }
 
-/// What a table shows.
+/// A table of which a row is made when it is drawn.
 pub struct ChoiceTable<'a> {
-    /// What it is called.
     pub name: &'a str,
-    /// Its columns.
-    pub heads: &'a [SortableColumn],
-    /// Column that the rows are sorted by, and whether the other way round.
+    pub columns: &'a [Column],
+    /// Whether the heading of a column sorts.
+    pub can_sort: &'a dyn Fn(usize) -> bool,
+    /// Column that the rows are sorted by, and whether in reverse.
     pub sorted: Option<(usize, bool)>,
-    /// Rows in all.
     pub count: usize,
-    /// The row that keys go from.
+    /// The row from which keys move.
     pub at: Option<usize>,
-    /// Makes a row.
     pub line: &'a dyn Fn(usize) -> TableLine,
-    /// Whether a row is chosen.
     pub is_chosen: &'a dyn Fn(usize) -> bool,
 }
 
@@ -123,8 +90,7 @@ impl ChoiceTable<'_> {
         scrolled: &mut ScrollPosition,
     ) -> (Vec<TableAction>, Range<usize>) {
         let (mut acts, mut shown) = (Vec::new(), 0..0);
-        let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
-        let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
+        let width = width_of(self.columns);
         let id = ui.make_persistent_id((self.name, "table"));
         ScrollArea::horizontal().id_salt((self.name, "across")).auto_shrink(false).show(ui, |ui| {
             let width = width.max(ui.available_width());
@@ -154,19 +120,18 @@ impl ChoiceTable<'_> {
 
     fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<TableAction>) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
-        row_ui(ui, &columns, width, |ui, index, column| {
-            let text = eframe::egui::RichText::new(&column.head).color(tokens.text_quiet).small();
-            if !self.heads[index].can_sort {
-                ui.add(eframe::egui::Label::new(text).truncate());
+        row_ui(ui, self.columns, width, |ui, index, column| {
+            let text = RichText::new(&column.head).color(tokens.text_quiet).small();
+            if !(self.can_sort)(index) {
+                ui.add(Label::new(text).truncate());
                 return;
             }
             ui.spacing_mut().button_padding.x = 0.0;
             let head = ui.add(Button::new(text).frame(false));
             if let Some((_, is_reversed)) = self.sorted.filter(|(by, _)| *by == index) {
-                let mark = if is_reversed { Glyph::Up } else { Glyph::Down };
+                let glyph = if is_reversed { Glyph::Up } else { Glyph::Down };
                 let place = head.rect.right_center() + vec2(8.0, 0.0);
-                glyph_at(ui.painter(), mark, place, tokens.text_quiet);
+                glyph_at(ui.painter(), glyph, place, GLYPH_RADIUS, tokens.text_quiet);
             }
             let head = head.accessible_name(format!("sort by {}", column.head));
             if head.on_hover_text("sort; once more for the other way round").clicked() {
@@ -179,12 +144,12 @@ impl ChoiceTable<'_> {
         &self,
         ui: &mut Ui,
         width: f32,
-        id: eframe::egui::Id,
+        id: Id,
         scrolled: &mut ScrollPosition,
         acts: &mut Vec<TableAction>,
     ) -> Range<usize> {
         let mut area = ScrollArea::vertical().id_salt((self.name, "rows")).auto_shrink(false);
-        if let Some(offset) = scrolled.wanted.take() {
+        if let Some(offset) = scrolled.target.take() {
             area = area.vertical_scroll_offset(offset);
         }
         let drawn = area.show_rows(ui, ROW, self.count, |ui, rows| {
@@ -198,14 +163,7 @@ impl ChoiceTable<'_> {
         drawn.inner
     }
 
-    fn line_ui(
-        &self,
-        ui: &mut Ui,
-        width: f32,
-        id: eframe::egui::Id,
-        index: usize,
-        acts: &mut Vec<TableAction>,
-    ) {
+    fn line_ui(&self, ui: &mut Ui, width: f32, id: Id, index: usize, acts: &mut Vec<TableAction>) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let (line, is_chosen) = ((self.line)(index), (self.is_chosen)(index));
         let (rect, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
@@ -224,10 +182,10 @@ impl ChoiceTable<'_> {
             ui.painter().rect_filled(mark, 0.0, tokens.text);
         }
         let mut left = rect.left() + GAP * 0.5;
-        for (cell, head) in line.cells.iter().zip(self.heads) {
-            let place = Rect::from_min_size(pos2(left, rect.top()), vec2(head.column.width, ROW));
-            cell_ui(ui, cell, place, head.column.is_number, is_chosen);
-            left += head.column.width + GAP;
+        for (cell, column) in line.cells.iter().zip(self.columns) {
+            let place = Rect::from_min_size(pos2(left, rect.top()), vec2(column.width, ROW));
+            cell_ui(ui, cell, place, column.is_number, is_chosen);
+            left += column.width + GAP;
         }
         if row.double_clicked() {
             acts.extend([TableAction::Choose(index, SelectionMode::Only), TableAction::Open]);
@@ -240,7 +198,7 @@ impl ChoiceTable<'_> {
             });
             acts.push(TableAction::Choose(index, how));
         }
-        if row.hovered() && line.cells.iter().any(|cell| cell.tone == TextTone::Alarm) {
+        if row.hovered() && line.cells.iter().any(|cell| cell.emphasis == Emphasis::Alarm) {
             row.on_hover_text(&line.name);
         }
     }
@@ -252,12 +210,12 @@ impl ChoiceTable<'_> {
         let page = ((scrolled.height / ROW) as usize).max(1);
         let (mut went, mut how) = (None, SelectionMode::Only);
         ui.input(|input| {
-            went = self.gone_to(input, page);
+            went = self.key_target(input, page);
             if input.modifiers.shift {
                 how = SelectionMode::Extend;
             }
             if input.modifiers.command && input.key_pressed(Key::A) {
-                acts.push(TableAction::All);
+                acts.push(TableAction::ChooseAll);
             }
             if let Some(at) = self.at.filter(|_| input.key_pressed(Key::Space)) {
                 acts.push(TableAction::Choose(at, SelectionMode::Toggle));
@@ -270,15 +228,15 @@ impl ChoiceTable<'_> {
             acts.push(TableAction::Choose(to, how));
             let (top, bottom) = (to as f32 * ROW, (to + 1) as f32 * ROW);
             if top < scrolled.offset {
-                scrolled.wanted = Some(top);
+                scrolled.target = Some(top);
             } else if bottom > scrolled.offset + scrolled.height {
-                scrolled.wanted = Some(bottom - scrolled.height);
+                scrolled.target = Some(bottom - scrolled.height);
             }
         }
     }
 
     /// The row that keys lead to.
-    fn gone_to(&self, input: &InputState, page: usize) -> Option<usize> {
+    fn key_target(&self, input: &InputState, page: usize) -> Option<usize> {
         let last = self.count - 1;
         let from = |step: isize| match self.at {
             Some(at) => at.saturating_add_signed(step).min(last),
@@ -300,18 +258,14 @@ impl ChoiceTable<'_> {
 
 fn cell_ui(ui: &Ui, cell: &TableCell, place: Rect, is_number: bool, is_chosen: bool) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink: Color32 = match cell.tone {
-        // A chosen row's ground is darker: only full ink is readable on it.
-        _ if is_chosen => tokens.text,
-        TextTone::Plain => tokens.text,
-        TextTone::Quiet => tokens.text_quiet,
-        TextTone::Alarm => tokens.alarm_text,
-    };
+    // The ground of a chosen row is darker: only full ink is readable on it.
+    let emphasis = if is_chosen { Emphasis::Plain } else { cell.emphasis };
+    let ink = emphasis.ink(tokens);
     let mut left = place.left();
-    if let Some(mark) = cell.mark {
-        let center = pos2(left + glyph::WIDTH * 0.4, place.center().y);
-        glyph_at(ui.painter(), mark, center, ink);
-        left += glyph::WIDTH;
+    if let Some(glyph) = cell.glyph {
+        let center = pos2(left + GLYPH_WIDTH * 0.4, place.center().y);
+        glyph_at(ui.painter(), glyph, center, GLYPH_RADIUS, ink);
+        left += GLYPH_WIDTH;
     }
     let font = TextStyle::Body.resolve(ui.style());
     let mut job = LayoutJob::single_section(cell.text.clone(), TextFormat::simple(font, ink));

@@ -1,6 +1,7 @@
 //! Start of a longer piece of work, how far it is, and its end.
 
-use super::reason_button::reason_button;
+use super::buttons::reason_button;
+use super::text::{alarm_ui, placeholder_ui};
 use crate::command::{CommandQueue, UserCommand};
 use crate::theme::Tokens;
 use crate::workers::task::{BackgroundTask, TaskState};
@@ -20,8 +21,7 @@ pub fn task_ui<T: Send + 'static>(
     };
     bar_ui(ui, &state);
     if task.is_ending() {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        ui.label(RichText::new("ending").color(tokens.text_quiet));
+        placeholder_ui(ui, "ending");
     } else if cancel_ui(ui, "Cancel") {
         task.cancel();
     }
@@ -39,6 +39,20 @@ pub fn work_ui<T: Send + 'static>(
     if task_ui(ui, start, task, verdict) {
         commands.push(UserCommand::Work);
     }
+}
+
+/// The answer of a task; without one it draws what is wrong, or words that stand there before the first.
+pub fn answer_ui<'a, T: Send + 'static>(
+    ui: &mut Ui,
+    task: &'a BackgroundTask<T>,
+    before: &str,
+) -> Option<&'a T> {
+    match task.answer() {
+        Some(Ok(answer)) => return Some(answer),
+        Some(Err(reason)) => alarm_ui(ui, reason),
+        None => placeholder_ui(ui, before),
+    }
+    None
 }
 
 /// Draws the progress of work that began by itself, and a button that ends it; true when that is pressed.

@@ -6,8 +6,6 @@ pub mod latest;
 pub mod live_scene;
 pub mod path_dialog;
 pub mod player;
-pub mod ports;
-pub mod recovery;
 pub mod review;
 pub mod task;
 pub mod trail;
@@ -47,7 +45,7 @@ impl<T: Send + 'static> Job<T> {
         std::thread::Builder::new().name(name.into()).spawn(move || {
             let _in = span.entered();
             tracing::debug!("started");
-            // Nobody may wait any more when the window has closed.
+            // The receiver is gone when the window has closed.
             let _ = sender.try_send(work());
             tracing::debug!("ended");
             done();

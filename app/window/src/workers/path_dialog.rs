@@ -1,7 +1,7 @@
 //! The desktop's own dialogs for folders and files, each on its own thread: they block whoever opens them.
 
 use super::Job;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::{alarm_ui, quiet_ui};
 use eframe::egui::{Button, Context, Ui};
 use rfd::FileDialog;
 use std::path::PathBuf;

@@ -6,16 +6,16 @@ use palpate_analysis::progress::TaskProgress;
 use palpate_runner::Stopwatch;
 use std::sync::Arc;
 
-/// How far a task is, for drawing.
+/// How far a task is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TaskState {
-    /// Share done, 0 to 1.
+    /// Done, 0 to 1.
     pub fraction: f64,
-    /// What it is at.
+    /// The piece of work in progress.
     pub what: String,
-    /// Seconds since it began.
+    /// Since the start.
     pub seconds: f64,
-    /// Seconds left at this pace, once a piece is done.
+    /// At this pace, once a piece is done.
     pub seconds_left: Option<f64>,
 }
 
@@ -25,16 +25,19 @@ pub struct BackgroundTask<T> {
     progress: Arc<TaskProgress>,
     since: Option<Stopwatch>,
     answer: Option<Result<T, String>>,
+    /// The last start failed, which the next poll reports as an end.
+    has_failed: bool,
 }
 
 impl<T> Default for BackgroundTask<T> {
     fn default() -> Self {
-        Self { job: Job::default(), progress: Arc::default(), since: None, answer: None }
+        let (job, progress) = (Job::default(), Arc::default());
+        Self { job, progress, since: None, answer: None, has_failed: false }
     }
 }
 
 impl<T: Send + 'static> BackgroundTask<T> {
-    /// Starts work, unless some is under way. The last answer stays until the new one is there.
+    /// Starts work, unless some is in progress. The last answer stays until the new one is there.
     pub fn start(
         &mut self,
         name: &str,
@@ -53,23 +56,26 @@ impl<T: Send + 'static> BackgroundTask<T> {
         );
         match started {
             Ok(()) => self.since = Some(Stopwatch::start()),
-            Err(err) => self.answer = Some(Err(format!("the work cannot be started: {err}"))),
+            Err(err) => {
+                self.answer = Some(Err(format!("the work cannot be started: {err}")));
+                self.has_failed = true;
+            }
         }
     }
 
-    /// Fetches the answer if it has come.
-    pub fn poll(&mut self) {
+    /// Fetches the answer if it has come; true when the work has just ended.
+    pub fn poll(&mut self) -> bool {
         if !self.job.is_busy() {
-            return;
+            return std::mem::take(&mut self.has_failed);
         }
         let answer = self.job.poll();
         if self.job.is_busy() {
-            return;
+            return false;
         }
         self.since = None;
         let is_cancelled = self.progress.is_cancelled();
         match answer {
-            // A cancelled task has no answer; what was known before stays.
+            // A cancelled task has no answer; the one before stays.
             Some(Err(_)) if is_cancelled => {}
             Some(answer) => self.answer = Some(answer),
             None => {
@@ -77,6 +83,11 @@ impl<T: Send + 'static> BackgroundTask<T> {
                 self.answer = Some(Err(gone.to_owned()));
             }
         }
+        true
+    }
+
+    pub fn is_busy(&self) -> bool {
+        self.job.is_busy()
     }
 
     /// Asks the work to end at its next piece.
@@ -84,7 +95,7 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.progress.cancel();
     }
 
-    /// Whether it was asked to end and has not yet.
+    /// Whether it is cancelled and has not ended yet.
     pub fn is_ending(&self) -> bool {
         self.job.is_busy() && self.progress.is_cancelled()
     }
@@ -94,7 +105,7 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.answer.as_ref()
     }
 
-    /// How far it is; none when nothing is under way.
+    /// None while no work is in progress.
     pub fn state(&self) -> Option<TaskState> {
         let seconds = self.since.as_ref()?.seconds();
         let (done, of, what) = self.progress.read();
@@ -149,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn progress_is_told_and_the_answer_stays() {
+    fn progress_is_reported_and_the_answer_stays() {
         let (step, go) = sync_channel(8);
         let mut task = BackgroundTask::default();
         stepwise(&mut task, 4, go);

@@ -1,7 +1,8 @@
 //! The chosen calibration as four plots over force: signal, residual, slope and uncertainty.
 
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
-use eframe::egui::{RichText, Ui, vec2};
+use crate::widgets::heading_ui;
+use eframe::egui::{Ui, vec2};
 use palpate_figures::figure::Plot;
 
 /// How each looks: it is half as wide as the plots of a run.
@@ -20,7 +21,7 @@ pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
         ui.horizontal(|ui| {
             for plot in row {
                 ui.vertical(|ui| {
-                    ui.label(RichText::new(&plot.title).heading().strong());
+                    heading_ui(ui, &plot.title);
                     ui.allocate_ui(size, |ui| {
                         ui.set_min_size(size);
                         plot_ui(ui, &plot.title, plot, LOOK);

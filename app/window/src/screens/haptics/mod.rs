@@ -1,4 +1,5 @@
-//! From model to touch: what damping a body needs of a device, and the loop itself with a hand led from here.
+//! From model to touch: the damping that a material needs of a device, and the haptic loop with a hand that is led from
+//! here.
 
 mod form;
 mod middle;
@@ -8,13 +9,10 @@ use super::screen::{Screen, ScreenEntry, ScreenReply};
 use super::tape::TapePanel;
 use crate::command::{CommandQueue, UserCommand};
 use crate::shell::palette::PaletteAction;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::NamedControl;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::work_ui;
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{
+    NamedControl, alarm_ui, form_label, quiet_ui, reason_button, require, section_ui, tick_box,
+    work_ui,
+};
 use crate::workbench::Workbench;
 use crate::workers::haptic_loop::HapticLoop;
 use crate::workers::path_dialog::PathPurpose;
@@ -31,28 +29,25 @@ use std::path::{Path, PathBuf};
 /// How far above the surface a hand can be led, in mm.
 const ABOVE: f64 = 2.0;
 
-/// Sessions that other screens have in front.
+/// Sessions in front on other screens.
 #[derive(Clone, Copy, Debug)]
 pub struct OfferedSessions<'a> {
-    /// On the review screen.
     pub review: Option<&'a Path>,
-    /// In the library.
     pub library: Option<&'a Path>,
 }
 
-/// A body on a device, looked at.
+/// A material on a device, checked.
 pub struct HapticsCheck {
     source: PathBuf,
     setting: Setting,
     notes: Vec<String>,
-    /// What was found.
     pub checked: Checked,
 }
 
 /// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
-    purpose: "feel a body through a device: margin, buzz and loop",
+    purpose: "feel a material through a device: stability margin, limit cycle and loop",
     key: Key::Num9,
     open: |_| Box::new(HapticsScreen::default()),
 };
@@ -70,12 +65,11 @@ pub struct HapticsScreen {
 }
 
 impl HapticsScreen {
-    /// Whether the loop runs.
     pub fn is_running(&self) -> bool {
         self.feel.as_ref().is_some_and(HapticLoop::is_running)
     }
 
-    /// What was found of the body and device checked last.
+    /// The last check.
     pub fn looked(&self) -> Option<&Result<HapticsCheck, String>> {
         self.task.answer()
     }
@@ -85,17 +79,16 @@ impl HapticsScreen {
         self.feel.as_ref()
     }
 
-    /// A recording that was computed again last.
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }
 
-    /// The check of what stands in the form, or why the loop may not start.
+    /// The check of the setting in the form, or why the loop may not start.
     fn checked(&self) -> Result<&HapticsCheck, String> {
-        let wanted = self.form.wanted()?;
+        let request = self.form.request()?;
         match self.task.answer() {
-            Some(Ok(looked)) if (&looked.source, &looked.setting) == (&wanted.0, &wanted.1) => {
-                Ok(looked)
+            Some(Ok(check)) if (&check.source, &check.setting) == (&request.0, &request.1) => {
+                Ok(check)
             }
             _ => Err("check this setting first".into()),
         }
@@ -107,7 +100,7 @@ impl HapticsScreen {
             return;
         }
         let checked = self.checked();
-        let checked = checked.map(|looked| (looked.setting, looked.checked.body));
+        let checked = checked.map(|check| (check.setting, check.checked.body));
         let started = checked.and_then(|(setting, body)| {
             let is_guarded = !self.is_open;
             let begin = |folder: &Path| led_recorder(folder, body, &setting, is_guarded);
@@ -149,13 +142,9 @@ impl HapticsScreen {
                 commands.push(UserCommand::LoopStart);
             }
         }
-        let (Some(feel), Some(Ok(looked))) = (&self.feel, self.task.answer()) else {
-            return;
-        };
-        if !is_running {
-            return;
-        }
-        let deepest = looked.setting.deepest.0;
+        let answer = self.task.answer().filter(|_| is_running);
+        let (Some(feel), Some(Ok(check))) = (&self.feel, answer) else { return };
+        let deepest = check.setting.deepest.0;
         let mut place = feel.place();
         ui.horizontal(|ui| {
             let label = form_label(ui, "hand");
@@ -173,7 +162,7 @@ impl HapticsScreen {
             }
         });
         let words =
-            "the hand goes there at its speed; arrow keys move the slider when it has the focus";
+            "The hand moves there at its speed; arrow keys move the slider while it has the focus.";
         quiet_ui(ui, words);
     }
 }
@@ -184,7 +173,7 @@ impl Screen for HapticsScreen {
             review: workbench.front.review.as_deref(),
             library: workbench.front.library.as_deref(),
         };
-        // What runs is what was checked: it is not to be changed under a hand.
+        // A running loop keeps the setting that was checked.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
             if self.form.ui(ui, &offered) {
@@ -192,11 +181,8 @@ impl Screen for HapticsScreen {
             }
         });
         ui.add_space(6.0);
-        let wanted = match is_running {
-            true => Err("the loop runs".into()),
-            false => self.form.wanted().map(|_| ()),
-        };
-        work_ui(ui, "Check  F6", &self.task, &wanted, commands);
+        let verdict = require(!is_running, "the loop runs").and(self.form.request().map(|_| ()));
+        work_ui(ui, "Check  F6", &self.task, &verdict, commands);
         self.feel_ui(ui, &workbench.loop_verdict(SCREEN.name), commands);
         self.tape.ui(ui, is_running, replay);
     }
@@ -243,16 +229,14 @@ impl Screen for HapticsScreen {
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        let Ok((source, setting)) = self.form.wanted() else {
-            return;
-        };
+        let Ok((source, setting)) = self.form.request() else { return };
         self.view = View::Margin;
         self.task.start("haptics-check", ctx, move |progress| {
-            let tell = |share: f64, what: &str| progress.share(share, what);
-            tell(0.0, "the body's fit");
+            progress.share(0.0, "the fit");
             let body = body_of(&source)?;
-            let checked =
-                check(body.body, &setting, &mut |share| tell(share, "the simulated device"))?;
+            let checked = check(body.body, &setting, &mut |share| {
+                progress.share(share, "the simulated device")
+            })?;
             let mut notes = body.notes.clone();
             notes.extend(body.beyond(setting.deepest));
             Ok(HapticsCheck { source, setting, notes, checked })
@@ -264,7 +248,7 @@ impl Screen for HapticsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.state().is_some() || self.tape.is_busy() || self.is_running()
+        self.task.is_busy() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -283,10 +267,7 @@ impl Screen for HapticsScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let can_stop = match self.is_running() {
-            true => Ok(()),
-            false => Err("the loop does not run".to_owned()),
-        };
+        let can_stop = require(self.is_running(), "the loop does not run");
         let can_start = workbench.loop_verdict(SCREEN.name);
         vec![
             PaletteAction::new("Start the haptic loop", "", UserCommand::LoopStart)

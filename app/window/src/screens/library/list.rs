@@ -1,11 +1,9 @@
-//! The sessions found: what is known of those in sight, and which are chosen.
+//! The sessions found: catalog entries of those in sight, and which are chosen.
 
-use crate::widgets::choice_table::{
-    ChoiceTable, ScrollPosition, SelectionMode, SortableColumn, TableAction, TableCell, TableLine,
-    TextTone,
+use crate::widgets::{
+    ChoiceTable, Column, Emphasis, Glyph, ScrollPosition, SelectionMode, TableAction, TableCell,
+    TableLine,
 };
-use crate::widgets::glyph::Glyph;
-use crate::widgets::table::Column;
 use eframe::egui::Ui;
 use palpate_analysis::find::Found;
 use palpate_analysis::report::catalog::one_line;
@@ -14,12 +12,12 @@ use palpate_sessions::edits::{Decision, Verdict};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// Entries that are kept at most, apart from those just read.
-const KEPT: usize = 5000;
+/// Entries that are kept, apart from those just read.
+const ENTRIES_MAX: usize = 5000;
 /// Rows above and below those in sight that are read with them.
 const MARGIN: usize = 60;
 
-/// The columns, and by what their heads sort.
+/// Heading, width, whether it has numbers, and the order that the heading sorts by.
 const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
     ("started (UTC)", 134.0, false, Some(Order::Started)),
     ("specimen", 92.0, false, Some(Order::Specimen)),
@@ -33,14 +31,13 @@ const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
     ("folder", 320.0, false, None),
 ];
 
-/// The list.
 #[derive(Debug, Default)]
 pub(super) struct SessionList {
     folders: Vec<String>,
     entries: BTreeMap<String, (Entry, u64)>,
     generation: u64,
     chosen: BTreeSet<String>,
-    /// Counts up whenever others are chosen.
+    /// Raised with every change of those chosen.
     choice: u64,
     at: Option<String>,
     anchor: Option<String>,
@@ -48,17 +45,16 @@ pub(super) struct SessionList {
     in_sight: Range<usize>,
 }
 
-/// What was done with the list that others must do.
+/// What the list asks of its screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ListRequest {
-    /// Those chosen are to be looked at.
+    /// Review the sessions chosen.
     Open,
-    /// Another order.
     Sort(Order),
 }
 
 impl SessionList {
-    /// Takes what a search found. What is found no more is chosen no more.
+    /// Takes the result of a search. Sessions that it does not have are no longer chosen.
     pub fn take(&mut self, found: &mut Found) {
         self.folders = std::mem::take(&mut found.folders);
         self.generation += 1;
@@ -71,17 +67,17 @@ impl SessionList {
         }
     }
 
-    /// Takes what was read of some sessions.
+    /// Takes catalog entries.
     pub fn learn(&mut self, entries: Vec<Entry>) {
         let now = self.generation;
-        if self.entries.len() > KEPT {
+        if self.entries.len() > ENTRIES_MAX {
             self.entries.retain(|_, (_, of)| *of == now);
         }
         let entries = entries.into_iter();
         self.entries.extend(entries.map(|entry| (entry.folder.clone(), (entry, now))));
     }
 
-    /// Sessions in sight or chosen of which nothing new enough is known.
+    /// Sessions in sight or chosen whose entry is missing or old.
     pub fn unknown(&self) -> Vec<String> {
         let from = self.in_sight.start.saturating_sub(MARGIN);
         let to = (self.in_sight.end + MARGIN).min(self.folders.len());
@@ -94,7 +90,6 @@ impl SessionList {
         in_sight.iter().chain(chosen).filter(is_old).cloned().collect()
     }
 
-    /// How many were found.
     pub fn count(&self) -> usize {
         self.folders.len()
     }
@@ -105,23 +100,22 @@ impl SessionList {
         self.folders.iter().filter(is_chosen).cloned().collect()
     }
 
-    /// Another number whenever those chosen, or their order, may be others.
+    /// Another number whenever the sessions chosen, or their order, may have changed.
     pub fn choice(&self) -> u64 {
         self.choice
     }
 
-    /// How many are chosen.
     pub fn chosen_count(&self) -> usize {
         self.chosen.len()
     }
 
-    /// What is known of those chosen, as far as it was read.
+    /// Of the sessions chosen, as far as they are read.
     pub fn chosen_entries(&self) -> impl Iterator<Item = &Entry> {
         let known = self.chosen.iter().filter_map(|one| self.entries.get(one));
         known.map(|(entry, _)| entry)
     }
 
-    /// The only one chosen, and how new what is known of it is.
+    /// The only session chosen, and the generation of its entry.
     pub fn only(&self) -> Option<(&Entry, u64)> {
         let folder = self.chosen.first().filter(|_| self.chosen.len() == 1)?;
         let (entry, of) = self.entries.get(folder)?;
@@ -129,9 +123,7 @@ impl SessionList {
     }
 
     fn choose(&mut self, row: usize, how: SelectionMode) {
-        let Some(folder) = self.folders.get(row).cloned() else {
-            return;
-        };
+        let Some(folder) = self.folders.get(row).cloned() else { return };
         self.choice += 1;
         let place = |one: &Option<String>| {
             let one = one.as_ref()?;
@@ -156,20 +148,17 @@ impl SessionList {
         self.at = Some(folder);
     }
 
-    /// Draws the list; tells what is wanted of others.
     pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<ListRequest> {
-        let heads = COLUMNS.map(|(head, width, is_number, order)| SortableColumn {
-            column: match is_number {
-                true => Column::numbers(head, width),
-                false => Column::words(head, width),
-            },
-            can_sort: order.is_some(),
+        let columns = COLUMNS.map(|(head, width, is_number, _)| {
+            let head = head.to_owned();
+            Column { head, width, is_number }
         });
         let by = COLUMNS.iter().position(|column| column.3 == Some(sorted.0));
         let at = self.at.as_ref();
         let table = ChoiceTable {
             name: "Sessions",
-            heads: &heads,
+            columns: &columns,
+            can_sort: &|column| COLUMNS[column].3.is_some(),
             sorted: by.map(|by| (by, sorted.1)),
             count: self.folders.len(),
             at: at.and_then(|at| self.folders.iter().position(|folder| folder == at)),
@@ -186,34 +175,34 @@ impl SessionList {
         let (acts, in_sight) = table.ui(ui, &mut scrolled);
         self.scrolled = scrolled;
         self.in_sight = in_sight;
-        let mut wanted = Vec::new();
+        let mut requests = Vec::new();
         for act in acts {
             match act {
                 TableAction::Choose(row, how) => self.choose(row, how),
-                TableAction::All => {
+                TableAction::ChooseAll => {
                     self.choice += 1;
                     self.chosen = self.folders.iter().cloned().collect();
                 }
-                TableAction::Open => wanted.push(ListRequest::Open),
+                TableAction::Open => requests.push(ListRequest::Open),
                 TableAction::Sort(column) => {
-                    wanted.extend(COLUMNS[column].3.map(ListRequest::Sort))
+                    requests.extend(COLUMNS[column].3.map(ListRequest::Sort))
                 }
             }
         }
-        wanted
+        requests
     }
 }
 
-/// A row of which nothing is known yet.
+/// The row of a session whose entry is not read yet.
 fn unread(folder: &str) -> TableLine {
     let mut cells = vec![TableCell::default(); COLUMNS.len()];
     if let Some(last) = cells.last_mut() {
-        *last = TableCell { text: folder.to_owned(), tone: TextTone::Quiet, mark: None };
+        *last = TableCell { emphasis: Emphasis::Quiet, ..TableCell::text(folder) };
     }
     TableLine { name: format!("Session {folder}"), cells }
 }
 
-/// In which state a session's files are, as far as the catalog looks: a shape, a word, and what is wrong.
+/// State of a session's files according to the catalog: a glyph, a word, and what is wrong.
 pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
     match (&entry.trouble, &entry.ending) {
         (Some(trouble), _) => (Glyph::Diamond, "damaged", Some(trouble)),
@@ -222,7 +211,6 @@ pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
     }
 }
 
-/// What a session is worth, as a shape and a word.
 pub(super) fn verdict(entry: &Entry) -> (Glyph, &'static str) {
     match entry.verdict {
         Some(Verdict::Valid) => (Glyph::Tick, "valid"),
@@ -233,7 +221,6 @@ pub(super) fn verdict(entry: &Entry) -> (Glyph, &'static str) {
     }
 }
 
-/// What its review came to, as a shape and a word.
 pub(super) fn review(entry: &Entry) -> (Glyph, &'static str) {
     let review = ReviewIs::of(entry.review.as_ref());
     let mark = match review {
@@ -262,13 +249,10 @@ fn line(entry: &Entry) -> TableLine {
     let started = second(&entry.started_at);
     let (health_mark, health, trouble) = health(entry);
     let ((verdict_mark, verdict), (review_mark, review)) = (verdict(entry), review(entry));
-    let tone = match trouble {
-        Some(_) => TextTone::Alarm,
-        None => TextTone::Plain,
-    };
-    let quiet = |word: &str| match word {
-        "none" | "unknown" => TextTone::Quiet,
-        _ => TextTone::Plain,
+    let health_emphasis = trouble.map_or(Emphasis::Plain, |_| Emphasis::Alarm);
+    let emphasis = |word: &str| match word {
+        "none" | "unknown" => Emphasis::Quiet,
+        _ => Emphasis::Plain,
     };
     let why = trouble.map_or(String::new(), |why| format!(": {}", one_line(why)));
     let name = format!(
@@ -281,14 +265,14 @@ fn line(entry: &Entry) -> TableLine {
     let cells = vec![
         TableCell::text(started),
         TableCell::text(or_dash(&entry.specimen)),
-        TableCell::marked(verdict_mark, verdict, quiet(verdict)),
-        TableCell::marked(review_mark, review, quiet(review)),
-        TableCell::marked(health_mark, health, tone),
+        TableCell::marked(verdict_mark, verdict, emphasis(verdict)),
+        TableCell::marked(review_mark, review, emphasis(review)),
+        TableCell::marked(health_mark, health, health_emphasis),
         TableCell::text(or_dash(&entry.protocol)),
         TableCell::text(or_dash(&entry.operator)),
         TableCell::text(format!("{:.1} s", entry.duration_s)),
         TableCell::text(one_line(&entry.tags.join(", "))),
-        TableCell { tone: TextTone::Quiet, ..TableCell::text(one_line(&entry.folder)) },
+        TableCell { emphasis: Emphasis::Quiet, ..TableCell::text(one_line(&entry.folder)) },
     ];
     TableLine { name, cells }
 }
@@ -330,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_sight_and_old_is_asked_for() {
+    fn old_entries_in_sight_are_read_again() {
         let mut list = SessionList::default();
         list.take(&mut found(&["a", "b", "c"]));
         list.in_sight = 0..3;
@@ -344,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_tells_its_state_in_words_and_shapes() {
+    fn a_row_has_its_state_in_words_and_shapes() {
         let mut entry = Entry {
             folder: "s/1".into(),
             ending: Some("finish".into()),

@@ -1,13 +1,12 @@
-//! What is compared, and how.
+//! Recordings to compare, and the options of the comparison.
 
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::places::NamedControl;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{
+    NamedControl, choice_ui, form_label, placeholder_ui, quiet_ui, require, small_alarm_ui,
+    tick_box,
+};
 use crate::workers::path_dialog::PathPurpose;
-use eframe::egui::{Button, Label, RichText, TextEdit, Ui};
+use eframe::egui::{Button, Label, TextEdit, Ui};
 use palpate_analysis::select::SelectRequest;
 use palpate_analysis::source::Stretch;
 use palpate_analysis::sources::Naming;
@@ -18,7 +17,6 @@ use std::path::{Path, PathBuf};
 /// More recordings than this compared by hand are a job for the command line.
 const SOURCES_MAX: usize = 24;
 
-/// What may be held out and predicted, with its words.
 const HOLD_OUTS: [(HoldOut, &str); 5] = [
     (HoldOut::Auto, "each recording in turn"),
     (HoldOut::Speed, "each speed in turn"),
@@ -57,11 +55,9 @@ impl ModelsForm {
         }
     }
 
-    /// What the form asks for, or why it asks for nothing.
+    /// The comparison to make, or why there is none.
     pub fn request(&self) -> Result<SelectRequest, String> {
-        if self.sources.is_empty() {
-            return Err("add a recording first".into());
-        }
+        require(!self.sources.is_empty(), "add a recording first")?;
         Ok(SelectRequest {
             paths: self.sources.clone(),
             wanted: Stretch::with_unload(self.with_unload).into(),
@@ -88,21 +84,13 @@ impl ModelsForm {
         last_run: Option<&Path>,
         commands: &mut CommandQueue,
     ) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let mut dropped = None;
         for (index, path) in self.sources.iter().enumerate() {
             ui.horizontal(|ui| {
                 let name = short(path);
-                let button = Button::new("×").small();
-                let button = ui.add(button).on_hover_text(format!("leave out {name}"));
-                button.widget_info(|| {
-                    eframe::egui::WidgetInfo::labeled(
-                        eframe::egui::Role::Button,
-                        true,
-                        format!("leave out {name}"),
-                    )
-                });
-                if button.clicked() {
+                let hint = format!("leave out {name}");
+                let button = ui.add(Button::new("×").small()).on_hover_text(&hint);
+                if button.accessible_name(hint).clicked() {
                     dropped = Some(index);
                 }
                 ui.add(Label::new(name).truncate()).on_hover_text(path.display().to_string());
@@ -112,7 +100,7 @@ impl ModelsForm {
             self.sources.remove(index);
         }
         if self.sources.is_empty() {
-            ui.label(RichText::new("none yet").color(tokens.text_quiet));
+            placeholder_ui(ui, "none yet");
         }
         ui.horizontal(|ui| {
             let label = form_label(ui, "path");
@@ -146,13 +134,11 @@ impl ModelsForm {
             }
         });
         if last_run.is_none() {
-            let text = "the run screen has no run that ended";
-            ui.label(RichText::new(text).color(tokens.text_quiet).small());
+            quiet_ui(ui, "no run has ended on the run screen yet");
         }
     }
 
     pub(super) fn choices_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             let label = form_label(ui, "tolerance");
             let input = TextEdit::singleline(&mut self.tolerance)
@@ -162,19 +148,12 @@ impl ModelsForm {
             ui.add(input).labelled_by(label.id).named("tolerance");
         });
         match self.tolerance() {
-            Err(reason) => {
-                ui.label(RichText::new(reason).color(tokens.alarm_text).small());
-            }
-            Ok(tolerance) => {
-                let text = tolerance.map_or_else(
-                    || "none: information criteria alone decide".to_owned(),
-                    |tolerance| format!("an error of {tolerance} does not matter"),
-                );
-                ui.label(RichText::new(text).color(tokens.text_quiet).small());
-            }
+            Err(reason) => small_alarm_ui(ui, reason),
+            Ok(None) => quiet_ui(ui, "none: information criteria alone decide"),
+            Ok(Some(tolerance)) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
         }
         choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
-        tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
+        tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
     }
 }
 

@@ -1,5 +1,4 @@
-//! Which model recordings need: what is compared on the left, the families in the middle, the choice on
-//! the right.
+//! Model selection: recordings on the left, families in the middle, the choice on the right.
 
 mod answer;
 mod form;
@@ -8,13 +7,11 @@ pub use form::ModelsForm;
 
 use super::screen::{Screen, ScreenEntry, ScreenReply};
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::task_bar::work_ui;
+use crate::widgets::{answer_ui, placeholder_ui, section_ui, work_ui};
 use crate::workbench::Workbench;
 use crate::workers::path_dialog::PathPurpose;
 use crate::workers::task::BackgroundTask;
-use eframe::egui::{Context, Key, Label, RichText, Ui};
+use eframe::egui::{Context, Key, Ui};
 use palpate_analysis::select::{Selected, select_sources};
 
 /// The screen's line in the table.
@@ -53,14 +50,9 @@ impl Screen for ModelsScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
-        match self.task.answer() {
-            Some(Ok(selected)) => answer::families_ui(ui, &selected.selection),
-            Some(Err(reason)) => sentence_ui(ui, reason, true),
-            None => sentence_ui(
-                ui,
-                "Add recordings on the left and compare. Two speeds or depths of one specimen tell more than one: what is held out of each fit is then predicted.",
-                false,
-            ),
+        let before = "Add recordings on the left and compare them. Two speeds or depths of one specimen are better than one: each fit then predicts the recordings that are held out.";
+        if let Some(selected) = answer_ui(ui, &self.task, before) {
+            answer::families_ui(ui, &selected.selection);
         }
     }
 
@@ -69,7 +61,7 @@ impl Screen for ModelsScreen {
             Some(Ok(selected)) => answer::choice_ui(ui, selected),
             _ => {
                 section_ui(ui, "Choice");
-                sentence_ui(ui, "nothing compared yet", false);
+                placeholder_ui(ui, "nothing compared yet");
             }
         }
     }
@@ -107,12 +99,6 @@ impl Screen for ModelsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.state().is_some()
+        self.task.is_busy()
     }
-}
-
-fn sentence_ui(ui: &mut Ui, text: &str, is_wrong: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink = if is_wrong { tokens.alarm_text } else { tokens.text_quiet };
-    ui.add(Label::new(RichText::new(text).color(ink)).wrap());
 }

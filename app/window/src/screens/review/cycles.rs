@@ -1,29 +1,24 @@
-//! Every cycle: the loops of the session in front over each other, and of every session shown the peaks, where they
-//! were, and how they compare with the first.
+//! Every cycle: hysteresis loops of the session in front over each other, and the peaks of every session shown, next to
+//! the first.
 
 use super::ReviewScreen;
 use super::middle::head_ui;
 use super::subject::ReviewSubject;
-use crate::plots::over_depth::{DepthLayer, DepthSource, over_depth_ui};
+use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::theme::Tokens;
-use crate::widgets::remark::quiet_ui;
-use crate::widgets::table::{Column, TableRow, table_ui};
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{Column, TableRow, quiet_ui, table_ui, tick_box};
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};
 
 /// A cycle of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cycle {
-    /// Its number, from 1.
+    /// From 1.
     pub number: u32,
-    /// Highest force in N.
     pub peak_n: f64,
-    /// When, in s since the first sample.
-    pub peak_t: f64,
-    /// Depth there in mm.
+    /// Depth at the peak.
     pub depth_mm: Option<f64>,
-    /// When it began and ended.
+    /// Start and end in s since the first sample.
     pub t: [f64; 2],
     /// Its first sample and the one behind its last.
     pub rows: [usize; 2],
@@ -49,7 +44,6 @@ pub(super) fn cycles(subject: &ReviewSubject) -> Vec<Cycle> {
         found.push(Cycle {
             number: stretch.what,
             peak_n,
-            peak_t,
             depth_mm: place.and_then(|place| track.value(Quantity::Depth as usize, place)),
             t: [stretch.t, track.time_of(end.saturating_sub(1)).unwrap_or(stretch.t)],
             rows: [stretch.first, end],
@@ -58,7 +52,7 @@ pub(super) fn cycles(subject: &ReviewSubject) -> Vec<Cycle> {
     found
 }
 
-/// The rows of the table, and what they were made of: made anew only where that is other.
+/// The rows of the table, and the versions of the sessions for which they were made.
 #[derive(Debug, Default)]
 pub(super) struct CycleRows {
     key: Vec<(u64, u64)>,
@@ -103,13 +97,13 @@ impl ReviewScreen {
     pub(super) fn cycles_ui(&mut self, ui: &mut Ui) {
         self.cycle_rows.update(&self.subjects);
         if self.cycle_rows.rows.is_empty() {
-            quiet_ui(ui, "no session shown has cycles");
+            quiet_ui(ui, "No session shown has cycles.");
             return;
         }
         self.moves_ui(ui);
         let height = (0.55 * ui.available_height()).max(160.0);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
-        let words = "the highest force of every cycle; 'palpate analyse' tells hysteresis, relaxation and shift";
+        let words = "peak force of every cycle; 'palpate analyse' computes hysteresis, relaxation and shift";
         head_ui(ui, "Cycles", words);
         let columns = [
             Column::words("session", 200.0),
@@ -130,7 +124,7 @@ impl ReviewScreen {
         };
         let all = cycles(front);
         if all.is_empty() {
-            quiet_ui(ui, &format!("{} has no cycles", front.name));
+            quiet_ui(ui, format!("{} has no cycles", front.name));
             return;
         }
         let tokens = Tokens::of(ui.visuals().dark_mode);
@@ -155,29 +149,21 @@ impl ReviewScreen {
             .filter(|(index, _)| is_drawn(*index))
             .map(|(_, one)| one)
             .collect();
-        let sources: Vec<DepthSource<'_>> = drawn
+        let lines: Vec<DepthLine<'_>> = drawn
             .iter()
-            .map(|(cycle, color)| DepthSource {
-                track: &front.recording.track,
-                columns: [Quantity::Depth as usize, Quantity::Force as usize],
-                rows: cycle.rows,
-                version: front.fifths(),
-                id: id(cycle),
-                color: *color,
-            })
-            .collect();
-        let spans = [&self.depth, &self.force];
-        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<DepthLayer<'_>> = drawn
-            .iter()
-            .map(|(cycle, color)| DepthLayer {
+            .map(|(cycle, color)| DepthLine {
                 name: &front.name,
-                color: *color,
-                id: id(cycle),
+                track: &front.recording.track,
+                key: DepthLineKey {
+                    id: id(cycle),
+                    version: front.fifths(),
+                    rows: cycle.rows,
+                    color: *color,
+                },
                 cursors: [None; 2],
             })
             .collect();
-        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
-        self.follow_over_depth(drawn);
+        let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);
+        self.follow_over_depth(&gesture);
     }
 }

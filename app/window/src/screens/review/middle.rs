@@ -5,12 +5,13 @@ use super::left::color_of;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
-use crate::plots::over_depth::{DepthLayer, DepthSource, over_depth_ui};
+use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
 use crate::theme::Tokens;
-use crate::widgets::remark::quiet_ui;
+use crate::widgets::{heading_ui, quiet_ui, sentence_ui};
 use crate::workers::review::{Quantity, ReviewRecording};
-use eframe::egui::{Button, Label, RichText, Ui, vec2};
+use eframe::egui::{Ui, vec2};
+use palpate_model::signal::track::Track;
 
 /// Points that the axes beside and below a plot take of it.
 const AXIS_WIDTH: f32 = 58.0;
@@ -27,15 +28,13 @@ impl ReviewScreen {
             return;
         }
         match self.view {
-            View::OverTime => {
+            View::OverTime | View::OverDepth => {
                 self.moves_ui(ui);
                 self.readout_ui(ui);
-                self.over_time_ui(ui);
-            }
-            View::OverDepth => {
-                self.moves_ui(ui);
-                self.readout_ui(ui);
-                self.over_depth_ui(ui);
+                match self.view {
+                    View::OverTime => self.over_time_ui(ui),
+                    _ => self.over_depth_ui(ui),
+                }
             }
             View::Cycles => self.cycles_ui(ui),
             View::Parameters => self.parameters_ui(ui),
@@ -46,27 +45,22 @@ impl ReviewScreen {
     /// Buttons for what the pointer and the keys can do.
     pub(super) fn moves_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            let mut asked = None;
             for (text, key, to) in [
                 ("Zoom in", "+", ViewMove::ZoomIn),
                 ("Zoom out", "-", ViewMove::ZoomOut),
-                ("Back", "left arrow", ViewMove::Back),
-                ("On", "right arrow", ViewMove::On),
-                ("Everything", "Home", ViewMove::All),
+                ("Pan left", "left arrow", ViewMove::PanLeft),
+                ("Pan right", "right arrow", ViewMove::PanRight),
+                ("Reset view", "Home", ViewMove::Reset),
                 ("Cursor A", "A, or a click", ViewMove::Cursor(0)),
                 ("Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
-                ("No cursors", "Delete", ViewMove::NoCursors),
+                ("Clear cursors", "Delete", ViewMove::ClearCursors),
             ] {
-                let is_of_time = matches!(to, ViewMove::Cursor(_) | ViewMove::NoCursors);
-                if is_of_time && self.view == View::Cycles {
-                    continue;
+                // Cursors stand in time, which the view of cycles does not have.
+                let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
+                let is_offered = !is_cursor || self.view != View::Cycles;
+                if is_offered && ui.button(text).on_hover_text(key).clicked() {
+                    self.go(to);
                 }
-                if ui.add(Button::new(text)).on_hover_text(key).clicked() {
-                    asked = Some(to);
-                }
-            }
-            if let Some(to) = asked {
-                self.go(to);
             }
         });
         self.remarks_ui(ui);
@@ -74,31 +68,27 @@ impl ReviewScreen {
 
     /// What a reader of the plots must know.
     fn remarks_ui(&self, ui: &mut Ui) {
-        for subject in &self.subjects {
-            if subject.recording.is_reading() {
-                let share = 100.0 * subject.recording.share();
-                quiet_ui(ui, &format!("{}: still reading {share:.0} %", subject.name));
-            }
+        for subject in self.subjects.iter().filter(|one| one.recording.is_reading()) {
+            let share = 100.0 * subject.recording.share();
+            quiet_ui(ui, format!("{}: still reading {share:.0} %", subject.name));
         }
         let words = match self.view {
-            View::OverDepth | View::Cycles => {
-                match (self.depth_lines.is_busy(), self.depth_lines.remark()) {
-                    (true, _) => Some("finding the lines for this view".to_owned()),
-                    (false, remark) => remark,
-                }
+            View::OverDepth | View::Cycles if self.depth_lines.is_busy() => {
+                Some("finding the lines for this view".to_owned())
             }
+            View::OverDepth | View::Cycles => self.depth_lines.remark(),
             _ if self.thinned > 1 => {
                 Some(format!("thinned to min/max of {} samples", self.thinned))
             }
             _ => Some("every sample is drawn".to_owned()),
         };
         if let Some(words) = words {
-            quiet_ui(ui, &words);
+            quiet_ui(ui, words);
         }
     }
 
-    /// The setting of the plots over time, as the session in front has it.
-    fn setting(&self, front: &ReviewSubject) -> TimeBackdrop {
+    /// Phases, events and cursors of the session in front.
+    fn backdrop(&self, front: &ReviewSubject) -> TimeBackdrop {
         let shift = front.shift(self.time_origin);
         let recording = &front.recording;
         let end = recording.track.span().map_or(0.0, |span| span[1]);
@@ -140,18 +130,18 @@ impl ReviewScreen {
         let window = self.time.shown();
         self.thinned = 1;
         for subject in &mut self.subjects {
-            let wanted = subject.wanted(window, pixels, self.time_origin);
+            let line_window = subject.line_window(window, pixels, self.time_origin);
             for quantity in &self.quantities {
-                subject.update(*quantity, wanted);
+                subject.update(*quantity, line_window);
                 let drawn = subject.lines[*quantity as usize].drawn();
                 self.thinned = self.thinned.max(drawn.samples_per_column);
             }
-            subject.update_fit(wanted);
+            subject.update_fit(line_window);
         }
         let Some(front) = self.front() else {
             return;
         };
-        let setting = self.setting(front);
+        let setting = self.backdrop(front);
         let time_axis = format!("time from {} (s)", self.time_origin.name());
         let height = ((ui.available_height() - AXIS_HEIGHT) / count as f32).max(40.0);
         let mut gestures = Vec::new();
@@ -191,82 +181,53 @@ impl ReviewScreen {
             });
         }
         for gesture in gestures {
-            self.follow(&gesture);
-        }
-    }
-
-    /// Moves the time axis and the cursors as the pointer did.
-    fn follow(&mut self, gesture: &Gesture) {
-        if gesture.pan[0] != 0.0 {
-            self.time.pan(gesture.pan[0]);
-        }
-        if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
-            self.time.zoom(gesture.zoom, self.time.at(gesture.at[0]));
-        }
-        if gesture.is_double {
-            self.time.show_all();
-        } else if let Some(is_shift) = gesture.click {
-            self.cursors[usize::from(is_shift)] = Some(self.time.at(gesture.at[0]));
+            self.time.follow(&gesture, 0);
+            if let Some(is_shift) = gesture.click.filter(|_| !gesture.is_double) {
+                self.cursors[usize::from(is_shift)] = Some(self.time.at(gesture.at[0]));
+            }
         }
     }
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let sources: Vec<DepthSource<'_>> = self
-            .subjects
-            .iter()
-            .map(|subject| DepthSource {
-                track: &subject.recording.track,
-                columns: [Quantity::Depth as usize, Quantity::Force as usize],
-                rows: [0, subject.recording.track.len()],
-                version: subject.fifths(),
-                id: subject.id,
-                color: color_of(tokens, subject.id),
+        let cursors = |track: &Track, shift: f64| {
+            self.cursors.map(|cursor| {
+                let place = track.place(cursor? + shift)?;
+                let value = |quantity: Quantity| track.value(quantity as usize, place);
+                Some([value(Quantity::Depth)?, value(Quantity::Force)?])
             })
-            .collect();
-        let spans = [&self.depth, &self.force];
-        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<DepthLayer<'_>> = self
+        };
+        let line = |subject: &'_ ReviewSubject| DepthLineKey {
+            id: subject.id,
+            version: subject.fifths(),
+            rows: [0, subject.recording.track.len()],
+            color: color_of(tokens, subject.id),
+        };
+        let lines: Vec<DepthLine<'_>> = self
             .subjects
             .iter()
-            .rev()
-            .map(|subject| DepthLayer {
+            .map(|subject| DepthLine {
                 name: &subject.name,
-                color: color_of(tokens, subject.id),
-                id: subject.id,
-                cursors: self.cursors.map(|cursor| {
-                    let track = &subject.recording.track;
-                    let place = track.place(cursor? + subject.shift(self.time_origin))?;
-                    let value = |quantity: Quantity| track.value(quantity as usize, place);
-                    Some([value(Quantity::Depth)?, value(Quantity::Force)?])
-                }),
+                track: &subject.recording.track,
+                key: line(subject),
+                cursors: cursors(&subject.recording.track, subject.shift(self.time_origin)),
             })
             .collect();
-        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
-        self.follow_over_depth(drawn);
+        let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);
+        self.follow_over_depth(&gesture);
     }
 
-    /// Moves the axes of depth and force as the pointer did in a plot of so many pixels.
-    pub(super) fn follow_over_depth(&mut self, (gesture, pixels): (Gesture, [f64; 2])) {
-        self.depth_pixels = pixels;
-        for (axis, span) in [&mut self.depth, &mut self.force].into_iter().enumerate() {
-            if gesture.pan[axis] != 0.0 {
-                span.pan(gesture.pan[axis]);
-            }
-            if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
-                span.zoom(gesture.zoom, span.at(gesture.at[axis]));
-            }
-            if gesture.is_double {
-                span.show_all();
-            }
-        }
+    /// Moves the axes of depth and force as the pointer did.
+    pub(super) fn follow_over_depth(&mut self, gesture: &Gesture) {
+        self.depth.follow(gesture, 0);
+        self.force.follow(gesture, 1);
     }
 }
 
 /// A heading with a line of words below it.
 pub(super) fn head_ui(ui: &mut Ui, title: &str, words: &str) {
-    ui.label(RichText::new(title).heading().strong());
+    heading_ui(ui, title);
     if !words.is_empty() {
-        ui.add(Label::new(words).wrap());
+        sentence_ui(ui, words);
     }
 }

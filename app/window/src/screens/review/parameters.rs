@@ -3,45 +3,9 @@
 use super::ReviewScreen;
 use super::middle::head_ui;
 use super::subject::ReviewSubject;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, TableRow, table_ui};
+use crate::widgets::{Column, TableRow, alarm_ui, quiet_ui, table_ui};
 use eframe::egui::Ui;
 use palpate_analysis::report::text::{self, typeset};
-use palpate_rheology::fit::Parameter;
-
-/// A parameter of a session's fit, with numbers as they are.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterRow {
-    /// The session.
-    pub session: String,
-    /// The analysis that it was read by.
-    pub analysis: Option<String>,
-    /// What was indented.
-    pub specimen: String,
-    /// The parameter, its unit, error and 95 % interval.
-    pub parameter: Parameter,
-    /// Root mean square of what the fit leaves, in N.
-    pub rmse_n: f64,
-}
-
-/// Every parameter of every session that was fitted, session by session, those of one specimen together.
-#[must_use]
-pub fn parameter_rows(screen: &ReviewScreen) -> Vec<ParameterRow> {
-    let mut rows = Vec::new();
-    for (subject, specimen) in by_specimen(&screen.subjects) {
-        let Some(fit) = subject.fitted() else {
-            continue;
-        };
-        rows.extend(fit.report.parameters.iter().map(|parameter| ParameterRow {
-            session: subject.recording.name(),
-            analysis: subject.looked.analysis.clone(),
-            specimen: specimen.clone(),
-            parameter: parameter.clone(),
-            rmse_n: fit.report.rmse_n,
-        }));
-    }
-    rows
-}
 
 /// The sessions, those of one specimen together, in the order in which they stand.
 fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {

@@ -2,7 +2,7 @@
 
 use super::Looked;
 use crate::plots::stretches::{LineWindow, Stretches};
-use crate::widgets::model_choice::ModelChoice;
+use crate::widgets::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
 use crate::workers::review::{Quantity, ReviewRecording, Stage, TimeOrigin};
 use eframe::egui::Context;
@@ -11,15 +11,12 @@ use std::sync::Arc;
 
 /// A session that is shown.
 pub struct ReviewSubject {
-    /// Which, and how it is read.
-    pub looked: Looked,
-    /// Tells it from the others as long as it is shown; its colour follows from it.
+    pub source: Looked,
+    /// Its own as long as it is shown; its colour follows from it.
     pub id: u64,
-    /// What it is called.
     pub name: String,
-    /// What was read of it.
     pub recording: ReviewRecording,
-    /// Its fit, or why there is none; none before it was asked for.
+    /// None before a fit was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
     /// The points of each quantity, of the modelled force and of what is left.
     pub lines: [Stretches; 6],
@@ -29,17 +26,16 @@ pub struct ReviewSubject {
 
 /// Places of the fit's lines behind those of the quantities.
 pub const LINE_MODELLED: usize = 4;
-/// What is left.
 pub const LINE_RESIDUAL: usize = 5;
 
 impl ReviewSubject {
     /// A session that is still to be read.
     #[must_use]
-    pub fn new(looked: Looked, id: u64) -> Self {
-        let recording = ReviewRecording::new(&looked.session, looked.analysis.as_deref());
+    pub fn new(source: Looked, id: u64) -> Self {
+        let recording = ReviewRecording::new(&source.session, source.analysis.as_deref());
         Self {
             name: recording.name(),
-            looked,
+            source,
             id,
             recording,
             fit: None,
@@ -48,13 +44,10 @@ impl ReviewSubject {
         }
     }
 
-    /// Fetches what was read; a session that is to be read by another analysis begins anew.
+    /// Fetches what was read; a session that is to be read by another analysis begins again.
     pub fn poll(&mut self) {
-        if self.recording.analysis != self.looked.analysis {
-            let analysis = self.looked.analysis.as_deref();
-            let version = self.recording.version + 1;
-            self.recording = ReviewRecording::new(&self.looked.session, analysis);
-            self.recording.version = version;
+        if self.recording.analysis != self.source.analysis {
+            self.read_again();
             self.fit = None;
         }
         let before = self.recording.version;
@@ -63,7 +56,7 @@ impl ReviewSubject {
             return;
         }
         self.name = self.recording.name();
-        if let Some(analysis) = &self.looked.analysis {
+        if let Some(analysis) = &self.source.analysis {
             self.name = format!("{} as {analysis}", self.name);
         }
         let track = &self.recording.track;
@@ -86,8 +79,8 @@ impl ReviewSubject {
     /// Reads it again.
     pub fn read_again(&mut self) {
         let version = self.recording.version + 1;
-        let analysis = self.looked.analysis.as_deref();
-        self.recording = ReviewRecording::new(&self.looked.session, analysis);
+        let analysis = self.source.analysis.as_deref();
+        self.recording = ReviewRecording::new(&self.source.session, analysis);
         self.recording.version = version;
     }
 
@@ -142,8 +135,8 @@ impl ReviewSubject {
         let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
         let first = begins.into_iter().flatten().reduce(f64::min);
         fit::FitSubject {
-            path: self.looked.session.clone(),
-            analysis: self.looked.analysis.clone(),
+            path: self.source.session.clone(),
+            analysis: self.source.analysis.clone(),
             family: model.family.clone(),
             is_rejected_included: model.is_rejected_included,
             ramp_t: first.unwrap_or(0.0),
@@ -151,24 +144,28 @@ impl ReviewSubject {
     }
 
     /// Finds the points of a quantity again where something changed.
-    pub fn update(&mut self, quantity: Quantity, wanted: LineWindow) {
+    pub fn update(&mut self, quantity: Quantity, window: LineWindow) {
         let place = quantity as usize;
-        self.lines[place].update(&self.recording.track, place, wanted);
+        self.lines[place].update(&self.recording.track, place, window);
     }
 
     /// The same of its fit.
-    pub fn update_fit(&mut self, wanted: LineWindow) {
+    pub fn update_fit(&mut self, window: LineWindow) {
         let Some(Ok(fit)) = &self.fit else {
             return;
         };
         for (line, column) in [(LINE_MODELLED, fit::MODELLED), (LINE_RESIDUAL, fit::RESIDUAL)] {
-            self.lines[line].update(&fit.track, column, wanted);
+            self.lines[line].update(&fit.track, column, window);
         }
     }
 
-    /// What a shown session wants of the plots.
     #[must_use]
-    pub fn wanted(&self, window: [f64; 2], pixels: f64, time_origin: TimeOrigin) -> LineWindow {
+    pub fn line_window(
+        &self,
+        window: [f64; 2],
+        pixels: f64,
+        time_origin: TimeOrigin,
+    ) -> LineWindow {
         LineWindow {
             window,
             pixels,

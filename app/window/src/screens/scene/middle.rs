@@ -3,21 +3,17 @@
 use super::SceneScreen;
 use crate::plots::figure::strip_ui;
 use crate::scene::view::ScenePicture;
-use crate::theme::Tokens;
-use crate::widgets::places::NamedControl;
-use crate::widgets::remark::alarm_ui;
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui, tick_box};
 use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene, SceneInstant};
 use crate::workers::trail::PAST_S;
-use eframe::egui::{RichText, Ui, vec2};
+use eframe::egui::{Ui, vec2};
 use palpate_figures::figure::{Ink, Series};
 
-/// What the middle shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PictureSource {
-    /// The path that was computed.
+    /// A computed path.
     Computed,
-    /// The scene that runs or ran.
+    /// The scene that runs, or ran last.
     Live,
 }
 
@@ -26,7 +22,6 @@ const PICTURE_SHARE: f32 = 0.52;
 /// Room for a legend.
 const HEAD: f32 = 24.0;
 
-/// What the picture and the plots show.
 struct ShownScene<'a> {
     moment: &'a SceneInstant,
     trail: Vec<ForcePoint>,
@@ -35,7 +30,7 @@ struct ShownScene<'a> {
     title: String,
 }
 
-/// What was computed or runs, or why there is nothing; without a reason, nothing was asked for yet.
+/// The scene to show, or why there is none; no reason where nothing is computed yet.
 fn shown_scene<'a>(
     side: PictureSource,
     touch: Option<&'a LiveScene>,
@@ -45,7 +40,7 @@ fn shown_scene<'a>(
         (PictureSource::Live, Some(touch), _) => {
             let end = touch.now().max(PAST_S);
             let title = match (touch.is_running(), touch.is_led()) {
-                (false, _) => "stopped; as it was seen last",
+                (false, _) => "stopped; the last picture",
                 (true, true) => "the path leads the hand",
                 (true, false) => "the pointer and the keys lead the hand",
             };
@@ -63,7 +58,7 @@ fn shown_scene<'a>(
                 trail: ahead.trail.clone(),
                 shown: [0.0, ahead.path.seconds()],
                 title: format!(
-                    "{}, computed: where it is deepest, after {:.2} s",
+                    "{}, computed: the deepest point, after {:.2} s",
                     ahead.path.name(),
                     at.seconds().0
                 ),
@@ -77,7 +72,6 @@ fn shown_scene<'a>(
 impl SceneScreen {
     /// Picture and plots.
     pub fn draw_middle(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (side, name) in
                 [(PictureSource::Computed, "Computed"), (PictureSource::Live, "Live")]
@@ -86,7 +80,7 @@ impl SceneScreen {
             }
             ui.separator();
             tick_box(ui, &mut self.view.has_lines, "mesh lines");
-            if ui.button("Look as at first").clicked() {
+            if ui.button("Reset camera").clicked() {
                 self.view.reset();
             }
         });
@@ -98,12 +92,12 @@ impl SceneScreen {
                         PictureSource::Live => "the scene has not run yet",
                         PictureSource::Computed => "nothing computed yet",
                     };
-                    ui.label(RichText::new(words).color(tokens.text_quiet));
+                    placeholder_ui(ui, words);
                     return;
                 }
                 Err(Some(reason)) => return alarm_ui(ui, reason),
             };
-        ui.label(RichText::new(title).color(tokens.text_quiet).small());
+        quiet_ui(ui, title);
         let now = match moment.now() {
             Ok(now) => now,
             Err(reason) => return alarm_ui(ui, &reason.to_string()),

@@ -1,5 +1,5 @@
-//! A piece of tissue that is pressed with the pointer, the keys or along a path, seen in three dimensions, with the force
-//! that a hand would feel.
+//! A piece of tissue in three dimensions that is pressed with the pointer, the keys or along a path, and the force on the
+//! hand.
 
 mod form;
 mod middle;
@@ -11,13 +11,11 @@ use super::tape::TapePanel;
 use crate::command::{CommandQueue, UserCommand};
 use crate::scene::view::SceneView;
 use crate::shell::palette::PaletteAction;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::NamedControl;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::work_ui;
+use crate::widgets::{
+    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, work_ui,
+};
 use crate::workbench::Workbench;
-use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, ahead};
+use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, compute_path};
 use crate::workers::path_dialog::PathPurpose;
 use crate::workers::task::BackgroundTask;
 use eframe::egui::{Button, Context, Key, Ui, vec2};
@@ -38,7 +36,7 @@ const TURN: [f64; 3] = [0.0, -0.5, 0.0];
 /// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
-    purpose: "press into a piece of tissue and see it give way",
+    purpose: "press into a piece of tissue and see it deform",
     // Every number is taken: Ctrl+0 is the usual size of text.
     key: Key::E,
     open: |_| Box::new(SceneScreen::default()),
@@ -48,8 +46,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 pub struct SceneScreen {
     form: SceneForm,
     reading: BackgroundTask<(SceneFile, Vec<String>)>,
-    /// Whether the file asked for has not come yet.
-    is_reading: bool,
     ahead: BackgroundTask<ComputedPath>,
     is_shown: bool,
     touch: Option<LiveScene>,
@@ -71,7 +67,6 @@ impl Default for SceneScreen {
         Self {
             form,
             reading: BackgroundTask::default(),
-            is_reading: false,
             ahead: BackgroundTask::default(),
             is_shown: false,
             touch: None,
@@ -87,7 +82,6 @@ impl Default for SceneScreen {
 }
 
 impl SceneScreen {
-    /// Whether the scene runs.
     pub fn is_running(&self) -> bool {
         self.touch.as_ref().is_some_and(LiveScene::is_running)
     }
@@ -102,16 +96,17 @@ impl SceneScreen {
         self.ahead.answer()
     }
 
-    /// Whether what stands in the form can be started.
+    /// Whether the scene of the form can start, or why not.
     fn verdict(&self, workbench: &Workbench) -> Result<(), String> {
         workbench.loop_verdict(SCREEN.name)?;
-        if self.is_running() {
-            return Err("the scene runs".into());
-        }
+        self.compute_verdict()
+    }
+
+    fn compute_verdict(&self) -> Result<(), String> {
+        require(!self.is_running(), "the scene runs")?;
         self.form.settings().map(|_| ())
     }
 
-    /// A recording that was computed again last.
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }
@@ -122,22 +117,19 @@ impl SceneScreen {
             return;
         }
         let named = self.form.file.trim().to_owned();
-        self.is_reading = true;
         self.reading.start("scene-read", ctx, move |_| {
             scene_of((!named.is_empty()).then_some(Path::new(&named)))
         });
     }
 
-    /// Computes what stands in the form along its path.
+    /// Computes the scene of the form along its path.
     fn compute(&mut self, ctx: &Context) {
-        let Ok(settings) = self.form.settings() else {
-            return;
-        };
+        let Ok(settings) = self.form.settings() else { return };
         let path = self.form.path.unwrap_or(form::FIRST_PATH);
         self.side = PictureSource::Computed;
         self.look_at(&settings);
         self.ahead.start("scene-ahead", ctx, move |progress| {
-            ahead(settings, path, &mut |share| progress.share(share, "the path"))
+            compute_path(settings, path, &mut |share| progress.share(share, "the path"))
         });
     }
 
@@ -169,7 +161,7 @@ impl SceneScreen {
         }
     }
 
-    /// Another piece of tissue is looked at anew.
+    /// Resets the camera where the size of the tissue has changed.
     fn look_at(&mut self, settings: &SceneSettings) {
         if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
             self.viewed_mm = settings.side_mm;
@@ -193,7 +185,7 @@ impl SceneScreen {
 
 impl Screen for SceneScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
-        // What runs is not to be changed under a hand.
+        // A running scene keeps its settings.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
             Some(form::FileAction::Dialog) => {
@@ -206,11 +198,8 @@ impl Screen for SceneScreen {
             alarm_ui(ui, reason);
         }
         ui.add_space(6.0);
-        let may = match is_running {
-            true => Err("the scene runs".into()),
-            false => self.form.settings().map(|_| ()),
-        };
-        work_ui(ui, "Compute the path  F6", &self.ahead, &may, commands);
+        let verdict = self.compute_verdict();
+        work_ui(ui, "Compute path  F6", &self.ahead, &verdict, commands);
         section_ui(ui, "Touch");
         let size = vec2(170.0, 34.0);
         if is_running {
@@ -222,11 +211,11 @@ impl Screen for SceneScreen {
             commands.push(UserCommand::SceneStart);
         }
         let words = match self.touch.as_ref().is_some_and(LiveScene::is_led) {
-            true => "the path leads the hand; after it the pointer and the keys do",
+            true => "The path leads the hand, and then the pointer and the keys do.",
             false => {
-                "in the picture: hold the left button to press, with the wheel deeper; drag with the right button to \
-                 turn, wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift with arrows turns, \
-                 + and - zoom, Home looks as at first"
+                "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
+                 button to rotate, turn the wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift \
+                 with arrows rotates, + and - zoom, Home resets the camera."
             }
         };
         quiet_ui(ui, words);
@@ -247,9 +236,7 @@ impl Screen for SceneScreen {
         self.form.check();
         self.tape.poll();
         self.ahead.poll();
-        self.reading.poll();
-        if self.is_reading && self.reading.state().is_none() {
-            self.is_reading = false;
+        if self.reading.poll() {
             match self.reading.answer() {
                 Some(Ok((file, notes))) => {
                     self.refusal = None;
@@ -268,7 +255,7 @@ impl Screen for SceneScreen {
     }
 
     fn shown(&mut self, ctx: &Context) {
-        // So that there is something to see.
+        // An example is on the screen from the start.
         if !std::mem::replace(&mut self.is_shown, true) {
             self.compute(ctx);
         }
@@ -310,7 +297,7 @@ impl Screen for SceneScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.ahead.state().is_some() || self.tape.is_busy() || self.is_running()
+        self.ahead.is_busy() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -329,10 +316,7 @@ impl Screen for SceneScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let can_stop = match self.is_running() {
-            true => Ok(()),
-            false => Err("the scene does not run".to_owned()),
-        };
+        let can_stop = require(self.is_running(), "the scene does not run");
         let can_start = self.verdict(workbench);
         vec![
             PaletteAction::new("Start the scene", "", UserCommand::SceneStart).if_ok(can_start),

@@ -1,22 +1,18 @@
-//! What is felt, why it is not more, and how the loop does.
+//! Force on the hand, its limits, and timing of the loop.
 
 use super::SceneScreen;
 use super::middle::PictureSource;
 use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::loop_times::loop_times_ui;
+use crate::widgets::{fact_ui, loop_times_ui, placeholder_ui, section_ui, small_ui};
 use crate::workers::live_scene::{LiveScene, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::margin_text;
 use palpate_haptics::scene::{SceneSettings, SceneTick};
 
 impl SceneScreen {
-    /// What is known.
     pub fn draw_right(&self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let Some((settings, moment)) = self.seen() else {
-            ui.label(RichText::new("nothing to feel yet").color(tokens.text_quiet));
-            return;
+            return placeholder_ui(ui, "no scene yet");
         };
         force_ui(ui, &moment.tick);
         guard_ui(ui, settings, &moment.tick);
@@ -55,10 +51,10 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
     fact_ui(ui, "added", added);
     fact_ui(ui, "energy", format!("{:.2} mJ absorbed", tick.energy));
     for sentence in tick.flags.sentences() {
-        ui.add(Label::new(RichText::new(sentence).small()).wrap());
+        small_ui(ui, sentence);
     }
     if tick.is_buzzing {
-        let words = RichText::new("the loop swings by itself: buzz");
+        let words = RichText::new("limit cycle: the loop vibrates by itself");
         ui.label(words.strong().color(tokens.alarm_text));
     }
 }
@@ -66,7 +62,7 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
 fn loop_ui(ui: &mut Ui, touch: &LiveScene) {
     section_ui(ui, "Loop");
     let rate = touch.settings().period.hz();
-    fact_ui(ui, "wanted", format!("{rate:.0} ticks a second"));
+    fact_ui(ui, "target", format!("{rate:.0} ticks a second"));
     fact_ui(ui, "priority", touch.priority());
     loop_times_ui(ui, touch.kept());
 }

@@ -1,7 +1,7 @@
 //! Reads a session through once, or twice where its edits or an analysis change its samples, and never holds
 //! more than one block of rows.
 //!
-//! What a sample costs in memory is told at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
+//! The memory of a sample is described at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
 //! force, depth, signal and position, 267 MB for ten million samples.
 
 use super::facts::SessionFacts;
@@ -20,21 +20,21 @@ use std::sync::Arc;
 /// Samples of the first piece: enough for a picture, and there at once.
 const FIRST: usize = 1 << 12;
 
-/// Reads a session as an analysis has it and tells what comes; `tell` says whether anybody listens still.
+/// Reads a session as an analysis has it and sends it in pieces; `send` returns whether the receiver is still there.
 pub fn read(
     path: &Path,
     analysis: Option<&str>,
-    tell: &dyn Fn(ReadUpdate) -> bool,
+    send: &dyn Fn(ReadUpdate) -> bool,
 ) -> Result<(), String> {
     let summary = Summary::read(path).map_err(|err| err.to_string())?;
     let manifest = summary.manifest.clone();
     let edits = Edits::read(path, &manifest.session_id).map_err(|err| err.to_string())?;
     let is_moved = |change: &Change| matches!(change, Change::Contact { .. });
     let is_as_recorded = analysis.is_none() && !edits.all.iter().any(|edit| is_moved(&edit.change));
-    if !tell(ReadUpdate::Head(Box::new(summary))) {
+    if !send(ReadUpdate::Head(Box::new(summary))) {
         return Ok(());
     }
-    let builder = RefCell::new(Builder::new(&manifest, tell));
+    let builder = RefCell::new(Builder::new(&manifest, send));
     let passing = if is_as_recorded {
         let outline = Session::scan(path, &mut |block| {
             let mut builder = builder.borrow_mut();
@@ -52,8 +52,8 @@ pub fn read(
     }
     let mut builder = builder.into_inner();
     builder.hand_over();
-    if builder.is_heard {
-        tell(ReadUpdate::Whole(Box::new(SessionFacts::of(path, &passing))));
+    if builder.is_received {
+        send(ReadUpdate::Whole(Box::new(SessionFacts::of(path, &passing))));
     }
     Ok(())
 }
@@ -61,7 +61,7 @@ pub fn read(
 /// Rows on their way into segments.
 struct Builder<'a> {
     manifest: &'a Manifest,
-    tell: &'a dyn Fn(ReadUpdate) -> bool,
+    send: &'a dyn Fn(ReadUpdate) -> bool,
     mm_per_pulse: f64,
     first_tick: Option<u64>,
     times: Vec<f64>,
@@ -71,16 +71,16 @@ struct Builder<'a> {
     phase: Option<Phase>,
     cycle: Option<u32>,
     samples: usize,
-    /// When the samples are handed over.
+    /// Samples that are handed over together.
     room: usize,
-    is_heard: bool,
+    is_received: bool,
 }
 
 impl<'a> Builder<'a> {
-    fn new(manifest: &'a Manifest, tell: &'a dyn Fn(ReadUpdate) -> bool) -> Self {
+    fn new(manifest: &'a Manifest, send: &'a dyn Fn(ReadUpdate) -> bool) -> Self {
         Self {
             manifest,
-            tell,
+            send,
             mm_per_pulse: manifest.rig.as_ref().map_or(0.0, |rig| rig.mm_per_pulse),
             first_tick: None,
             times: Vec::new(),
@@ -91,13 +91,13 @@ impl<'a> Builder<'a> {
             cycle: None,
             samples: 0,
             room: FIRST,
-            is_heard: true,
+            is_received: true,
         }
     }
 
     fn take(&mut self, row: &Row) {
-        // Nobody wants the rest; what is read on the way to its end is thrown away.
-        if !self.is_heard {
+        // The receiver is gone; the rest is read and dropped.
+        if !self.is_received {
             return;
         }
         let first = *self.first_tick.get_or_insert(row.tick);
@@ -130,7 +130,7 @@ impl<'a> Builder<'a> {
         let times = std::mem::take(&mut self.times);
         let segment = Arc::new(Segment::new(times, &self.columns));
         self.columns.iter_mut().for_each(Vec::clear);
-        self.is_heard = (self.tell)(ReadUpdate::Samples {
+        self.is_received = (self.send)(ReadUpdate::Samples {
             segment,
             phases: std::mem::take(&mut self.phases),
             cycles: std::mem::take(&mut self.cycles),
@@ -154,15 +154,15 @@ mod tests {
     fn every_sample_of_a_session_arrives_as_it_was_recorded() {
         let path = recorded("ramp-hold-lab");
         let session = Session::open(&path).unwrap();
-        let news = RefCell::new(Vec::new());
+        let updates = RefCell::new(Vec::new());
         read(&path, None, &|piece| {
-            news.borrow_mut().push(piece);
+            updates.borrow_mut().push(piece);
             true
         })
         .unwrap();
         let (mut track, mut phases) = (Track::default(), Vec::new());
         let mut facts = None;
-        for piece in news.into_inner() {
+        for piece in updates.into_inner() {
             match piece {
                 ReadUpdate::Samples { segment, phases: own, .. } => {
                     track.push(segment);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_says_why_and_what_nobody_wants_ends() {
+    fn an_unreadable_session_has_a_reason_and_a_cancelled_one_ends() {
         let ctx = Context::default();
         let finish = |recording: &mut ReviewRecording| {
             let is_read = || {
@@ -224,9 +224,9 @@ mod tests {
         assert!(
             matches!(&unknown.stage, super::super::Stage::Failed(reason) if reason.contains("no such"))
         );
-        let mut left = ReviewRecording::new(&recorded("ramp-hold-lab"), None);
-        left.start(&ctx);
-        left.cancel();
-        assert!(left.stage == super::super::Stage::Cancelled && left.share() < 1.0);
+        let mut cancelled = ReviewRecording::new(&recorded("ramp-hold-lab"), None);
+        cancelled.start(&ctx);
+        cancelled.cancel();
+        assert!(cancelled.stage == super::super::Stage::Cancelled && cancelled.share() < 1.0);
     }
 }

@@ -1,12 +1,7 @@
 //! Report and figure of what is in front, as new files.
 
 use super::super::Looked;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::task_ui;
-use crate::widgets::text_row::text_row;
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{alarm_ui, choice_ui, quiet_ui, section_ui, task_ui, text_row, tick_box};
 use crate::workers::path_dialog::Dialog;
 use crate::workers::task::BackgroundTask;
 use eframe::egui::Ui;
@@ -16,7 +11,7 @@ use palpate_analysis::report::figures::Window;
 use rfd::FileDialog;
 use std::path::PathBuf;
 
-/// Which field a dialog fills.
+/// The field that a dialog fills.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Field {
     Report,
@@ -56,33 +51,31 @@ impl ReportPanel {
     }
 
     /// Draws the form.
-    pub fn ui(&mut self, ui: &mut Ui, looked: &Looked, shown: &[Looked]) {
-        let wanted =
-            |one: &Looked| Wanted { session: one.session.clone(), analysis: one.analysis.clone() };
+    pub fn ui(&mut self, ui: &mut Ui, source: &Looked, shown: &[Looked]) {
         section_ui(ui, "Report");
         text_row(ui, "report file", "a new .html file", &mut self.report);
-        self.choose_ui(ui, Field::Report, looked);
+        self.choose_ui(ui, Field::Report, source);
         if shown.len() > 1 {
             tick_box(ui, &mut self.is_of_all, &format!("of all {} shown", shown.len()));
         }
         let verdict = path_verdict(&self.report, &["html", "htm"]);
         if task_ui(ui, "Write report", &self.pages, &verdict) {
             let sessions: Vec<Wanted> = match self.is_of_all && shown.len() > 1 {
-                true => shown.iter().map(wanted).collect(),
-                false => vec![wanted(looked)],
+                true => shown.iter().map(report_source).collect(),
+                false => vec![report_source(source)],
             };
             let to = PathBuf::from(self.report.trim());
             self.pages.start("report", ui.ctx(), move |progress| {
                 paper(&Paper::Page(sessions), &to, progress)
             });
         }
-        answer_ui(ui, &self.pages);
+        done_ui(ui, &self.pages);
 
         section_ui(ui, "Figure");
         let figures = Figure::ALL.map(|one| (one, one.name()));
         choice_ui(ui, "of", &mut self.of, &figures);
         text_row(ui, "figure file", "a new .svg or .png file", &mut self.figure);
-        self.choose_ui(ui, Field::Figure, looked);
+        self.choose_ui(ui, Field::Figure, source);
         let is_over_samples = matches!(self.of, Figure::ForceTime | Figure::ForceDepth);
         if let Some([from, until]) = self.span.filter(|_| is_over_samples) {
             let words = format!("only {from:.3} to {until:.3} s");
@@ -92,21 +85,21 @@ impl ReportPanel {
         if task_ui(ui, "Write figure", &self.figures, &verdict) {
             let span = self.span.filter(|_| self.is_of_span && is_over_samples);
             let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
-            let one = Paper::Figure(wanted(looked), self.of, window);
+            let one = Paper::Figure(report_source(source), self.of, window);
             let to = PathBuf::from(self.figure.trim());
             self.figures.start("figure", ui.ctx(), move |progress| paper(&one, &to, progress));
         }
-        answer_ui(ui, &self.figures);
+        done_ui(ui, &self.figures);
     }
 
-    fn choose_ui(&mut self, ui: &mut Ui, field: Field, looked: &Looked) {
+    fn choose_ui(&mut self, ui: &mut Ui, field: Field, source: &Looked) {
         let (words, title, ending) = match field {
             Field::Report => ("Report...", "Report", "html"),
             Field::Figure => ("Figure...", "Figure", "svg"),
         };
         if ui.button(words).clicked() && !self.dialog.is_open() {
             self.asked = Some(field);
-            let name = format!("{}.{ending}", name_of(&looked.session));
+            let name = format!("{}.{ending}", name_of(&source.session));
             let pick = move |dialog: FileDialog| {
                 let dialog = dialog.set_title(title).set_file_name(name);
                 dialog.add_filter(ending, &[ending]).save_file()
@@ -127,15 +120,20 @@ fn path_verdict(path: &str, endings: &[&str]) -> Result<(), String> {
         path.len() > ending.len() && path.to_ascii_lowercase().ends_with(&ending)
     };
     match (path, endings.iter().any(is_known)) {
-        ("", _) => Err("write the name of a new file, or choose one".to_owned()),
+        ("", _) => Err("type the name of a new file, or choose one".to_owned()),
         (_, true) => Ok(()),
-        (_, false) => Err(format!("let the name end in .{}", endings.join(" or ."))),
+        (_, false) => Err(format!("the file name must end in .{}", endings.join(" or ."))),
     }
 }
 
-fn answer_ui(ui: &mut Ui, task: &BackgroundTask<Done>) {
-    match task.answer() {
-        _ if task.state().is_some() => {}
+/// A session as reports and fits take it.
+pub(super) fn report_source(one: &Looked) -> Wanted {
+    Wanted { session: one.session.clone(), analysis: one.analysis.clone() }
+}
+
+/// The last answer of work that has ended.
+pub(super) fn done_ui(ui: &mut Ui, task: &BackgroundTask<Done>) {
+    match task.answer().filter(|_| !task.is_busy()) {
         None => {}
         Some(Ok(done)) => quiet_ui(ui, &done.sentence),
         Some(Err(reason)) => alarm_ui(ui, reason),
