@@ -85,7 +85,6 @@ impl WorkbenchApp {
         &self.workbench.snapshot
     }
 
-    /// A screen by its type.
     pub fn screen<T: Screen>(&self) -> Option<&T> {
         self.screens.get()
     }
@@ -182,7 +181,6 @@ impl WorkbenchApp {
         }
     }
 
-    /// Draws every panel.
     fn draw(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
         let panel = |name: &'static str, ui: &Ui| {
             let panel = Panel::top(name).frame(frame(ui, false));

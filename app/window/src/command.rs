@@ -1,117 +1,98 @@
-//! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
+//! All commands of the user, one enum. Drawing code pushes them; only the app executes them.
 
 use crate::screens::run_panes::RunPane;
 use crate::shell::run_strip::RunControl;
 use crate::shell::sizes::PanelEdge;
-use crate::workers::path_dialog::PathPurpose;
+use crate::workers::PathPurpose;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// One thing the user asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum UserCommand {
-    /// Start the plan in the form.
     Start,
-    /// Stop motion, now.
+    /// Controlled stop: the axis brakes.
     Stop,
-    /// Cut the motion, now, without braking.
+    /// Immediate stop without braking; the axis must be homed again.
     Halt,
-    /// Pause, resume, finish early, abort or answer a prompt, where the run allows it.
     RunControl(RunControl),
-    /// After a stop: leave the tissue.
+    /// After a stop: move the probe out of the tissue.
     Retract,
-    /// After a stop: end the session where the probe stands.
+    /// After a stop: end the session where the probe is.
     CloseSession,
-    /// Connect the rig anew after its link was lost; nothing moves.
+    /// Connects the rig again after its link was lost; nothing moves.
     Reconnect,
-    /// List the serial ports again.
     ListPorts,
-    /// Choose a folder or a file in a dialog of its own.
+    /// Opens a dialog for a folder or a file.
     Choose(PathPurpose),
-    /// Show the protocols, the expected course or what was measured.
     View(RunPane),
-    /// Take a built-in protocol into the form.
+    /// Takes a built-in protocol into the form.
     TakeProtocol(&'static str),
-    /// Read the protocol file whose path is typed.
+    /// Reads the protocol file whose path is typed.
     OpenProtocol,
-    /// Write down in the run in progress what stands in the field for notes; a mark if nothing does.
+    /// Writes the text of the note field into the run in progress, or a mark where it is empty.
     NoteTyped,
-    /// Move by hand: a short run beside the protocol in the form.
     ManualMove(ManualMove),
-    /// Take the protocol that calibrates the load cell.
+    /// Takes the protocol that calibrates the load cell.
     MeasureCalibration,
-    /// Store the calibration that the last run measured.
+    /// Saves the calibration that the last run measured.
     KeepCalibration,
-    /// Begin the work of the screen shown: compare models, measure, test.
+    /// Starts the work of the screen shown: compare models, measure, test.
     Work,
-    /// End the work of the screen shown.
     CancelWork,
-    /// Start the haptic loop on the body and device that were checked.
+    /// Starts the haptic loop on the material and device that were checked.
     LoopStart,
-    /// Stop the haptic loop.
     LoopStop,
-    /// Start the scene.
     SceneStart,
-    /// Stop the scene.
     SceneStop,
-    /// Read the scene file whose path is typed; the built-in scene where none is.
+    /// Reads the scene file whose path is typed, or the built-in scene.
     OpenScene,
-    /// Show where the curves of a scene are measured.
+    /// Shows the screen that measures the curves of a scene.
     MeasureScene,
-    /// Change between the light and the dark theme.
     SwitchTheme,
-    /// Look at sessions on the review screen, instead of those there.
+    /// Shows these sessions on the review screen, instead of those there.
     Review(Vec<PathBuf>),
-    /// Make text and everything else larger or smaller.
     TextSize(TextSize),
-    /// Make a panel larger, or smaller.
     Resize {
-        /// Which.
         edge: PanelEdge,
-        /// Whether larger.
         is_larger: bool,
     },
-    /// Put the keyboard's focus on something.
     Focus(Id),
-    /// Open or close the list of everything that can be asked for.
+    /// Opens or closes the command palette.
     Palette,
-    /// Begin the tour of the window.
     TourStart,
-    /// Go on with it.
     TourNext,
-    /// End it.
     TourEnd,
-    /// Show the screen of this name. What goes on goes on, and the stop control stays.
+    /// Shows the screen of this name.
     Show(&'static str),
-    /// Take what was chosen in a dialog, or dropped on the window.
+    /// A path was chosen in a dialog, or dropped on the window.
     Chosen(PathPurpose, PathBuf),
-    /// Import tables of other programs.
+    /// Proposes files of other programs for import.
     Import(Vec<PathBuf>),
-    /// Compute a recording of the haptic loop again.
+    /// Proposes a recording of the haptic loop for replay.
     ReplayLoop(PathBuf),
-    /// Compute a recording of a scene again.
+    /// Proposes a recording of a scene for replay.
     ReplayScene(PathBuf),
 }
 
 impl UserCommand {
-    /// Whether it stops motion: nothing may come before it.
+    /// A stop comes before all other commands.
     pub const fn is_stop(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
     }
 }
 
-/// A run beside the protocol in the form.
+/// A short run apart from the protocol in the form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ManualMove {
-    /// Name of the built-in protocol.
+    /// A built-in one.
     pub protocol: &'static str,
-    /// Its values, as they would be typed.
+    /// As they would be typed.
     pub values: BTreeMap<String, String>,
 }
 
 impl ManualMove {
-    /// Move by a distance in mm, towards the tissue where it is positive, at a speed in mm/s.
+    /// Moves by a distance in mm, positive towards the tissue, at a speed in mm/s.
     #[must_use]
     pub fn jog(distance: f64, speed: f64) -> Self {
         let values = [
@@ -121,7 +102,7 @@ impl ManualMove {
         Self { protocol: "free-jog", values: values.into() }
     }
 
-    /// Find home, and touch it once more.
+    /// Finds home, and touches it once more to compare.
     #[must_use]
     pub fn home() -> Self {
         let values =
@@ -130,28 +111,24 @@ impl ManualMove {
     }
 }
 
-/// How the size of text changes.
+/// A change of the size of text: a tenth, or back to the usual size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextSize {
-    /// By a tenth.
     Larger,
-    /// By a tenth.
     Smaller,
-    /// As it is made.
     Usual,
 }
 
-/// What was asked for since the app last acted.
+/// Commands since the app last acted.
 #[derive(Debug, Default)]
 pub struct CommandQueue(Vec<UserCommand>);
 
 impl CommandQueue {
-    /// Asks for something.
     pub fn push(&mut self, command: UserCommand) {
         self.0.push(command);
     }
 
-    /// Everything asked for, a halt and then a stop before all else; leaves nothing behind.
+    /// Takes all commands, halts and then stops first.
     pub fn take(&mut self) -> Vec<UserCommand> {
         let mut commands = std::mem::take(&mut self.0);
         commands.sort_by_key(|command| match command {
@@ -168,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stop_overtakes_what_was_asked_before() {
+    fn a_stop_overtakes_commands_before_it() {
         let mut commands = CommandQueue::default();
         for command in
             [UserCommand::Start, UserCommand::ListPorts, UserCommand::Stop, UserCommand::Halt]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A longer file is something else.
+/// A longer file is not one of settings.
 const BYTES_MAX: usize = 64 * 1024;
 
 /// Zoom factors of text and everything else.
@@ -23,7 +23,7 @@ pub struct WindowSettings {
     pub left: Option<f32>,
     pub right: Option<f32>,
     pub log: Option<f32>,
-    /// Who ran the last protocol.
+    /// Of the last run.
     pub operator: String,
     /// Folder for new sessions; empty for the library.
     pub sessions: String,
@@ -109,7 +109,6 @@ impl SettingsFile {
         self.path.is_some()
     }
 
-    /// Writes what has changed.
     pub fn store(&mut self) -> Result<(), String> {
         match &self.path {
             Some(path) if self.now != self.stored => {

@@ -62,7 +62,6 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
     open_window(move |ctx| WorkbenchApp::new(options, ctx))
 }
 
-/// Opens a window of the usual size.
 pub(crate) fn open_window<A: eframe::App + 'static>(
     make: impl FnOnce(&Context) -> Result<A, String> + 'static,
 ) -> Result<(), String> {

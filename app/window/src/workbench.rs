@@ -5,8 +5,7 @@ use crate::screens::form::{ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
-use crate::workers::path_dialog::{Dialog, PathPurpose, pick};
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
 use eframe::egui::Context;
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
@@ -55,7 +54,6 @@ pub struct Workbench {
     pub form: ProtocolForm,
     /// The folder of recorded sessions, or why there is none.
     pub library: Result<PathBuf, String>,
-    /// The serial ports of this computer.
     pub ports: BackgroundTask<Vec<PortInfo>>,
     list_ports: ListPorts,
     pub dialog: Dialog<(PathPurpose, PathBuf)>,
@@ -202,8 +200,8 @@ impl Workbench {
     pub fn act(&mut self, ctx: &Context, command: &UserCommand) -> bool {
         match command {
             UserCommand::Halt => self.operator(Operator::Halt),
-            UserCommand::RunControl(wish) => {
-                let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
+            UserCommand::RunControl(control) => {
+                let choice = run_in_progress(&self.snapshot).map(|run| control.operator(run));
                 if let Some(Ok(choice)) = choice {
                     self.operator(choice);
                 }
@@ -258,9 +256,9 @@ impl Workbench {
     }
 
     /// A manual move as a run; what prevents it becomes the refusal.
-    pub fn manual_run(&mut self, aside: &ManualMove) -> Option<RunRequest> {
+    pub fn manual_run(&mut self, manual: &ManualMove) -> Option<RunRequest> {
         self.move_verdict().ok()?;
-        let request = self.form.manual_request(aside, &self.snapshot.rig, &self.bench);
+        let request = self.form.manual_request(manual, &self.snapshot.rig, &self.bench);
         request.map_err(|reason| self.refusal = Some(reason)).ok()
     }
 

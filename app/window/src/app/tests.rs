@@ -1,4 +1,5 @@
 use super::*;
+use eframe::App;
 use eframe::egui::{Event, Key, Modifiers};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent};

@@ -93,7 +93,6 @@ impl AxisRange {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gesture {
     pub pan: [f64; 2],
-    /// Factor.
     pub zoom: f64,
     /// Where the pointer was.
     pub at: [f64; 2],

@@ -4,6 +4,7 @@
 use super::navigate::{AxisRange, Gesture, gesture};
 use super::style::still;
 use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions, Ui, vec2};
@@ -110,13 +111,10 @@ impl DepthLines {
         self.is_cancelled = Arc::default();
         self.requested = Some(key.clone());
         let tracks: Vec<Track> = lines.iter().map(|line| line.track.clone()).collect();
-        let (is_cancelled, wake) = (Arc::clone(&self.is_cancelled), ctx.clone());
+        let is_cancelled = Arc::clone(&self.is_cancelled);
         // Without a thread the lines stay as they are, and the next frame tries again.
-        let _ = self.job.start(
-            "review-loops",
-            move || reduce(key, &tracks, &is_cancelled),
-            move || wake.request_repaint(),
-        );
+        let search = move || reduce(key, &tracks, &is_cancelled);
+        let _ = self.job.start("review-loops", ctx, search);
     }
 
     /// How many samples the points drawn stand for, where these are fewer.
@@ -136,7 +134,6 @@ impl DepthLines {
         })
     }
 
-    /// Whether a search is in progress.
     pub fn is_busy(&self) -> bool {
         self.job.is_busy()
     }
@@ -155,7 +152,7 @@ impl DepthLines {
         [depth, force]: [&AxisRange; 2],
     ) -> Gesture {
         self.update(ui.ctx(), lines, [depth, force]);
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let (x, y) = (depth.shown(), force.shown());
         let plot = still(ui, Plot::new("review_force_depth"), tokens)
             .x_axis_label("depth from contact (mm)")

@@ -4,51 +4,41 @@ use super::navigate::{AxisRange, Gesture, gesture};
 use super::stretches::Stretches;
 use super::style::{round_marks, still};
 use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{Align2, Color32, RichText, Ui};
 use egui_plot::{HLine, LineStyle, Plot, PlotPoint, PlotUi, Span as Shade, Text, VLine};
 use palpate_model::rig::Phase;
 
-/// One line.
 pub struct TimeLayer<'a> {
-    /// What it is.
     pub name: &'a str,
-    /// Its colour.
     pub color: Color32,
-    /// Its points.
     pub stretches: &'a Stretches,
 }
 
-/// A moment that is marked.
+/// A vertical mark at a time.
 #[derive(Clone, Debug)]
 pub struct TimeMark {
-    /// When, on the axis.
     pub t: f64,
-    /// Whether it needs attention.
     pub is_alarm: bool,
-    /// Whether a person wrote it down.
+    /// A person wrote it.
     pub is_note: bool,
 }
 
-/// What stands behind and before the lines of every plot.
+/// Drawn behind and before the lines of every plot.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBackdrop {
-    /// Phases of the session in front: from, to, which.
+    /// Start, end and phase, of the session in front.
     pub phases: Vec<(f64, f64, Phase)>,
     /// Stretches whose forces do not count.
     pub left_out: Vec<[f64; 2]>,
-    /// What happened.
     pub moments: Vec<TimeMark>,
-    /// Both cursors.
     pub cursors: [Option<f64>; 2],
 }
 
-/// One of the plots.
 pub struct TimePanel<'a> {
-    /// Its name.
     pub id: &'static str,
-    /// What stands at its axis.
     pub axis: &'static str,
-    /// Its lines, the one in front last.
+    /// The line in front comes last.
     pub layers: Vec<TimeLayer<'a>>,
     /// Whether the axis' zero is drawn.
     pub has_zero: bool,
@@ -115,7 +105,7 @@ pub fn over_time_ui(
     setting: &TimeBackdrop,
     time_axis: Option<&str>,
 ) -> Gesture {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let (shown, [low, high]) = (span.shown(), heights(panel));
     let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
     let plot = still(ui, Plot::new(panel.id), tokens)

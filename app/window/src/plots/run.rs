@@ -1,8 +1,7 @@
 //! Force over time and over depth of the run that is shown, with what its exact fit found and left over.
 
 use super::figure::{PlacedPlot, PlotLook};
-use crate::theme::Tokens;
-use crate::widgets::{NamedControl, heading_ui};
+use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
@@ -72,7 +71,7 @@ impl PlotCache {
 
     /// Draws both in the space there is, the exact fit over the measured force once there is one.
     pub fn ui(&mut self, ui: &mut Ui, exact: Option<&ExactFit>) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         ui.horizontal(|ui| {
             ui.label(RichText::new(&self.force_time.plot.title).heading().strong());
             for (view, name) in [(false, "Whole run"), (true, "From ramp")] {

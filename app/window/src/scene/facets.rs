@@ -10,14 +10,14 @@ use palpate_haptics::surface::{Grid, Heights, Node};
 pub const CELLS_MAX: usize = 128;
 /// Points that a cell takes at least: smaller ones would be less than is seen.
 const CELL_POINTS: f32 = 4.0;
-/// From the surface to the light.
+/// Unit vector from the surface to the light.
 const LIGHT: Vec3 = [-0.4, -0.5, 0.768_114_574_786_860_8];
 /// Light where no light comes from the lamp.
 const AMBIENT: f64 = 0.4;
 /// Half the width of a mesh line in points.
 const LINE: f32 = 0.5;
 
-/// What is drawn of a surface.
+/// Colours of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceStyle {
     /// The depth that has the last colour, in mm.
@@ -39,7 +39,7 @@ pub fn colour_depth(deepest: f64) -> f64 {
     palpate_figures::drawing::round_up(deepest.clamp(1.0, 1e6))
 }
 
-/// Which of so many nodes in a row are drawn: all, or the first, the last, and every so manieth such that `keep`, where
+/// Which of so many nodes in a row are drawn: all, or the first, the last, and every n-th such that `keep`, where
 /// the tool is, is among them.
 #[must_use]
 pub fn drawn(count: usize, cells_max: usize, keep: usize) -> Vec<usize> {
@@ -69,7 +69,7 @@ pub fn far_to_near(edges: &[f64], eye: f64) -> Vec<usize> {
 pub struct Facets {
     /// Its triangles, back to front.
     pub mesh: Mesh,
-    /// Every so manieth node is drawn.
+    /// Every n-th node is drawn.
     pub every: usize,
     /// The deepest depth of the nodes that are drawn, in mm.
     pub deepest: f64,

@@ -26,7 +26,6 @@ impl HandTarget {
         Self { at: [extent[0] / 2.0, extent[1] / 2.0, ABOVE], extent }
     }
 
-    /// Where, in mm.
     pub fn at(&self) -> Vec3 {
         self.at
     }

@@ -4,7 +4,7 @@ use super::camera::{Camera, Lens, Vec3, along};
 use super::facets::{SurfaceStyle, colour_depth, facets};
 use super::hand::{HandTarget, stylus};
 use crate::theme::Tokens;
-use crate::widgets::NamedControl;
+use crate::widgets::{NamedControl, tokens_of};
 use eframe::egui::epaint::Mesh;
 use eframe::egui::{
     Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
@@ -32,24 +32,23 @@ const WHEEL_MM: f64 = 0.02;
 const BAR: [f32; 2] = [12.0, 160.0];
 const EDGE: f32 = 12.0;
 
-/// What is shown at one moment.
+/// The scene at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct ScenePicture<'a> {
-    /// The surface.
     pub now: Heights<'a>,
     /// Its heights at rest, in mm.
     pub rest: &'a [f64],
     /// Where the tip of the device is, in mm.
     pub device: Vec3,
-    /// How its stylus is turned: yaw, pitch and roll in rad.
+    /// Yaw, pitch and roll of the stylus in rad.
     pub turn: Vec3,
-    /// Where it touches; `None` where it does not.
+    /// The contact point; `None` without contact.
     pub contact: Option<Vec3>,
     /// Force on the hand, in N.
     pub force: Vec3,
 }
 
-/// How a scene is looked at, and where the hand in the window is.
+/// Camera and hand of a scene.
 #[derive(Clone, Debug)]
 pub struct SceneView {
     camera: Camera,
@@ -79,7 +78,6 @@ impl SceneView {
         &self.hand
     }
 
-    /// Looks from where it looked at first.
     pub fn reset(&mut self) {
         self.camera = Camera::of(self.extent);
     }
@@ -96,7 +94,7 @@ impl SceneView {
             let painter = ui.painter().with_clip_rect(rect);
             self.paint(&painter, ui, rect, shown);
             if response.has_focus() {
-                let focus = Stroke::new(1.5, Tokens::of(ui.visuals().dark_mode).focus);
+                let focus = Stroke::new(1.5, tokens_of(ui).focus);
                 painter.rect_stroke(rect.shrink(1.0), 2.0, focus, eframe::egui::StrokeKind::Inside);
             }
         }
@@ -175,7 +173,7 @@ impl SceneView {
     }
 
     fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &ScenePicture) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let font = TextStyle::Small.resolve(ui.style());
         let lens = self.camera.lens(rect);
         let size = self.extent[0].max(self.extent[1]);
@@ -209,9 +207,7 @@ impl SceneView {
 fn stylus_shape(painter: &Painter, lens: &Lens, shown: &ScenePicture, size: f64, tokens: &Tokens) {
     let [length, button] = stylus(shown.turn);
     let end = along(shown.device, length, STYLUS * size);
-    let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else {
-        return;
-    };
+    let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else { return };
     let thick = |radius: f64, distance: f64| (radius * size * lens.points_per_mm(distance)) as f32;
     let aside = (top.at - tip.at).normalized().rot90();
     let (thin, wide) = (thick(0.003, tip.distance), thick(0.014, top.distance));

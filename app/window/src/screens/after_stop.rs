@@ -3,8 +3,7 @@
 use super::calibration::calibration_session;
 use crate::command::{CommandQueue, UserCommand};
 use crate::shell::activity::is_planned;
-use crate::theme::Tokens;
-use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui};
+use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui, tokens_of};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 use palpate_protocols::engine::Outcome;
 use palpate_runner::RunView;
@@ -42,7 +41,7 @@ fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
 }
 
 fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let ink = if is_planned(outcome.ending) { tokens.text } else { tokens.alarm_text };
     let text = format!("{}: {}", outcome.ending, outcome.reason);
     ui.add(Label::new(RichText::new(text).color(ink)).wrap());

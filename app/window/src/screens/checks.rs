@@ -1,21 +1,18 @@
 //! The daily checks of the rig over time: deviations of its zero and of a known weight, and their limits.
 
-use super::screen::{Screen, ScreenEntry};
-use crate::command::CommandQueue;
+use super::screen::{CommandQueue, Screen, ScreenEntry, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
     Column, Emphasis, TableRow, alarm_ui, answer_ui, fact_ui, heading_ui, quiet_ui, section_ui,
     table_ui, work_ui,
 };
-use crate::workbench::Workbench;
-use crate::workers::task::BackgroundTask;
+use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, Ui, vec2};
 use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
 use palpate_analysis::report::live::deviations;
 use std::path::PathBuf;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Checks",
     purpose: "the rig's daily checks over time",
@@ -46,7 +43,6 @@ const PLOTS: [(&str, Measured); 2] = [
     ("Zero: measured - expected (N)", |one| one.zero),
 ];
 
-/// The screen's state.
 pub struct ChecksScreen {
     library: Result<PathBuf, String>,
     rig: String,
@@ -125,10 +121,7 @@ impl Screen for ChecksScreen {
         fact_ui(ui, "by", &check.by);
         for part in &check.parts {
             section_ui(ui, &part.what);
-            match part.is_passed {
-                true => quiet_ui(ui, &part.sentence),
-                false => alarm_ui(ui, &part.sentence),
-            }
+            if part.is_passed { quiet_ui(ui, &part.sentence) } else { alarm_ui(ui, &part.sentence) }
         }
         let failed = checks.iter().filter(|one| !one.check.is_passed).count();
         section_ui(ui, "All checks");

@@ -1,20 +1,16 @@
 //! Which cases at the ends of every range are right and which are refused.
 
-use super::screen::{Screen, ScreenEntry};
-use crate::command::CommandQueue;
-use crate::theme::Tokens;
+use super::screen::{CommandQueue, Screen, ScreenEntry, Workbench};
 use crate::widgets::{
     Column, Emphasis, TableRow, answer_ui, choice_ui, heading_ui, placeholder_ui, quiet_ui,
-    section_ui, table_ui, work_ui,
+    section_ui, table_ui, tokens_of, work_ui,
 };
-use crate::workbench::Workbench;
-use crate::workers::task::BackgroundTask;
+use crate::workers::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{GroupSummary, summary};
 use palpate_rheology::extremes::{Extent, Row, Verdict};
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
     purpose: "what is right and what is refused at the ends of every range",
@@ -30,7 +26,6 @@ struct ExtremesResult {
     groups: Vec<GroupSummary>,
 }
 
-/// The screen's state.
 pub struct ExtremesScreen {
     extent: Extent,
     /// All groups if none.
@@ -102,7 +97,7 @@ impl Screen for ExtremesScreen {
     }
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {
             placeholder_ui(ui, "nothing tested yet");

@@ -1,8 +1,7 @@
 //! The force model's parameters as they become known, each with its uncertainty.
 
-use crate::theme::Tokens;
-use crate::widgets::quiet_ui;
-use eframe::egui::{Align, Layout, RichText, Ui, vec2};
+use crate::widgets::{quiet_ui, tokens_of};
+use eframe::egui::{Align, Layout, Response, RichText, Ui, vec2};
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{LiveEstimate, Parameter};
 use palpate_model::rig::Phase;
@@ -81,30 +80,34 @@ fn row_ui(
     parameter: Option<&Parameter>,
     reason: Option<&str>,
 ) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.horizontal(|ui| {
-        cell(ui, 54.0, |ui| {
-            ui.label(RichText::new(name).color(tokens.text_quiet));
-        });
-        cell(ui, 166.0, |ui| {
-            let text = value_text(parameter);
-            let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
-            let label = ui.label(RichText::new(text).monospace().color(ink));
-            if let Some(reason) = reason {
-                label.on_hover_text(reason);
-            }
-        });
-        let unit = typeset(unit);
-        ui.label(RichText::new(unit).color(tokens.text_quiet).small());
-    });
+    let tokens = tokens_of(ui);
+    let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
+    let value = RichText::new(value_text(parameter)).color(ink);
+    let label = value_ui(ui, name, value, &typeset(unit));
+    if let Some(reason) = reason {
+        label.on_hover_text(reason);
+    }
 }
 
-pub(super) fn cell(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui)) {
-    let size = vec2(width, 18.0);
-    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+/// Draws name, value and unit of a parameter; returns the value.
+pub(super) fn value_ui(ui: &mut Ui, name: &str, value: RichText, unit: &str) -> Response {
+    let quiet = tokens_of(ui).text_quiet;
+    let row = |ui: &mut Ui| {
+        cell(ui, 60.0, |ui| ui.label(RichText::new(name).color(quiet)));
+        let value = cell(ui, 166.0, |ui| ui.label(value.monospace()));
+        ui.label(RichText::new(unit).color(quiet).small());
+        value
+    };
+    ui.horizontal(row).inner
+}
+
+pub(super) fn cell<R>(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
+    let layout = Layout::left_to_right(Align::Center);
+    let content = |ui: &mut Ui| {
         ui.set_min_width(width);
-        content(ui);
-    });
+        content(ui)
+    };
+    ui.allocate_ui_with_layout(vec2(width, 18.0), layout, content).inner
 }
 
 fn is_known(parameter: Option<&Parameter>) -> bool {

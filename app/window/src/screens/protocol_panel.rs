@@ -4,13 +4,12 @@ use super::form::{LabelField, ParamField, ProtocolForm};
 use super::preview_view::{acknowledgement_ui, preview_ui};
 use super::run_panes::RunPane;
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
 use crate::widgets::{
     NamedControl, alarm_ui, form_label, quiet_ui, reason_button, section_ui, small_alarm_ui,
-    small_ui, tick_box,
+    small_ui, tick_box, tokens_of,
 };
 use crate::workbench::Workbench;
-use crate::workers::path_dialog::PathPurpose;
+use crate::workers::PathPurpose;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
 use palpate_protocols::file::{Kind, What};
 
@@ -64,7 +63,7 @@ fn head_ui(ui: &mut Ui, form: &ProtocolForm) {
     match (&form.protocol, &form.file) {
         (Ok(protocol), _) => {
             section_ui(ui, &protocol.title);
-            let ink = Tokens::of(ui.visuals().dark_mode).text_quiet;
+            let ink = tokens_of(ui).text_quiet;
             let about = RichText::new(&protocol.about).color(ink).small();
             ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
         }
@@ -74,7 +73,7 @@ fn head_ui(ui: &mut Ui, form: &ProtocolForm) {
 }
 
 fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let hint = field.hint();
     if field.parameter.kind == Kind::Flag {
         let mut is_on = field.text == "true";

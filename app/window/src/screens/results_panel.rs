@@ -14,7 +14,6 @@ use palpate_runner::{RunView, Snapshot};
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;
 
-/// Draws the panel.
 pub fn results_ui(
     ui: &mut Ui,
     snapshot: &Snapshot,
@@ -92,9 +91,7 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
 fn cycles_ui(ui: &mut Ui, cycles: &[Cycle]) {
-    let Some(first) = cycles.first().and_then(|one| one.peak) else {
-        return;
-    };
+    let Some(first) = cycles.first().and_then(|one| one.peak) else { return };
     section_ui(ui, "Peak of each cycle, change from the first");
     let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);
     if left_out > 0 {

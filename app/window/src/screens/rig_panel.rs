@@ -1,16 +1,14 @@
 //! Identity and status of the rig, and the serial ports of this computer.
 
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
-use crate::widgets::{alarm_ui, answer_ui, fact_ui, section_ui};
-use crate::workers::task::BackgroundTask;
+use crate::widgets::{alarm_ui, answer_ui, fact_ui, section_ui, tokens_of};
+use crate::workers::BackgroundTask;
 use eframe::egui::{Button, RichText, Ui};
 use palpate_drivers::serial::PortInfo;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_runner::{RigView, Snapshot};
 
-/// Draws the panel.
 pub fn rig_ui(
     ui: &mut Ui,
     snapshot: &Snapshot,
@@ -68,7 +66,7 @@ fn axis_words(status: AxisStatus) -> String {
 }
 
 fn ports_ui(ui: &mut Ui, ports: &BackgroundTask<Vec<PortInfo>>, commands: &mut CommandQueue) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     ui.add_space(2.0);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Serial ports found").color(tokens.text_quiet));

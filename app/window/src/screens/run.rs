@@ -6,26 +6,22 @@ use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
-use super::screen::{Screen, ScreenEntry, ScreenReply};
+use super::screen::{
+    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
+};
 use super::weighing::weighing_ui;
-use crate::command::{CommandQueue, UserCommand};
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
-use crate::shell::palette::PaletteAction;
-use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{PanelEdge, Sizes};
+use crate::shell::panels::frame;
 use crate::widgets::require;
-use crate::workbench::Workbench;
 use crate::workers::fit::{Refit, Refitter};
-use crate::workers::path_dialog::PathPurpose;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
 use palpate_runner::{RunRequest, RunView, wall_now};
 use palpate_sessions::recover::recover_library;
 use std::path::Path;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Run",
     purpose: "run a protocol and see what comes of it",
@@ -107,24 +103,9 @@ impl RunScreen {
 }
 
 impl Screen for RunScreen {
-    fn ui(
-        &mut self,
-        ui: &mut Ui,
-        sizes: &mut Sizes,
-        workbench: &mut Workbench,
-        commands: &mut CommandQueue,
-    ) {
-        // The start strip on the left never scrolls away, so that panel scrolls by itself.
-        let left = Panel::left("rig_and_protocol").frame(frame(ui, false));
-        let left = sizes.of(PanelEdge::Left, left);
-        let left = left.show(ui, |ui| self.left_ui(ui, workbench, commands));
-        sizes.drag(ui, PanelEdge::Left, left.response.rect);
-        side_ui(ui, sizes, PanelEdge::Right, |ui| {
-            self.right_ui(ui, workbench, commands);
-        });
-        CentralPanel::default()
-            .frame(frame(ui, true))
-            .show(ui, |ui| self.middle_ui(ui, workbench, commands));
+    fn has_own_scroll(&self) -> bool {
+        // The start strip on the left never scrolls away.
+        true
     }
 
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {

@@ -3,11 +3,9 @@
 use super::form::{CheckedPlan, ProtocolForm};
 use crate::command::{CommandQueue, UserCommand};
 use crate::plots::course::{CourseLimits, course_ui};
-use crate::theme::Tokens;
-use crate::widgets::{NamedControl, heading_ui, placeholder_ui};
+use crate::widgets::{NamedControl, heading_ui, placeholder_ui, tokens_of};
 use crate::workbench::Workbench;
-use crate::workers::Job;
-use crate::workers::path_dialog::PathPurpose;
+use crate::workers::{Job, PathPurpose};
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
 use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
@@ -110,7 +108,7 @@ impl Chooser {
     /// Reads a file on a thread of its own.
     pub fn read(&mut self, path: &Path, ctx: &Context) -> std::io::Result<()> {
         self.typed = path.display().to_string();
-        let (path, ctx) = (path.to_owned(), ctx.clone());
+        let path = path.to_owned();
         let work = move || {
             let name = path.display();
             let text = match read_if_present(&path) {
@@ -120,8 +118,7 @@ impl Chooser {
             };
             (path, text)
         };
-        let done = move || ctx.request_repaint();
-        self.reading.start("protocol-file", work, done)
+        self.reading.start("protocol-file", ctx, work)
     }
 
     /// A file that was read, once.
@@ -177,7 +174,7 @@ impl Chooser {
 }
 
 fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let head = format!("{} cannot run:", file.display());
     ui.label(RichText::new(head).strong());
     for problem in form.problems() {
@@ -189,7 +186,7 @@ fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
 }
 
 fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut CommandQueue) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let name = BUILT_IN.iter().find(|(name, _)| *name == protocol.name);
     ui.add_space(4.0);
     let button = Button::selectable(is_chosen, RichText::new(&protocol.title).strong())

@@ -1,18 +1,35 @@
 //! Recording of a loop: the folder of the next recording, the result of the last one, and the replay of one.
 
-use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, task_ui, text_row};
-use crate::workers::Job;
-use crate::workers::path_dialog::Dialog;
-use crate::workers::task::BackgroundTask;
-use eframe::egui::{Context, Ui};
+use crate::command::{CommandQueue, UserCommand};
+use crate::widgets::{alarm_ui, quiet_ui, reason_button, require, section_ui, task_ui, text_row};
+use crate::workers::{BackgroundTask, Dialog, Job};
+use eframe::egui::{Context, Ui, vec2};
 use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::{Ended, Replayed, ended_words};
 use std::path::{Path, PathBuf};
 
+/// Draws the button that starts a loop, or the one that stops it while it runs.
+pub(super) fn loop_button_ui(
+    ui: &mut Ui,
+    name: &str,
+    is_running: bool,
+    verdict: &Result<(), String>,
+    [start, stop]: [UserCommand; 2],
+    commands: &mut CommandQueue,
+) {
+    let size = vec2(170.0, 34.0);
+    if is_running {
+        if reason_button(ui, &format!("Stop the {name}"), size, &Ok(())) {
+            commands.push(stop);
+        }
+    } else if reason_button(ui, &format!("Start the {name}"), size, verdict) {
+        commands.push(start);
+    }
+}
+
 /// Computes a recording again.
 pub(super) type Replay = fn(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String>;
 
-/// The panel.
 #[derive(Default)]
 pub(super) struct TapePanel {
     to: String,
@@ -56,8 +73,7 @@ impl TapePanel {
             drop(work);
             return;
         };
-        let wake = move || ctx.request_repaint();
-        if self.ending.start("recording-end", work, wake).is_err() {
+        if self.ending.start("recording-end", &ctx, work).is_err() {
             self.ended(None);
         }
     }
@@ -97,7 +113,6 @@ impl TapePanel {
         self.task.is_busy()
     }
 
-    /// Fetches answers that have come.
     pub fn poll(&mut self) {
         self.task.poll();
         if self.ending.is_busy() {

@@ -5,9 +5,11 @@ use super::form::RunSetup;
 use crate::command::{CommandQueue, UserCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::shell::run_strip::{RunControl, is_controllable};
-use crate::theme::{Tokens, reading_style};
-use crate::widgets::{Column, Emphasis, TableRow, heading_ui, reason_button, require, table_ui};
-use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
+use crate::theme::reading_style;
+use crate::widgets::{
+    Column, Emphasis, TableRow, heading_ui, reason_button, require, share_ui, table_ui, tokens_of,
+};
+use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing;
 use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
 use palpate_model::units::Volts;
@@ -67,7 +69,7 @@ fn now_ui(
     signal: Option<Volts>,
     curve: &Curve,
 ) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let place = match next {
         Some(next) => {
             let done = run.weighed.len();
@@ -99,15 +101,9 @@ fn now_ui(
 
 /// The stability indicator: how full the window is that must be steady, and what is not steady yet.
 fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.vertical(|ui| {
-        ui.add(
-            ProgressBar::new(settling.filled as f32)
-                .desired_width(240.0)
-                .desired_height(10.0)
-                .corner_radius(2)
-                .fill(tokens.text_quiet),
-        );
+        ui.set_width(240.0);
+        share_ui(ui, settling.filled);
         ui.label(steady_words(settling));
     });
 }

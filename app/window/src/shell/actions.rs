@@ -7,6 +7,7 @@ use super::sizes::PanelEdge;
 use crate::app::WorkbenchApp;
 use crate::command::{ManualMove, TextSize, UserCommand};
 use crate::screens::table::SCREENS;
+use crate::widgets::require;
 
 impl WorkbenchApp {
     /// What can be asked for now, and of the rest why not.
@@ -20,7 +21,7 @@ impl WorkbenchApp {
             PaletteAction::new("Start the protocol", "F5", UserCommand::Start)
                 .if_ok(bench.start_verdict()),
         ];
-        for (name, keys, wish) in [
+        for (name, keys, control) in [
             ("Pause", "F7", RunControl::Pause),
             ("Pause at the next checkpoint", "F4", RunControl::PauseAfter),
             ("Resume", "F9", RunControl::Resume),
@@ -30,9 +31,10 @@ impl WorkbenchApp {
             ("Answer the prompt: not done", "", RunControl::Decline),
             ("Read the last weight again", "", RunControl::Redo),
         ] {
-            let verdict = run.map_or_else(no_run, |run| wish.operator(run).map(|_| ()));
-            actions
-                .push(PaletteAction::new(name, keys, UserCommand::RunControl(wish)).if_ok(verdict));
+            let verdict = run.map_or_else(no_run, |run| control.operator(run).map(|_| ()));
+            actions.push(
+                PaletteAction::new(name, keys, UserCommand::RunControl(control)).if_ok(verdict),
+            );
         }
         let has_run = run.map_or_else(no_run, |_| Ok(()));
         let can_retract = run.map_or_else(no_run, |run| run.can_retract.clone());
@@ -43,7 +45,7 @@ impl WorkbenchApp {
         };
         let is_lost = match bench.snapshot.rig.link_error {
             Some(_) => Ok(()),
-            None => Err("the link is there".to_owned()),
+            None => Err("the link is not lost".to_owned()),
         };
         actions.extend([
             PaletteAction::new("Retract after a stop", "F8", UserCommand::Retract)
@@ -65,10 +67,7 @@ impl WorkbenchApp {
             let name = format!("Screen {}: {}", screen.name, screen.purpose);
             actions.push(PaletteAction::new(name, &keys, UserCommand::Show(screen.name)));
         }
-        let is_on_tour = match self.tour.is_on() {
-            true => Ok(()),
-            false => Err("no tour is under way".to_owned()),
-        };
+        let is_on_tour = require(self.tour.is_on(), "the tour is not open");
         actions.push(PaletteAction::new("Light or dark screen", "", UserCommand::SwitchTheme));
         for (name, keys, size) in [
             ("Larger text", "Ctrl++", TextSize::Larger),

@@ -1,13 +1,13 @@
-//! Files dropped on the window go where they belong.
+//! Files that are dropped on the window, passed to the screen that they are for.
 
 use crate::command::{CommandQueue, UserCommand};
 use crate::screens::{models, run, scene};
-use crate::workers::path_dialog::PathPurpose;
+use crate::workers::PathPurpose;
 use palpate_analysis::haptics_tape::is_tape;
 use palpate_sessions::ticks::TICKS;
 use std::path::{Path, PathBuf};
 
-/// Asks for what files and folders are good for; `shown` is the screen that they were dropped on.
+/// Pushes a command for each dropped file or folder; `shown` is the screen in front.
 pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut CommandQueue) {
     let (protocols, others): (Vec<_>, Vec<_>) =
         paths.into_iter().partition(|path| ends(path, "toml"));
@@ -32,7 +32,7 @@ pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut CommandQueu
         commands.push(UserCommand::Import(tables));
     }
     if let Some(folder) = recordings.into_iter().next() {
-        // What is of neither is told to be so on the scene's.
+        // A recording of neither loop is refused with a reason on the screen of scenes.
         commands.push(match is_tape(&folder).unwrap_or(false) {
             true => UserCommand::ReplayLoop(folder),
             false => UserCommand::ReplayScene(folder),
@@ -96,7 +96,7 @@ mod tests {
             dropped(&[&protocol], "Scene"),
             [UserCommand::Chosen(PathPurpose::Scene, protocol)]
         );
-        // Ticks of no known loop are told to be so on the scene's screen.
+        // Ticks of no known loop are refused on the screen of scenes.
         let ticks = at("ticks");
         std::fs::create_dir(&ticks).unwrap();
         std::fs::write(ticks.join(TICKS), "").unwrap();

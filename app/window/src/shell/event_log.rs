@@ -1,8 +1,7 @@
-//! What happened, newest last, with a filter and a copy of what is shown.
+//! Events of the run, newest last, with a filter and a copy of the lines shown.
 
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
-use crate::widgets::{NamedControl, placeholder_ui};
+use crate::widgets::{NamedControl, placeholder_ui, tokens_of};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, Snapshot};
 
@@ -19,13 +18,10 @@ impl EventLog {
         let shown: Vec<&LogLine> =
             events.iter().filter(|line| is_shown(line, &self.filter)).collect();
         self.head_ui(ui, &shown, commands);
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         if shown.is_empty() {
-            let text = if events.is_empty() {
-                "nothing happened yet"
-            } else {
-                "no event matches the filter"
-            };
+            let text =
+                if events.is_empty() { "no event yet" } else { "no event matches the filter" };
             placeholder_ui(ui, text);
             return;
         }

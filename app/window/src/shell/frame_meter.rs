@@ -148,7 +148,6 @@ impl FrameMeter {
     }
 }
 
-/// Whose CPU time.
 #[derive(Clone, Copy)]
 enum Clock {
     Process,

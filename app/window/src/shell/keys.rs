@@ -6,7 +6,7 @@ use crate::command::{CommandQueue, UserCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Context, Event, Key};
 
-/// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
+/// The keys and their commands. Escape stops too: a startled hand finds it.
 pub const KEYS: [(Key, UserCommand); 13] = [
     (Key::F1, UserCommand::Palette),
     (Key::F12, UserCommand::Stop),
@@ -33,7 +33,7 @@ pub struct KeyReader {
 }
 
 impl KeyReader {
-    /// Asks for the stops among the events of a frame that is about to begin: the earliest that they can be seen.
+    /// Pushes the stops among the events of a frame that is about to begin, as early as possible.
     pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut CommandQueue) {
         let frame = ctx.cumulative_frame_nr();
         // Events that wait while the window is hidden come again, before those that are new.
@@ -42,7 +42,7 @@ impl KeyReader {
             _ => 0,
         };
         self.looked_at = Some((frame, events.len()));
-        // Repeats are not told apart yet: a key that is held went down before.
+        // Repeats are not marked yet: a key that is held went down before.
         let is_new = |event: &&Event| match event {
             Event::Key { key, .. } => !ctx.input(|input| input.key_down(*key)),
             _ => false,
@@ -51,8 +51,8 @@ impl KeyReader {
         push_keys(&new, true, commands);
     }
 
-    /// Asks for the stops of this frame: keys that nobody looked at before it began, and the buttons of the top bar,
-    /// which are asked before anything is drawn.
+    /// Pushes the stops of this frame, before anything is drawn: keys that [`Self::read_early`] has not read, and the
+    /// buttons of the top bar.
     pub fn read_stops(&mut self, ctx: &Context, commands: &mut CommandQueue) {
         // A frame may have several passes, and while the window is hidden its input is that of the last frame
         // shown: pressing once must not act again and again.
@@ -66,7 +66,7 @@ impl KeyReader {
         push_stop_buttons(ctx, commands);
     }
 
-    /// Asks for what else was pressed since the last frame; whether this frame is read for the first time.
+    /// Pushes the commands of other keys; true if this frame is read for the first time.
     pub fn read(&mut self, ctx: &Context, commands: &mut CommandQueue) -> bool {
         let frame = ctx.cumulative_frame_nr();
         if self.frame_read.replace(frame) == Some(frame) {
@@ -87,7 +87,7 @@ impl KeyReader {
     }
 }
 
-/// Asks for the keys of [`KEYS`] among events: for those that stop, or for the others.
+/// Pushes the commands of [`KEYS`] among events: the stops, or the others.
 fn push_keys(events: &[Event], are_stops: bool, commands: &mut CommandQueue) {
     for (key, command) in KEYS {
         if command.is_stop() == are_stops && is_pressed(events, key, false) {

@@ -7,7 +7,6 @@ use eframe::egui::{Button, Ui, vec2};
 /// Width of the rail in points.
 pub const WIDTH: f32 = 100.0;
 
-/// Draws the rail.
 pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut CommandQueue) {
     for screen in SCREENS {
         let button = Button::selectable(screen.name == shown, screen.name)

@@ -1,6 +1,6 @@
 //! How wide the panels beside the middle are and how high the event log: dragged at their edges, or by name.
 
-use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{CursorIcon, Id, Panel, Rect, Response, Sense, Stroke, Ui};
 
 palpate_model::named! {
@@ -113,7 +113,7 @@ fn shown(ui: &Ui, edge: PanelEdge, near: Rect, grip: &Response) {
         _ => (CursorIcon::ResizeHorizontal, [near.center_top(), near.center_bottom()]),
     };
     ui.ctx().set_cursor_icon(icon);
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     ui.painter().line_segment(line, Stroke::new(2.0, tokens.text_quiet));
 }
 

@@ -2,7 +2,7 @@
 
 use super::glyph::{GLYPH_RADIUS, GLYPH_WIDTH, Glyph, glyph_at};
 use super::table::{Column, Emphasis, GAP, ROW, row_ui, width_of};
-use crate::theme::Tokens;
+use super::text::tokens_of;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
 use eframe::egui::{
     Align2, Button, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
@@ -102,7 +102,7 @@ impl ChoiceTable<'_> {
                 ui.interact(ui.available_rect_before_wrap(), id, Sense::focusable_noninteractive());
             body.widget_info(|| WidgetInfo::labeled(Role::ListBox, true, self.name));
             if body.has_focus() {
-                let tokens = Tokens::of(ui.visuals().dark_mode);
+                let tokens = tokens_of(ui);
                 let stroke = Stroke::new(1.0, tokens.focus);
                 ui.painter().rect_stroke(body.rect, 0.0, stroke, StrokeKind::Inside);
                 // Up and down are the table's, not the way to another control.
@@ -119,7 +119,7 @@ impl ChoiceTable<'_> {
     }
 
     fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<TableAction>) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         row_ui(ui, self.columns, width, |ui, index, column| {
             let text = RichText::new(&column.head).color(tokens.text_quiet).small();
             if !(self.can_sort)(index) {
@@ -164,7 +164,7 @@ impl ChoiceTable<'_> {
     }
 
     fn line_ui(&self, ui: &mut Ui, width: f32, id: Id, index: usize, acts: &mut Vec<TableAction>) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let (line, is_chosen) = ((self.line)(index), (self.is_chosen)(index));
         let (rect, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
         // Not to be walked through by Tab: the table has the focus, and keys choose in it.
@@ -257,7 +257,7 @@ impl ChoiceTable<'_> {
 }
 
 fn cell_ui(ui: &Ui, cell: &TableCell, place: Rect, is_number: bool, is_chosen: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     // The ground of a chosen row is darker: only full ink is readable on it.
     let emphasis = if is_chosen { Emphasis::Plain } else { cell.emphasis };
     let ink = emphasis.ink(tokens);

@@ -2,13 +2,13 @@
 
 use super::buttons::steady;
 use super::places::NamedControl;
-use super::text::small_alarm_ui;
-use crate::theme::Tokens;
+use super::text::{quiet_ui, small_alarm_ui, tokens_of};
 use eframe::egui::{
     Align, Align2, ComboBox, Key, Label, Layout, Response, RichText, TextEdit, Ui, vec2,
 };
 use palpate_haptics::Period;
 use palpate_rheology::families;
+use palpate_rheology::tolerance::Tolerance;
 
 /// A number as it is typed, and what it means.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ const LABEL_WIDTH: f32 = 74.0;
 
 /// Draws a labelled input with its unit; true when the text changed.
 pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let row = |ui: &mut Ui| {
         let label = form_label(ui, name);
         let input = TextEdit::singleline(&mut field.text).desired_width(76.0).char_limit(24);
@@ -107,6 +107,21 @@ pub fn text_row(ui: &mut Ui, name: &str, hint: &str, text: &mut String) -> bool 
         typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
     };
     steady(ui, name, |ui| ui.horizontal(row).inner)
+}
+
+/// Draws the field of a tolerance and its meaning, which is `without` for an empty field where that is allowed.
+pub fn tolerance_ui(ui: &mut Ui, text: &mut String, without: Option<&str>) {
+    ui.horizontal(|ui| {
+        let label = form_label(ui, "tolerance");
+        let input = TextEdit::singleline(text).desired_width(96.0).char_limit(24);
+        let hint = without.map_or("", |_| "none");
+        ui.add(input.hint_text(hint)).labelled_by(label.id).named("tolerance");
+    });
+    match (text.trim(), without, text.parse::<Tolerance>()) {
+        ("", Some(words), _) => quiet_ui(ui, words),
+        (_, _, Ok(tolerance)) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
+        (_, _, Err(reason)) => small_alarm_ui(ui, reason.to_string()),
+    }
 }
 
 /// Draws a box to tick that the palette leads to by its words.

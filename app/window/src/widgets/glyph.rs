@@ -1,7 +1,7 @@
 //! Small shapes that stand before a word, so that a state is more than a colour; the state badge and the list of steps.
 
+use super::text::tokens_of;
 use crate::shell::activity::{Activity, StateTone};
-use crate::theme::Tokens;
 use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Role, Sense, Shape, Stroke,
     StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
@@ -85,7 +85,7 @@ pub fn glyph_at(painter: &Painter, glyph: Glyph, center: Pos2, r: f32, ink: Colo
 
 /// Draws the state as word, glyph and colour in one box of a size in points.
 pub fn badge_ui(ui: &mut Ui, activity: &Activity, size: Vec2) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let (fill, ink) = match activity.tone {
         StateTone::Quiet => (tokens.control, tokens.text),
         StateTone::Active => (tokens.active_fill, tokens.on_active),
@@ -131,7 +131,7 @@ impl StepState {
 
 /// Draws one step with its state and expected duration.
 pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let size = vec2(ui.available_width(), 19.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let label = format!("Step {name}: {}", state.name());

@@ -1,14 +1,13 @@
 //! How a loop keeps its time, as a table.
 
-use super::text::fact_ui;
-use crate::theme::Tokens;
+use super::text::{fact_ui, tokens_of};
 use eframe::egui::{Grid, RichText, Ui};
 use palpate_model::units::Seconds;
 use palpate_runner::haptics::timing::Kept;
 
 /// Draws overruns, and the percentiles of period, lateness and work.
 pub fn loop_times_ui(ui: &mut Ui, timing: &Kept) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     fact_ui(ui, "overruns", format!("{}; {} ticks missed", timing.overruns, timing.missed));
     let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
     Grid::new("loop_times").striped(true).show(ui, |ui| {

@@ -1,5 +1,6 @@
 //! A table of short texts: headings, aligned columns, a marked row; only rows in sight are laid out.
 
+use super::text::tokens_of;
 use crate::theme::Tokens;
 use eframe::egui::{
     Align, Color32, Label, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2, pos2,
@@ -67,7 +68,7 @@ pub struct TableRow {
 
 /// Draws the table in the space there is; scrolls both ways.
 pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let width = width_of(columns);
     ScrollArea::horizontal().id_salt((name, "across")).auto_shrink(false).show(ui, |ui| {
         ui.set_min_width(width);
@@ -85,9 +86,7 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) 
                 for row in &rows[shown] {
                     let ink = row.emphasis.ink(tokens);
                     let rect = row_ui(ui, columns, width, |ui, index, _| {
-                        let Some(cell) = row.cells.get(index) else {
-                            return;
-                        };
+                        let Some(cell) = row.cells.get(index) else { return };
                         let mut text = RichText::new(cell).color(ink);
                         if row.emphasis == Emphasis::Marked {
                             text = text.strong();

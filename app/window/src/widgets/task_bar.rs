@@ -1,10 +1,9 @@
-//! Start of a longer piece of work, how far it is, and its end.
+//! Start, progress and end of a longer piece of work.
 
 use super::buttons::reason_button;
-use super::text::{alarm_ui, placeholder_ui};
+use super::text::{alarm_ui, placeholder_ui, tokens_of};
 use crate::command::{CommandQueue, UserCommand};
-use crate::theme::Tokens;
-use crate::workers::task::{BackgroundTask, TaskState};
+use crate::workers::{BackgroundTask, TaskState};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 use palpate_figures::uncertain::clock;
 
@@ -55,7 +54,13 @@ pub fn answer_ui<'a, T: Send + 'static>(
     None
 }
 
-/// Draws the progress of work that began by itself, and a button that ends it; true when that is pressed.
+/// Draws a bar for a share from 0 to 1.
+pub fn share_ui(ui: &mut Ui, share: f64) {
+    let bar = ProgressBar::new(share as f32).desired_height(10.0).corner_radius(2);
+    ui.add(bar.fill(tokens_of(ui).text_quiet));
+}
+
+/// Draws the progress of work that began without a button, and a button that cancels it; true when that is pressed.
 pub fn progress_ui(ui: &mut Ui, state: &TaskState, cancel: &str) -> bool {
     bar_ui(ui, state);
     cancel_ui(ui, cancel)
@@ -66,13 +71,7 @@ fn cancel_ui(ui: &mut Ui, text: &str) -> bool {
 }
 
 fn bar_ui(ui: &mut Ui, state: &TaskState) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.add(
-        ProgressBar::new(state.fraction as f32)
-            .desired_height(10.0)
-            .corner_radius(2)
-            .fill(tokens.text_quiet),
-    );
+    share_ui(ui, state.fraction);
     let left = state.seconds_left.map_or_else(
         || format!("{} so far", clock(state.seconds)),
         |left| format!("{} left", clock(left)),

@@ -6,6 +6,11 @@ use eframe::egui::{Align, Color32, Label, Layout, RichText, Sense, Ui, vec2};
 /// Width of the names of facts in points.
 pub const NAME_WIDTH: f32 = 72.0;
 
+/// Colours of the theme that is shown.
+pub fn tokens_of(ui: &Ui) -> &'static Tokens {
+    Tokens::of(ui.visuals().dark_mode)
+}
+
 /// A heading.
 pub fn heading_ui(ui: &mut Ui, words: impl Into<String>) {
     ui.label(RichText::new(words).heading().strong());
@@ -20,7 +25,7 @@ pub fn section_ui(ui: &mut Ui, title: &str) {
 
 /// A fact's name, as wide as all of them.
 pub fn fact_name_ui(ui: &mut Ui, name: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let layout = Layout::left_to_right(Align::Min);
     ui.allocate_ui_with_layout(vec2(NAME_WIDTH, 0.0), layout, |ui| {
         ui.set_min_width(NAME_WIDTH);
@@ -57,25 +62,25 @@ pub fn small_ui(ui: &mut Ui, words: impl Into<String>) {
 
 /// What stands in the place of something that is not there yet.
 pub fn placeholder_ui(ui: &mut Ui, words: impl Into<String>) {
-    let ink = Tokens::of(ui.visuals().dark_mode).text_quiet;
+    let ink = tokens_of(ui).text_quiet;
     colored_ui(ui, RichText::new(words), ink);
 }
 
 /// A remark in small letters.
 pub fn quiet_ui(ui: &mut Ui, words: impl Into<String>) {
-    let ink = Tokens::of(ui.visuals().dark_mode).text_quiet;
+    let ink = tokens_of(ui).text_quiet;
     colored_ui(ui, RichText::new(words).small(), ink);
 }
 
 /// A sentence about what is wrong.
 pub fn alarm_ui(ui: &mut Ui, words: impl Into<String>) {
-    let ink = Tokens::of(ui.visuals().dark_mode).alarm_text;
+    let ink = tokens_of(ui).alarm_text;
     colored_ui(ui, RichText::new(words), ink);
 }
 
 /// What is wrong with a field, below it in small letters.
 pub fn small_alarm_ui(ui: &mut Ui, words: impl Into<String>) {
-    let ink = Tokens::of(ui.visuals().dark_mode).alarm_text;
+    let ink = tokens_of(ui).alarm_text;
     colored_ui(ui, RichText::new(words).small(), ink);
 }
 

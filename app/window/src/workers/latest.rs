@@ -34,14 +34,11 @@ impl<Q: Send + 'static, A: Send + 'static> LatestAnswer<Q, A> {
         if self.job.is_busy() {
             return;
         }
-        let Some(question) = self.next.take() else {
-            return;
-        };
-        let (work, wake) = (self.work, ctx.clone());
-        let started =
-            self.job.start(self.name, move || work(&question), move || wake.request_repaint());
+        let Some(question) = self.next.take() else { return };
+        let work = self.work;
+        let started = self.job.start(self.name, ctx, move || work(&question));
         if started.is_err() {
-            // No thread is to be had now; the next poll tells.
+            // The next poll tries again.
             ctx.request_repaint();
         }
     }

@@ -1,6 +1,6 @@
-//! The scene as the window has it: computed ahead along a path, or in a loop of its own, and what was seen of it.
+//! The scene of the window: computed along a path, or in a loop of its own, and its past for the plots.
 
-use super::trail::{LOOK_S, forget_old};
+use super::trail::{TIMING_S, forget_old};
 use palpate_haptics::LawSettings;
 use palpate_haptics::margin::{Device, Margin, Watch};
 use palpate_haptics::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
@@ -11,13 +11,13 @@ use palpate_runner::haptics::scene::SceneRecorder;
 use palpate_runner::haptics::timing::Kept;
 use std::collections::VecDeque;
 
-/// Ticks between two looks at a scene that is computed ahead.
-const AHEAD_TICKS: u64 = 10;
+/// Ticks between two points of a computed path.
+const TICKS_PER_POINT: u64 = 10;
 
 /// Force and depth at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForcePoint {
-    /// Since the start, in s.
+    /// In s since the start.
     pub t: f64,
     /// Length of the force on the hand in N.
     pub force: f64,
@@ -42,10 +42,9 @@ pub fn force_of(tick: &SceneTick) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-/// A scene at one moment.
+/// A tick of a scene, and its surface then.
 #[derive(Clone, Debug)]
 pub struct SceneInstant {
-    /// Its tick.
     pub tick: SceneTick,
     grid: Grid,
     heights: Vec<f64>,
@@ -64,7 +63,6 @@ impl SceneInstant {
         }
     }
 
-    /// The surface.
     pub fn now(&self) -> Result<Heights<'_>, MeshError> {
         Heights::new(self.grid, &self.heights)
     }
@@ -93,20 +91,17 @@ pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
     watch.at(Depth(tick.depth), MmPerS(tick.speed))
 }
 
-/// A scene that was computed along a path, and not in real time.
+/// A scene computed along a path, not in real time.
 #[derive(Clone, Debug)]
 pub struct ComputedPath {
-    /// What it is made of.
     pub settings: SceneSettings,
-    /// The path.
     pub path: ScenePath,
-    /// Where it was deepest.
+    /// Of the greatest depth.
     pub deepest: SceneInstant,
-    /// Force and depth over time.
     pub trail: Vec<ForcePoint>,
 }
 
-/// Computes a scene along a path. `is_going` hears the share done and ends it early.
+/// Computes a scene along a path. `is_going` receives the share done, and cancels by returning false.
 pub fn compute_path(
     settings: SceneSettings,
     path: ScenePath,
@@ -119,7 +114,7 @@ pub fn compute_path(
     for tick in 1..=ticks {
         let t = settings.period.time_of(tick).seconds().0;
         let tick_now = led.tick(path.at(t, &settings));
-        if !tick.is_multiple_of(AHEAD_TICKS) {
+        if !tick.is_multiple_of(TICKS_PER_POINT) {
             continue;
         }
         trail.push(ForcePoint::of(&tick_now, &settings));
@@ -129,21 +124,21 @@ pub fn compute_path(
             deepest.heights.copy_from_slice(now);
         }
         if !is_going(tick as f64 / ticks as f64) {
-            return Err("ended before it was done".into());
+            return Err("cancelled before it was done".into());
         }
     }
     Ok(ComputedPath { settings, path, deepest, trail })
 }
 
-/// A scene that runs or ran, and what was seen of it.
+/// A scene that runs or ran last.
 #[derive(Debug)]
 pub struct LiveScene {
     live: Option<SceneLoop>,
     settings: SceneSettings,
     moment: SceneInstant,
     trail: VecDeque<ForcePoint>,
-    kept: Kept,
-    looked: f64,
+    timing: Kept,
+    timing_read_at: f64,
     is_led: bool,
     priority: String,
 }
@@ -162,15 +157,15 @@ impl LiveScene {
             settings,
             moment,
             trail: VecDeque::new(),
-            kept: live.timing(),
-            looked: 0.0,
+            timing: live.timing(),
+            timing_read_at: 0.0,
             is_led: path.is_some(),
             priority: live.granted().to_string(),
             live: Some(live),
         })
     }
 
-    /// Points the hand and takes over what is new. An error: the loop has ended by itself.
+    /// Moves the hand and reads the newest tick. An error: the loop has ended by itself.
     pub fn poll(&mut self, hand: Hand6) -> Result<(), String> {
         let Some(live) = &mut self.live else {
             return Ok(());
@@ -192,9 +187,9 @@ impl LiveScene {
         let period = self.settings.period;
         let now = period.time_of(self.moment.tick.tick).seconds().0;
         forget_old(&mut self.trail, now, |point| point.t);
-        if now - self.looked >= LOOK_S {
-            self.kept = live.timing();
-            self.looked = now;
+        if now - self.timing_read_at >= TIMING_S {
+            self.timing = live.timing();
+            self.timing_read_at = now;
         }
         if live.is_alive() {
             return Ok(());
@@ -204,50 +199,45 @@ impl LiveScene {
             .into())
     }
 
-    /// Whether it ticks.
     pub fn is_running(&self) -> bool {
         self.live.is_some()
     }
 
-    /// Whether a path leads the hand, and not who sits here.
+    /// Whether a path leads the hand, and not pointer and keys.
     pub fn is_led(&self) -> bool {
         self.is_running() && self.is_led
     }
 
-    /// What is still to be ended, whose recording waits for the disk; what was seen stays.
+    /// Takes the loop out to be ended, as its recording waits for the disk.
     pub fn stop(&mut self) -> Option<SceneLoop> {
         let live = self.live.take()?;
-        self.kept = live.timing();
+        self.timing = live.timing();
         Some(live)
     }
 
-    /// What it is made of.
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
-    /// What was seen last.
     pub fn moment(&self) -> &SceneInstant {
         &self.moment
     }
 
-    /// The time of it in s.
+    /// In s since the start.
     pub fn now(&self) -> f64 {
         let period = self.settings.period;
         period.time_of(self.moment.tick.tick).seconds().0
     }
 
-    /// The past as it was seen.
     pub fn trail(&self) -> impl Iterator<Item = &ForcePoint> + Clone {
         self.trail.iter()
     }
 
-    /// How the loop kept its time.
     pub fn kept(&self) -> &Kept {
-        &self.kept
+        &self.timing
     }
 
-    /// The priority that the system gave.
+    /// As granted by the system.
     pub fn priority(&self) -> &str {
         &self.priority
     }
@@ -258,9 +248,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_poke_computed_ahead_is_as_deep_as_the_hand_goes_and_ends_above() {
+    fn a_computed_poke_is_as_deep_as_the_hand_and_ends_above() {
         let settings = SceneSettings { nodes: 41, max_shear_mm: 1.5, ..SceneSettings::default() };
-        let poke = || ahead(settings, ScenePath::Poke, &mut |_| true).unwrap();
+        let poke = || compute_path(settings, ScenePath::Poke, &mut |_| true).unwrap();
         let one = poke();
         let deepest = &one.deepest.tick;
         // The hand goes 8 mm deep; the force holds the stylus back.
@@ -274,7 +264,7 @@ mod tests {
         let again = poke();
         assert_eq!(one.trail, again.trail);
         assert_eq!(one.deepest.heights, again.deepest.heights);
-        let cut = ahead(settings, ScenePath::Poke, &mut |share| share < 0.5);
+        let cut = compute_path(settings, ScenePath::Poke, &mut |share| share < 0.5);
         assert!(cut.unwrap_err().contains("before it was done"));
     }
 }

@@ -48,9 +48,7 @@ impl<T: Send + 'static> Dialog<T> {
         ctx: &Context,
         pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
     ) -> Result<(), String> {
-        let ctx = ctx.clone();
-        let pick = move || pick(FileDialog::new());
-        let opened = self.job.start("dialog", pick, move || ctx.request_repaint());
+        let opened = self.job.start("dialog", ctx, move || pick(FileDialog::new()));
         opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
 

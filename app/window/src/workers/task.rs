@@ -48,13 +48,8 @@ impl<T: Send + 'static> BackgroundTask<T> {
             return;
         }
         self.progress = Arc::default();
-        let (progress, wake) = (Arc::clone(&self.progress), ctx.clone());
-        let started = self.job.start(
-            name,
-            move || logged(|| work(&progress)),
-            move || wake.request_repaint(),
-        );
-        match started {
+        let progress = Arc::clone(&self.progress);
+        match self.job.start(name, ctx, move || logged(|| work(&progress))) {
             Ok(()) => self.since = Some(Stopwatch::start()),
             Err(err) => {
                 self.answer = Some(Err(format!("the work cannot be started: {err}")));
@@ -100,7 +95,6 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.job.is_busy() && self.progress.is_cancelled()
     }
 
-    /// The last answer.
     pub fn answer(&self) -> Option<&Result<T, String>> {
         self.answer.as_ref()
     }

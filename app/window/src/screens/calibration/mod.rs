@@ -2,15 +2,14 @@
 
 mod plots;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use crate::command::{CommandQueue, UserCommand};
-use crate::shell::palette::PaletteAction;
+use super::screen::{
+    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
+};
 use crate::widgets::{
     NamedControl, alarm_ui, answer_ui, fact_ui, form_label, placeholder_ui, quiet_ui,
     reason_button, require, section_ui, sentence_ui, small_alarm_ui,
 };
-use crate::workbench::Workbench;
-use crate::workers::task::BackgroundTask;
+use crate::workers::BackgroundTask;
 use eframe::egui::{Button, Context, Key, TextEdit, Ui, vec2};
 use palpate_analysis::calibrations::{Shelved, Shown, keep, read};
 use palpate_analysis::report::calibration::Entry;
@@ -20,7 +19,6 @@ use palpate_protocols::engine::EndingKind;
 use palpate_runner::RunView;
 use std::path::{Path, PathBuf};
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
     purpose: "volts to newtons: which calibrations there are",
@@ -28,7 +26,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),
 };
 
-/// The screen's state.
 pub struct CalibrationScreen {
     library: Result<PathBuf, String>,
     /// The rig's own, which needs no library, and the rig's name.
@@ -208,9 +205,7 @@ impl Screen for CalibrationScreen {
 
     /// New sessions are read with the calibration that is chosen.
     fn work(&mut self, _ctx: &Context, workbench: &mut Workbench) {
-        let Ok(calibration) = self.usable(workbench).cloned() else {
-            return;
-        };
+        let Ok(calibration) = self.usable(workbench).cloned() else { return };
         if let Ok(curve) = calibration.curve() {
             workbench.bench.calibration = calibration;
             workbench.bench.curve = curve;

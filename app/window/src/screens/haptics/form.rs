@@ -1,10 +1,10 @@
 //! The material, the device, the loop and the hand as typed.
 
-use crate::screens::haptics::OfferedSessions;
 use crate::widgets::{
     NamedControl, QuantityField, check_rate, form_label, quantity_ui, quiet_ui, require,
     section_ui, text_row,
 };
+use crate::workbench::ScreenOffers;
 use eframe::egui::{Button, Ui};
 use palpate_analysis::haptics::{Setting, THESIS};
 use palpate_haptics::{DriveKind, Period, TorqueSettings};
@@ -94,7 +94,7 @@ impl HapticsForm {
     }
 
     /// Draws the fields; true when the button of the session dialog is pressed.
-    pub fn ui(&mut self, ui: &mut Ui, offered: &OfferedSessions<'_>) -> bool {
+    pub fn ui(&mut self, ui: &mut Ui, offers: &ScreenOffers) -> bool {
         section_ui(ui, "Material");
         text_row(ui, "body", "a session's folder, a table, or thesis", &mut self.body);
         let mut is_dialog_pressed = false;
@@ -102,7 +102,7 @@ impl HapticsForm {
             if ui.button("Source thesis").clicked() {
                 self.body = THESIS.into();
             }
-            for (name, session) in [("In review", offered.review), ("In library", offered.library)]
+            for (name, session) in [("In review", &offers.review), ("In library", &offers.library)]
             {
                 let button = ui.add_enabled(session.is_some(), Button::new(name));
                 if let (true, Some(session)) = (button.clicked(), session) {

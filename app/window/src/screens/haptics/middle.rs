@@ -22,19 +22,22 @@ pub(super) enum View {
 const HEAD: f32 = 52.0;
 
 impl HapticsScreen {
-    /// The plots.
     pub fn draw_middle(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             for (view, name) in [(View::Margin, "Before play"), (View::Live, "Live")] {
                 ui.selectable_value(&mut self.view, view, name).named(name);
             }
         });
-        match (self.view, &self.feel) {
-            (View::Live, Some(feel)) => live_ui(ui, feel),
+        match (self.view, &self.live_loop) {
+            (View::Live, Some(live_loop)) => live_ui(ui, live_loop),
             (View::Live, None) => placeholder_ui(ui, "the loop has not run yet"),
-            (View::Margin, feel) => {
+            (View::Margin, live_loop) => {
                 if let Some(check) = answer_ui(ui, &self.task, "nothing checked yet") {
-                    before_ui(ui, check, feel.as_ref().filter(|feel| feel.is_running()));
+                    before_ui(
+                        ui,
+                        check,
+                        live_loop.as_ref().filter(|live_loop| live_loop.is_running()),
+                    );
                 }
             }
         }
@@ -50,7 +53,7 @@ fn before_ui(ui: &mut Ui, check: &HapticsCheck, running: Option<&HapticLoop>) {
             curve: &checked.curve,
             has: 1e3 * checked.margin.worst.has,
             cycles: &checked.margin.cycles,
-            now: running.map(|feel| feel.last().snapshot.depth.0),
+            now: running.map(|live_loop| live_loop.last().snapshot.depth.0),
         };
         margin_ui(ui, &picture);
     });
@@ -85,10 +88,10 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
     plot_ui(ui, id, &plot, PlotLook { shown: Some([from, to]), ..PlotLook::default() });
 }
 
-fn live_ui(ui: &mut Ui, feel: &HapticLoop) {
-    let end = feel.last().t.0.max(PAST_S);
+fn live_ui(ui: &mut Ui, live_loop: &HapticLoop) {
+    let end = live_loop.last().t.0.max(PAST_S);
     let curve = |name, ink: Ink, of: fn(&TrailPoint) -> f64| {
-        Series::line(name, ink, 1.4, feel.trail().map(|point| [point.t, of(point)]).collect())
+        Series::line(name, ink, 1.4, live_loop.trail().map(|point| [point.t, of(point)]).collect())
     };
     let model = curve("force of the model", Ink::Quiet, |point| point.model);
     let force = curve("force commanded", Ink::Series, |point| point.force);

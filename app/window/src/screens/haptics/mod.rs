@@ -5,19 +5,16 @@ mod form;
 mod middle;
 mod right;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use super::tape::TapePanel;
-use crate::command::{CommandQueue, UserCommand};
-use crate::shell::palette::PaletteAction;
-use crate::widgets::{
-    NamedControl, alarm_ui, form_label, quiet_ui, reason_button, require, section_ui, tick_box,
-    work_ui,
+use super::screen::{
+    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
 };
-use crate::workbench::Workbench;
+use super::tape::{TapePanel, loop_button_ui};
+use crate::widgets::{
+    NamedControl, alarm_ui, form_label, quiet_ui, require, section_ui, tick_box, work_ui,
+};
 use crate::workers::haptic_loop::HapticLoop;
-use crate::workers::path_dialog::PathPurpose;
-use crate::workers::task::BackgroundTask;
-use eframe::egui::{Button, Context, Key, Slider, Ui, vec2};
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Slider, Ui};
 use form::HapticsForm;
 use middle::View;
 use palpate_analysis::haptics::{Checked, Setting, body_of, check};
@@ -29,13 +26,6 @@ use std::path::{Path, PathBuf};
 /// How far above the surface a hand can be led, in mm.
 const ABOVE: f64 = 2.0;
 
-/// Sessions in front on other screens.
-#[derive(Clone, Copy, Debug)]
-pub struct OfferedSessions<'a> {
-    pub review: Option<&'a Path>,
-    pub library: Option<&'a Path>,
-}
-
 /// A material on a device, checked.
 pub struct HapticsCheck {
     source: PathBuf,
@@ -44,7 +34,6 @@ pub struct HapticsCheck {
     pub checked: Checked,
 }
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
     purpose: "feel a material through a device: stability margin, limit cycle and loop",
@@ -52,13 +41,12 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(HapticsScreen::default()),
 };
 
-/// The screen's state.
 #[derive(Default)]
 pub struct HapticsScreen {
     form: HapticsForm,
     is_open: bool,
     task: BackgroundTask<HapticsCheck>,
-    feel: Option<HapticLoop>,
+    live_loop: Option<HapticLoop>,
     refusal: Option<String>,
     tape: TapePanel,
     view: View,
@@ -66,7 +54,7 @@ pub struct HapticsScreen {
 
 impl HapticsScreen {
     pub fn is_running(&self) -> bool {
-        self.feel.as_ref().is_some_and(HapticLoop::is_running)
+        self.live_loop.as_ref().is_some_and(HapticLoop::is_running)
     }
 
     /// The last check.
@@ -76,7 +64,7 @@ impl HapticsScreen {
 
     /// The loop that runs or ran last.
     pub fn feel(&self) -> Option<&HapticLoop> {
-        self.feel.as_ref()
+        self.live_loop.as_ref()
     }
 
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
@@ -109,8 +97,8 @@ impl HapticsScreen {
             HapticLoop::start(&settings, setting.speed, recorder)
         });
         match started {
-            Ok(feel) => {
-                self.feel = Some(feel);
+            Ok(live_loop) => {
+                self.live_loop = Some(live_loop);
                 self.view = View::Live;
                 self.refusal = None;
             }
@@ -130,34 +118,25 @@ impl HapticsScreen {
         if let Some(reason) = &self.refusal {
             alarm_ui(ui, reason);
         }
-        let size = vec2(170.0, 34.0);
-        if is_running {
-            let stop = Button::new("Stop the loop").min_size(size);
-            if ui.add(stop).named("Stop the loop").clicked() {
-                commands.push(UserCommand::LoopStop);
-            }
-        } else {
-            let may = verdict.clone().and_then(|()| self.checked().map(|_| ()));
-            if reason_button(ui, "Start the loop", size, &may) {
-                commands.push(UserCommand::LoopStart);
-            }
-        }
+        let verdict = verdict.clone().and_then(|()| self.checked().map(|_| ()));
+        let both = [UserCommand::LoopStart, UserCommand::LoopStop];
+        loop_button_ui(ui, "loop", is_running, &verdict, both, commands);
         let answer = self.task.answer().filter(|_| is_running);
-        let (Some(feel), Some(Ok(check))) = (&self.feel, answer) else { return };
+        let (Some(live_loop), Some(Ok(check))) = (&self.live_loop, answer) else { return };
         let deepest = check.setting.deepest.0;
-        let mut place = feel.place();
+        let mut place = live_loop.place();
         ui.horizontal(|ui| {
             let label = form_label(ui, "hand");
             let slider = Slider::new(&mut place, -ABOVE..=deepest).step_by(0.1).suffix(" mm");
             let slider = ui.add(slider).labelled_by(label.id).named("hand");
             if slider.changed() {
-                feel.lead(place);
+                live_loop.lead(place);
             }
         });
         ui.horizontal(|ui| {
             for (name, place) in [("Ramp and hold", deepest), ("Lift off", -ABOVE)] {
                 if ui.button(name).named(name).clicked() {
-                    feel.lead(place);
+                    live_loop.lead(place);
                 }
             }
         });
@@ -169,14 +148,10 @@ impl HapticsScreen {
 
 impl Screen for HapticsScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
-        let offered = OfferedSessions {
-            review: workbench.front.review.as_deref(),
-            library: workbench.front.library.as_deref(),
-        };
         // A running loop keeps the setting that was checked.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
-            if self.form.ui(ui, &offered) {
+            if self.form.ui(ui, &workbench.front) {
                 commands.push(UserCommand::Choose(PathPurpose::Body));
             }
         });
@@ -199,7 +174,7 @@ impl Screen for HapticsScreen {
         self.task.poll();
         self.form.check();
         self.tape.poll();
-        if let Some(Err(reason)) = self.feel.as_mut().map(HapticLoop::poll) {
+        if let Some(Err(reason)) = self.live_loop.as_mut().map(HapticLoop::poll) {
             self.refusal = Some(reason);
             self.tape.cut_off();
         }
@@ -256,7 +231,7 @@ impl Screen for HapticsScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(beat) = self.feel.as_mut().and_then(HapticLoop::stop) {
+        if let Some(beat) = self.live_loop.as_mut().and_then(HapticLoop::stop) {
             self.tape.end(move || beat.end().and_then(recorded));
         }
     }

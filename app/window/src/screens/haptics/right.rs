@@ -1,9 +1,8 @@
 //! Force, stability margin and timing of the loop.
 
 use super::{HapticsCheck, HapticsScreen};
-use crate::theme::Tokens;
 use crate::widgets::{
-    alarm_ui, fact_ui, loop_times_ui, placeholder_ui, quiet_ui, section_ui, sentences_ui,
+    alarm_ui, fact_ui, loop_times_ui, placeholder_ui, quiet_ui, section_ui, sentences_ui, tokens_of,
 };
 use crate::workers::haptic_loop::HapticLoop;
 use eframe::egui::{Label, RichText, Ui};
@@ -11,9 +10,9 @@ use palpate_analysis::report::haptics::{margin_text, tried_text, why_less};
 
 impl HapticsScreen {
     pub fn draw_right(&self, ui: &mut Ui) {
-        if let Some(feel) = &self.feel {
-            force_ui(ui, feel);
-            loop_ui(ui, feel);
+        if let Some(live_loop) = &self.live_loop {
+            force_ui(ui, live_loop);
+            loop_ui(ui, live_loop);
         }
         section_ui(ui, "Before play");
         match self.task.answer() {
@@ -24,8 +23,8 @@ impl HapticsScreen {
     }
 }
 
-fn force_ui(ui: &mut Ui, feel: &HapticLoop) {
-    let seen = &feel.last().snapshot;
+fn force_ui(ui: &mut Ui, live_loop: &HapticLoop) {
+    let seen = &live_loop.last().snapshot;
     section_ui(ui, "Force");
     let now = format!("{:.2} N at {:.2} mm", seen.force.0, seen.depth.0);
     ui.label(RichText::new(now).heading().monospace());
@@ -33,11 +32,11 @@ fn force_ui(ui: &mut Ui, feel: &HapticLoop) {
     fact_ui(ui, "torque", format!("{:.1} N mm", seen.torque));
     fact_ui(ui, "winding", format!("{:.0} °C", seen.winding_c));
     section_ui(ui, "Why no force?");
-    if !feel.is_running() {
+    if !live_loop.is_running() {
         ui.label("the loop does not run");
         return;
     }
-    let causes = why_less(feel.flags(), feel.missed());
+    let causes = why_less(live_loop.flags(), live_loop.missed());
     if causes.is_empty() {
         placeholder_ui(ui, "nothing reduces it");
     }
@@ -46,9 +45,9 @@ fn force_ui(ui: &mut Ui, feel: &HapticLoop) {
     }
 }
 
-fn loop_ui(ui: &mut Ui, feel: &HapticLoop) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let seen = &feel.last().snapshot;
+fn loop_ui(ui: &mut Ui, live_loop: &HapticLoop) {
+    let tokens = tokens_of(ui);
+    let seen = &live_loop.last().snapshot;
     section_ui(ui, "Margin and guard");
     ui.add(Label::new(margin_text(&seen.margin)).wrap());
     fact_ui(ui, "added", format!("{:.2} N s/m of damping", 1e3 * seen.damping));
@@ -66,9 +65,9 @@ fn loop_ui(ui: &mut Ui, feel: &HapticLoop) {
         }
     }
     section_ui(ui, "Loop");
-    fact_ui(ui, "target", format!("{:.0} ticks a second", feel.rate_hz()));
-    fact_ui(ui, "priority", feel.priority());
-    loop_times_ui(ui, feel.kept());
+    fact_ui(ui, "target", format!("{:.0} ticks a second", live_loop.rate_hz()));
+    fact_ui(ui, "priority", live_loop.priority());
+    loop_times_ui(ui, live_loop.kept());
 }
 
 fn check_ui(ui: &mut Ui, check: &HapticsCheck) {

@@ -4,7 +4,7 @@
 use crate::widgets::{
     progress_ui, quiet_ui, reason_button, require, section_ui, small_alarm_ui, text_row,
 };
-use crate::workers::task::BackgroundTask;
+use crate::workers::BackgroundTask;
 use eframe::egui::{Button, Context, Key, Modifiers, Popup, Ui, vec2};
 use palpate_analysis::edits::{Act, Said, Saying, author, say, take_back};
 use palpate_sessions::edits::{Decision, Verdict};
@@ -151,28 +151,22 @@ impl EditPanel {
         }
         text_row(ui, "reason", "of a verdict or a review", &mut self.reason);
         let needs_reason = needs(&self.reason, "the reason");
-        ui.horizontal_wrapped(|ui| {
-            for (name, verdict) in [
-                ("Valid", Verdict::Valid),
-                ("Suspect", Verdict::Suspect),
-                ("Rejected", Verdict::Rejected),
-            ] {
-                if pressed(ui, name, needs_reason.is_ok()) {
-                    edit = Some(Saying::Verdict(verdict, self.reason.clone()));
-                }
-            }
-        });
-        ui.horizontal_wrapped(|ui| {
-            for (name, decision) in [
-                ("Accept", Decision::Accepted),
-                ("Reject", Decision::Rejected),
-                ("Repeat", Decision::Repeat),
-            ] {
-                if pressed(ui, name, needs_reason.is_ok()) {
-                    edit = Some(Saying::Review(decision, self.reason.clone()));
-                }
-            }
-        });
+        let verdicts = [
+            ("Valid", Verdict::Valid),
+            ("Suspect", Verdict::Suspect),
+            ("Rejected", Verdict::Rejected),
+        ];
+        if let Some(verdict) = choice_buttons(ui, verdicts, needs_reason.is_ok()) {
+            edit = Some(Saying::Verdict(verdict, self.reason.clone()));
+        }
+        let decisions = [
+            ("Accept", Decision::Accepted),
+            ("Reject", Decision::Rejected),
+            ("Repeat", Decision::Repeat),
+        ];
+        if let Some(decision) = choice_buttons(ui, decisions, needs_reason.is_ok()) {
+            edit = Some(Saying::Review(decision, self.reason.clone()));
+        }
         if let Err(reason) = &needs_reason {
             quiet_ui(ui, format!("Verdict and review: {reason}"));
         }
@@ -232,9 +226,18 @@ fn button(ui: &mut Ui, text: &str, verdict: &Result<(), String>) -> bool {
     reason_button(ui, text, vec2(96.0, BUTTON), verdict)
 }
 
-fn pressed(ui: &mut Ui, text: &str, is_enabled: bool) -> bool {
-    let button = Button::new(text).min_size(vec2(64.0, BUTTON));
-    ui.add_enabled(is_enabled, button).clicked()
+/// Draws buttons in a row; returns the choice of the one that was pressed.
+fn choice_buttons<T>(ui: &mut Ui, choices: [(&str, T); 3], is_enabled: bool) -> Option<T> {
+    let mut chosen = None;
+    ui.horizontal_wrapped(|ui| {
+        for (name, choice) in choices {
+            let button = Button::new(name).min_size(vec2(64.0, BUTTON));
+            if ui.add_enabled(is_enabled, button).clicked() {
+                chosen = Some(choice);
+            }
+        }
+    });
+    chosen
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! Export of the sessions chosen as tables or into a lake.
 
 use crate::widgets::{choice_ui, quiet_ui, require, section_ui, small_alarm_ui, task_ui, text_row};
-use crate::workers::path_dialog::Dialog;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, Dialog};
 use eframe::egui::Ui;
 use palpate_analysis::exports::{Destination, Exported, export_all};
 use palpate_tables::export::Format;
@@ -40,7 +39,6 @@ pub(super) struct FilesPanel {
 }
 
 impl FilesPanel {
-    /// Fetches answers that have come.
     pub fn poll(&mut self) {
         self.task.poll();
         if let Some(folder) = self.dialog.poll() {

@@ -83,7 +83,6 @@ impl SearchForm {
         *self = Self { order: self.order, is_reversed: self.is_reversed, ..Self::default() };
     }
 
-    /// Draws the fields.
     pub fn ui(&mut self, ui: &mut Ui, choices: &Choices) {
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
         text_row(ui, "find", "words, depth>=20mm", &mut self.line);

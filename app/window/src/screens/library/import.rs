@@ -1,8 +1,7 @@
 //! Import of files of other programs as sessions of the library.
 
 use crate::widgets::{progress_ui, quiet_ui, require, section_ui, small_alarm_ui, text_row};
-use crate::workers::path_dialog::Dialog;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, Dialog};
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
 use palpate_analysis::imports::{Request, import_and_tell};
 use palpate_model::about::Labels;

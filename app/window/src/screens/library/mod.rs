@@ -9,12 +9,9 @@ mod import;
 mod list;
 mod session;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use crate::command::{CommandQueue, UserCommand};
+use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
 use crate::widgets::{progress_ui, quiet_ui, reason_button, require, section_ui, small_alarm_ui};
-use crate::workbench::Workbench;
-use crate::workers::latest::LatestAnswer;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, LatestAnswer};
 use edits::EditPanel;
 use eframe::egui::{Context, Key, Label, RichText, TextStyle, Ui, vec2};
 use files::FilesPanel;
@@ -26,7 +23,6 @@ use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Library",
     purpose: "find sessions",
@@ -43,15 +39,6 @@ const SHORT_S: f64 = 1.0;
 /// Sessions on the review screen.
 const REVIEW_MAX: usize = 50;
 
-/// The result of a search, above the list.
-#[derive(Debug, Default)]
-struct Heading {
-    count: usize,
-    seconds: f64,
-    doubts: Vec<String>,
-    remarks: Vec<String>,
-}
-
 /// Notes and history of the session chosen.
 struct SessionDetails {
     folder: String,
@@ -60,7 +47,6 @@ struct SessionDetails {
     history: Option<Result<Told, String>>,
 }
 
-/// The screen's state.
 pub struct LibraryScreen {
     library: Result<PathBuf, String>,
     form: SearchForm,
@@ -75,7 +61,7 @@ pub struct LibraryScreen {
     update: BackgroundTask<Changes>,
     is_update_wanted: bool,
     choices: Choices,
-    heading: Option<Result<Heading, String>>,
+    found: Option<Result<Found, String>>,
     list: SessionList,
     /// Folders of the sessions chosen, and the number of the choice: thousands are not joined in every frame.
     chosen: (u64, Rc<Vec<PathBuf>>),
@@ -101,7 +87,7 @@ impl LibraryScreen {
             update: BackgroundTask::default(),
             is_update_wanted: false,
             choices: Choices::default(),
-            heading: None,
+            found: None,
             list: SessionList::default(),
             chosen: (0, Rc::default()),
             edits: EditPanel::default(),
@@ -191,11 +177,11 @@ impl LibraryScreen {
     }
 
     fn heading_ui(&self, ui: &mut Ui) {
-        match &self.heading {
+        match &self.found {
             None => quiet_ui(ui, "searching"),
             Some(Err(err)) => small_alarm_ui(ui, err),
-            Some(Ok(heading)) => {
-                let sessions = match heading.count {
+            Some(Ok(found)) => {
+                let sessions = match self.list.count() {
                     1 => "1 session".to_owned(),
                     count => format!("{count} sessions"),
                 };
@@ -205,12 +191,12 @@ impl LibraryScreen {
                 };
                 let text = format!(
                     "{sessions}{chosen}, found in {:.0} ms",
-                    (heading.seconds * 1e3).max(1.0)
+                    (found.seconds * 1e3).max(1.0)
                 );
                 ui.label(RichText::new(text).text_style(TextStyle::Heading).strong());
-                let remarks = heading.doubts.iter().chain(&heading.remarks);
+                let remarks = found.doubts.iter().chain(&found.remarks);
                 remarks.for_each(|remark| small_alarm_ui(ui, remark));
-                if heading.count == 0 && !self.is_busy() {
+                if self.list.count() == 0 && !self.is_busy() {
                     quiet_ui(ui, "No session matches the search.");
                 }
             }
@@ -302,20 +288,15 @@ impl Screen for LibraryScreen {
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         self.is_back |= !std::mem::take(&mut self.was_shown);
-        if let Some(found) = self.search.poll(ctx) {
+        if let Some(mut answer) = self.search.poll(ctx) {
             self.searches += 1;
-            self.heading = Some(found.map(|mut found| {
-                self.list.take(&mut found);
-                self.choices = found.choices;
+            if let Ok(found) = &mut answer {
+                self.list.take(found);
+                self.choices = std::mem::take(&mut found.choices);
                 // A damaged catalog was replaced by an empty one.
                 self.is_update_wanted |= !found.remarks.is_empty();
-                Heading {
-                    count: self.list.count(),
-                    seconds: found.seconds,
-                    doubts: found.doubts,
-                    remarks: found.remarks,
-                }
-            }));
+            }
+            self.found = Some(answer);
         }
         if let Some(Ok(entries)) = self.pages.poll(ctx) {
             self.list.learn(entries);

@@ -1,10 +1,9 @@
 //! Facts of the sessions chosen.
 
 use super::list::{health, review, second, verdict};
-use crate::theme::Tokens;
 use crate::widgets::{
     GLYPH_RADIUS, GLYPH_WIDTH, Glyph, fact_name_ui, fact_ui, glyph_at, quiet_ui, section_ui,
-    small_alarm_ui, small_ui,
+    small_alarm_ui, small_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_analysis::find::Told;
@@ -22,7 +21,7 @@ const HISTORY: f32 = 150.0;
 
 /// A fact with a glyph before its word.
 fn marked_ui(ui: &mut Ui, name: &str, mark: Glyph, word: &str, is_wrong: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let ink = if is_wrong { tokens.alarm_text } else { tokens.text };
     ui.horizontal_top(|ui| {
         fact_name_ui(ui, name);

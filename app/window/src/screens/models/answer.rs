@@ -1,10 +1,9 @@
 //! A comparison of models, drawn.
 
 use crate::plots::figure::{PlotLook, plot_ui};
-use crate::theme::Tokens;
 use crate::widgets::{
     Column, Emphasis, TableRow, fact_ui, heading_ui, placeholder_ui, quiet_ui, section_ui,
-    sentences_ui, small_ui, table_ui,
+    sentences_ui, small_ui, table_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
@@ -90,7 +89,7 @@ fn hint(one: &Candidate) -> String {
 
 /// Draws the choice in words, what each term buys, and the recordings.
 pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let selection = &selected.selection;
     section_ui(ui, "Choice");
     sentences_ui(ui, &selection.verdict.sentences);

@@ -2,10 +2,9 @@
 
 use crate::command::{CommandQueue, UserCommand};
 use crate::widgets::{
-    NamedControl, choice_ui, form_label, placeholder_ui, quiet_ui, require, small_alarm_ui,
-    tick_box,
+    NamedControl, choice_ui, form_label, placeholder_ui, quiet_ui, require, tick_box, tolerance_ui,
 };
-use crate::workers::path_dialog::PathPurpose;
+use crate::workers::PathPurpose;
 use eframe::egui::{Button, Label, TextEdit, Ui};
 use palpate_analysis::select::SelectRequest;
 use palpate_analysis::source::Stretch;
@@ -139,19 +138,8 @@ impl ModelsForm {
     }
 
     pub(super) fn choices_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "tolerance");
-            let input = TextEdit::singleline(&mut self.tolerance)
-                .desired_width(96.0)
-                .char_limit(24)
-                .hint_text("none");
-            ui.add(input).labelled_by(label.id).named("tolerance");
-        });
-        match self.tolerance() {
-            Err(reason) => small_alarm_ui(ui, reason),
-            Ok(None) => quiet_ui(ui, "none: information criteria alone decide"),
-            Ok(Some(tolerance)) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
-        }
+        let without = Some("none: information criteria alone decide");
+        tolerance_ui(ui, &mut self.tolerance, without);
         choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
         tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
     }

@@ -5,16 +5,12 @@ mod form;
 
 pub use form::ModelsForm;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use crate::command::{CommandQueue, UserCommand};
+use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
 use crate::widgets::{answer_ui, placeholder_ui, section_ui, work_ui};
-use crate::workbench::Workbench;
-use crate::workers::path_dialog::PathPurpose;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
 use palpate_analysis::select::{Selected, select_sources};
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
     purpose: "how much model a recording needs",
@@ -22,7 +18,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(ModelsScreen::default()),
 };
 
-/// The screen's state.
 #[derive(Default)]
 pub struct ModelsScreen {
     form: ModelsForm,
@@ -86,9 +81,7 @@ impl Screen for ModelsScreen {
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        let Ok(request) = self.form.request() else {
-            return;
-        };
+        let Ok(request) = self.form.request() else { return };
         self.task.start("select", ctx, move |progress| {
             select_sources(request, progress).map_err(|err| err.to_string())
         });

@@ -8,8 +8,7 @@ mod report;
 use super::Looked;
 use crate::command::CommandQueue;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, task_ui, text_row};
-use crate::workers::Job;
-use crate::workers::task::BackgroundTask;
+use crate::workers::{BackgroundTask, Job};
 use eframe::egui::{Context, Ui};
 use form::AnalysisForm;
 use palpate_analysis::analyses::{Deed, Done, Known, Who, own, read};
@@ -104,19 +103,14 @@ impl AnalysesPanel {
         self.report.span = cursors.map(|[a, b]| [a.min(b), a.max(b)]);
     }
 
-    /// Puts a stretch of time, in s since the first sample, into the form that leaves stretches out.
-    pub fn propose_span(&mut self, from: f64, until: f64) {
-        self.form.propose_span(from, until);
-    }
-
     fn read_again(&mut self, ctx: &Context) {
         let Some(session) = self.front.clone() else { return };
-        let (library, wake) = (self.library.clone(), ctx.clone());
+        let library = self.library.clone();
         let work = move || {
             let known = read(&session, library.as_deref());
             (session, known)
         };
-        if let Err(err) = self.reading.start("analyses", work, move || wake.request_repaint()) {
+        if let Err(err) = self.reading.start("analyses", ctx, work) {
             self.known = Some(Err(format!("the session cannot be read: {err}")));
         }
     }

@@ -5,8 +5,7 @@ use super::ReviewScreen;
 use super::middle::head_ui;
 use super::subject::ReviewSubject;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
-use crate::theme::Tokens;
-use crate::widgets::{Column, TableRow, quiet_ui, table_ui, tick_box};
+use crate::widgets::{Column, TableRow, quiet_ui, table_ui, tick_box, tokens_of};
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};
 
@@ -119,15 +118,13 @@ impl ReviewScreen {
 
     /// The loops of the session in front, from the first cycle to the last.
     fn loops_ui(&mut self, ui: &mut Ui) {
-        let Some(front) = self.subjects.first() else {
-            return;
-        };
+        let Some(front) = self.subjects.first() else { return };
         let all = cycles(front);
         if all.is_empty() {
             quiet_ui(ui, format!("{} has no cycles", front.name));
             return;
         }
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let colors: Vec<Color32> =
             (0..all.len()).map(|index| tokens.in_order(index, all.len())).collect();
         ui.horizontal_wrapped(|ui| {

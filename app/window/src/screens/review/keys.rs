@@ -46,7 +46,6 @@ impl ReviewScreen {
         }
     }
 
-    /// Reads the keys.
     pub(super) fn read_keys(&mut self, ctx: &Context) {
         if ctx.egui_wants_keyboard_input() {
             return;

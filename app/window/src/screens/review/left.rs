@@ -5,11 +5,11 @@ use crate::command::{CommandQueue, UserCommand};
 use crate::screens::library;
 use crate::theme::Tokens;
 use crate::widgets::{
-    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, task_ui, text_row,
-    tick_box,
+    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, share_ui, task_ui,
+    text_row, tick_box, tokens_of,
 };
 use crate::workers::review::{Quantity, Stage, TimeOrigin};
-use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, Ui, vec2};
+use eframe::egui::{Button, Color32, Label, RichText, Sense, Ui, vec2};
 use std::path::PathBuf;
 
 /// A button of a session.
@@ -39,9 +39,7 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
         Stage::Whole => return None,
         Stage::Waiting => quiet_ui(ui, "waiting to be read"),
         Stage::Reading => {
-            let tokens = Tokens::of(ui.visuals().dark_mode);
-            let bar = ProgressBar::new(share as f32).desired_height(8.0);
-            ui.add(bar.fill(tokens.text_quiet));
+            share_ui(ui, share);
             ui.horizontal(|ui| {
                 quiet_ui(ui, format!("still reading {:.0} %", 100.0 * share));
                 let cancel = format!("cancel: {}", subject.name);
@@ -102,7 +100,7 @@ impl ReviewScreen {
     }
 
     fn sessions_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         if self.subjects.is_empty() {
             quiet_ui(ui, "none yet: choose sessions in the library, or type the path of one");
         }

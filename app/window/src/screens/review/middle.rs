@@ -7,8 +7,7 @@ use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
-use crate::theme::Tokens;
-use crate::widgets::{heading_ui, quiet_ui, sentence_ui};
+use crate::widgets::{heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
 use eframe::egui::{Ui, vec2};
 use palpate_model::signal::track::Track;
@@ -121,7 +120,7 @@ impl ReviewScreen {
             quiet_ui(ui, "choose on the left what is shown");
             return;
         }
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let width = ui.available_width();
         let scale = f64::from(ui.ctx().pixels_per_point());
         let pixels = (f64::from((width - AXIS_WIDTH).max(64.0)) * scale).round();
@@ -138,9 +137,7 @@ impl ReviewScreen {
             }
             subject.update_fit(line_window);
         }
-        let Some(front) = self.front() else {
-            return;
-        };
+        let Some(front) = self.front() else { return };
         let setting = self.backdrop(front);
         let time_axis = format!("time from {} (s)", self.time_origin.name());
         let height = ((ui.available_height() - AXIS_HEIGHT) / count as f32).max(40.0);
@@ -189,7 +186,7 @@ impl ReviewScreen {
     }
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let cursors = |track: &Track, shift: f64| {
             self.cursors.map(|cursor| {
                 let place = track.place(cursor? + shift)?;

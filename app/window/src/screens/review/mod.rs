@@ -13,20 +13,17 @@ mod subject;
 
 use subject::ReviewSubject;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use crate::command::{CommandQueue, UserCommand};
+use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_depth::DepthLines;
 use crate::widgets::ModelChoice;
-use crate::workbench::Workbench;
+use crate::workers::BackgroundTask;
 use crate::workers::review::fit::{FitAnswer, SessionPrediction};
 use crate::workers::review::{Quantity, TimeOrigin};
-use crate::workers::task::BackgroundTask;
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Key, Ui};
 use std::path::PathBuf;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
     purpose: "look at sessions: one closely, several beside each other",
@@ -126,7 +123,12 @@ impl ReviewScreen {
         self.view = view;
     }
 
-    /// Whether nothing is being read, fitted or source for.
+    /// Whether samples of any session have arrived.
+    pub fn has_samples(&self) -> bool {
+        self.subjects.iter().any(|one| one.recording.track.len() > 0)
+    }
+
+    /// Whether nothing is being read, fitted or searched for.
     pub fn is_settled(&self) -> bool {
         let is_working = self.fits.is_busy() || self.prediction.is_busy();
         let is_read = self.subjects.iter().all(ReviewSubject::is_settled);

@@ -6,8 +6,7 @@ use super::middle::head_ui;
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
 use crate::plots::stretches::LineWindow;
-use crate::theme::Tokens;
-use crate::widgets::{alarm_ui, quiet_ui, require, task_ui};
+use crate::widgets::{alarm_ui, quiet_ui, require, task_ui, tokens_of};
 use crate::workers::review::Quantity;
 use crate::workers::review::fit::{MODELLED, RESIDUAL, SessionPrediction, predict};
 use eframe::egui::{Ui, vec2};
@@ -49,7 +48,7 @@ impl ReviewScreen {
     }
 
     fn prediction_plots(&mut self, ui: &mut Ui, found: &SessionPrediction, index: usize) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let Some(whole) = found.track.span() else { return };
         let mut span = AxisRange::default();
         span.set_whole(whole);

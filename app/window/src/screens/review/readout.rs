@@ -64,9 +64,7 @@ impl CursorReadout {
 
 impl ReviewScreen {
     pub(super) fn readout_ui(&self, ui: &mut Ui) {
-        let Some(front) = self.front() else {
-            return;
-        };
+        let Some(front) = self.front() else { return };
         if self.cursors == [None; 2] {
             quiet_ui(ui, "set cursors A and B to read values and differences");
             return;

@@ -3,8 +3,7 @@
 use super::ReviewScreen;
 use super::subject::ReviewSubject;
 use crate::screens::exact_fit::exact_ui;
-use crate::theme::Tokens;
-use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui};
+use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, tokens_of};
 use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
@@ -54,7 +53,7 @@ impl ReviewScreen {
 }
 
 fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let names = [
         ("specimen", &facts.specimen),
         ("operator", &facts.operator),
@@ -75,9 +74,10 @@ fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
         None => alarm_ui(ui, "ending: none, the recording was interrupted"),
     }
     let (health, is_well) = facts.health_words();
-    match is_well {
-        true => fact_ui(ui, "health", health),
-        false => alarm_ui(ui, format!("health: {health}")),
+    if is_well {
+        fact_ui(ui, "health", health)
+    } else {
+        alarm_ui(ui, format!("health: {health}"))
     }
     if let Some(calibration) = &facts.calibration {
         let taken = calibration.taken_at.as_deref();
@@ -103,7 +103,7 @@ fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
 /// Draws the events; returns the time of the one that was pressed, for cursor A.
 fn events_ui(ui: &mut Ui, front: &ReviewSubject) -> Option<f64> {
     let facts = front.recording.facts.as_ref()?;
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     section_ui(ui, "Events and notes");
     if facts.events.is_empty() {
         quiet_ui(ui, "none");

@@ -18,7 +18,6 @@ pub struct ReviewSubject {
     pub recording: ReviewRecording,
     /// None before a fit was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
-    /// The points of each quantity, of the modelled force and of what is left.
     pub lines: [Stretches; 6],
     /// Lowest and highest of each quantity, found for so many samples.
     ends: (u64, [Option<[f64; 2]>; 4]),
@@ -76,7 +75,6 @@ impl ReviewSubject {
         is_waiting && self.recording.is_reading()
     }
 
-    /// Reads it again.
     pub fn read_again(&mut self) {
         let version = self.recording.version + 1;
         let analysis = self.source.analysis.as_deref();
@@ -91,10 +89,7 @@ impl ReviewSubject {
 
     /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
     pub fn fifths(&self) -> u64 {
-        match self.is_settled() {
-            true => u64::MAX,
-            false => (self.recording.share() * 5.0) as u64,
-        }
+        if self.is_settled() { u64::MAX } else { (self.recording.share() * 5.0) as u64 }
     }
 
     /// Takes a fit that was made of it.
@@ -103,7 +98,6 @@ impl ReviewSubject {
         self.recording.version += 1;
     }
 
-    /// The fit, if there is one.
     pub fn fitted(&self) -> Option<&SessionFit> {
         self.fit.as_ref()?.as_ref().ok().map(Arc::as_ref)
     }
@@ -151,9 +145,7 @@ impl ReviewSubject {
 
     /// The same of its fit.
     pub fn update_fit(&mut self, window: LineWindow) {
-        let Some(Ok(fit)) = &self.fit else {
-            return;
-        };
+        let Some(Ok(fit)) = &self.fit else { return };
         for (line, column) in [(LINE_MODELLED, fit::MODELLED), (LINE_RESIDUAL, fit::RESIDUAL)] {
             self.lines[line].update(&fit.track, column, window);
         }

@@ -1,13 +1,13 @@
 //! The screen of the rig: its readings in large letters, and manual moves.
 
 use super::rig_panel::rig_ui;
-use super::screen::{Screen, ScreenEntry};
-use crate::command::{CommandQueue, ManualMove, UserCommand};
-use crate::theme::{Tokens, reading_style};
+use super::screen::{CommandQueue, Screen, ScreenEntry, UserCommand, Workbench};
+use crate::command::ManualMove;
+use crate::theme::reading_style;
 use crate::widgets::{
     QuantityField, alarm_ui, placeholder_ui, quantity_ui, reason_button, require, section_ui,
+    tokens_of,
 };
-use crate::workbench::Workbench;
 use eframe::egui::{Button, Grid, Key, Label, RichText, ScrollArea, Ui, vec2};
 use palpate_model::calibration::Curve;
 use palpate_model::rig::Limits;
@@ -15,7 +15,6 @@ use palpate_model::rig::command::position_from_pulses;
 use palpate_model::units::{MmPerS, Seconds};
 use palpate_runner::RigView;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
     purpose: "what the rig reports, and moving it by hand",
@@ -26,7 +25,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 /// Distances of the buttons, in mm; positive towards the tissue.
 const READY: [f64; 8] = [-10.0, -5.0, -1.0, -0.1, 0.1, 1.0, 5.0, 10.0];
 
-/// The screen's state.
 #[derive(Debug)]
 pub struct RigScreen {
     distance: QuantityField,
@@ -69,7 +67,7 @@ impl Screen for RigScreen {
 impl RigScreen {
     fn move_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut CommandQueue) {
         let (rig, verdict) = (&workbench.snapshot.rig, workbench.move_verdict());
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let fastest = rig.description.speed_max.0;
         let furthest = rig.description.travel.0;
         ui.horizontal(|ui| {
@@ -130,16 +128,13 @@ impl RigScreen {
 }
 
 fn values_ui(ui: &mut Ui, rig: &RigView, curve: &Curve) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let none = || "--".to_owned();
     let position = rig.reading.map(|reading| {
         let place = position_from_pulses(reading.pulses, rig.description.mm_per_pulse);
         format!("{:.3} mm", place.0)
     });
-    let place = match rig.is_homed {
-        true => "position from home",
-        false => "counter, home not known",
-    };
+    let place = if rig.is_homed { "position from home" } else { "counter, home not known" };
     Grid::new("values").num_columns(3).spacing(vec2(40.0, 6.0)).show(ui, |ui| {
         for name in ["signal", "force, not tared", place] {
             placeholder_ui(ui, name);

@@ -23,7 +23,7 @@ const PICTURE_SHARE: f32 = 0.52;
 const HEAD: f32 = 24.0;
 
 struct ShownScene<'a> {
-    moment: &'a SceneInstant,
+    instant: &'a SceneInstant,
     trail: Vec<ForcePoint>,
     /// Seconds along the plots.
     shown: [f64; 2],
@@ -33,33 +33,33 @@ struct ShownScene<'a> {
 /// The scene to show, or why there is none; no reason where nothing is computed yet.
 fn shown_scene<'a>(
     side: PictureSource,
-    touch: Option<&'a LiveScene>,
-    ahead: Option<&'a Result<ComputedPath, String>>,
+    live: Option<&'a LiveScene>,
+    computed: Option<&'a Result<ComputedPath, String>>,
 ) -> Result<ShownScene<'a>, Option<&'a str>> {
-    match (side, touch, ahead) {
-        (PictureSource::Live, Some(touch), _) => {
-            let end = touch.now().max(PAST_S);
-            let title = match (touch.is_running(), touch.is_led()) {
+    match (side, live, computed) {
+        (PictureSource::Live, Some(live), _) => {
+            let end = live.now().max(PAST_S);
+            let title = match (live.is_running(), live.is_led()) {
                 (false, _) => "stopped; the last picture",
                 (true, true) => "the path leads the hand",
                 (true, false) => "the pointer and the keys lead the hand",
             };
             Ok(ShownScene {
-                moment: touch.moment(),
-                trail: touch.trail().copied().collect(),
+                instant: live.moment(),
+                trail: live.trail().copied().collect(),
                 shown: [end - PAST_S, end],
                 title: title.to_owned(),
             })
         }
-        (PictureSource::Computed, _, Some(Ok(ahead))) => {
-            let at = ahead.settings.period.time_of(ahead.deepest.tick.tick);
+        (PictureSource::Computed, _, Some(Ok(computed))) => {
+            let at = computed.settings.period.time_of(computed.deepest.tick.tick);
             Ok(ShownScene {
-                moment: &ahead.deepest,
-                trail: ahead.trail.clone(),
-                shown: [0.0, ahead.path.seconds()],
+                instant: &computed.deepest,
+                trail: computed.trail.clone(),
+                shown: [0.0, computed.path.seconds()],
                 title: format!(
                     "{}, computed: the deepest point, after {:.2} s",
-                    ahead.path.name(),
+                    computed.path.name(),
                     at.seconds().0
                 ),
             })
@@ -70,7 +70,6 @@ fn shown_scene<'a>(
 }
 
 impl SceneScreen {
-    /// Picture and plots.
     pub fn draw_middle(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             for (side, name) in
@@ -84,8 +83,8 @@ impl SceneScreen {
                 self.view.reset();
             }
         });
-        let ShownScene { moment, trail, shown, title } =
-            match shown_scene(self.side, self.touch.as_ref(), self.ahead.answer()) {
+        let ShownScene { instant, trail, shown, title } =
+            match shown_scene(self.side, self.live.as_ref(), self.computed.answer()) {
                 Ok(shown_scene) => shown_scene,
                 Err(None) => {
                     let words = match self.side {
@@ -98,14 +97,14 @@ impl SceneScreen {
                 Err(Some(reason)) => return alarm_ui(ui, reason),
             };
         quiet_ui(ui, title);
-        let now = match moment.now() {
+        let now = match instant.now() {
             Ok(now) => now,
             Err(reason) => return alarm_ui(ui, &reason.to_string()),
         };
-        let tick = &moment.tick;
+        let tick = &instant.tick;
         let picture = ScenePicture {
             now,
-            rest: moment.rest(),
+            rest: instant.rest(),
             device: tick.device,
             turn: tick.turn,
             contact: tick.is_contact().then_some(tick.proxy),

@@ -6,19 +6,15 @@ mod middle;
 mod plan;
 mod right;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use super::tape::TapePanel;
-use crate::command::{CommandQueue, UserCommand};
-use crate::scene::view::SceneView;
-use crate::shell::palette::PaletteAction;
-use crate::widgets::{
-    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, work_ui,
+use super::screen::{
+    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
 };
-use crate::workbench::Workbench;
+use super::tape::{TapePanel, loop_button_ui};
+use crate::scene::view::SceneView;
+use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
 use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, compute_path};
-use crate::workers::path_dialog::PathPurpose;
-use crate::workers::task::BackgroundTask;
-use eframe::egui::{Button, Context, Key, Ui, vec2};
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Ui};
 use form::SceneForm;
 use middle::PictureSource;
 use palpate_analysis::progress::Progress;
@@ -33,7 +29,6 @@ use std::path::Path;
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
 const TURN: [f64; 3] = [0.0, -0.5, 0.0];
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
     purpose: "press into a piece of tissue and see it deform",
@@ -42,15 +37,14 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(SceneScreen::default()),
 };
 
-/// The screen's state.
 pub struct SceneScreen {
     form: SceneForm,
     reading: BackgroundTask<(SceneFile, Vec<String>)>,
-    ahead: BackgroundTask<ComputedPath>,
+    computed: BackgroundTask<ComputedPath>,
     is_shown: bool,
-    touch: Option<LiveScene>,
+    live: Option<LiveScene>,
     /// What it is made of.
-    touched: SceneFile,
+    live_file: SceneFile,
     refusal: Option<String>,
     tape: TapePanel,
     planned: Option<PlannedScene>,
@@ -67,10 +61,10 @@ impl Default for SceneScreen {
         Self {
             form,
             reading: BackgroundTask::default(),
-            ahead: BackgroundTask::default(),
+            computed: BackgroundTask::default(),
             is_shown: false,
-            touch: None,
-            touched: SceneFile::default(),
+            live: None,
+            live_file: SceneFile::default(),
             refusal: None,
             tape: TapePanel::default(),
             planned: None,
@@ -83,17 +77,17 @@ impl Default for SceneScreen {
 
 impl SceneScreen {
     pub fn is_running(&self) -> bool {
-        self.touch.as_ref().is_some_and(LiveScene::is_running)
+        self.live.as_ref().is_some_and(LiveScene::is_running)
     }
 
     /// The scene that runs or ran last.
     pub fn touch(&self) -> Option<&LiveScene> {
-        self.touch.as_ref()
+        self.live.as_ref()
     }
 
     /// The path that was computed last.
     pub fn ahead(&self) -> Option<&Result<ComputedPath, String>> {
-        self.ahead.answer()
+        self.computed.answer()
     }
 
     /// Whether the scene of the form can start, or why not.
@@ -128,7 +122,7 @@ impl SceneScreen {
         let path = self.form.path.unwrap_or(form::FIRST_PATH);
         self.side = PictureSource::Computed;
         self.look_at(&settings);
-        self.ahead.start("scene-ahead", ctx, move |progress| {
+        self.computed.start("scene-path", ctx, move |progress| {
             compute_path(settings, path, &mut |share| progress.share(share, "the path"))
         });
     }
@@ -144,13 +138,13 @@ impl SceneScreen {
             let text = file.text();
             let begin = |folder: &Path| SceneRecorder::start(folder, &text, COLUMNS);
             let recorder = self.tape.begin(ctx, begin)?;
-            let touch = LiveScene::start(settings, self.form.path, recorder)?;
-            Ok((touch, file))
+            let live = LiveScene::start(settings, self.form.path, recorder)?;
+            Ok((live, file))
         });
         match started {
-            Ok((touch, file)) => {
-                self.touch = Some(touch);
-                self.touched = file;
+            Ok((live, file)) => {
+                self.live = Some(live);
+                self.live_file = file;
                 self.side = PictureSource::Live;
                 self.refusal = None;
             }
@@ -171,12 +165,12 @@ impl SceneScreen {
         }
     }
 
-    /// What is on the screen: the scene that runs or ran, or the path computed ahead.
+    /// What is on the screen: the scene that runs or ran, or the computed path.
     fn seen(&self) -> Option<(&SceneSettings, &SceneInstant)> {
-        match (self.side, &self.touch, self.ahead.answer()) {
-            (PictureSource::Live, Some(touch), _) => Some((touch.settings(), touch.moment())),
-            (PictureSource::Computed, _, Some(Ok(ahead))) => {
-                Some((&ahead.settings, &ahead.deepest))
+        match (self.side, &self.live, self.computed.answer()) {
+            (PictureSource::Live, Some(live), _) => Some((live.settings(), live.moment())),
+            (PictureSource::Computed, _, Some(Ok(computed))) => {
+                Some((&computed.settings, &computed.deepest))
             }
             _ => None,
         }
@@ -199,18 +193,11 @@ impl Screen for SceneScreen {
         }
         ui.add_space(6.0);
         let verdict = self.compute_verdict();
-        work_ui(ui, "Compute path  F6", &self.ahead, &verdict, commands);
+        work_ui(ui, "Compute path  F6", &self.computed, &verdict, commands);
         section_ui(ui, "Touch");
-        let size = vec2(170.0, 34.0);
-        if is_running {
-            let stop = Button::new("Stop the scene").min_size(size);
-            if ui.add(stop).named("Stop the scene").clicked() {
-                commands.push(UserCommand::SceneStop);
-            }
-        } else if reason_button(ui, "Start the scene", size, &self.verdict(workbench)) {
-            commands.push(UserCommand::SceneStart);
-        }
-        let words = match self.touch.as_ref().is_some_and(LiveScene::is_led) {
+        let both = [UserCommand::SceneStart, UserCommand::SceneStop];
+        loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
+        let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
             true => "The path leads the hand, and then the pointer and the keys do.",
             false => {
                 "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
@@ -235,7 +222,7 @@ impl Screen for SceneScreen {
     fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
         self.form.check();
         self.tape.poll();
-        self.ahead.poll();
+        self.computed.poll();
         if self.reading.poll() {
             match self.reading.answer() {
                 Some(Ok((file, notes))) => {
@@ -247,7 +234,7 @@ impl Screen for SceneScreen {
             }
         }
         let hand = Hand6 { at: self.view.hand().at(), turn: TURN };
-        if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
+        if let Some(Err(reason)) = self.live.as_mut().map(|live| live.poll(hand)) {
             self.refusal = Some(reason);
             self.tape.cut_off();
         }
@@ -293,11 +280,11 @@ impl Screen for SceneScreen {
     }
 
     fn cancel(&mut self) {
-        self.ahead.cancel();
+        self.computed.cancel();
     }
 
     fn is_busy(&self) -> bool {
-        self.ahead.is_busy() || self.tape.is_busy() || self.is_running()
+        self.computed.is_busy() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -305,7 +292,7 @@ impl Screen for SceneScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(live) = self.touch.as_mut().and_then(LiveScene::stop) {
+        if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
             self.tape.end(move || live.stop().and_then(recorded));
         }
     }

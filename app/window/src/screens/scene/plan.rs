@@ -76,10 +76,10 @@ impl SceneScreen {
 
     /// That ticks of the scene that runs or ran take longer than it grants them, if they do, and what follows for its plan.
     fn late_ui(&self, ui: &mut Ui) {
-        let timing = self.touch.as_ref().map(LiveScene::kept);
+        let timing = self.live.as_ref().map(LiveScene::kept);
         let Some(timing) = timing.filter(|timing| timing.work.count > 0) else { return };
         // Of what ran, which need not be what stands in the form by now.
-        let file = &self.touched;
+        let file = &self.live_file;
         let (took, budget) = (1e6 * timing.work.p99_9.0, file.tolerances.tick_us);
         if took <= budget {
             return;

@@ -2,8 +2,7 @@
 
 use super::SceneScreen;
 use super::middle::PictureSource;
-use crate::theme::Tokens;
-use crate::widgets::{fact_ui, loop_times_ui, placeholder_ui, section_ui, small_ui};
+use crate::widgets::{fact_ui, loop_times_ui, placeholder_ui, section_ui, small_ui, tokens_of};
 use crate::workers::live_scene::{LiveScene, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::margin_text;
@@ -11,14 +10,14 @@ use palpate_haptics::scene::{SceneSettings, SceneTick};
 
 impl SceneScreen {
     pub fn draw_right(&self, ui: &mut Ui) {
-        let Some((settings, moment)) = self.seen() else {
+        let Some((settings, instant)) = self.seen() else {
             return placeholder_ui(ui, "no scene yet");
         };
-        force_ui(ui, &moment.tick);
-        guard_ui(ui, settings, &moment.tick);
-        let live = self.touch.as_ref().filter(|_| self.side == PictureSource::Live);
-        if let Some(touch) = live {
-            loop_ui(ui, touch);
+        force_ui(ui, &instant.tick);
+        guard_ui(ui, settings, &instant.tick);
+        let live = self.live.as_ref().filter(|_| self.side == PictureSource::Live);
+        if let Some(live) = live {
+            loop_ui(ui, live);
         }
     }
 }
@@ -36,7 +35,7 @@ fn force_ui(ui: &mut Ui, tick: &SceneTick) {
 }
 
 fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     section_ui(ui, "Margin and guard");
     if tick.is_contact() {
         let margin = margin_text(&margin_of(settings, tick));
@@ -59,10 +58,10 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
     }
 }
 
-fn loop_ui(ui: &mut Ui, touch: &LiveScene) {
+fn loop_ui(ui: &mut Ui, live: &LiveScene) {
     section_ui(ui, "Loop");
-    let rate = touch.settings().period.hz();
+    let rate = live.settings().period.hz();
     fact_ui(ui, "target", format!("{rate:.0} ticks a second"));
-    fact_ui(ui, "priority", touch.priority());
-    loop_times_ui(ui, touch.kept());
+    fact_ui(ui, "priority", live.priority());
+    loop_times_ui(ui, live.kept());
 }

@@ -3,16 +3,14 @@
 
 mod tables;
 
-use super::screen::{Screen, ScreenEntry, ScreenReply};
-use crate::command::{CommandQueue, UserCommand};
+use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
-    NamedControl, QuantityField, alarm_ui, form_label, placeholder_ui, quantity_ui, quiet_ui,
-    require, section_ui, sentence_ui, small_alarm_ui, small_ui, table_ui, tick_box, work_ui,
+    NamedControl, QuantityField, alarm_ui, placeholder_ui, quantity_ui, quiet_ui, require,
+    section_ui, sentence_ui, small_alarm_ui, small_ui, table_ui, tick_box, tolerance_ui, work_ui,
 };
-use crate::workbench::Workbench;
-use crate::workers::task::BackgroundTask;
-use eframe::egui::{Context, Key, Label, RichText, TextEdit, Ui, vec2};
+use crate::workers::BackgroundTask;
+use eframe::egui::{Context, Key, Label, RichText, Ui, vec2};
 use palpate_analysis::report::scatter::Scatter;
 use palpate_analysis::report::text::capital;
 use palpate_analysis::trade::stored::{read_trade, trade_file, write_trade};
@@ -68,7 +66,6 @@ struct TradeMeasurement {
     stored: Result<String, String>,
 }
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Trade",
     purpose: "what accuracy costs on this machine",
@@ -76,7 +73,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |workbench| Box::new(TradeScreen::new(workbench.library.clone())),
 };
 
-/// The screen's state.
 pub struct TradeScreen {
     library: Result<PathBuf, String>,
     tolerance: String,
@@ -198,15 +194,7 @@ impl TradeScreen {
 impl Screen for TradeScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
         section_ui(ui, "Requirements");
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "tolerance");
-            let input = TextEdit::singleline(&mut self.tolerance).desired_width(96.0);
-            ui.add(input.char_limit(24)).labelled_by(label.id).named("tolerance");
-        });
-        match self.tolerance.parse::<Tolerance>() {
-            Ok(tolerance) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
-            Err(reason) => small_alarm_ui(ui, reason.to_string()),
-        }
+        tolerance_ui(ui, &mut self.tolerance, None);
         let is_scene = self.view.is_scene();
         if is_scene {
             quantity_ui(ui, "shape", "mm of error", &mut self.shape);

@@ -19,7 +19,6 @@ palpate_model::named! {
     /// A quantity of a session over time; its number is that of its column in a track.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
     pub enum Quantity {
-        /// Force above tare.
         Force = "Force",
         /// Depth below contact.
         Depth = "Depth",
@@ -111,13 +110,11 @@ pub struct ReviewRecording {
 const QUEUE: usize = 64;
 
 impl ReviewRecording {
-    /// A session that is not yet read.
     #[must_use]
     pub fn new(path: &Path, analysis: Option<&str>) -> Self {
         Self { path: path.to_owned(), analysis: analysis.map(str::to_owned), ..Self::default() }
     }
 
-    /// Begins to read.
     pub fn start(&mut self, ctx: &Context) {
         let (sender, receiver) = sync_channel(QUEUE);
         let (path, analysis, wake) = (self.path.clone(), self.analysis.clone(), ctx.clone());
@@ -144,7 +141,6 @@ impl ReviewRecording {
         }
     }
 
-    /// Fetches what has come.
     pub fn poll(&mut self) {
         let Some(updates) = &self.updates else { return };
         loop {

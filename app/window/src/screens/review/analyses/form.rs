@@ -1,10 +1,10 @@
 //! The analysis to be made, as typed.
 
 use crate::widgets::{
-    ModelChoice, NamedControl, QuantityField, form_label, quantity_ui, reason_button, require,
+    ModelChoice, NamedControl, QuantityField, choice_ui, quantity_ui, reason_button, require,
     text_row, tick_box,
 };
-use eframe::egui::{ComboBox, Ui, vec2};
+use eframe::egui::{Ui, vec2};
 use palpate_analysis::analyses::{Deed, FitWanted, Known};
 use palpate_analysis::report::dossier::Wanted;
 use std::path::PathBuf;
@@ -107,27 +107,10 @@ impl AnalysisForm {
     }
 
     fn calibration_ui(&mut self, ui: &mut Ui, known: &Known) {
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "from library");
-            let chosen = self.calibration.as_deref();
-            let words = match (chosen, known.calibrations.is_empty()) {
-                (Some(id), _) => id,
-                (None, true) => "no calibration there",
-                (None, false) => "none chosen",
-            };
-            ComboBox::from_id_salt("analysis_calibration")
-                .selected_text(words)
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    ui.selectable_value(&mut self.calibration, None, "none");
-                    for (id, _) in &known.calibrations {
-                        ui.selectable_value(&mut self.calibration, Some(id.clone()), id);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .named("from library");
-        });
+        let none = if known.calibrations.is_empty() { "no calibration there" } else { "none" };
+        let all = known.calibrations.iter().map(|(id, _)| (Some(id.clone()), id.as_str()));
+        let all: Vec<_> = std::iter::once((None, none)).chain(all).collect();
+        choice_ui(ui, "from library", &mut self.calibration, &all);
         text_row(ui, "or file", "a calibration's document", &mut self.file);
     }
 

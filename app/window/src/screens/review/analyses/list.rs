@@ -2,8 +2,9 @@
 
 use super::super::Looked;
 use super::OwnFit;
-use crate::theme::Tokens;
-use crate::widgets::{NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui};
+use crate::widgets::{
+    NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
+};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::analyses::{Deed, Known};
 use palpate_analysis::report::said;
@@ -31,7 +32,7 @@ pub(super) fn list_ui(
 }
 
 fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, source: &mut Looked) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     match kept::withdrawn(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());

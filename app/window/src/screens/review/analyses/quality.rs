@@ -8,7 +8,6 @@ use palpate_analysis::analyses::{Deed, Known};
 use palpate_model::units::Position;
 use palpate_sessions::edits::Verdict;
 
-/// The form.
 pub(super) struct QualityForm {
     verdict: Verdict,
     contact: usize,
