@@ -1,6 +1,6 @@
 //! The workbench's window as an eframe app: `logic` reads keys and the answers of workers, `ui` draws a snapshot.
 
-use crate::command::{CommandQueue, TextSize, UserCommand};
+use crate::command::{Commands, TextSize, UiCommand};
 use crate::screens::run;
 use crate::screens::screen::{Screen, Screens};
 use crate::settings::{SettingsFile, ZOOM};
@@ -96,40 +96,40 @@ impl WorkbenchApp {
         self.palette.close();
     }
 
-    fn act(&mut self, ctx: &Context, commands: &mut CommandQueue) {
+    fn act(&mut self, ctx: &Context, commands: &mut Commands) {
         for command in commands.take() {
             self.act_on(ctx, command);
             ctx.request_repaint();
         }
     }
 
-    fn act_on(&mut self, ctx: &Context, command: UserCommand) {
+    fn act_on(&mut self, ctx: &Context, command: UiCommand) {
         self.workbench.occupation = self.screens.occupation();
         match command {
-            UserCommand::Stop => self.stop(),
-            UserCommand::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
-            UserCommand::CancelWork => self.screens.shown_mut().cancel(),
-            UserCommand::Show(screen) => self.screens.show(screen),
-            UserCommand::SwitchTheme => theme::switch(ctx),
-            UserCommand::Resize { edge, is_larger } => {
+            UiCommand::Stop => self.stop(),
+            UiCommand::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
+            UiCommand::CancelWork => self.screens.shown_mut().cancel(),
+            UiCommand::Show(screen) => self.screens.show(screen),
+            UiCommand::SwitchTheme => theme::switch(ctx),
+            UiCommand::Resize { edge, is_larger } => {
                 self.sizes.grow(edge, if is_larger { STEP } else { -STEP });
             }
-            UserCommand::TextSize(size) => set_text_size(ctx, size),
-            UserCommand::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
-            UserCommand::Palette => self.palette.toggle(),
-            UserCommand::TourStart => {
+            UiCommand::TextSize(size) => set_text_size(ctx, size),
+            UiCommand::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
+            UiCommand::Palette => self.palette.toggle(),
+            UiCommand::TourStart => {
                 self.tour.start();
                 self.screens.show(run::SCREEN.name);
             }
-            UserCommand::TourNext => match self.tour.go_on() {
+            UiCommand::TourNext => match self.tour.go_on() {
                 Some(screen) => self.screens.show(screen),
                 None => self.settings.now.is_tour_over = true,
             },
-            UserCommand::TourEnd => {
+            UiCommand::TourEnd => {
                 self.tour.end();
                 self.settings.now.is_tour_over = true;
             }
-            UserCommand::NoteTyped => {
+            UiCommand::NoteTyped => {
                 let text = match self.note.trim() {
                     "" => "mark".to_owned(),
                     text => text.to_owned(),
@@ -173,7 +173,7 @@ impl WorkbenchApp {
     }
 
     /// Reads the keys that stop nothing, and takes what was dropped.
-    fn read_input(&mut self, ctx: &Context, commands: &mut CommandQueue) {
+    fn read_input(&mut self, ctx: &Context, commands: &mut Commands) {
         if self.keys.read(ctx, commands) {
             let dropped = ctx.input(|input| input.raw.dropped_files.clone());
             let paths = dropped.iter().map(|file| file.path().to_owned());
@@ -181,7 +181,7 @@ impl WorkbenchApp {
         }
     }
 
-    fn draw(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
+    fn draw(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let panel = |name: &'static str, ui: &Ui| {
             let panel = Panel::top(name).frame(frame(ui, false));
             panel.resizable(false)
@@ -228,14 +228,14 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut RawInput) {
-        let mut stops = CommandQueue::default();
+        let mut stops = Commands::default();
         self.keys.read_early(ctx, &raw_input.events, &mut stops);
         self.act(ctx, &mut stops);
     }
 
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
         // Stops come before anything else of a frame.
-        let mut commands = CommandQueue::default();
+        let mut commands = Commands::default();
         self.keys.read_stops(ctx, &mut commands);
         self.act(ctx, &mut commands);
         self.handle_close(ctx);
@@ -246,7 +246,7 @@ impl eframe::App for WorkbenchApp {
         }
         self.workbench.poll();
         if let Some((ask, path)) = self.workbench.dialog.poll() {
-            commands.push(UserCommand::Chosen(ask, path));
+            commands.push(UiCommand::Chosen(ask, path));
         }
         self.workbench.occupation = self.screens.occupation();
         self.screens.poll(ctx, &mut self.workbench);
@@ -263,12 +263,12 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        let mut commands = CommandQueue::default();
+        let mut commands = Commands::default();
         self.draw(ui, &mut commands);
         if self.palette.is_open() {
             let mut actions = self.actions();
             actions.extend(places(ui.ctx()).into_iter().map(|(name, id)| {
-                PaletteAction::new(format!("Go to {name}"), "", UserCommand::Focus(id))
+                PaletteAction::new(format!("Go to {name}"), "", UiCommand::Focus(id))
             }));
             self.palette.ui(ui, &actions, &mut commands);
         }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum UserCommand {
+pub enum UiCommand {
     Start,
     /// Controlled stop: the axis brakes.
     Stop,
@@ -75,7 +75,7 @@ pub enum UserCommand {
     ReplayScene(PathBuf),
 }
 
-impl UserCommand {
+impl UiCommand {
     /// A stop comes before all other commands.
     pub const fn is_stop(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
@@ -121,19 +121,19 @@ pub enum TextSize {
 
 /// Commands since the app last acted.
 #[derive(Debug, Default)]
-pub struct CommandQueue(Vec<UserCommand>);
+pub struct Commands(Vec<UiCommand>);
 
-impl CommandQueue {
-    pub fn push(&mut self, command: UserCommand) {
+impl Commands {
+    pub fn push(&mut self, command: UiCommand) {
         self.0.push(command);
     }
 
     /// Takes all commands, halts and then stops first.
-    pub fn take(&mut self) -> Vec<UserCommand> {
+    pub fn take(&mut self) -> Vec<UiCommand> {
         let mut commands = std::mem::take(&mut self.0);
         commands.sort_by_key(|command| match command {
-            UserCommand::Halt => 0,
-            UserCommand::Stop => 1,
+            UiCommand::Halt => 0,
+            UiCommand::Stop => 1,
             _ => 2,
         });
         commands
@@ -146,15 +146,13 @@ mod tests {
 
     #[test]
     fn a_stop_overtakes_commands_before_it() {
-        let mut commands = CommandQueue::default();
-        for command in
-            [UserCommand::Start, UserCommand::ListPorts, UserCommand::Stop, UserCommand::Halt]
-        {
+        let mut commands = Commands::default();
+        for command in [UiCommand::Start, UiCommand::ListPorts, UiCommand::Stop, UiCommand::Halt] {
             commands.push(command);
         }
         assert_eq!(
             commands.take(),
-            [UserCommand::Halt, UserCommand::Stop, UserCommand::Start, UserCommand::ListPorts]
+            [UiCommand::Halt, UiCommand::Stop, UiCommand::Start, UiCommand::ListPorts]
         );
         assert!(commands.take().is_empty());
     }

@@ -1,6 +1,6 @@
 //! State that all screens share: the runner and its snapshot, the protocol in the form, the calibration in use.
 
-use crate::command::{ManualMove, UserCommand};
+use crate::command::{ManualMove, UiCommand};
 use crate::screens::form::{ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
@@ -197,27 +197,27 @@ impl Workbench {
     }
 
     /// Does a command that concerns the rig or the run in progress; false for other commands.
-    pub fn act(&mut self, ctx: &Context, command: &UserCommand) -> bool {
+    pub fn act(&mut self, ctx: &Context, command: &UiCommand) -> bool {
         match command {
-            UserCommand::Halt => self.operator(Operator::Halt),
-            UserCommand::RunControl(control) => {
+            UiCommand::Halt => self.operator(Operator::Halt),
+            UiCommand::RunControl(control) => {
                 let choice = run_in_progress(&self.snapshot).map(|run| control.operator(run));
                 if let Some(Ok(choice)) = choice {
                     self.operator(choice);
                 }
             }
-            UserCommand::Retract => {
+            UiCommand::Retract => {
                 if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
                     self.operator(Operator::Retract);
                 }
             }
-            UserCommand::CloseSession => self.operator(Operator::Close),
-            UserCommand::Reconnect => {
+            UiCommand::CloseSession => self.operator(Operator::Close),
+            UiCommand::Reconnect => {
                 let sent = self.runner.request(Request::Reconnect);
                 self.keep_refusal(sent);
             }
-            UserCommand::ListPorts => self.refresh_ports(ctx),
-            UserCommand::Choose(ask) => {
+            UiCommand::ListPorts => self.refresh_ports(ctx),
+            UiCommand::Choose(ask) => {
                 let ask = *ask;
                 let opened = self.dialog.open(ctx, move |dialog| pick(ask, dialog));
                 self.keep_refusal(opened);

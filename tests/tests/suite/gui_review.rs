@@ -88,7 +88,7 @@ fn one_session_is_looked_at_closely() {
     for name in ["Raw signal", "Depth", "Force"] {
         flow.click(name);
     }
-    assert!(flow.says("choose on the left what is shown"));
+    assert!(flow.says("choose quantities on the left"));
     flow.click("Position");
     flow.click("Force");
     flow.click("contact");

@@ -3,7 +3,7 @@
 
 mod transport;
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::plots::PlotCache;
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
@@ -128,7 +128,7 @@ impl eframe::App for PlaybackApp {
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        let mut commands = CommandQueue::default();
+        let mut commands = Commands::default();
         Panel::top("head")
             .exact_size(HEIGHT + 14.0)
             .resizable(false)
@@ -156,7 +156,7 @@ impl eframe::App for PlaybackApp {
             });
         CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));
         // The only thing that the events ask for here.
-        if commands.take().contains(&UserCommand::SwitchTheme) {
+        if commands.take().contains(&UiCommand::SwitchTheme) {
             theme::switch(ui.ctx());
         }
     }

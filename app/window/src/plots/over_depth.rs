@@ -3,7 +3,6 @@
 
 use super::navigate::{AxisRange, Gesture, gesture};
 use super::style::still;
-use crate::theme::Tokens;
 use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
@@ -252,6 +251,7 @@ fn paint(picture: &mut Option<ColorImage>, coverage: &Coverage, color: Color32) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::theme::Tokens;
     use palpate_model::signal::track::Segment;
 
     const KEY: [f64; 2] = [0.0, 100.0];

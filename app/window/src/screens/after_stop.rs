@@ -1,7 +1,7 @@
 //! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
 
 use super::calibration::calibration_session;
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::shell::activity::is_planned;
 use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui, tokens_of};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
@@ -9,13 +9,13 @@ use palpate_protocols::engine::Outcome;
 use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
-pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
+pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     if let Some(outcome) = &run.outcome {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
         if calibration_session(Some(run)).is_ok() && ui.button("Save this calibration").clicked() {
-            commands.push(UserCommand::KeepCalibration);
+            commands.push(UiCommand::KeepCalibration);
         }
     } else if let Some(ending) = &run.holding {
         section_ui(ui, "Run stopped, axis holds");
@@ -25,14 +25,14 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
 }
 
 /// The two ways on, with the reason if one of them is closed.
-fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut CommandQueue) {
+fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     let button = |text: &'static str| Button::new(text).min_size(vec2(112.0, 28.0));
     ui.horizontal(|ui| {
         if ui.add_enabled(run.can_retract.is_ok(), button("Retract  F8")).clicked() {
-            commands.push(UserCommand::Retract);
+            commands.push(UiCommand::Retract);
         }
         if ui.add(button("Close session")).clicked() {
-            commands.push(UserCommand::CloseSession);
+            commands.push(UiCommand::CloseSession);
         }
     });
     if let Err(reason) = &run.can_retract {

@@ -13,7 +13,7 @@ use palpate_rheology::extremes::{Extent, Row, Verdict};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
-    purpose: "what is right and what is refused at the ends of every range",
+    purpose: "which cases at the ends of every range are right or refused",
     key: Key::Num8,
     open: |_| Box::new(ExtremesScreen::default()),
 };

@@ -3,7 +3,7 @@
 use super::form::{LabelField, ParamField, ProtocolForm};
 use super::preview_view::{acknowledgement_ui, preview_ui};
 use super::run_panes::RunPane;
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{
     NamedControl, alarm_ui, form_label, quiet_ui, reason_button, section_ui, small_alarm_ui,
     small_ui, tick_box, tokens_of,
@@ -32,14 +32,14 @@ pub fn protocol_ui(
     ui: &mut Ui,
     workbench: &mut Workbench,
     facts: &ProtocolFacts<'_>,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     let is_busy = workbench.is_busy();
     let is_dialog_open = workbench.dialog.is_open();
     let form = &mut workbench.form;
     head_ui(ui, form);
     if ui.add_enabled(!is_busy, Button::new("Change protocol...")).clicked() {
-        commands.push(UserCommand::View(RunPane::Choose));
+        commands.push(UiCommand::View(RunPane::Choose));
     }
     ui.scope(|ui| {
         // Locked during a run, but still readable: it says what is running.
@@ -152,7 +152,7 @@ fn folder_ui(
     folder: &mut String,
     facts: &ProtocolFacts<'_>,
     is_dialog_open: bool,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     ui.horizontal(|ui| {
         let label = form_label(ui, "sessions in");
@@ -161,7 +161,7 @@ fn folder_ui(
         let input = TextEdit::singleline(folder).desired_width(width).char_limit(4096);
         ui.add(input.hint_text(hint)).labelled_by(label.id).named("sessions in");
         if ui.add_enabled(!is_dialog_open, Button::new("Choose...")).clicked() {
-            commands.push(UserCommand::Choose(PathPurpose::NewSessions));
+            commands.push(UiCommand::Choose(PathPurpose::NewSessions));
         }
     });
     if let (Err(reason), true) = (facts.library, folder.trim().is_empty()) {
@@ -175,21 +175,21 @@ fn folder_ui(
 
 /// Draws the start strip, which never scrolls away: what to acknowledge, the button and why it is closed, and the last
 /// refusal.
-pub fn start_ui(ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+pub fn start_ui(ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
     let (is_busy, verdict) = (workbench.is_busy(), workbench.start_verdict());
     if !is_busy {
         acknowledgement_ui(ui, &mut workbench.form);
     }
     ui.horizontal(|ui| {
         if reason_button(ui, "Start  F5", vec2(104.0, 34.0), &verdict) {
-            commands.push(UserCommand::Start);
+            commands.push(UiCommand::Start);
         }
     });
     if workbench.snapshot.rig.link_error.is_some() {
         let hint = "opens the devices again and stops the axis; nothing moves, and the axis must be homed again";
         let button = ui.add_enabled(!is_busy, Button::new("Connect again"));
         if button.on_hover_text(hint).clicked() {
-            commands.push(UserCommand::Reconnect);
+            commands.push(UiCommand::Reconnect);
         }
     }
     if let Some(refusal) = &workbench.refusal {

@@ -1,6 +1,6 @@
 //! Identity and status of the rig, and the serial ports of this computer.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{alarm_ui, answer_ui, fact_ui, section_ui, tokens_of};
 use crate::workers::BackgroundTask;
 use eframe::egui::{Button, RichText, Ui};
@@ -13,7 +13,7 @@ pub fn rig_ui(
     ui: &mut Ui,
     snapshot: &Snapshot,
     ports: &BackgroundTask<Vec<PortInfo>>,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     let rig = &snapshot.rig;
     section_ui(ui, &format!("Rig {}", rig.description.name));
@@ -65,14 +65,14 @@ fn axis_words(status: AxisStatus) -> String {
     words.join(", ")
 }
 
-fn ports_ui(ui: &mut Ui, ports: &BackgroundTask<Vec<PortInfo>>, commands: &mut CommandQueue) {
+fn ports_ui(ui: &mut Ui, ports: &BackgroundTask<Vec<PortInfo>>, commands: &mut Commands) {
     let tokens = tokens_of(ui);
     ui.add_space(2.0);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Serial ports found").color(tokens.text_quiet));
         let button = Button::new("Refresh").small();
         if ui.add_enabled(!ports.is_busy(), button).clicked() {
-            commands.push(UserCommand::ListPorts);
+            commands.push(UiCommand::ListPorts);
         }
     });
     let Some(found) = answer_ui(ui, ports, "listing them") else { return };

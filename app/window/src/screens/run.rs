@@ -6,13 +6,10 @@ use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
-use super::screen::{
-    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
-};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::weighing::weighing_ui;
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
-use crate::shell::panels::frame;
 use crate::widgets::require;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::{BackgroundTask, PathPurpose};
@@ -24,7 +21,7 @@ use std::path::Path;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Run",
-    purpose: "run a protocol and see what comes of it",
+    purpose: "run a protocol and see its results",
     key: Key::Num3,
     open: |workbench| Box::new(RunScreen::new(workbench)),
 };
@@ -108,7 +105,7 @@ impl Screen for RunScreen {
         true
     }
 
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
@@ -121,7 +118,7 @@ impl Screen for RunScreen {
         });
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let run = workbench.run();
         views_ui(ui, self.middle, run, commands);
         let limits = &workbench.bench.limits;
@@ -152,7 +149,7 @@ impl Screen for RunScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let refit = self.refit(workbench.run());
         results_ui(ui, &workbench.snapshot, refit, self.plots.cycles(), commands);
     }
@@ -185,43 +182,36 @@ impl Screen for RunScreen {
         self.refitter.update(ctx, workbench.run());
     }
 
-    fn act(
-        &mut self,
-        ctx: &Context,
-        command: &UserCommand,
-        workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::Start => {
+            UiCommand::Start => {
                 let request = workbench.ready_run();
                 self.begin(request, workbench);
             }
-            UserCommand::ManualMove(manual) => {
+            UiCommand::ManualMove(manual) => {
                 let request = workbench.manual_run(manual);
                 self.begin(request, workbench);
             }
-            UserCommand::View(view) => {
+            UiCommand::View(view) => {
                 self.middle = *view;
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            UserCommand::TakeProtocol(name) => {
+            UiCommand::TakeProtocol(name) => {
                 self.take_protocol(name, workbench);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            UserCommand::MeasureCalibration => {
+            UiCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            UserCommand::OpenProtocol => self.read(None, ctx, workbench),
-            UserCommand::Chosen(PathPurpose::Protocol, path) => {
-                self.read(Some(path), ctx, workbench)
-            }
-            UserCommand::Chosen(PathPurpose::NewSessions, folder) => {
+            UiCommand::OpenProtocol => self.read(None, ctx, workbench),
+            UiCommand::Chosen(PathPurpose::Protocol, path) => self.read(Some(path), ctx, workbench),
+            UiCommand::Chosen(PathPurpose::NewSessions, folder) => {
                 workbench.form.folder = folder.display().to_string();
             }
-            _ => return ScreenReply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Done
+        Reaction::Done
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
@@ -237,18 +227,18 @@ impl Screen for RunScreen {
             .map(|(view, name)| {
                 let is_offered = is_offered(view, workbench.run());
                 let verdict = require(is_offered, "the run has no such view");
-                PaletteAction::new(name, "", UserCommand::View(view)).if_ok(verdict)
+                PaletteAction::new(name, "", UiCommand::View(view)).if_ok(verdict)
             })
             .collect();
         let is_free = workbench.free_verdict();
         actions.extend(BUILT_IN.iter().map(|(name, _)| {
             let words = format!("Protocol {name}");
-            PaletteAction::new(words, "", UserCommand::TakeProtocol(name)).if_ok(is_free.clone())
+            PaletteAction::new(words, "", UiCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
         actions.push(PaletteAction::new(
             "Open a protocol file",
             "",
-            UserCommand::Choose(PathPurpose::Protocol),
+            UiCommand::Choose(PathPurpose::Protocol),
         ));
         actions
     }

@@ -1,7 +1,7 @@
 //! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
 
 use super::form::{CheckedPlan, ProtocolForm};
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::plots::course::{CourseLimits, course_ui};
 use crate::widgets::{NamedControl, heading_ui, placeholder_ui, tokens_of};
 use crate::workbench::Workbench;
@@ -35,14 +35,14 @@ const VIEWS: [(RunPane, &str); 5] = [
 ];
 
 /// Draws the switch between the views.
-pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &mut CommandQueue) {
+pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &mut Commands) {
     ui.horizontal(|ui| {
         for (view, name) in VIEWS {
             if !is_offered(view, run) {
                 continue;
             }
             if ui.selectable_label(shown == view, name).named(name).clicked() {
-                commands.push(UserCommand::View(view));
+                commands.push(UiCommand::View(view));
             }
         }
     });
@@ -127,7 +127,7 @@ impl Chooser {
     }
 
     /// Draws the list, the field for a file and what is wrong with the file chosen.
-    pub fn ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut CommandQueue) {
+    pub fn ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
         let (form, is_busy) = (&workbench.form, workbench.is_busy());
         if is_busy {
             ui.label("A run is in progress. Choose another protocol when it has ended.");
@@ -151,7 +151,7 @@ impl Chooser {
         });
     }
 
-    fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut CommandQueue) {
+    fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut Commands) {
         heading_ui(ui, "Your own protocol");
         ui.horizontal(|ui| {
             let label = ui.label("protocol file");
@@ -163,11 +163,11 @@ impl Chooser {
             ui.add(input).labelled_by(label.id).named("protocol file");
             let can_open = !self.typed.trim().is_empty() && !self.reading.is_busy();
             if ui.add_enabled(can_open, Button::new("Open")).clicked() {
-                commands.push(UserCommand::OpenProtocol);
+                commands.push(UiCommand::OpenProtocol);
             }
             let button = Button::new("Open a protocol file...");
             if ui.add_enabled(!is_dialog_open, button).clicked() {
-                commands.push(UserCommand::Choose(PathPurpose::Protocol));
+                commands.push(UiCommand::Choose(PathPurpose::Protocol));
             }
         });
     }
@@ -185,14 +185,14 @@ fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
     placeholder_ui(ui, words);
 }
 
-fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut CommandQueue) {
+fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut Commands) {
     let tokens = tokens_of(ui);
     let name = BUILT_IN.iter().find(|(name, _)| *name == protocol.name);
     ui.add_space(4.0);
     let button = Button::selectable(is_chosen, RichText::new(&protocol.title).strong())
         .min_size(vec2(280.0, 24.0));
     if let (true, Some((name, _))) = (ui.add(button).clicked(), name) {
-        commands.push(UserCommand::TakeProtocol(name));
+        commands.push(UiCommand::TakeProtocol(name));
     }
     let about = RichText::new(&protocol.about).color(tokens.text_quiet);
     ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);

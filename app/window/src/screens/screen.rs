@@ -1,7 +1,7 @@
 //! The trait of screens, through which the window reaches each of them.
 
 use super::table::SCREENS;
-pub use crate::command::{CommandQueue, UserCommand};
+pub use crate::command::{Commands, UiCommand};
 pub use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
 use crate::shell::sizes::{PanelEdge, Sizes};
@@ -24,7 +24,7 @@ pub struct ScreenEntry {
 
 /// Whether a screen has done a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScreenReply {
+pub enum Reaction {
     /// The command belongs to another screen.
     NotMine,
     /// Done, or refused with a reason on the screen.
@@ -39,14 +39,13 @@ pub enum ScreenReply {
 /// [`Self::poll`] fetches.
 pub trait Screen: Any {
     /// Draws the inputs.
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue);
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
 
     /// Draws plots and tables.
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue);
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
 
     /// Draws facts and results.
-    fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
-    }
+    fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {}
 
     fn has_right(&self) -> bool {
         true
@@ -63,7 +62,7 @@ pub trait Screen: Any {
         ui: &mut Ui,
         sizes: &mut Sizes,
         workbench: &mut Workbench,
-        commands: &mut CommandQueue,
+        commands: &mut Commands,
     ) {
         side_ui(ui, sizes, PanelEdge::Left, !self.has_own_scroll(), |ui| {
             self.left_ui(ui, workbench, commands);
@@ -88,10 +87,10 @@ pub trait Screen: Any {
     fn act(
         &mut self,
         _ctx: &Context,
-        _command: &UserCommand,
+        _command: &UiCommand,
         _workbench: &mut Workbench,
-    ) -> ScreenReply {
-        ScreenReply::NotMine
+    ) -> Reaction {
+        Reaction::NotMine
     }
 
     /// Begins the work of the screen (F6).
@@ -169,12 +168,12 @@ impl Screens {
     }
 
     /// Passes a command to the screen that it is for.
-    pub fn act(&mut self, ctx: &Context, command: &UserCommand, workbench: &mut Workbench) {
+    pub fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) {
         for (index, (_, screen)) in self.all.iter_mut().enumerate() {
             match screen.act(ctx, command, workbench) {
-                ScreenReply::NotMine => {}
-                ScreenReply::Done => return,
-                ScreenReply::Show => {
+                Reaction::NotMine => {}
+                Reaction::Done => return,
+                Reaction::Show => {
                     self.shown = index;
                     return;
                 }

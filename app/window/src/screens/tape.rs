@@ -1,6 +1,6 @@
 //! Recording of a loop: the folder of the next recording, the result of the last one, and the replay of one.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{alarm_ui, quiet_ui, reason_button, require, section_ui, task_ui, text_row};
 use crate::workers::{BackgroundTask, Dialog, Job};
 use eframe::egui::{Context, Ui, vec2};
@@ -14,8 +14,8 @@ pub(super) fn loop_button_ui(
     name: &str,
     is_running: bool,
     verdict: &Result<(), String>,
-    [start, stop]: [UserCommand; 2],
-    commands: &mut CommandQueue,
+    [start, stop]: [UiCommand; 2],
+    commands: &mut Commands,
 ) {
     let size = vec2(170.0, 34.0);
     if is_running {

@@ -2,7 +2,7 @@
 //! the calibration in use expects.
 
 use super::form::RunSetup;
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::shell::run_strip::{RunControl, is_controllable};
 use crate::theme::reading_style;
@@ -25,7 +25,7 @@ pub fn weighing_ui(
     run: &RunView,
     signal: Option<Volts>,
     bench: &RunSetup,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     let next = next_of(run);
     now_ui(ui, run, next, signal, &bench.curve);
@@ -33,7 +33,7 @@ pub fn weighing_ui(
     let verdict = verdict.and(run.can_redo.clone());
     ui.horizontal(|ui| {
         if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
-            commands.push(UserCommand::RunControl(RunControl::Redo));
+            commands.push(UiCommand::RunControl(RunControl::Redo));
         }
     });
     ui.add_space(4.0);

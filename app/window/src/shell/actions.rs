@@ -5,7 +5,7 @@ use super::palette::PaletteAction;
 use super::run_strip::RunControl;
 use super::sizes::PanelEdge;
 use crate::app::WorkbenchApp;
-use crate::command::{ManualMove, TextSize, UserCommand};
+use crate::command::{ManualMove, TextSize, UiCommand};
 use crate::screens::table::SCREENS;
 use crate::widgets::require;
 
@@ -16,9 +16,9 @@ impl WorkbenchApp {
         let run = run_in_progress(&bench.snapshot);
         let no_run = || Err("no run is in progress".to_owned());
         let mut actions = vec![
-            PaletteAction::new("Stop motion", "F12, Escape", UserCommand::Stop),
-            PaletteAction::new("Halt: cut the motion without braking", "F11", UserCommand::Halt),
-            PaletteAction::new("Start the protocol", "F5", UserCommand::Start)
+            PaletteAction::new("Stop motion", "F12, Escape", UiCommand::Stop),
+            PaletteAction::new("Halt: stop without braking", "F11", UiCommand::Halt),
+            PaletteAction::new("Start the protocol", "F5", UiCommand::Start)
                 .if_ok(bench.start_verdict()),
         ];
         for (name, keys, control) in [
@@ -33,7 +33,7 @@ impl WorkbenchApp {
         ] {
             let verdict = run.map_or_else(no_run, |run| control.operator(run).map(|_| ()));
             actions.push(
-                PaletteAction::new(name, keys, UserCommand::RunControl(control)).if_ok(verdict),
+                PaletteAction::new(name, keys, UiCommand::RunControl(control)).if_ok(verdict),
             );
         }
         let has_run = run.map_or_else(no_run, |_| Ok(()));
@@ -48,44 +48,46 @@ impl WorkbenchApp {
             None => Err("the link is not lost".to_owned()),
         };
         actions.extend([
-            PaletteAction::new("Retract after a stop", "F8", UserCommand::Retract)
-                .if_ok(can_retract),
-            PaletteAction::new("Close the session after a stop", "", UserCommand::CloseSession)
+            PaletteAction::new("Retract after a stop", "F8", UiCommand::Retract).if_ok(can_retract),
+            PaletteAction::new("Close the session after a stop", "", UiCommand::CloseSession)
                 .if_ok(is_held),
-            PaletteAction::new("Write a note or a mark", "F3", UserCommand::NoteTyped)
-                .if_ok(has_run),
-            PaletteAction::new("Find home", "", UserCommand::ManualMove(ManualMove::home()))
+            PaletteAction::new("Write a note or a mark", "F3", UiCommand::NoteTyped).if_ok(has_run),
+            PaletteAction::new("Find home", "", UiCommand::ManualMove(ManualMove::home()))
                 .if_ok(bench.move_verdict()),
-            PaletteAction::new("Connect the rig again", "", UserCommand::Reconnect).if_ok(is_lost),
-            PaletteAction::new("List the serial ports again", "", UserCommand::ListPorts),
-            PaletteAction::new("Begin the work of this screen", "F6", UserCommand::Work),
-            PaletteAction::new("Cancel the work of this screen", "", UserCommand::CancelWork),
+            PaletteAction::new("Connect the rig again", "", UiCommand::Reconnect).if_ok(is_lost),
+            PaletteAction::new("List the serial ports again", "", UiCommand::ListPorts),
+            PaletteAction::new("Begin the work of this screen", "F6", UiCommand::Work),
+            PaletteAction::new("Cancel the work of this screen", "", UiCommand::CancelWork),
         ]);
         actions.extend(self.screens.actions(bench));
         for screen in SCREENS {
             let keys = format!("Ctrl+{}", screen.key.symbol_or_name());
             let name = format!("Screen {}: {}", screen.name, screen.purpose);
-            actions.push(PaletteAction::new(name, &keys, UserCommand::Show(screen.name)));
+            actions.push(PaletteAction::new(name, &keys, UiCommand::Show(screen.name)));
         }
         let is_on_tour = require(self.tour.is_on(), "the tour is not open");
-        actions.push(PaletteAction::new("Light or dark screen", "", UserCommand::SwitchTheme));
+        actions.push(PaletteAction::new(
+            "Switch between light and dark theme",
+            "",
+            UiCommand::SwitchTheme,
+        ));
         for (name, keys, size) in [
             ("Larger text", "Ctrl++", TextSize::Larger),
             ("Smaller text", "Ctrl+-", TextSize::Smaller),
-            ("Text as it is made", "Ctrl+0", TextSize::Usual),
+            ("Usual text size", "Ctrl+0", TextSize::Usual),
         ] {
-            actions.push(PaletteAction::new(name, keys, UserCommand::TextSize(size)));
+            actions.push(PaletteAction::new(name, keys, UiCommand::TextSize(size)));
         }
         for edge in PanelEdge::ALL {
             for (word, is_larger) in [("Larger", true), ("Smaller", false)] {
                 let name = format!("{word} {}", edge.name());
-                actions.push(PaletteAction::new(name, "", UserCommand::Resize { edge, is_larger }));
+                actions.push(PaletteAction::new(name, "", UiCommand::Resize { edge, is_larger }));
             }
         }
         actions.extend([
-            PaletteAction::new("Take the tour", "", UserCommand::TourStart),
-            PaletteAction::new("End the tour", "", UserCommand::TourEnd).if_ok(is_on_tour),
-            PaletteAction::new("This list", "Ctrl+K, F1", UserCommand::Palette),
+            PaletteAction::new("Take the tour", "", UiCommand::TourStart),
+            PaletteAction::new("End the tour", "", UiCommand::TourEnd).if_ok(is_on_tour),
+            PaletteAction::new("This list", "Ctrl+K, F1", UiCommand::Palette),
         ]);
         actions
     }

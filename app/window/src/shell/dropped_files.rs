@@ -1,6 +1,6 @@
 //! Files that are dropped on the window, passed to the screen that they are for.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::screens::{models, run, scene};
 use crate::workers::PathPurpose;
 use palpate_analysis::haptics_tape::is_tape;
@@ -8,7 +8,7 @@ use palpate_sessions::ticks::TICKS;
 use std::path::{Path, PathBuf};
 
 /// Pushes a command for each dropped file or folder; `shown` is the screen in front.
-pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut CommandQueue) {
+pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
     let (protocols, others): (Vec<_>, Vec<_>) =
         paths.into_iter().partition(|path| ends(path, "toml"));
     let (tables, folders): (Vec<_>, Vec<_>) =
@@ -17,29 +17,29 @@ pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut CommandQueu
         folders.into_iter().partition(|path| path.join(TICKS).is_file());
     match protocols.into_iter().next() {
         Some(path) if shown == scene::SCREEN.name => {
-            commands.push(UserCommand::Chosen(PathPurpose::Scene, path));
+            commands.push(UiCommand::Chosen(PathPurpose::Scene, path));
         }
         Some(path) => {
-            commands.push(UserCommand::Show(run::SCREEN.name));
-            commands.push(UserCommand::Chosen(PathPurpose::Protocol, path));
+            commands.push(UiCommand::Show(run::SCREEN.name));
+            commands.push(UiCommand::Chosen(PathPurpose::Protocol, path));
         }
         None => {}
     }
     if shown == models::SCREEN.name {
         let chosen = tables.into_iter();
-        chosen.for_each(|path| commands.push(UserCommand::Chosen(PathPurpose::Table, path)));
+        chosen.for_each(|path| commands.push(UiCommand::Chosen(PathPurpose::Table, path)));
     } else if !tables.is_empty() {
-        commands.push(UserCommand::Import(tables));
+        commands.push(UiCommand::Import(tables));
     }
     if let Some(folder) = recordings.into_iter().next() {
         // A recording of neither loop is refused with a reason on the screen of scenes.
         commands.push(match is_tape(&folder).unwrap_or(false) {
-            true => UserCommand::ReplayLoop(folder),
-            false => UserCommand::ReplayScene(folder),
+            true => UiCommand::ReplayLoop(folder),
+            false => UiCommand::ReplayScene(folder),
         });
     }
     if !sessions.is_empty() {
-        commands.push(UserCommand::Review(sessions.into_iter().map(session_of).collect()));
+        commands.push(UiCommand::Review(sessions.into_iter().map(session_of).collect()));
     }
 }
 
@@ -60,8 +60,8 @@ fn session_of(path: PathBuf) -> PathBuf {
 mod tests {
     use super::*;
 
-    fn dropped(paths: &[&Path], shown: &str) -> Vec<UserCommand> {
-        let mut commands = CommandQueue::default();
+    fn dropped(paths: &[&Path], shown: &str) -> Vec<UiCommand> {
+        let mut commands = Commands::default();
         let paths = paths.iter().map(|path| path.to_path_buf()).collect();
         push_dropped(paths, shown, &mut commands);
         commands.take()
@@ -78,28 +78,28 @@ mod tests {
         let log = session.join("log.mcap");
         std::fs::write(&log, "").unwrap();
         let all: [&Path; 3] = [&protocol, &table, &log];
-        let review = UserCommand::Review(vec![session.clone()]);
+        let review = UiCommand::Review(vec![session.clone()]);
         assert_eq!(
             dropped(&all, "Rig"),
             [
-                UserCommand::Show("Run"),
-                UserCommand::Chosen(PathPurpose::Protocol, protocol.clone()),
-                UserCommand::Import(vec![table.clone()]),
+                UiCommand::Show("Run"),
+                UiCommand::Chosen(PathPurpose::Protocol, protocol.clone()),
+                UiCommand::Import(vec![table.clone()]),
                 review.clone(),
             ]
         );
         assert_eq!(
             dropped(&all, "Models")[2..],
-            [UserCommand::Chosen(PathPurpose::Table, table), review]
+            [UiCommand::Chosen(PathPurpose::Table, table), review]
         );
         assert_eq!(
             dropped(&[&protocol], "Scene"),
-            [UserCommand::Chosen(PathPurpose::Scene, protocol)]
+            [UiCommand::Chosen(PathPurpose::Scene, protocol)]
         );
         // Ticks of no known loop are refused on the screen of scenes.
         let ticks = at("ticks");
         std::fs::create_dir(&ticks).unwrap();
         std::fs::write(ticks.join(TICKS), "").unwrap();
-        assert_eq!(dropped(&[&ticks], "Run"), [UserCommand::ReplayScene(ticks)]);
+        assert_eq!(dropped(&[&ticks], "Run"), [UiCommand::ReplayScene(ticks)]);
     }
 }

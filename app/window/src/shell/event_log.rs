@@ -1,6 +1,6 @@
 //! Events of the run, newest last, with a filter and a copy of the lines shown.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{NamedControl, placeholder_ui, tokens_of};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, Snapshot};
@@ -13,7 +13,7 @@ pub struct EventLog {
 
 impl EventLog {
     /// Draws the log in the space there is.
-    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut CommandQueue) {
+    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
         let events = snapshot.run.as_ref().map_or(&[][..], |run| run.events.as_slice());
         let shown: Vec<&LogLine> =
             events.iter().filter(|line| is_shown(line, &self.filter)).collect();
@@ -39,7 +39,7 @@ impl EventLog {
             });
     }
 
-    fn head_ui(&mut self, ui: &mut Ui, shown: &[&LogLine], commands: &mut CommandQueue) {
+    fn head_ui(&mut self, ui: &mut Ui, shown: &[&LogLine], commands: &mut Commands) {
         ui.horizontal(|ui| {
             ui.label(RichText::new("Events").heading().strong());
             ui.add_space(8.0);
@@ -54,7 +54,7 @@ impl EventLog {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
                 if ui.button(name).clicked() {
-                    commands.push(UserCommand::SwitchTheme);
+                    commands.push(UiCommand::SwitchTheme);
                 }
             });
         });

@@ -2,25 +2,25 @@
 
 use super::run_strip::RunControl;
 use super::top_bar::push_stop_buttons;
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Context, Event, Key};
 
 /// The keys and their commands. Escape stops too: a startled hand finds it.
-pub const KEYS: [(Key, UserCommand); 13] = [
-    (Key::F1, UserCommand::Palette),
-    (Key::F12, UserCommand::Stop),
-    (Key::Escape, UserCommand::Stop),
-    (Key::F11, UserCommand::Halt),
-    (Key::F2, UserCommand::RunControl(RunControl::Confirm)),
-    (Key::F3, UserCommand::NoteTyped),
-    (Key::F4, UserCommand::RunControl(RunControl::PauseAfter)),
-    (Key::F5, UserCommand::Start),
-    (Key::F6, UserCommand::Work),
-    (Key::F7, UserCommand::RunControl(RunControl::Pause)),
-    (Key::F8, UserCommand::Retract),
-    (Key::F9, UserCommand::RunControl(RunControl::Resume)),
-    (Key::F10, UserCommand::RunControl(RunControl::Finish)),
+pub const KEYS: [(Key, UiCommand); 13] = [
+    (Key::F1, UiCommand::Palette),
+    (Key::F12, UiCommand::Stop),
+    (Key::Escape, UiCommand::Stop),
+    (Key::F11, UiCommand::Halt),
+    (Key::F2, UiCommand::RunControl(RunControl::Confirm)),
+    (Key::F3, UiCommand::NoteTyped),
+    (Key::F4, UiCommand::RunControl(RunControl::PauseAfter)),
+    (Key::F5, UiCommand::Start),
+    (Key::F6, UiCommand::Work),
+    (Key::F7, UiCommand::RunControl(RunControl::Pause)),
+    (Key::F8, UiCommand::Retract),
+    (Key::F9, UiCommand::RunControl(RunControl::Resume)),
+    (Key::F10, UiCommand::RunControl(RunControl::Finish)),
 ];
 
 /// Reads the keys once per frame, those that stop before all others.
@@ -34,7 +34,7 @@ pub struct KeyReader {
 
 impl KeyReader {
     /// Pushes the stops among the events of a frame that is about to begin, as early as possible.
-    pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut CommandQueue) {
+    pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut Commands) {
         let frame = ctx.cumulative_frame_nr();
         // Events that wait while the window is hidden come again, before those that are new.
         let known = match self.looked_at {
@@ -53,7 +53,7 @@ impl KeyReader {
 
     /// Pushes the stops of this frame, before anything is drawn: keys that [`Self::read_early`] has not read, and the
     /// buttons of the top bar.
-    pub fn read_stops(&mut self, ctx: &Context, commands: &mut CommandQueue) {
+    pub fn read_stops(&mut self, ctx: &Context, commands: &mut Commands) {
         // A frame may have several passes, and while the window is hidden its input is that of the last frame
         // shown: pressing once must not act again and again.
         let frame = ctx.cumulative_frame_nr();
@@ -67,7 +67,7 @@ impl KeyReader {
     }
 
     /// Pushes the commands of other keys; true if this frame is read for the first time.
-    pub fn read(&mut self, ctx: &Context, commands: &mut CommandQueue) -> bool {
+    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) -> bool {
         let frame = ctx.cumulative_frame_nr();
         if self.frame_read.replace(frame) == Some(frame) {
             return false;
@@ -75,11 +75,11 @@ impl KeyReader {
         ctx.input(|input| {
             push_keys(&input.events, false, commands);
             if is_pressed(&input.events, Key::K, true) {
-                commands.push(UserCommand::Palette);
+                commands.push(UiCommand::Palette);
             }
             for screen in SCREENS {
                 if is_pressed(&input.events, screen.key, true) {
-                    commands.push(UserCommand::Show(screen.name));
+                    commands.push(UiCommand::Show(screen.name));
                 }
             }
         });
@@ -88,7 +88,7 @@ impl KeyReader {
 }
 
 /// Pushes the commands of [`KEYS`] among events: the stops, or the others.
-fn push_keys(events: &[Event], are_stops: bool, commands: &mut CommandQueue) {
+fn push_keys(events: &[Event], are_stops: bool, commands: &mut Commands) {
     for (key, command) in KEYS {
         if command.is_stop() == are_stops && is_pressed(events, key, false) {
             commands.push(command);

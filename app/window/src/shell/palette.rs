@@ -1,6 +1,6 @@
 //! The command palette: all commands by name, with their keys.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{placeholder_ui, tokens_of};
 use eframe::egui::{
     Align, Align2, Area, Button, Frame, Id, Key, Label, Layout, Margin, Modifiers, Order, RichText,
@@ -13,7 +13,7 @@ pub struct PaletteAction {
     pub name: String,
     /// Empty if it has none.
     pub keys: String,
-    pub command: UserCommand,
+    pub command: UiCommand,
     /// Whether it is possible now, or why not.
     pub verdict: Result<(), String>,
 }
@@ -21,7 +21,7 @@ pub struct PaletteAction {
 impl PaletteAction {
     /// An action that is always possible.
     #[must_use]
-    pub fn new(name: impl Into<String>, keys: &str, command: UserCommand) -> Self {
+    pub fn new(name: impl Into<String>, keys: &str, command: UiCommand) -> Self {
         Self { name: name.into(), keys: keys.into(), command, verdict: Ok(()) }
     }
 
@@ -56,7 +56,7 @@ impl Palette {
     }
 
     /// Draws it above the window; controls beneath can still be pressed.
-    pub fn ui(&mut self, ui: &Ui, actions: &[PaletteAction], commands: &mut CommandQueue) {
+    pub fn ui(&mut self, ui: &Ui, actions: &[PaletteAction], commands: &mut Commands) {
         if !self.is_open {
             return;
         }
@@ -77,7 +77,7 @@ impl Palette {
             });
     }
 
-    fn content_ui(&mut self, ui: &mut Ui, actions: &[PaletteAction], commands: &mut CommandQueue) {
+    fn content_ui(&mut self, ui: &mut Ui, actions: &[PaletteAction], commands: &mut Commands) {
         let (mut moved, mut is_taken) = (0_isize, false);
         ui.input_mut(|input| {
             for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
@@ -126,7 +126,7 @@ impl Palette {
             });
     }
 
-    fn take(&mut self, action: &PaletteAction, commands: &mut CommandQueue) {
+    fn take(&mut self, action: &PaletteAction, commands: &mut Commands) {
         if action.verdict.is_ok() {
             commands.push(action.command.clone());
             self.is_open = false;

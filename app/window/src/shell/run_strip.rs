@@ -1,7 +1,7 @@
 //! Controls of the run in progress, on every screen: pause, resume, finish early, abort, and the answer to a prompt. Stop
 //! and halt are in the top bar.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{NamedControl, tokens_of};
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
@@ -70,7 +70,7 @@ pub fn is_controllable(run: &RunView) -> bool {
 }
 
 /// Draws the buttons, the state of the pause in words, and the prompt if there is one.
-pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut CommandQueue) {
+pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
     let tokens = tokens_of(ui);
     ui.horizontal(|ui| {
         let after = match &run.next_checkpoint {
@@ -102,10 +102,10 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mu
 const NOTE_MAX: usize = 300;
 
 /// A note of the operator with the time at which it is written.
-fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut CommandQueue) {
+fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
     let name = if note.trim().is_empty() { "Mark  F3" } else { "Note  F3" };
     if ui.add(Button::new(name).min_size(vec2(74.0, 28.0))).clicked() {
-        commands.push(UserCommand::NoteTyped);
+        commands.push(UiCommand::NoteTyped);
     }
     let input = TextEdit::singleline(note).desired_width(180.0).char_limit(NOTE_MAX);
     // Drawn from the right, so the label comes after its field.
@@ -114,7 +114,7 @@ fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut CommandQueue) {
     let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     input.labelled_by(label.id);
     if is_taken {
-        commands.push(UserCommand::NoteTyped);
+        commands.push(UiCommand::NoteTyped);
     }
 }
 
@@ -123,7 +123,7 @@ fn control_ui(
     run: &RunView,
     control: RunControl,
     text: &str,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     let verdict = control.operator(run);
     let button = Button::new(text).min_size(vec2(0.0, 28.0));
@@ -133,7 +133,7 @@ fn control_ui(
         Ok(_) => response,
     };
     if response.clicked() {
-        commands.push(UserCommand::RunControl(control));
+        commands.push(UiCommand::RunControl(control));
     }
 }
 
@@ -160,7 +160,7 @@ fn pause_words(run: &RunView) -> String {
 }
 
 /// The prompt. It blocks nothing: motion can be stopped and panels used.
-fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut CommandQueue) {
+fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Commands) {
     let tokens = tokens_of(ui);
     Frame::new()
         .fill(tokens.canvas)

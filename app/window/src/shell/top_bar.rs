@@ -1,7 +1,7 @@
 //! The bar that stands on every screen: state, run, progress, the numbers, the stop control.
 
 use super::activity::{Activity, is_motion_possible, run_in_progress};
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::theme::reading_style;
 use crate::widgets::{badge_ui, quiet_ui, share_ui, tokens_of};
 use eframe::egui::{Align, Button, Context, Id, Label, Layout, RichText, Stroke, Ui, vec2};
@@ -40,10 +40,10 @@ struct StopButtons {
 
 /// Pushes the commands of the two buttons if they were pressed since the last frame: before anything is drawn, so that no
 /// screen can delay a stop.
-pub fn push_stop_buttons(ctx: &Context, commands: &mut CommandQueue) {
+pub fn push_stop_buttons(ctx: &Context, commands: &mut Commands) {
     let drawn = ctx.data(|data| data.get_temp::<StopButtons>(Id::unique("stop buttons")));
     let Some(StopButtons { stop, halt }) = drawn else { return };
-    for (button, command) in [(stop, UserCommand::Stop), (halt, UserCommand::Halt)] {
+    for (button, command) in [(stop, UiCommand::Stop), (halt, UiCommand::Halt)] {
         if ctx.read_response(button).is_some_and(|one| one.clicked()) {
             commands.push(command);
         }

@@ -1,6 +1,6 @@
 //! The first-run tour: a strip of a few sentences, each about a part of the screen, that covers no control.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::screens::{calibration, library, review, rig, run};
 use crate::widgets::tokens_of;
 use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
@@ -33,7 +33,7 @@ const STOPS: [(&str, &str); 7] = [
     ),
     (
         review::SCREEN.name,
-        "One session closely or several beside each other: cursors, phases, fits, other calibrations, a report.",
+        "One session in detail or several next to each other: cursors, phases, fits, other calibrations, a report.",
     ),
     (
         run::SCREEN.name,
@@ -61,7 +61,7 @@ impl Tour {
         self.0.map(|at| STOPS[at].0)
     }
 
-    pub fn ui(&self, ui: &mut Ui, commands: &mut CommandQueue) {
+    pub fn ui(&self, ui: &mut Ui, commands: &mut Commands) {
         let Some((at, (_, words))) = self.0.and_then(|at| Some((at, STOPS.get(at)?))) else {
             return;
         };
@@ -76,10 +76,10 @@ impl Tour {
                     ui.label(RichText::new(place).strong());
                     let name = if at + 1 == STOPS.len() { "Done with the tour" } else { "Next" };
                     if ui.button(name).clicked() {
-                        commands.push(UserCommand::TourNext);
+                        commands.push(UiCommand::TourNext);
                     }
                     if at + 1 < STOPS.len() && ui.button("End the tour").clicked() {
-                        commands.push(UserCommand::TourEnd);
+                        commands.push(UiCommand::TourEnd);
                     }
                     ui.add(Label::new(*words).wrap());
                 });

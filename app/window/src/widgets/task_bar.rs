@@ -2,7 +2,7 @@
 
 use super::buttons::reason_button;
 use super::text::{alarm_ui, placeholder_ui, tokens_of};
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::workers::{BackgroundTask, TaskState};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 use palpate_figures::uncertain::clock;
@@ -33,10 +33,10 @@ pub fn work_ui<T: Send + 'static>(
     start: &str,
     task: &BackgroundTask<T>,
     verdict: &Result<(), String>,
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     if task_ui(ui, start, task, verdict) {
-        commands.push(UserCommand::Work);
+        commands.push(UiCommand::Work);
     }
 }
 

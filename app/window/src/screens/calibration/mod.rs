@@ -2,9 +2,7 @@
 
 mod plots;
 
-use super::screen::{
-    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
-};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::widgets::{
     NamedControl, alarm_ui, answer_ui, fact_ui, form_label, placeholder_ui, quiet_ui,
     reason_button, require, section_ui, sentence_ui, small_alarm_ui,
@@ -21,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
-    purpose: "volts to newtons: which calibrations there are",
+    purpose: "volts to newtons: calibrations of the library",
     key: Key::Num2,
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),
 };
@@ -92,7 +90,7 @@ impl CalibrationScreen {
 }
 
 impl Screen for CalibrationScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, "Calibrations");
         if let Some(shelved) = answer_ui(ui, &self.shelved, "reading the library") {
             for (index, one) in shelved.shown.iter().enumerate() {
@@ -110,12 +108,12 @@ impl Screen for CalibrationScreen {
         ui.add_space(8.0);
         let verdict = self.usable(workbench).map(|_| ());
         if reason_button(ui, "Use calibration  F6", vec2(150.0, 30.0), &verdict) {
-            commands.push(UserCommand::Work);
+            commands.push(UiCommand::Work);
         }
         section_ui(ui, "New calibration");
         let button = Button::new("Measure...").min_size(vec2(150.0, 28.0));
         if ui.add_enabled(!workbench.is_busy(), button).clicked() {
-            commands.push(UserCommand::MeasureCalibration);
+            commands.push(UiCommand::MeasureCalibration);
         }
         ui.horizontal(|ui| {
             let label = form_label(ui, "name");
@@ -127,7 +125,7 @@ impl Screen for CalibrationScreen {
         let has_name = require(!self.name.trim().is_empty(), "type a name first");
         let verdict = calibration_session(workbench.run()).and(has_name);
         if reason_button(ui, "Save calibration of last run", vec2(150.0, 28.0), &verdict) {
-            commands.push(UserCommand::KeepCalibration);
+            commands.push(UiCommand::KeepCalibration);
         }
         match self.shelved.answer().and_then(|answer| answer.as_ref().ok()?.kept.as_ref()) {
             Some(Ok(id)) => quiet_ui(ui, format!("saved as {id}")),
@@ -136,13 +134,13 @@ impl Screen for CalibrationScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         if let Some(Shown { told: Ok((_, curves)), .. }) = self.shown_one() {
             plots::curves_ui(ui, curves);
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         section_ui(ui, "Chosen calibration");
         let Some(one) = self.shown_one() else { return placeholder_ui(ui, "none yet") };
         let document = &one.calibration;
@@ -190,17 +188,12 @@ impl Screen for CalibrationScreen {
         }
     }
 
-    fn act(
-        &mut self,
-        ctx: &Context,
-        command: &UserCommand,
-        workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::KeepCalibration => self.keep(workbench.run(), ctx),
-            _ => return ScreenReply::NotMine,
+            UiCommand::KeepCalibration => self.keep(workbench.run(), ctx),
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Show
+        Reaction::Show
     }
 
     /// New sessions are read with the calibration that is chosen.
@@ -217,9 +210,9 @@ impl Screen for CalibrationScreen {
         let is_measured = calibration_session(workbench.run()).map(|_| ());
         let keep = "Save the calibration of the last run";
         vec![
-            PaletteAction::new("Measure a calibration", "", UserCommand::MeasureCalibration)
+            PaletteAction::new("Measure a calibration", "", UiCommand::MeasureCalibration)
                 .if_ok(workbench.free_verdict()),
-            PaletteAction::new(keep, "", UserCommand::KeepCalibration).if_ok(is_measured),
+            PaletteAction::new(keep, "", UiCommand::KeepCalibration).if_ok(is_measured),
         ]
     }
 }

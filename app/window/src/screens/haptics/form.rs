@@ -119,7 +119,7 @@ impl HapticsForm {
         });
         let damps = match self.is_current {
             false => "the motor's back-EMF damps",
-            true => "the motor damps nothing",
+            true => "the motor does not damp",
         };
         quiet_ui(ui, damps);
         quantity_ui(ui, "damping", "N s/m, own", &mut self.damping);

@@ -5,9 +5,7 @@ mod form;
 mod middle;
 mod right;
 
-use super::screen::{
-    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
-};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::tape::{TapePanel, loop_button_ui};
 use crate::widgets::{
     NamedControl, alarm_ui, form_label, quiet_ui, require, section_ui, tick_box, work_ui,
@@ -109,7 +107,7 @@ impl HapticsScreen {
         }
     }
 
-    fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut CommandQueue) {
+    fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
         section_ui(ui, "Feel");
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
@@ -119,7 +117,7 @@ impl HapticsScreen {
             alarm_ui(ui, reason);
         }
         let verdict = verdict.clone().and_then(|()| self.checked().map(|_| ()));
-        let both = [UserCommand::LoopStart, UserCommand::LoopStop];
+        let both = [UiCommand::LoopStart, UiCommand::LoopStop];
         loop_button_ui(ui, "loop", is_running, &verdict, both, commands);
         let answer = self.task.answer().filter(|_| is_running);
         let (Some(live_loop), Some(Ok(check))) = (&self.live_loop, answer) else { return };
@@ -147,12 +145,12 @@ impl HapticsScreen {
 }
 
 impl Screen for HapticsScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         // A running loop keeps the setting that was checked.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
             if self.form.ui(ui, &workbench.front) {
-                commands.push(UserCommand::Choose(PathPurpose::Body));
+                commands.push(UiCommand::Choose(PathPurpose::Body));
             }
         });
         ui.add_space(6.0);
@@ -162,11 +160,11 @@ impl Screen for HapticsScreen {
         self.tape.ui(ui, is_running, replay);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_right(ui);
     }
 
@@ -180,27 +178,22 @@ impl Screen for HapticsScreen {
         }
     }
 
-    fn act(
-        &mut self,
-        ctx: &Context,
-        command: &UserCommand,
-        workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
+            UiCommand::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
                 self.start_loop(ctx);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            UserCommand::LoopStart => {}
-            UserCommand::LoopStop => self.stop(),
-            UserCommand::Chosen(PathPurpose::Body, path) => self.form.take(path),
-            UserCommand::ReplayLoop(folder) => {
+            UiCommand::LoopStart => {}
+            UiCommand::LoopStop => self.stop(),
+            UiCommand::Chosen(PathPurpose::Body, path) => self.form.take(path),
+            UiCommand::ReplayLoop(folder) => {
                 self.tape.take(folder);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            _ => return ScreenReply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -245,9 +238,8 @@ impl Screen for HapticsScreen {
         let can_stop = require(self.is_running(), "the loop does not run");
         let can_start = workbench.loop_verdict(SCREEN.name);
         vec![
-            PaletteAction::new("Start the haptic loop", "", UserCommand::LoopStart)
-                .if_ok(can_start),
-            PaletteAction::new("Stop the haptic loop", "", UserCommand::LoopStop).if_ok(can_stop),
+            PaletteAction::new("Start the haptic loop", "", UiCommand::LoopStart).if_ok(can_start),
+            PaletteAction::new("Stop the haptic loop", "", UiCommand::LoopStop).if_ok(can_stop),
         ]
     }
 }

@@ -9,7 +9,7 @@ mod import;
 mod list;
 mod session;
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::widgets::{progress_ui, quiet_ui, reason_button, require, section_ui, small_alarm_ui};
 use crate::workers::{BackgroundTask, LatestAnswer};
 use edits::EditPanel;
@@ -170,9 +170,9 @@ impl LibraryScreen {
         require(count <= REVIEW_MAX, words)
     }
 
-    fn review(&mut self, commands: &mut CommandQueue) {
+    fn review(&mut self, commands: &mut Commands) {
         if self.review_verdict().is_ok() {
-            commands.push(UserCommand::Review(self.chosen().to_vec()));
+            commands.push(UiCommand::Review(self.chosen().to_vec()));
         }
     }
 
@@ -208,7 +208,7 @@ impl LibraryScreen {
 }
 
 impl Screen for LibraryScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Find sessions");
         if let Err(err) = &self.library {
@@ -243,7 +243,7 @@ impl Screen for LibraryScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.heading_ui(ui);
         let help = "Arrows choose, Shift extends, Space or Ctrl with a click adds, Ctrl+A chooses all, Enter reviews.";
         ui.add(Label::new(RichText::new(help).small().weak()).truncate());
@@ -259,7 +259,7 @@ impl Screen for LibraryScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         let chosen = self.chosen();
         if chosen.is_empty() {
             section_ui(ui, "Session");
@@ -322,16 +322,11 @@ impl Screen for LibraryScreen {
         self.edits.read_keys(ctx);
     }
 
-    fn act(
-        &mut self,
-        _ctx: &Context,
-        command: &UserCommand,
-        _workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::Import(files) => self.import.add(files),
-            _ => return ScreenReply::NotMine,
+            UiCommand::Import(files) => self.import.add(files),
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Show
+        Reaction::Show
     }
 }

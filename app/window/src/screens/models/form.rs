@@ -1,6 +1,6 @@
 //! Recordings to compare, and the options of the comparison.
 
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{
     NamedControl, choice_ui, form_label, placeholder_ui, quiet_ui, require, tick_box, tolerance_ui,
 };
@@ -81,7 +81,7 @@ impl ModelsForm {
         &mut self,
         ui: &mut Ui,
         last_run: Option<&Path>,
-        commands: &mut CommandQueue,
+        commands: &mut Commands,
     ) {
         let mut dropped = None;
         for (index, path) in self.sources.iter().enumerate() {
@@ -120,10 +120,10 @@ impl ModelsForm {
         });
         ui.horizontal_wrapped(|ui| {
             if ui.button("Choose table...").clicked() {
-                commands.push(UserCommand::Choose(PathPurpose::Table));
+                commands.push(UiCommand::Choose(PathPurpose::Table));
             }
             if ui.button("Choose session...").clicked() {
-                commands.push(UserCommand::Choose(PathPurpose::Session));
+                commands.push(UiCommand::Choose(PathPurpose::Session));
             }
             let button = Button::new("Add the last run");
             if ui.add_enabled(last_run.is_some(), button).clicked()

@@ -5,7 +5,7 @@ mod form;
 
 pub use form::ModelsForm;
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::widgets::{answer_ui, placeholder_ui, section_ui, work_ui};
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
@@ -32,7 +32,7 @@ impl ModelsScreen {
 }
 
 impl Screen for ModelsScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let run = workbench.run().filter(|run| run.outcome.is_some());
         let last_run = run.map(|run| run.folder.as_path());
         section_ui(ui, "Recordings compared");
@@ -44,14 +44,14 @@ impl Screen for ModelsScreen {
         work_ui(ui, "Compare models  F6", &self.task, &verdict, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let before = "Add recordings on the left and compare them. Two speeds or depths of one specimen are better than one: each fit then predicts the recordings that are held out.";
         if let Some(selected) = answer_ui(ui, &self.task, before) {
             answer::families_ui(ui, &selected.selection);
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         match self.task.answer() {
             Some(Ok(selected)) => answer::choice_ui(ui, selected),
             _ => {
@@ -65,19 +65,14 @@ impl Screen for ModelsScreen {
         self.task.poll();
     }
 
-    fn act(
-        &mut self,
-        _ctx: &Context,
-        command: &UserCommand,
-        _workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::Chosen(PathPurpose::Session | PathPurpose::Table, path) => {
+            UiCommand::Chosen(PathPurpose::Session | PathPurpose::Table, path) => {
                 self.form.add(path)
             }
-            _ => return ScreenReply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {

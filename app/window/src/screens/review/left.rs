@@ -1,7 +1,7 @@
 //! The sessions shown, and how they are laid over each other.
 
 use super::{ReviewScreen, ReviewSubject, View};
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::screens::library;
 use crate::theme::Tokens;
 use crate::widgets::{
@@ -58,12 +58,12 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
 }
 
 impl ReviewScreen {
-    pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut CommandQueue) {
+    pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
         section_ui(ui, "Sessions shown");
         self.sessions_ui(ui);
         self.add_ui(ui);
         if ui.button("Find sessions in the library").clicked() {
-            commands.push(UserCommand::Show(library::SCREEN.name));
+            commands.push(UiCommand::Show(library::SCREEN.name));
         }
         section_ui(ui, "Time zero at");
         for time_origin in TimeOrigin::ALL {
@@ -158,7 +158,7 @@ impl ReviewScreen {
         for subject in &self.subjects {
             if subject.is_settled() && subject.moment(self.time_origin).is_none() {
                 let words = format!(
-                    "{} has no {}; it lies at its start",
+                    "{} has no {}; its time is counted from its start",
                     subject.name,
                     self.time_origin.name()
                 );

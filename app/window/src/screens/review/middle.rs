@@ -117,7 +117,7 @@ impl ReviewScreen {
             self.has_residuals && self.subjects.iter().any(|one| one.fitted().is_some());
         let count = self.quantities.len() + usize::from(has_residuals);
         if count == 0 {
-            quiet_ui(ui, "choose on the left what is shown");
+            quiet_ui(ui, "choose quantities on the left");
             return;
         }
         let tokens = tokens_of(ui);

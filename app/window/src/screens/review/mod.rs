@@ -13,7 +13,7 @@ mod subject;
 
 use subject::ReviewSubject;
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_depth::DepthLines;
 use crate::widgets::ModelChoice;
@@ -26,7 +26,7 @@ use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
-    purpose: "look at sessions: one closely, several beside each other",
+    purpose: "one session in detail, several next to each other",
     key: Key::Num5,
     open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),
 };
@@ -221,15 +221,15 @@ impl ReviewScreen {
 }
 
 impl Screen for ReviewScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_left(ui, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_right(ui);
         let shown: Vec<Looked> = self.subjects.iter().map(|one| one.source.clone()).collect();
         self.analyses.set_shown(&shown);
@@ -252,17 +252,12 @@ impl Screen for ReviewScreen {
         }
     }
 
-    fn act(
-        &mut self,
-        ctx: &Context,
-        command: &UserCommand,
-        _workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::Review(sessions) => self.open(sessions.clone(), ctx),
-            _ => return ScreenReply::NotMine,
+            UiCommand::Review(sessions) => self.open(sessions.clone(), ctx),
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Show
+        Reaction::Show
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {

@@ -1,7 +1,7 @@
 //! The screen of the rig: its readings in large letters, and manual moves.
 
 use super::rig_panel::rig_ui;
-use super::screen::{CommandQueue, Screen, ScreenEntry, UserCommand, Workbench};
+use super::screen::{Commands, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::command::ManualMove;
 use crate::theme::reading_style;
 use crate::widgets::{
@@ -17,7 +17,7 @@ use palpate_runner::RigView;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
-    purpose: "what the rig reports, and moving it by hand",
+    purpose: "readings of the rig, and manual moves",
     key: Key::Num1,
     open: |_| Box::new(RigScreen::default()),
 };
@@ -38,11 +38,11 @@ impl Default for RigScreen {
 }
 
 impl Screen for RigScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let rig = &workbench.snapshot.rig;
         ScrollArea::vertical().id_salt("rig").auto_shrink(false).show(ui, |ui| {
             section_ui(ui, "Readings");
@@ -65,7 +65,7 @@ impl Screen for RigScreen {
 }
 
 impl RigScreen {
-    fn move_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut CommandQueue) {
+    fn move_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
         let (rig, verdict) = (&workbench.snapshot.rig, workbench.move_verdict());
         let tokens = tokens_of(ui);
         let fastest = rig.description.speed_max.0;
@@ -92,7 +92,7 @@ impl RigScreen {
             if reason_button(ui, "Jog", vec2(80.0, 34.0), &is_possible)
                 && let Ok((distance, speed)) = typed
             {
-                commands.push(UserCommand::ManualMove(ManualMove::jog(distance, speed)));
+                commands.push(UiCommand::ManualMove(ManualMove::jog(distance, speed)));
             }
         });
         ui.horizontal_wrapped(|ui| {
@@ -103,7 +103,7 @@ impl RigScreen {
                 if ui.add_enabled(is_possible, button).clicked()
                     && let Ok(speed) = speed
                 {
-                    commands.push(UserCommand::ManualMove(ManualMove::jog(distance, speed)));
+                    commands.push(UiCommand::ManualMove(ManualMove::jog(distance, speed)));
                 }
             }
         });
@@ -112,7 +112,7 @@ impl RigScreen {
         ui.add_space(6.0);
         ui.horizontal_wrapped(|ui| {
             if reason_button(ui, "Find home", vec2(110.0, 34.0), &verdict) {
-                commands.push(UserCommand::ManualMove(ManualMove::home()));
+                commands.push(UiCommand::ManualMove(ManualMove::home()));
             }
             let words = if rig.is_homed {
                 "Position zero is known. The axis touches the home switch again and compares."

@@ -6,9 +6,7 @@ mod middle;
 mod plan;
 mod right;
 
-use super::screen::{
-    CommandQueue, PaletteAction, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench,
-};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::tape::{TapePanel, loop_button_ui};
 use crate::scene::view::SceneView;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
@@ -178,14 +176,12 @@ impl SceneScreen {
 }
 
 impl Screen for SceneScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         // A running scene keeps its settings.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
-            Some(form::FileAction::Dialog) => {
-                commands.push(UserCommand::Choose(PathPurpose::Scene))
-            }
-            Some(form::FileAction::Read) => commands.push(UserCommand::OpenScene),
+            Some(form::FileAction::Dialog) => commands.push(UiCommand::Choose(PathPurpose::Scene)),
+            Some(form::FileAction::Read) => commands.push(UiCommand::OpenScene),
             None => {}
         });
         if let Some(reason) = &self.refusal {
@@ -195,7 +191,7 @@ impl Screen for SceneScreen {
         let verdict = self.compute_verdict();
         work_ui(ui, "Compute path  F6", &self.computed, &verdict, commands);
         section_ui(ui, "Touch");
-        let both = [UserCommand::SceneStart, UserCommand::SceneStop];
+        let both = [UiCommand::SceneStart, UiCommand::SceneStop];
         loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
         let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
             true => "The path leads the hand, and then the pointer and the keys do.",
@@ -211,11 +207,11 @@ impl Screen for SceneScreen {
         self.tape.ui(ui, is_running, replay);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_right(ui);
     }
 
@@ -248,31 +244,26 @@ impl Screen for SceneScreen {
         }
     }
 
-    fn act(
-        &mut self,
-        ctx: &Context,
-        command: &UserCommand,
-        workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::SceneStart if self.verdict(workbench).is_ok() => {
+            UiCommand::SceneStart if self.verdict(workbench).is_ok() => {
                 self.start(ctx);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            UserCommand::SceneStart => {}
-            UserCommand::SceneStop => self.stop(),
-            UserCommand::OpenScene => self.read(ctx),
-            UserCommand::Chosen(PathPurpose::Scene, path) => {
+            UiCommand::SceneStart => {}
+            UiCommand::SceneStop => self.stop(),
+            UiCommand::OpenScene => self.read(ctx),
+            UiCommand::Chosen(PathPurpose::Scene, path) => {
                 self.form.file = path.display().to_string();
                 self.read(ctx);
             }
-            UserCommand::ReplayScene(folder) => {
+            UiCommand::ReplayScene(folder) => {
                 self.tape.take(folder);
-                return ScreenReply::Show;
+                return Reaction::Show;
             }
-            _ => return ScreenReply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -306,8 +297,8 @@ impl Screen for SceneScreen {
         let can_stop = require(self.is_running(), "the scene does not run");
         let can_start = self.verdict(workbench);
         vec![
-            PaletteAction::new("Start the scene", "", UserCommand::SceneStart).if_ok(can_start),
-            PaletteAction::new("Stop the scene", "", UserCommand::SceneStop).if_ok(can_stop),
+            PaletteAction::new("Start the scene", "", UiCommand::SceneStart).if_ok(can_start),
+            PaletteAction::new("Stop the scene", "", UiCommand::SceneStop).if_ok(can_stop),
         ]
     }
 }

@@ -1,7 +1,7 @@
 //! Tolerances of the scene, and the cheapest plan that meets them.
 
 use super::SceneScreen;
-use crate::command::{CommandQueue, UserCommand};
+use crate::command::{Commands, UiCommand};
 use crate::widgets::{NamedControl, alarm_ui, fact_ui, quiet_ui, reason_button, section_ui};
 use crate::workers::live_scene::LiveScene;
 use eframe::egui::{Ui, vec2};
@@ -40,7 +40,7 @@ impl SceneScreen {
     }
 
     /// Draws it; the plan can be taken.
-    pub(super) fn plan_ui(&mut self, ui: &mut Ui, is_running: bool, commands: &mut CommandQueue) {
+    pub(super) fn plan_ui(&mut self, ui: &mut Ui, is_running: bool, commands: &mut Commands) {
         section_ui(ui, "Tolerances and plan");
         if let Ok(file) = self.form.scene_file() {
             let one = &file.tolerances;
@@ -59,7 +59,7 @@ impl SceneScreen {
         if self.planned.is_none() {
             const NAME: &str = "Measure on Trade...";
             if ui.button(NAME).named(NAME).clicked() {
-                commands.push(UserCommand::MeasureScene);
+                commands.push(UiCommand::MeasureScene);
             }
         }
         let is_used = reason_button(ui, "Use plan", vec2(170.0, 26.0), &verdict);

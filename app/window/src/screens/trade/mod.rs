@@ -3,7 +3,7 @@
 
 mod tables;
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, ScreenReply, UserCommand, Workbench};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
     NamedControl, QuantityField, alarm_ui, placeholder_ui, quantity_ui, quiet_ui, require,
@@ -192,7 +192,7 @@ impl TradeScreen {
 }
 
 impl Screen for TradeScreen {
-    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, "Requirements");
         tolerance_ui(ui, &mut self.tolerance, None);
         let is_scene = self.view.is_scene();
@@ -229,7 +229,7 @@ impl Screen for TradeScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         ui.horizontal(|ui| {
             ui.label(RichText::new("Error over time").heading().strong());
             for (view, name) in VIEWS {
@@ -255,7 +255,7 @@ impl Screen for TradeScreen {
         table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         section_ui(ui, "Recommendation");
         if self.view.is_scene() {
             self.plan_ui(ui);
@@ -307,17 +307,12 @@ impl Screen for TradeScreen {
         });
     }
 
-    fn act(
-        &mut self,
-        _ctx: &Context,
-        command: &UserCommand,
-        _workbench: &mut Workbench,
-    ) -> ScreenReply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            UserCommand::MeasureScene => self.view = View::Mesh,
-            _ => return ScreenReply::NotMine,
+            UiCommand::MeasureScene => self.view = View::Mesh,
+            _ => return Reaction::NotMine,
         }
-        ScreenReply::Show
+        Reaction::Show
     }
 
     fn work(&mut self, ctx: &Context, workbench: &mut Workbench) {

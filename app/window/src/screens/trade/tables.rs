@@ -78,7 +78,7 @@ pub(super) fn integrators(curves: &TradeCurves) -> TradeTable {
 pub(super) fn families(curves: &TradeCurves) -> TradeTable {
     let mut shown = TradeTable::new(
         ["ns a step", "error (% of peak force)"],
-        &["family and what it stands for", "a step", "error (%)"],
+        &["family and its target", "a step", "error (%)"],
     );
     for row in &curves.families {
         let error = 100.0 * row.error_n / row.peak_n;
