@@ -121,9 +121,9 @@ impl Witness {
 }
 
 impl Screen for Witness {
-    fn left_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut CommandQueue) {}
+    fn left_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut Commands) {}
 
-    fn middle_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut CommandQueue) {}
+    fn middle_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut Commands) {}
 
     fn stop(&mut self) {
         self.note("stop");

@@ -1,6 +1,6 @@
 //! The daily checks of the rig over time: deviations of its zero and of a known weight, and their limits.
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, Workbench};
+use super::screen::{Commands, Screen, ScreenEntry, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
     Column, Emphasis, TableRow, alarm_ui, answer_ui, fact_ui, heading_ui, quiet_ui, section_ui,
@@ -65,7 +65,7 @@ impl ChecksScreen {
 }
 
 impl Screen for ChecksScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, &format!("Daily checks of {}", self.rig));
         quiet_ui(
             ui,
@@ -77,7 +77,7 @@ impl Screen for ChecksScreen {
         quiet_ui(ui, format!("Run '{HOW}' on the command line."));
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let before = "reading the library";
         let Some(checks) = answer_ui(ui, &self.task, before) else { return };
         if checks.is_empty() {
@@ -111,7 +111,7 @@ impl Screen for ChecksScreen {
         table_ui(ui, "daily_checks", &columns, &rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         section_ui(ui, "Last check");
         let Some(Ok(checks)) = self.task.answer() else { return };
         let Some(PastCheck { check, .. }) = checks.last() else {

@@ -1,6 +1,6 @@
 //! Which cases at the ends of every range are right and which are refused.
 
-use super::screen::{CommandQueue, Screen, ScreenEntry, Workbench};
+use super::screen::{Commands, Screen, ScreenEntry, Workbench};
 use crate::widgets::{
     Column, Emphasis, TableRow, answer_ui, choice_ui, heading_ui, placeholder_ui, quiet_ui,
     section_ui, table_ui, tokens_of, work_ui,
@@ -50,7 +50,7 @@ impl ExtremesScreen {
 }
 
 impl Screen for ExtremesScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut CommandQueue) {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, "Test");
         ui.add(
             Label::new(
@@ -73,7 +73,7 @@ impl Screen for ExtremesScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let before = "nothing tested yet";
         let Some(found) = answer_ui(ui, &self.task, before) else { return };
         let rows: Vec<TableRow> = found
@@ -96,7 +96,7 @@ impl Screen for ExtremesScreen {
         table_ui(ui, "extremes_table", &columns, &rows);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut CommandQueue) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let tokens = tokens_of(ui);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {

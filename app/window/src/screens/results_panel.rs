@@ -3,7 +3,7 @@
 use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
-use crate::command::CommandQueue;
+use crate::command::Commands;
 use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
 use crate::workers::fit::Refit;
 use eframe::egui::Ui;
@@ -19,7 +19,7 @@ pub fn results_ui(
     snapshot: &Snapshot,
     refit: Refit<'_>,
     cycles: &[Cycle],
-    commands: &mut CommandQueue,
+    commands: &mut Commands,
 ) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {

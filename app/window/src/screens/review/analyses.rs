@@ -6,7 +6,7 @@ mod quality;
 mod report;
 
 use super::Looked;
-use crate::command::CommandQueue;
+use crate::command::Commands;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, task_ui, text_row};
 use crate::workers::{BackgroundTask, Job};
 use eframe::egui::{Context, Ui};
@@ -116,7 +116,7 @@ impl AnalysesPanel {
     }
 
     /// Draws the analyses of a session; which of them it is read by can be chosen.
-    pub fn ui(&mut self, ui: &mut Ui, source: &mut Looked, _commands: &mut CommandQueue) {
+    pub fn ui(&mut self, ui: &mut Ui, source: &mut Looked, _commands: &mut Commands) {
         if self.front.as_ref() != Some(&source.session) {
             self.front = Some(source.session.clone());
             self.known = None;
