@@ -1,5 +1,5 @@
-//! How soon a large session is seen, and what a frame costs while it is moved and zoomed, beside what plain egui_plot
-//! needs for the same samples in the same run.
+//! Time until a large session is drawn, and cost of a frame while it is panned and zoomed, next to plain egui_plot with the
+//! same samples in the same run.
 //!
 //! `cargo run --release -p palpate-window --example review_frames -- [SAMPLES] [SESSIONS] [SAMPLES_EACH]`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
@@ -21,7 +21,7 @@ use palpate_window::shell::frame_meter::thread_cpu_s;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// The plots' part of a window as it opens.
+/// Size of the plots in a window of the usual size.
 const SIZE: [f32; 2] = [1360.0, 820.0];
 /// Frames that are measured of each kind.
 const FRAMES: usize = 60;
@@ -116,13 +116,13 @@ fn record(folder: &Path, number: u32, samples: u64) -> Result<PathBuf, Failed> {
     Ok(path)
 }
 
-/// A window without a screen: what a frame costs up to the triangles, in ms of CPU.
-struct Bench {
+/// A window without a screen: the cost of a frame up to the triangles, in ms of CPU.
+struct FrameBench {
     ctx: Context,
     time: f64,
 }
 
-impl Bench {
+impl FrameBench {
     fn new() -> Self {
         let ctx = Context::default();
         palpate_window::theme::apply(&ctx);
@@ -198,7 +198,7 @@ fn plain(ui: &mut Ui, all: &[[Vec<PlotPoint>; 3]]) {
 
 #[expect(clippy::disallowed_methods, reason = "this program measures time")]
 fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
-    let mut bench = Bench::new();
+    let mut bench = FrameBench::new();
     let mut screen = ReviewScreen::new(Err("no library".into()));
     let start = Instant::now();
     let draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
@@ -211,11 +211,10 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
     loop {
         worst = worst.max(bench.frame(Vec::new(), |ui| draw(&mut screen, ui)));
-        let shown = screen.series(1000);
-        if first.is_none() && shown.iter().any(|one| !one.stretches.is_empty()) {
+        if first.is_none() && screen.has_samples() {
             first = Some(start.elapsed().as_secs_f64());
         }
-        if screen.shown().sessions.iter().all(|one| one.is_whole) {
+        if screen.is_settled() {
             break;
         }
         if start.elapsed() > Duration::from_secs(600) {
@@ -229,11 +228,11 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
         start.elapsed().as_secs_f64()
     );
     println!("{:<28} {:>12} {:>12}", "ms of CPU per frame", "median", "highest");
-    let tell = |what: &str, [median, highest]: [f64; 2]| {
+    let print = |what: &str, [median, highest]: [f64; 2]| {
         println!("{what:<28} {median:>12.2} {highest:>12.2}");
     };
-    tell("moved", bench.frames(false, |ui| draw(&mut screen, ui)));
-    tell("zoomed", bench.frames(true, |ui| draw(&mut screen, ui)));
+    print("moved", bench.frames(false, |ui| draw(&mut screen, ui)));
+    print("zoomed", bench.frames(true, |ui| draw(&mut screen, ui)));
     screen.show(View::OverDepth);
     let start = Instant::now();
     bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
@@ -243,9 +242,9 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
         bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
     }
     println!("loops over depth found after {:.2} s", start.elapsed().as_secs_f64());
-    tell("over depth, moved", bench.frames(false, |ui| draw(&mut screen, ui)));
+    print("over depth, moved", bench.frames(false, |ui| draw(&mut screen, ui)));
     drop(screen);
-    // Twice as many points as fit into memory help nobody: the same samples, made again.
+    // Both copies at once may not fit into memory, so the same samples are made again.
     let points: Vec<[Vec<PlotPoint>; 3]> = (0..sessions.len())
         .map(|number| {
             let mut random = number as u64 + 1;
@@ -260,9 +259,9 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
             columns
         })
         .collect();
-    let mut bench = Bench::new();
+    let mut bench = FrameBench::new();
     bench.frame(Vec::new(), |ui| plain(ui, &points));
-    tell("plain egui_plot, moved", bench.frames(false, |ui| plain(ui, &points)));
+    print("plain egui_plot, moved", bench.frames(false, |ui| plain(ui, &points)));
     Ok(())
 }
 

@@ -1,29 +1,30 @@
-//! The workbench's window as an eframe app: `logic` reads keys and answers, `ui` draws a snapshot.
+//! The workbench's window as an eframe app: `logic` reads keys and the answers of workers, `ui` draws a snapshot.
 
-use crate::command::{Command, Commands, TextSize};
+use crate::command::{Commands, TextSize, UiCommand};
 use crate::screens::run;
 use crate::screens::screen::{Screen, Screens};
-use crate::settings::{Kept, ZOOM};
+use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
-use crate::shell::dropped::push_dropped;
+use crate::shell::dropped_files::push_dropped;
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
-use crate::shell::keys::Keys;
+use crate::shell::keys::KeyReader;
 use crate::shell::pace::FramePace;
-use crate::shell::palette::{Action, Palette};
+use crate::shell::palette::{Palette, PaletteAction};
 use crate::shell::panels::frame;
 use crate::shell::rail::{self, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
-use crate::shell::sizes::{Edge, STEP, Sizes};
+use crate::shell::sizes::{PanelEdge, STEP, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::shell::tour::Tour;
 use crate::theme;
-use crate::widgets::places::places;
+use crate::widgets::places;
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_protocols::engine::Operator;
 use palpate_runner::Snapshot;
+use std::io::Write;
 use std::sync::Arc;
 
 /// The window's own state. The rig, the run and its data belong to the runner.
@@ -34,9 +35,9 @@ pub struct WorkbenchApp {
     events: EventLog,
     note: String,
     palette: Palette,
-    settings: Kept,
+    settings: SettingsFile,
     sizes: Sizes,
-    keys: Keys,
+    keys: KeyReader,
     meter: FrameMeter,
     pace: FramePace,
     is_zoom_set: bool,
@@ -47,19 +48,19 @@ impl WorkbenchApp {
     /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(mut options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
-        let (settings, told) = Kept::open(options.settings.take());
+        let (settings, refusal) = SettingsFile::open(options.settings.take());
         if settings.now.is_dark {
             theme::switch(ctx);
         }
         let mut tour = Tour::default();
-        if settings.is_kept() && !settings.now.is_tour_over {
+        if settings.has_file() && !settings.now.is_tour_over {
             tour.start();
         }
         let pace = FramePace::default();
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
-        workbench.refusal = told;
+        workbench.refusal = refusal;
         let form = &mut workbench.form;
-        form.set_told("operator", &settings.now.operator);
+        form.set_label("operator", &settings.now.operator);
         if form.folder.is_empty() {
             form.folder.clone_from(&settings.now.sessions);
         }
@@ -70,9 +71,9 @@ impl WorkbenchApp {
             events: EventLog::default(),
             note: String::new(),
             palette: Palette::default(),
-            sizes: Sizes::remembered([settings.now.left, settings.now.right, settings.now.log]),
+            sizes: Sizes::from_changes([settings.now.left, settings.now.right, settings.now.log]),
             settings,
-            keys: Keys::default(),
+            keys: KeyReader::default(),
             meter: FrameMeter::from_environment(),
             pace,
             is_zoom_set: false,
@@ -80,24 +81,21 @@ impl WorkbenchApp {
         })
     }
 
-    /// The newest snapshot taken for drawing.
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.workbench.snapshot
     }
 
-    /// A screen by its type.
     pub fn screen<T: Screen>(&self) -> Option<&T> {
         self.screens.get()
     }
 
-    /// Stops the rig, and then what else moves: that may take its time.
+    /// Stops the rig first: the loops of screens may take longer.
     fn stop(&mut self) {
         self.workbench.operator(Operator::Stop);
         self.screens.stop();
         self.palette.close();
     }
 
-    /// Does what was asked for.
     fn act(&mut self, ctx: &Context, commands: &mut Commands) {
         for command in commands.take() {
             self.act_on(ctx, command);
@@ -105,33 +103,33 @@ impl WorkbenchApp {
         }
     }
 
-    fn act_on(&mut self, ctx: &Context, command: Command) {
+    fn act_on(&mut self, ctx: &Context, command: UiCommand) {
         self.workbench.occupation = self.screens.occupation();
         match command {
-            Command::Stop => self.stop(),
-            Command::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
-            Command::CancelWork => self.screens.shown_mut().cancel(),
-            Command::Show(screen) => self.screens.show(screen),
-            Command::SwitchTheme => theme::switch(ctx),
-            Command::Resize { edge, is_larger } => {
+            UiCommand::Stop => self.stop(),
+            UiCommand::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
+            UiCommand::CancelWork => self.screens.shown_mut().cancel(),
+            UiCommand::Show(screen) => self.screens.show(screen),
+            UiCommand::SwitchTheme => theme::switch(ctx),
+            UiCommand::Resize { edge, is_larger } => {
                 self.sizes.grow(edge, if is_larger { STEP } else { -STEP });
             }
-            Command::TextSize(size) => set_text_size(ctx, size),
-            Command::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
-            Command::Palette => self.palette.toggle(),
-            Command::TourStart => {
+            UiCommand::TextSize(size) => set_text_size(ctx, size),
+            UiCommand::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
+            UiCommand::Palette => self.palette.toggle(),
+            UiCommand::TourStart => {
                 self.tour.start();
                 self.screens.show(run::SCREEN.name);
             }
-            Command::TourNext => match self.tour.go_on() {
+            UiCommand::TourNext => match self.tour.go_on() {
                 Some(screen) => self.screens.show(screen),
                 None => self.settings.now.is_tour_over = true,
             },
-            Command::TourEnd => {
+            UiCommand::TourEnd => {
                 self.tour.end();
                 self.settings.now.is_tour_over = true;
             }
-            Command::NoteTyped => {
+            UiCommand::NoteTyped => {
                 let text = match self.note.trim() {
                     "" => "mark".to_owned(),
                     text => text.to_owned(),
@@ -146,31 +144,24 @@ impl WorkbenchApp {
                 }
             }
         }
-        if self.workbench.is_run_wanted() {
-            // Nothing comes between a rig and its runner.
+        if self.workbench.has_next_run() {
+            // A loop on this computer would disturb the runner.
             self.screens.stop();
-            self.workbench.begin_wanted_run();
+            self.workbench.begin_next_run();
         }
     }
 
-    /// Takes over what is remembered until the window is opened again.
-    fn remember(&mut self, ctx: &Context) {
-        let now = &mut self.settings.now;
-        now.is_dark = ctx.theme() == Theme::Dark;
-        now.zoom = ctx.zoom_factor();
-    }
-
-    /// The rest of it, when the window closes.
-    fn remember_last(&mut self) {
+    /// Copies into the settings what is only needed when the window closes.
+    fn update_settings(&mut self) {
         let now = &mut self.settings.now;
         let form = &self.workbench.form;
         now.screen = self.screens.shown().to_owned();
-        now.operator = form.told_text("operator").to_owned();
+        now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);
-        [now.left, now.right, now.log] = self.sizes.told();
+        [now.left, now.right, now.log] = self.sizes.changes();
     }
 
-    /// Closing stops first: the window stays until the axis rests.
+    /// Closing stops motion first: the window stays until the axis is at rest.
     fn handle_close(&mut self, ctx: &Context) {
         if ctx.input(|input| input.viewport().close_requested()) {
             if !self.workbench.begin_to_close() {
@@ -190,7 +181,6 @@ impl WorkbenchApp {
         }
     }
 
-    /// Draws every panel. Changes nothing but what is typed and pressed.
     fn draw(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let panel = |name: &'static str, ui: &Ui| {
             let panel = Panel::top(name).frame(frame(ui, false));
@@ -214,9 +204,9 @@ impl WorkbenchApp {
             .frame(frame(ui, false))
             .show(ui, |ui| rail_ui(ui, self.screens.shown(), commands));
         let log = Panel::bottom("log").frame(frame(ui, true));
-        let log = self.sizes.of(Edge::Log, log);
+        let log = self.sizes.of(PanelEdge::Log, log);
         let log = log.show(ui, |ui| self.events.ui(ui, &snapshot, commands));
-        self.sizes.drag(ui, Edge::Log, log.response.rect);
+        self.sizes.drag(ui, PanelEdge::Log, log.response.rect);
         let screen = self.screens.shown_mut();
         screen.ui(ui, &mut self.sizes, &mut self.workbench, commands);
     }
@@ -256,7 +246,7 @@ impl eframe::App for WorkbenchApp {
         }
         self.workbench.poll();
         if let Some((ask, path)) = self.workbench.dialog.poll() {
-            commands.push(Command::Chosen(ask, path));
+            commands.push(UiCommand::Chosen(ask, path));
         }
         self.workbench.occupation = self.screens.occupation();
         self.screens.poll(ctx, &mut self.workbench);
@@ -265,7 +255,8 @@ impl eframe::App for WorkbenchApp {
             self.meter.run(run);
         }
         self.act(ctx, &mut commands);
-        self.remember(ctx);
+        self.settings.now.is_dark = ctx.theme() == Theme::Dark;
+        self.settings.now.zoom = ctx.zoom_factor();
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
         self.pace.next(ctx, !self.workbench.is_quiet(), is_watched);
@@ -276,11 +267,9 @@ impl eframe::App for WorkbenchApp {
         self.draw(ui, &mut commands);
         if self.palette.is_open() {
             let mut actions = self.actions();
-            actions.extend(
-                places(ui.ctx())
-                    .into_iter()
-                    .map(|(name, id)| Action::new(format!("Go to {name}"), "", Command::Focus(id))),
-            );
+            actions.extend(places(ui.ctx()).into_iter().map(|(name, id)| {
+                PaletteAction::new(format!("Go to {name}"), "", UiCommand::Focus(id))
+            }));
             self.palette.ui(ui, &actions, &mut commands);
         }
         if !std::mem::replace(&mut self.are_fonts_warm, true) {
@@ -294,17 +283,12 @@ impl eframe::App for WorkbenchApp {
 
     fn on_exit(&mut self) {
         self.screens.close();
-        self.remember_last();
-        if let Err(err) = self.settings.store() {
-            let _ =
-                std::io::Write::write_all(&mut std::io::stderr(), format!("{err}\n").as_bytes());
-        }
-        if let Err(err) = self.meter.write_report() {
-            // Nobody is left to read a screen; standard error is the last place to say it.
-            let _ = std::io::Write::write_all(
-                &mut std::io::stderr(),
-                format!("the frame report cannot be written: {err}\n").as_bytes(),
-            );
+        self.update_settings();
+        let report = self.meter.write_report();
+        let report = report.map_err(|err| format!("the frame report cannot be written: {err}"));
+        for err in [self.settings.store(), report].into_iter().filter_map(Result::err) {
+            // The window is gone; standard error is the last place to say it.
+            let _ = writeln!(std::io::stderr(), "{err}");
         }
     }
 }

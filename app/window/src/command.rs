@@ -1,117 +1,98 @@
-//! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
+//! All commands of the user, one enum. Drawing code pushes them; only the app executes them.
 
-use crate::screens::run_middle::Middle;
-use crate::shell::run_strip::Wish;
-use crate::shell::sizes::Edge;
-use crate::workers::path_dialog::Ask;
+use crate::screens::run_panes::RunPane;
+use crate::shell::run_strip::RunControl;
+use crate::shell::sizes::PanelEdge;
+use crate::workers::PathPurpose;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// One thing the user asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// Start the plan in the form.
+pub enum UiCommand {
     Start,
-    /// Stop motion, now.
+    /// Controlled stop: the axis brakes.
     Stop,
-    /// Cut the motion, now, without braking.
+    /// Immediate stop without braking; the axis must be homed again.
     Halt,
-    /// Pause, resume, finish early, abort or answer a prompt, where the run allows it.
-    Wish(Wish),
-    /// After a stop: leave the tissue.
+    RunControl(RunControl),
+    /// After a stop: move the probe out of the tissue.
     Retract,
-    /// After a stop: end the session where the probe stands.
+    /// After a stop: end the session where the probe is.
     CloseSession,
-    /// Connect the rig anew after its link was lost; nothing moves.
+    /// Connects the rig again after its link was lost; nothing moves.
     Reconnect,
-    /// List the serial ports again.
     ListPorts,
-    /// Choose a folder or a file in a dialog of its own.
-    Choose(Ask),
-    /// Show the protocols, the expected course or what was measured.
-    View(Middle),
-    /// Take a built-in protocol into the form.
+    /// Opens a dialog for a folder or a file.
+    Choose(PathPurpose),
+    View(RunPane),
+    /// Takes a built-in protocol into the form.
     TakeProtocol(&'static str),
-    /// Read the protocol file whose path is typed.
+    /// Reads the protocol file whose path is typed.
     OpenProtocol,
-    /// Write down in the run in progress what stands in the field for notes; a mark if nothing does.
+    /// Writes the text of the note field into the run in progress, or a mark where it is empty.
     NoteTyped,
-    /// Move by hand: a short run beside the protocol in the form.
-    Aside(Aside),
-    /// Take the protocol that calibrates the load cell.
+    ManualMove(ManualMove),
+    /// Takes the protocol that calibrates the load cell.
     MeasureCalibration,
-    /// Store the calibration that the last run measured.
+    /// Saves the calibration that the last run measured.
     KeepCalibration,
-    /// Begin the work of the screen shown: compare models, measure, test.
+    /// Starts the work of the screen shown: compare models, measure, test.
     Work,
-    /// End the work of the screen shown.
     CancelWork,
-    /// Start the haptic loop on the body and device that were checked.
+    /// Starts the haptic loop on the material and device that were checked.
     LoopStart,
-    /// Stop the haptic loop.
     LoopStop,
-    /// Start the scene.
     SceneStart,
-    /// Stop the scene.
     SceneStop,
-    /// Read the scene file whose path is typed; the built-in scene where none is.
+    /// Reads the scene file whose path is typed, or the built-in scene.
     OpenScene,
-    /// Show where the curves of a scene are measured.
+    /// Shows the screen that measures the curves of a scene.
     MeasureScene,
-    /// Change between the light and the dark theme.
     SwitchTheme,
-    /// Look at sessions on the review screen, instead of those there.
+    /// Shows these sessions on the review screen, instead of those there.
     Review(Vec<PathBuf>),
-    /// Make text and everything else larger or smaller.
     TextSize(TextSize),
-    /// Make a panel larger, or smaller.
     Resize {
-        /// Which.
-        edge: Edge,
-        /// Whether larger.
+        edge: PanelEdge,
         is_larger: bool,
     },
-    /// Put the keyboard's focus on something.
     Focus(Id),
-    /// Open or close the list of everything that can be asked for.
+    /// Opens or closes the command palette.
     Palette,
-    /// Begin the tour of the window.
     TourStart,
-    /// Go on with it.
     TourNext,
-    /// End it.
     TourEnd,
-    /// Show the screen of this name. What goes on goes on, and the stop control stays.
+    /// Shows the screen of this name.
     Show(&'static str),
-    /// Take what was chosen in a dialog, or dropped on the window.
-    Chosen(Ask, PathBuf),
-    /// Import tables of other programs.
+    /// A path was chosen in a dialog, or dropped on the window.
+    Chosen(PathPurpose, PathBuf),
+    /// Proposes files of other programs for import.
     Import(Vec<PathBuf>),
-    /// Compute a recording of the haptic loop again.
+    /// Proposes a recording of the haptic loop for replay.
     ReplayLoop(PathBuf),
-    /// Compute a recording of a scene again.
+    /// Proposes a recording of a scene for replay.
     ReplayScene(PathBuf),
 }
 
-impl Command {
-    /// Whether it stops motion: nothing may come before it.
+impl UiCommand {
+    /// A stop comes before all other commands.
     pub const fn is_stop(&self) -> bool {
         matches!(self, Self::Stop | Self::Halt)
     }
 }
 
-/// A run beside the protocol in the form.
+/// A short run apart from the protocol in the form.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Aside {
-    /// Name of the built-in protocol.
+pub struct ManualMove {
+    /// A built-in one.
     pub protocol: &'static str,
-    /// Its values, as they would be typed.
+    /// As they would be typed.
     pub values: BTreeMap<String, String>,
 }
 
-impl Aside {
-    /// Move by a distance in mm, towards the tissue where it is positive, at a speed in mm/s.
+impl ManualMove {
+    /// Moves by a distance in mm, positive towards the tissue, at a speed in mm/s.
     #[must_use]
     pub fn jog(distance: f64, speed: f64) -> Self {
         let values = [
@@ -121,7 +102,7 @@ impl Aside {
         Self { protocol: "free-jog", values: values.into() }
     }
 
-    /// Find home, and touch it once more.
+    /// Finds home, and touches it once more to compare.
     #[must_use]
     pub fn home() -> Self {
         let values =
@@ -130,33 +111,29 @@ impl Aside {
     }
 }
 
-/// How the size of text changes.
+/// A change of the size of text: a tenth, or back to the usual size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextSize {
-    /// By a tenth.
     Larger,
-    /// By a tenth.
     Smaller,
-    /// As it is made.
     Usual,
 }
 
-/// What was asked for since the app last acted.
+/// Commands since the app last acted.
 #[derive(Debug, Default)]
-pub struct Commands(Vec<Command>);
+pub struct Commands(Vec<UiCommand>);
 
 impl Commands {
-    /// Asks for something.
-    pub fn push(&mut self, command: Command) {
+    pub fn push(&mut self, command: UiCommand) {
         self.0.push(command);
     }
 
-    /// Everything asked for, a halt and then a stop before all else; leaves nothing behind.
-    pub fn take(&mut self) -> Vec<Command> {
+    /// Takes all commands, halts and then stops first.
+    pub fn take(&mut self) -> Vec<UiCommand> {
         let mut commands = std::mem::take(&mut self.0);
         commands.sort_by_key(|command| match command {
-            Command::Halt => 0,
-            Command::Stop => 1,
+            UiCommand::Halt => 0,
+            UiCommand::Stop => 1,
             _ => 2,
         });
         commands
@@ -168,14 +145,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stop_overtakes_what_was_asked_before() {
+    fn a_stop_overtakes_commands_before_it() {
         let mut commands = Commands::default();
-        for command in [Command::Start, Command::ListPorts, Command::Stop, Command::Halt] {
+        for command in [UiCommand::Start, UiCommand::ListPorts, UiCommand::Stop, UiCommand::Halt] {
             commands.push(command);
         }
         assert_eq!(
             commands.take(),
-            [Command::Halt, Command::Stop, Command::Start, Command::ListPorts]
+            [UiCommand::Halt, UiCommand::Stop, UiCommand::Start, UiCommand::ListPorts]
         );
         assert!(commands.take().is_empty());
     }

@@ -1,41 +1,37 @@
-//! What the window remembers of its user, as one small JSON file in the library: how it looked when it was last closed.
+//! Settings of the window, a small JSON file in the library that is written when the window closes.
 
 use palpate_sessions::atomic;
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// A longer file is something else.
+/// A longer file is not one of settings.
 const BYTES_MAX: usize = 64 * 1024;
 
-/// Text may be half to twice and a half as large as it is made.
+/// Zoom factors of text and everything else.
 pub const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=2.5;
 
-/// What is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Settings {
-    /// Whether the dark theme is on.
+pub struct WindowSettings {
     pub is_dark: bool,
-    /// Size of everything, 1 as it is made.
+    /// Size of text and everything else; 1 is the usual one.
     pub zoom: f32,
     /// Name of the screen shown last.
     pub screen: String,
-    /// Widths of the panels left and right of the middle, and height of the event log, in points; none as they are made.
+    /// Widths of the panels left and right of the middle, and height of the event log, in points; none for the usual sizes.
     pub left: Option<f32>,
-    /// See [`Self::left`].
     pub right: Option<f32>,
-    /// See [`Self::left`].
     pub log: Option<f32>,
-    /// Who ran the last protocol.
+    /// Of the last run.
     pub operator: String,
     /// Folder for new sessions; empty for the library.
     pub sessions: String,
-    /// Whether the tour was taken or put away.
+    /// The tour was taken or ended.
     pub is_tour_over: bool,
 }
 
-impl Default for Settings {
+impl Default for WindowSettings {
     fn default() -> Self {
         Self {
             is_dark: false,
@@ -51,7 +47,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl WindowSettings {
     /// Those of a file; the usual ones where there is none.
     pub fn read(path: &Path) -> Result<Self, String> {
         let text = match std::fs::read_to_string(path) {
@@ -64,14 +60,8 @@ impl Settings {
         }
         let read: Self =
             serde_json::from_str(&text).map_err(|err| unreadable(path, &err.to_string()))?;
-        Ok(Self {
-            zoom: if read.zoom.is_finite() {
-                read.zoom.clamp(*ZOOM.start(), *ZOOM.end())
-            } else {
-                1.0
-            },
-            ..read
-        })
+        let zoom = if read.zoom.is_finite() { read.zoom } else { 1.0 };
+        Ok(Self { zoom: zoom.clamp(*ZOOM.start(), *ZOOM.end()), ..read })
     }
 
     /// Writes them; the file is replaced as a whole.
@@ -89,42 +79,36 @@ impl Settings {
 
 fn unreadable(path: &Path, reason: &str) -> String {
     format!(
-        "the window's settings in {} cannot be read ({reason}); it looks as it is made, and the file is left alone until it is mended or deleted",
+        "the window's settings in {} cannot be read ({reason}); it opens with the usual settings, and the file stays as it is until you correct or delete it",
         path.display()
     )
 }
 
-/// The settings and where they are kept, if anywhere.
+/// The settings and their file, if there is one.
 #[derive(Debug, Default)]
-pub struct Kept {
-    /// As they are now.
-    pub now: Settings,
+pub struct SettingsFile {
+    pub now: WindowSettings,
     /// As the file has them.
-    stored: Settings,
+    stored: WindowSettings,
     path: Option<PathBuf>,
 }
 
-impl Kept {
-    /// Reads them; what is wrong with the file is told once, and then nothing is written there.
+impl SettingsFile {
+    /// Reads the file. An unreadable one gives the usual settings and a sentence, and is never written.
     pub fn open(path: Option<PathBuf>) -> (Self, Option<String>) {
         let Some(path) = path else {
             return (Self::default(), None);
         };
-        match Settings::read(&path) {
-            Ok(read) => {
-                let kept = Self { now: read.clone(), stored: read, path: Some(path) };
-                (kept, None)
-            }
+        match WindowSettings::read(&path) {
+            Ok(read) => (Self { now: read.clone(), stored: read, path: Some(path) }, None),
             Err(reason) => (Self::default(), Some(reason)),
         }
     }
 
-    /// Whether this is kept anywhere.
-    pub fn is_kept(&self) -> bool {
+    pub fn has_file(&self) -> bool {
         self.path.is_some()
     }
 
-    /// Writes what has changed.
     pub fn store(&mut self) -> Result<(), String> {
         match &self.path {
             Some(path) if self.now != self.stored => {
@@ -146,23 +130,23 @@ mod tests {
     fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sub").join(SETTINGS_FILE);
-        let (mut kept, told) = Kept::open(Some(path.clone()));
-        assert_eq!((&kept.now, told), (&Settings::default(), None));
-        kept.now.zoom = 1.5;
-        kept.now.operator = "Ada \"L\"".into();
-        kept.store().unwrap();
-        let (again, _) = Kept::open(Some(path.clone()));
-        assert_eq!(again.now, kept.now);
+        let (mut file, refusal) = SettingsFile::open(Some(path.clone()));
+        assert_eq!((&file.now, refusal), (&WindowSettings::default(), None));
+        file.now.zoom = 1.5;
+        file.now.operator = "Ada \"L\"".into();
+        file.store().unwrap();
+        let (again, _) = SettingsFile::open(Some(path.clone()));
+        assert_eq!(again.now, file.now);
         for broken in ["{", "[1]", "{\"zoom\": \"large\"}"] {
             std::fs::write(&path, broken).unwrap();
-            let (mut kept, told) = Kept::open(Some(path.clone()));
-            assert!(told.unwrap().contains("cannot be read"), "{broken}");
-            kept.now.zoom = 2.0;
-            kept.store().unwrap();
+            let (mut file, refusal) = SettingsFile::open(Some(path.clone()));
+            assert!(refusal.unwrap().contains("cannot be read"), "{broken}");
+            file.now.zoom = 2.0;
+            file.store().unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), broken);
         }
-        // A newer palpate may keep more; a size that nobody can read is not taken.
+        // A newer palpate may store more; a size that is out of range is not taken.
         std::fs::write(&path, "{\"zoom\": 99.0, \"from_the_future\": 1}").unwrap();
-        assert_eq!(Kept::open(Some(path)).0.now.zoom, *ZOOM.end());
+        assert_eq!(SettingsFile::open(Some(path)).0.now.zoom, *ZOOM.end());
     }
 }

@@ -1,10 +1,9 @@
 //! The window: its options, and how it opens.
 
 use crate::app::WorkbenchApp;
-use crate::workers::ports::ListPorts;
+use crate::workbench::ListPorts;
 use eframe::egui::{Context, ViewportBuilder, ViewportCommand, vec2};
-use palpate_analysis::opening::SETTINGS_FILE;
-use palpate_analysis::opening::WorkbenchRequest;
+use palpate_analysis::opening::{SETTINGS_FILE, WorkbenchRequest};
 use palpate_drivers::Rig;
 use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
@@ -14,13 +13,10 @@ use palpate_runner::TimeScale;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
 
-/// What a window needs.
+/// What a window opens with.
 pub struct WindowOptions {
-    /// The rig, opened.
     pub rig: Box<dyn Rig>,
-    /// Volts to newtons of its load cell.
     pub calibration: Calibration,
-    /// Interlock thresholds.
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
@@ -28,9 +24,8 @@ pub struct WindowOptions {
     pub scale: TimeScale,
     /// Folder for new sessions; the library if none.
     pub sessions: Option<PathBuf>,
-    /// Lists the serial ports of this computer.
     pub list_ports: ListPorts,
-    /// File in which the window remembers how it looked; nothing is remembered without one.
+    /// File of the window's settings; none are kept without one.
     pub settings: Option<PathBuf>,
 }
 
@@ -39,19 +34,13 @@ impl WindowOptions {
     pub fn open(name: &str, settings: &SimSettings, scale: TimeScale) -> Result<Self, String> {
         let rig = palpate_drivers::open(name, settings).map_err(|err| err.to_string())?;
         let limits = Limits::for_travel(rig.description().travel);
-        Ok(Self {
-            rig,
-            calibration: palpate_drivers::sim::calibration(settings.profile),
-            limits,
-            to_acknowledge: Vec::new(),
-            scale,
-            sessions: None,
-            list_ports,
-            settings: None,
-        })
+        let calibration = palpate_drivers::sim::calibration(settings.profile);
+        let to_acknowledge = Vec::new();
+        let request = WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale };
+        Ok(Self { settings: None, ..Self::remembered(request) })
     }
 
-    /// Options for a rig that somebody opened, with what the window remembers in the library.
+    /// Options for an open rig, with the settings file of the library.
     #[must_use]
     pub fn remembered(request: WorkbenchRequest) -> Self {
         let WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale } = request;
@@ -73,7 +62,6 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
     open_window(move |ctx| WorkbenchApp::new(options, ctx))
 }
 
-/// Opens a window of the usual size.
 pub(crate) fn open_window<A: eframe::App + 'static>(
     make: impl FnOnce(&Context) -> Result<A, String> + 'static,
 ) -> Result<(), String> {

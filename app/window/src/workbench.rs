@@ -1,12 +1,13 @@
-//! What every screen shares: the runner and what it says, the protocol that stands ready, the calibration in use.
+//! State that all screens share: the runner and its snapshot, the protocol in the form, the calibration in use.
 
-use crate::command::{Aside, Command};
-use crate::screens::form::{Bench, ProtocolForm};
+use crate::command::{ManualMove, UiCommand};
+use crate::screens::form::{ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
+use crate::widgets::require;
 use crate::window::WindowOptions;
-use crate::workers::path_dialog::{Ask, Dialog, pick};
-use crate::workers::ports::Ports;
+use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
 use eframe::egui::Context;
+use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
 use palpate_protocols::engine::Operator;
 use palpate_runner::{Request, RunRequest, RunView, Runner, Snapshot, StartError};
@@ -14,65 +15,64 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
-/// A start that was asked for.
+/// How far the start of a run is.
 enum Start {
-    /// Not asked for.
     None,
     /// The runner has not answered yet.
-    Asked(Receiver<Result<(), StartError>>),
-    /// It has started, but the snapshot with this number does not show it yet.
-    Granted { seen: u64 },
+    Sent(Receiver<Result<(), StartError>>),
+    /// It has begun, but the snapshot with this number does not show it yet.
+    Granted {
+        seen: u64,
+    },
 }
 
-/// What a screen has in front that others offer to take.
+/// What one screen offers to the others.
 #[derive(Debug, Default)]
-pub struct Front {
-    /// The session on the review screen.
+pub struct ScreenOffers {
+    /// The session in front on the review screen.
     pub review: Option<PathBuf>,
     /// The session chosen in the library.
     pub library: Option<PathBuf>,
-    /// What a scene costs on this machine, once that is measured.
+    /// Once they are measured on this machine.
     pub scene_curves: Option<Arc<SceneCurves>>,
 }
 
-/// What screens are at beside the rig.
+/// Work of the screens that a run or a measurement of times would disturb.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Occupation {
-    /// Whether times measured now would be disturbed.
     pub is_busy: bool,
-    /// Screens whose loop runs: name, and what runs in words.
+    /// Screens whose loop runs, each with a sentence that says so.
     pub running: Vec<(&'static str, &'static str)>,
 }
 
-/// The rig, the run and their data belong to the runner; this is the window's side of them.
+/// The window's side of the rig and the run, which belong to the runner.
 pub struct Workbench {
     runner: Runner,
-    /// The newest snapshot taken for drawing.
     pub snapshot: Arc<Snapshot>,
     /// Calibration and limits of new sessions.
-    pub bench: Bench,
-    /// The protocol that stands ready.
+    pub bench: RunSetup,
     pub form: ProtocolForm,
     /// The folder of recorded sessions, or why there is none.
     pub library: Result<PathBuf, String>,
-    /// The serial ports of this computer.
-    pub ports: Ports,
-    /// The desktop's dialog.
-    pub dialog: Dialog<(Ask, PathBuf)>,
-    /// Why what was asked for last was not done.
+    pub ports: BackgroundTask<Vec<PortInfo>>,
+    list_ports: ListPorts,
+    pub dialog: Dialog<(PathPurpose, PathBuf)>,
+    /// Why the last command was refused.
     pub refusal: Option<String>,
-    /// What screens offer each other.
-    pub front: Front,
-    /// What screens are at.
+    pub front: ScreenOffers,
     pub occupation: Occupation,
     start: Start,
     starts: u64,
-    run_wanted: Option<RunRequest>,
+    /// The run that begins once every loop of the window has stopped.
+    next_run: Option<RunRequest>,
     is_closing: bool,
 }
 
+/// Lists serial ports; tests have ports of their own.
+pub type ListPorts = fn() -> Result<Vec<PortInfo>, SerialError>;
+
 impl Workbench {
-    /// Starts the runner on the rig of the options; `wake` is called with its news.
+    /// Starts the runner on the rig of the options; `wake` is called when its snapshot changes.
     pub fn start(
         options: WindowOptions,
         ctx: &Context,
@@ -84,8 +84,6 @@ impl Workbench {
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let runner = Runner::start(options.rig, options.scale, None, wake)
             .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
-        let mut ports = Ports::new(options.list_ports);
-        ports.refresh(ctx);
         let mut form = ProtocolForm::default();
         let library = match options.sessions {
             Some(folder) => {
@@ -94,10 +92,10 @@ impl Workbench {
             }
             None => palpate_sessions::library_folder().map_err(|err| err.to_string()),
         };
-        Ok(Self {
+        let mut workbench = Self {
             snapshot: runner.snapshot(),
             runner,
-            bench: Bench {
+            bench: RunSetup {
                 calibration: options.calibration,
                 curve,
                 limits: options.limits,
@@ -105,16 +103,25 @@ impl Workbench {
             },
             form,
             library,
-            ports,
+            ports: BackgroundTask::default(),
+            list_ports: options.list_ports,
             dialog: Dialog::default(),
             refusal: None,
-            front: Front::default(),
+            front: ScreenOffers::default(),
             occupation: Occupation::default(),
             start: Start::None,
             starts: 0,
-            run_wanted: None,
+            next_run: None,
             is_closing: false,
-        })
+        };
+        workbench.refresh_ports(ctx);
+        Ok(workbench)
+    }
+
+    /// Lists the serial ports in the background: some drivers take seconds.
+    fn refresh_ports(&mut self, ctx: &Context) {
+        let list = self.list_ports;
+        self.ports.start("serial-ports", ctx, move |_| list().map_err(|err| err.to_string()));
     }
 
     /// The run in progress or the last one.
@@ -127,7 +134,6 @@ impl Workbench {
         self.starts
     }
 
-    /// What the window is in the middle of.
     pub fn intent(&self) -> Intent {
         match (self.is_closing, &self.start) {
             (true, _) => Intent::Closing,
@@ -141,27 +147,23 @@ impl Workbench {
         run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None
     }
 
-    /// Whether what stands ready may be changed, or why not.
+    /// Whether the protocol may be changed, or why not.
     pub fn free_verdict(&self) -> Result<(), String> {
-        match self.is_busy() {
-            true => Err("a run is in progress".to_owned()),
-            false => Ok(()),
-        }
+        require(!self.is_busy(), "a run is in progress")
     }
 
-    /// Whether nothing moves, is about to move or runs.
     pub fn is_quiet(&self) -> bool {
         !self.is_busy() && !is_motion_possible(&self.snapshot) && self.occupation.running.is_empty()
     }
 
-    /// Whether the protocol that stands ready may start now, or the reason why not.
+    /// Whether the protocol may start now, or why not.
     pub fn start_verdict(&self) -> Result<(), String> {
-        self.aside_verdict()?;
+        self.move_verdict()?;
         self.form.verdict()
     }
 
     /// Whether the axis may be moved by hand now, or why not.
-    pub fn aside_verdict(&self) -> Result<(), String> {
+    pub fn move_verdict(&self) -> Result<(), String> {
         if let Some(reason) = &self.snapshot.rig.link_error {
             return Err(format!("the link to the rig is lost ({reason})"));
         }
@@ -176,15 +178,12 @@ impl Workbench {
         }
     }
 
-    /// Whether times may be measured now, or the reason why not.
+    /// Whether times may be measured now, or why not.
     pub fn measure_verdict(&self) -> Result<(), String> {
-        if run_in_progress(&self.snapshot).is_some() {
-            return Err("a run is in progress and would disturb the times".into());
-        }
-        match self.occupation.is_busy {
-            true => Err("other work is under way and would disturb the times".into()),
-            false => Ok(()),
-        }
+        let has_run = run_in_progress(&self.snapshot).is_some();
+        require(!has_run, "a run is in progress and would disturb the times")?;
+        let is_busy = self.occupation.is_busy;
+        require(!is_busy, "other work is in progress and would disturb the times")
     }
 
     /// Whether the loop of a screen may run now, or why not: its priority would disturb a run, or another loop.
@@ -197,109 +196,99 @@ impl Workbench {
         }
     }
 
-    /// Does what concerns the rig and the run in progress; whether that was asked for.
-    pub fn act(&mut self, ctx: &Context, command: &Command) -> bool {
+    /// Does a command that concerns the rig or the run in progress; false for other commands.
+    pub fn act(&mut self, ctx: &Context, command: &UiCommand) -> bool {
         match command {
-            Command::Halt => self.operator(Operator::Halt),
-            Command::Wish(wish) => {
-                let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
+            UiCommand::Halt => self.operator(Operator::Halt),
+            UiCommand::RunControl(control) => {
+                let choice = run_in_progress(&self.snapshot).map(|run| control.operator(run));
                 if let Some(Ok(choice)) = choice {
                     self.operator(choice);
                 }
             }
-            Command::Retract => {
+            UiCommand::Retract => {
                 if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
                     self.operator(Operator::Retract);
                 }
             }
-            Command::CloseSession => self.operator(Operator::Close),
-            Command::Reconnect => {
-                let asked = self.runner.request(Request::Reconnect);
-                self.heed(asked);
+            UiCommand::CloseSession => self.operator(Operator::Close),
+            UiCommand::Reconnect => {
+                let sent = self.runner.request(Request::Reconnect);
+                self.keep_refusal(sent);
             }
-            Command::ListPorts => self.ports.refresh(ctx),
-            Command::Choose(ask) => {
+            UiCommand::ListPorts => self.refresh_ports(ctx),
+            UiCommand::Choose(ask) => {
                 let ask = *ask;
                 let opened = self.dialog.open(ctx, move |dialog| pick(ask, dialog));
-                self.heed(opened);
+                self.keep_refusal(opened);
             }
             _ => return false,
         }
         true
     }
 
-    /// What cannot be done is told.
-    fn heed(&mut self, done: Result<(), String>) {
+    fn keep_refusal(&mut self, done: Result<(), String>) {
         if let Err(reason) = done {
             self.refusal = Some(reason);
         }
     }
 
-    /// Passes on the operator's choice.
     pub fn operator(&mut self, choice: Operator) {
         let passed = self.runner.operator(choice);
-        self.heed(passed);
+        self.keep_refusal(passed);
     }
 
-    /// Something is written down in the run in progress; without one there is nowhere to write it, and false is returned.
+    /// Writes a note into the run in progress; false without one.
     pub fn write_note(&mut self, text: String) -> bool {
         if run_in_progress(&self.snapshot).is_none() {
             return false;
         }
         let written = self.runner.request(Request::Note(text));
         let is_written = written.is_ok();
-        self.heed(written);
+        self.keep_refusal(written);
         is_written
     }
 
-    /// The protocol that stands ready as a run, if it may start.
+    /// The protocol of the form as a run, if it may start.
     pub fn ready_run(&self) -> Option<RunRequest> {
         self.start_verdict().ok()?;
         self.form.request(&self.bench)
     }
 
-    /// A run beside the protocol that stands ready; what keeps it from being is told.
-    pub fn aside_run(&mut self, aside: &Aside) -> Option<RunRequest> {
-        self.aside_verdict().ok()?;
-        match self.form.aside(aside, &self.snapshot.rig, &self.bench) {
-            Ok(request) => Some(request),
-            Err(reason) => {
-                self.refusal = Some(reason);
-                None
-            }
-        }
+    /// A manual move as a run; what prevents it becomes the refusal.
+    pub fn manual_run(&mut self, manual: &ManualMove) -> Option<RunRequest> {
+        self.move_verdict().ok()?;
+        let request = self.form.manual_request(manual, &self.snapshot.rig, &self.bench);
+        request.map_err(|reason| self.refusal = Some(reason)).ok()
     }
 
-    /// Wants a run, which begins once every loop of the window has stopped.
-    pub fn want_run(&mut self, request: RunRequest) {
-        self.run_wanted = Some(request);
+    /// Has a run begin once every loop of the window has stopped.
+    pub fn set_next_run(&mut self, request: RunRequest) {
+        self.next_run = Some(request);
     }
 
-    /// Whether a run is wanted.
-    pub fn is_run_wanted(&self) -> bool {
-        self.run_wanted.is_some()
+    pub fn has_next_run(&self) -> bool {
+        self.next_run.is_some()
     }
 
-    /// Asks the runner to begin the run that is wanted; the answer is polled, never awaited.
-    pub fn begin_wanted_run(&mut self) {
-        let Some(request) = self.run_wanted.take() else {
-            return;
-        };
+    /// Sends the next run to the runner; the answer is polled, never awaited.
+    pub fn begin_next_run(&mut self) {
+        let Some(request) = self.next_run.take() else { return };
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
         match self.runner.request(Request::Run(Box::new(request), reply)) {
-            Ok(()) => self.start = Start::Asked(answer),
+            Ok(()) => self.start = Start::Sent(answer),
             Err(reason) => self.refusal = Some(reason),
         }
     }
 
-    /// Takes what the runner says.
+    /// Takes the runner's snapshot and its answer to a start.
     pub fn poll(&mut self) {
         self.snapshot = self.runner.snapshot();
         self.ports.poll();
         match &self.start {
             Start::None => {}
-            Start::Asked(answer) => match answer.try_recv() {
+            Start::Sent(answer) => match answer.try_recv() {
                 Ok(Ok(())) => {
                     self.starts += 1;
                     self.start = Start::Granted { seen: self.snapshot.sequence };
@@ -322,13 +311,12 @@ impl Workbench {
         }
     }
 
-    /// Checks what stands in the form.
     pub fn refresh_form(&mut self) {
         let rig = &self.snapshot.rig;
         self.form.refresh(&rig.description, &self.bench, rig.is_homed);
     }
 
-    /// The window is to close, which stops first: whether it may close now, with the axis at rest.
+    /// Stops motion before the window closes; true if it may close now, with the axis at rest.
     pub fn begin_to_close(&mut self) -> bool {
         // Nothing may start in a window that is about to close.
         self.is_closing = true;

@@ -19,7 +19,7 @@ use palpate_window::workers::fit::Refit;
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {
     let mut flow = Flow::open(TimeScale::Max);
-    flow.wait("the serial ports", |window| window.query_by_label("looking for them").is_none());
+    flow.wait("the serial ports", |window| window.query_by_label("listing them").is_none());
     flow.window.run();
     flow.window.check_accessibility();
     for name in ["Stop motion  F12", "Start  F5"] {

@@ -75,7 +75,7 @@ fn sessions_are_found_by_words_conditions_and_choices() {
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     flow.type_into("from", "yesterday");
     flow.wait_for_words("'yesterday'");
-    flow.click("Show all");
+    flow.click("Clear search");
     flow.click("verdict is");
     pick(&mut flow, "suspect");
     flow.wait_for_words("2 sessions, found in");
@@ -84,7 +84,7 @@ fn sessions_are_found_by_words_conditions_and_choices() {
     pick(&mut flow, "Ada");
     flow.wait_for_words("1 session, found in");
     assert!(flow.says("Session stomach 8, ramp-hold, Ada"));
-    flow.click("Show all");
+    flow.click("Clear search");
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     flow.click("sort by specimen");
     flow.wait("the other order", |window| {
@@ -159,7 +159,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     assert_eq!(edits(&sessions[19]).all.len(), 3, "both are in the record");
     flow.click("Redo: tags +pilot -absent on 3 sessions");
     flow.wait_for_words("3 sessions, found in");
-    flow.click("Show all");
+    flow.click("Clear search");
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     click_row(&mut flow, 20, Modifiers::NONE);
     assert!(!flow.is_enabled("Suspect") && flow.says("reason first"));
@@ -213,7 +213,7 @@ fn damage_is_reported_and_sessions_are_exported() {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 0x10;
     fs::write(log(7), bytes).unwrap();
-    flow.click("Look for new sessions");
+    flow.click("Refresh");
     flow.wait_for_words("damaged: ");
     flow.wait_for_words("unfinished");
     let to = flow.folder.path().join("out/tables");
@@ -256,13 +256,13 @@ fn files_of_other_testers_become_sessions() {
     });
     let text = format!("t_s,depth_mm,force_N\n{}", rows.collect::<String>());
     fs::write(&file, text).unwrap();
-    assert!(!flow.is_enabled("Import") && flow.says("name a file first"));
+    assert!(!flow.is_enabled("Import") && flow.says("type or choose a file first"));
     flow.type_into("files", "/nowhere/at-all.csv");
     flow.click("Import");
     flow.wait_for_words("cannot read /nowhere/at-all.csv");
     flow.type_into("files", &file.display().to_string());
     flow.type_into("of what", "gelatine");
-    flow.click("See how it reads");
+    flow.click("Preview import");
     flow.wait_for_words("none made: a dry run");
     assert!(flow.says("200 over 19.900 s"));
     assert!(flow.says(&format!("{SESSIONS} sessions, found in")));

@@ -101,7 +101,7 @@ fn the_trade_is_measured_in_the_window() {
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| screen_of::<TradeScreen>(window).curves().is_some());
     flow.window.run_steps(3);
-    assert!(flow.says("What to use") && flow.says("of the peak force"));
+    assert!(flow.says("Recommendation") && flow.says("of the peak force"));
     for view in ["Families", "Fit", "Integrators"] {
         flow.click(view);
         flow.window.check_accessibility();
@@ -168,7 +168,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
         "the body's lag",
         "the device has 0.50 N s/m",
         "the model itself returns energy",
-        "without guards: buzzes",
+        "without guards: limit cycle",
         "with guards: ",
     ] {
         assert!(flow.says(words), "{words}");
@@ -216,7 +216,7 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     });
     flow.window.run_steps(2);
     assert!(flow.says("Why no force?") && flow.says("the force is zero"));
-    for words in ["force commanded", "p99.9", "ticks a second", "priority", "no buzz"] {
+    for words in ["force commanded", "p99.9", "ticks a second", "priority", "no limit cycle"] {
         assert!(flow.says(words), "{words}");
     }
     flow.window.check_accessibility();
@@ -258,7 +258,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
     flow.window.run_steps(3);
     // So much is tolerated that the coarsest mesh does, and what that leaves out is listed.
     for words in [
-        "the cheapest that holds both",
+        "the cheapest that meets both",
         "51 x 51 nodes (planned)",
         "left out: a mesh of 201 nodes",
         "MinDist has no effect",
@@ -291,7 +291,7 @@ fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
     flow.wait("none", |window| felt(window)[1] == 0.0);
     flow.window.key_press(Key::Escape);
     flow.wait_for_words("ticks recorded, none lost");
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait("the replay", |window| screen_of::<HapticsScreen>(window).replayed().is_some());
     let replayed = screen_of::<HapticsScreen>(&flow.window).replayed().unwrap();
     let replayed = replayed.as_ref().unwrap();

@@ -94,8 +94,8 @@ fn settle(window: &mut Window) {
         window.step();
         let waits = [
             "still reading",
-            "waits to be read",
-            "looking for",
+            "waiting to be read",
+            "listing them",
             "reading the library",
             "searching",
         ];
@@ -123,7 +123,7 @@ fn show(window: &mut Window, session: &Path) {
     window.step();
     window.get_by_label("session").set_text_value_accesskit(&path);
     window.run_steps(2);
-    window.get_by_label("Show besides").click_accesskit();
+    window.get_by_label("Add to view").click_accesskit();
     window.run_steps(3);
 }
 

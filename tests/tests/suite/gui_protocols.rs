@@ -162,8 +162,8 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     flow.click("Calibration");
     flow.wait_for_words("(built in)");
     flow.window.check_accessibility();
-    assert!(!flow.is_enabled("Use this one  F6") && flow.says("it is in use"));
-    assert!(!flow.is_enabled("Keep the last run's"));
+    assert!(!flow.is_enabled("Use calibration  F6") && flow.says("it is in use"));
+    assert!(!flow.is_enabled("Save calibration of last run"));
     flow.click("Measure...");
     for (name, text) in
         [("operator", "Ada"), ("masses", "240, 540 g"), ("heaviest", "1040"), ("repeats", "1")]
@@ -194,13 +194,13 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
     flow.window.run_steps(2);
-    flow.click("Keep this calibration");
-    flow.wait_for_words("kept as ");
+    flow.click("Save this calibration");
+    flow.wait_for_words("saved as ");
     flow.window.run_steps(2);
     let shelf = Shelf::open(flow.folder.path());
     let kept = shelf.in_force("sim").unwrap();
     assert!(flow.says(&kept.id) && flow.says("in force"));
-    assert!(flow.is_enabled("Use this one  F6"));
+    assert!(flow.is_enabled("Use calibration  F6"));
     flow.window.key_press(Key::F6);
     flow.window.run_steps(3);
     assert!(flow.says("IN USE, rig sim"));
@@ -233,5 +233,5 @@ fn a_declined_prompt_stops_and_keeps_nothing() {
     flow.click("Close session");
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
-    assert!(flow.window.query_by_label("Keep this calibration").is_none());
+    assert!(flow.window.query_by_label("Save this calibration").is_none());
 }

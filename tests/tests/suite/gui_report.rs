@@ -151,16 +151,16 @@ fn a_fit_is_made_compared_and_taken_back() {
     );
     // A name is used once.
     panel.type_into("name", "all of it");
-    assert!(!panel.is_enabled("Make analysis") && panel.says("never used twice"));
+    assert!(!panel.is_enabled("Make analysis") && panel.says("used only once"));
     // Taking back needs a reason, and is a record.
-    assert!(!panel.is_enabled("Withdraw the chosen") && panel.says("this needs a reason"));
+    assert!(!panel.is_enabled("Withdraw analysis") && panel.says("type a reason above"));
     panel.type_into("reason", "the probe slipped");
-    panel.click("Withdraw the chosen");
+    panel.click("Withdraw analysis");
     panel.wait_for("withdrawn by Ada");
     assert_eq!(panel.chosen(), None);
     assert_eq!(panel.analyses().all.len(), 2);
     assert_eq!(panel.analyses().counting().count(), 0);
-    assert!(panel.says("there is nothing to undo"));
+    assert!(panel.says("there is no analysis to withdraw"));
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("N rms and at most");
     assert_eq!(panel.analyses().counting().count(), 3);
     panel.type_into("reason", "only tried");
-    panel.click("Undo the last");
+    panel.click("Withdraw last analysis");
     panel.wait_for("withdrawn by");
     assert!(panel.analyses().get("repeat").is_err());
     // The log is read again only where an edit changes what it means.
@@ -220,7 +220,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
 #[test]
 fn sessions_shown_together_are_fitted_as_one_body() {
     let mut panel = Panel::open();
-    panel.click("one body for this and the other shown");
+    panel.click("one material for this and the other session shown");
     panel.type_into("name", "together");
     panel.click("Make analysis");
     panel.wait_for("kept as 'together'");
@@ -237,17 +237,17 @@ fn sessions_shown_together_are_fitted_as_one_body() {
 #[test]
 fn a_verdict_and_a_contact_are_corrected_with_a_reason() {
     let mut panel = Panel::open();
-    assert!(!panel.is_enabled("Give verdict") && !panel.is_enabled("Correct contact"));
+    assert!(!panel.is_enabled("Set verdict") && !panel.is_enabled("Correct contact"));
     panel.type_into("reason", "hair under the probe");
     panel.click("verdict");
     panel.click("suspect");
-    panel.click("Give verdict");
+    panel.click("Set verdict");
     panel.wait_for("suspect, says");
     panel.type_into("reason", "by eye");
-    panel.type_into("really at", "4000");
+    panel.type_into("correct to", "4000");
     panel.click("Correct contact");
     panel.wait_for("outside the rig's travel");
-    panel.type_into("really at", "40.5");
+    panel.type_into("correct to", "40.5");
     panel.click("Correct contact");
     panel.wait_for("contact 1 at 40.500 mm");
     let changed = panel.window.state_mut().panel.take_changed();
@@ -263,7 +263,7 @@ fn a_report_and_figures_are_written_once() {
     let mut panel = Panel::open();
     assert!(!panel.is_enabled("Write report") && !panel.is_enabled("Write figure"));
     panel.type_into("report file", "page.txt");
-    assert!(panel.says("let the name end in .html"));
+    assert!(panel.says("the file name must end in .html"));
     let page = panel.at("page.html");
     panel.type_into("report file", &page.display().to_string());
     panel.click("Write report");

@@ -23,13 +23,13 @@ fn show(flow: &mut Flow, name: &str) -> PathBuf {
         std::fs::copy(item.path(), path.join(item.file_name())).unwrap();
     }
     flow.type_into("session", &path.display().to_string());
-    flow.click("Show besides");
+    flow.click("Add to view");
     let id = Session::open(&path).unwrap().manifest.session_id;
     let words = format!("remove: {id}");
     flow.wait("the session", |window| {
         use egui_kittest::kittest::Queryable;
         let says = |words: &str| window.query_all_by_label_contains(words).next().is_some();
-        says(&words) && !says("still reading") && !says("waits to be read")
+        says(&words) && !says("still reading") && !says("waiting to be read")
     });
     flow.window.run_steps(3);
     path
@@ -38,7 +38,7 @@ fn show(flow: &mut Flow, name: &str) -> PathBuf {
 #[test]
 fn one_session_is_looked_at_closely() {
     let mut flow = review();
-    assert!(flow.says("no session is shown") && !flow.is_enabled("Show besides"));
+    assert!(flow.says("no session is shown") && !flow.is_enabled("Add to view"));
     assert!(flow.says("type the path of a session's folder"));
     let path = show(&mut flow, "ramp-hold-lab");
     let session = Session::open(&path).unwrap();
@@ -72,7 +72,7 @@ fn one_session_is_looked_at_closely() {
     flow.window.run_steps(2);
     assert!(flow.says("depth at A"));
     flow.click("Copy readout");
-    flow.click("No cursors");
+    flow.click("Clear cursors");
     assert!(!flow.says("F at A"));
     // From far away to every sample and back.
     for _ in 0..14 {
@@ -88,7 +88,7 @@ fn one_session_is_looked_at_closely() {
     for name in ["Raw signal", "Depth", "Force"] {
         flow.click(name);
     }
-    assert!(flow.says("choose on the left what is shown"));
+    assert!(flow.says("choose quantities on the left"));
     flow.click("Position");
     flow.click("Force");
     flow.click("contact");
@@ -116,7 +116,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     flow.click("Parameters");
     assert!(flow.says("no session shown has been fitted here yet"));
     flow.click("Prediction");
-    assert!(!flow.is_enabled("Foretell the second session"));
+    assert!(!flow.is_enabled("Predict second session"));
     assert!(flow.says("show two sessions"));
     let other = show(&mut flow, "hold-until-lab");
     flow.window.key_press(Key::F6);
@@ -141,10 +141,10 @@ fn sessions_are_fitted_compared_and_foretold() {
     assert!(flow.says("tau_eps (s)") && flow.says(&tau), "{tau}");
     flow.window.check_accessibility();
     flow.click("Prediction");
-    flow.click("Foretell the second session");
+    flow.click("Predict second session");
     flow.wait("the prediction", |window| {
         use egui_kittest::kittest::Queryable;
-        window.query_all_by_label_contains("mN rms").next().is_some()
+        window.query_all_by_label_contains("mN RMSE").next().is_some()
     });
     flow.window.run_steps(3);
     flow.window.check_accessibility();
@@ -157,7 +157,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     assert!(!flow.says(&format!("remove: {first}")) && flow.says(&format!("remove: {second}")));
     // A folder that is none says so and leaves the rest as it is.
     flow.type_into("session", "/nowhere/at-all");
-    flow.click("Show besides");
+    flow.click("Add to view");
     flow.wait("the refusal", |window| {
         use egui_kittest::kittest::Queryable;
         let mut found =

@@ -39,7 +39,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     let ahead = screen_of::<SceneScreen>(&flow.window).ahead().unwrap();
     let deepest = ahead.as_ref().unwrap().deepest.tick;
     assert!(flow.says(&format!("at {:.2} mm", deepest.depth)));
-    assert!(flow.says("poke, computed: where it is deepest"));
+    assert!(flow.says("poke, computed: the deepest point"));
     flow.window.check_accessibility();
 
     flow.type_into("nodes", "2");
@@ -69,7 +69,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(3);
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
-    assert!(flow.says("stopped; as it was seen last"));
+    assert!(flow.says("stopped; the last picture"));
 }
 
 #[test]
@@ -126,13 +126,13 @@ fn replayed(window: &Window) -> Option<Result<bool, String>> {
 #[test]
 fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     let mut flow = open();
-    assert!(!flow.is_enabled("Replay it") && flow.says("name the folder of a recording first"));
+    assert!(!flow.is_enabled("Replay recording") && flow.says("type the folder of a recording"));
     let folder = flow.folder.path().join("poke");
     let called = folder.display().to_string();
     flow.type_into("nodes", "51");
     flow.type_into("record to", &called);
     flow.click("Start the scene");
-    assert!(!flow.is_enabled("Replay it"));
+    assert!(!flow.is_enabled("Replay recording"));
     flow.wait("the end of the path", |window| {
         let touch = screen_of::<SceneScreen>(window).touch().unwrap();
         touch.is_running() && !touch.is_led()
@@ -140,7 +140,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(2);
     flow.wait_for_words("ticks recorded, none lost");
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait("the replay", |window| replayed(window).is_some());
     flow.window.run_steps(3);
     assert_eq!(replayed(&flow.window), Some(Ok(true)));
@@ -156,14 +156,14 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     let settings = folder.join("settings.toml");
     let text = std::fs::read_to_string(&settings).unwrap();
     std::fs::write(&settings, text.replacen("tau_eps = 1", "tau_eps = 2", 1)).unwrap();
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait("the difference", |window| replayed(window) == Some(Ok(false)));
     flow.window.run_steps(3);
     assert!(flow.says("and was recorded as"));
     let ticks = folder.join("ticks.csv");
     let lines = std::fs::read_to_string(&ticks).unwrap();
     std::fs::write(&ticks, lines.replacen("\n10,", "\n11,", 1)).unwrap();
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait("the damage", |window| replayed(window).is_some_and(|one| one.is_err()));
     flow.window.run_steps(3);
     assert!(flow.says("the recording is damaged"));
@@ -176,8 +176,8 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     let path = flow.folder.path().join("loose.toml");
     let text = "name = \"loose\"\n[tolerances]\nforce_percent = 1000.0\nshape_mm = 5.0\ntick_us = 100000.0\n";
     read(&mut flow, &path, text, "loose");
-    assert!(!flow.is_enabled("Take the plan"));
-    assert!(flow.says("measure what a scene costs on the screen Trade first"));
+    assert!(!flow.is_enabled("Use plan"));
+    assert!(flow.says("measure the cost of a scene on the screen Trade first"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num7);
     flow.window.run_steps(3);
     flow.click("Scene: mesh");
@@ -187,7 +187,7 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.window.run_steps(3);
     assert!(flow.says("left out: ") && flow.says("without effect: MinDist"));
-    flow.click("Take the plan");
+    flow.click("Use plan");
     flow.window.run_steps(3);
     flow.click("Start the scene");
     let settings = *screen_of::<SceneScreen>(&flow.window).touch().unwrap().settings();

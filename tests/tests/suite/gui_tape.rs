@@ -45,7 +45,7 @@ fn check_description(flow: &mut Flow, folder: &Path, column: &str) {
     assert_eq!(end[0], "end");
     let expected = format!("{} ticks recorded, none lost; hash at the end {}", end[1], end[3]);
     assert!(flow.says(&expected), "{expected}");
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("every number bit for bit as recorded");
 
     let middle = whole.len() / 2;
@@ -58,10 +58,10 @@ fn check_description(flow: &mut Flow, folder: &Path, column: &str) {
     let mut changed = whole.clone();
     changed[middle] = cells.join(",");
     write(folder, &changed);
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("the recording is damaged");
     write(folder, &changed[..=middle]);
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words(&format!("tick {tick}: {column} is "));
     assert!(!flow.says("bit for bit"));
     write(folder, &whole);
@@ -121,7 +121,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let elsewhere = whole.iter().filter(|line| !line.starts_with("end"));
     let elsewhere = elsewhere.map(|line| line.replace(",30.0,", ",-2.0,"));
     write(&folder, &elsewhere.collect::<Vec<_>>());
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("was recorded as");
     write(&folder, &whole);
 
@@ -129,18 +129,18 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let scene = Path::new(env!("CARGO_MANIFEST_DIR"));
     let scene = scene.join("../protocols/tests/recordings/scene-poke");
     flow.type_into("replay", &scene.display().to_string());
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("has no columns of a master and slave's recording");
     drop_on(&mut flow, &scene);
     assert!(flow.says("Start the scene"));
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("every number bit for bit as recorded");
     flow.type_into("replay", &folder.display().to_string());
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("has no columns of a scene's recording");
     drop_on(&mut flow, &folder);
     assert!(flow.says("Start the loop"));
-    flow.click("Replay it");
+    flow.click("Replay recording");
     flow.wait_for_words("master and slave, led by hand: ");
 }
 

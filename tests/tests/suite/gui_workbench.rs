@@ -228,7 +228,7 @@ fn zeroing_shows_what_the_probe_feels() {
     let run = flow.run().unwrap();
     assert_eq!(run.touches.iter().map(|one| one.pass).collect::<Vec<_>>(), [1, 2]);
     let contact = run.contact.unwrap();
-    assert!(flow.says(&format!("the surface is at {:.3}", contact.position.0)));
+    assert!(flow.says(&format!("the contact point is at {:.3}", contact.position.0)));
     // The search felt the tissue where it says that it did.
     let points = run.approach.points();
     let deepest = points.iter().map(|point| point.depth).fold(0.0, f64::max);

@@ -9,11 +9,11 @@ use palpate_runner::TimeScale;
 use palpate_test_support::wait::{Deadline, until};
 use std::sync::Mutex;
 
-/// What a rig was told to do, in order.
-type Commanded = Arc<Mutex<Vec<RigCommand>>>;
+/// Commands that a rig received, in order.
+type CommandLog = Arc<Mutex<Vec<RigCommand>>>;
 
-/// A simulated rig that does nothing of what it is told, and writes it down.
-struct Recorder(SimRig, Commanded);
+/// A simulated rig that obeys no command and records all.
+struct Recorder(SimRig, CommandLog);
 
 impl Rig for Recorder {
     fn description(&self) -> &RigDescription {
@@ -33,10 +33,10 @@ impl Rig for Recorder {
     }
 }
 
-fn open(ctx: &Context) -> (WorkbenchApp, Commanded) {
+fn open(ctx: &Context) -> (WorkbenchApp, CommandLog) {
     let settings = SimSettings::default();
     let mut options = WindowOptions::open("sim", &settings, TimeScale::Max).unwrap();
-    let commanded = Commanded::default();
+    let commanded = CommandLog::default();
     options.rig = Box::new(Recorder(SimRig::new(settings), Arc::clone(&commanded)));
     options.list_ports = || Ok(Vec::new());
     // A library that is not there: nothing of this computer is read.
@@ -58,8 +58,8 @@ fn pressed(key: Key) -> RawInput {
     }
 }
 
-/// Waits until the rig was told something, and gives all of it.
-fn all_up_to(commanded: &Commanded, last: RigCommand) -> Vec<RigCommand> {
+/// Waits until the last command of the rig is this one, and returns all.
+fn all_up_to(commanded: &CommandLog, last: RigCommand) -> Vec<RigCommand> {
     until(
         || {
             let all = commanded.lock().unwrap().clone();
@@ -105,8 +105,8 @@ fn a_stop_key_is_sent_before_its_frame_begins_and_once() {
     assert_eq!(all, [Stop, Halt, Stop, Halt]);
 }
 
-/// A screen that notes of everything a frame does to it whether the rig had been told to stop by then.
-struct Witness(Commanded, Arc<Mutex<Vec<(&'static str, bool)>>>);
+/// A screen that records, for every call, whether the rig had received a stop by then.
+struct Witness(CommandLog, Arc<Mutex<Vec<(&'static str, bool)>>>);
 
 impl Witness {
     /// The stop is on its way to the runner's thread: one that was sent comes, one that was not never does.

@@ -1,17 +1,17 @@
-//! The window of `palpate replay SESSION --window`: a recorded session as it was at any moment, at any speed. No rig
-//! belongs to it, so nothing in it can move one.
+//! The window of `palpate replay SESSION --window`: a recorded session at any moment and any speed. It has no rig, so
+//! nothing in it can move one.
 
 mod transport;
 
-use crate::command::{Command, Commands};
+use crate::command::{Commands, UiCommand};
 use crate::plots::PlotCache;
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
 use crate::shell::event_log::EventLog;
 use crate::shell::panels::frame;
 use crate::shell::top_bar::{HEIGHT, numbers_ui};
-use crate::theme::{self, Tokens};
-use crate::widgets::state_badge::badge_ui;
+use crate::theme::{self};
+use crate::widgets::{badge_ui, tokens_of};
 use crate::window::open_window;
 use crate::workers::fit::Refit;
 use crate::workers::player::PlayerThread;
@@ -37,7 +37,6 @@ pub fn run_playback(options: PlaybackRequest) -> Result<(), String> {
     open_window(move |ctx| PlaybackApp::new(options, ctx))
 }
 
-/// The window's state.
 pub struct PlaybackApp {
     thread: PlayerThread,
     snapshot: Arc<Snapshot>,
@@ -71,13 +70,12 @@ impl PlaybackApp {
         })
     }
 
-    /// What is shown.
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.snapshot
     }
 
     fn state_ui(&self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         ui.horizontal(|ui| {
             ui.set_height(HEIGHT);
             let state = activity(&self.snapshot, Intent::None);
@@ -88,11 +86,12 @@ impl PlaybackApp {
                 ui.add(Label::new(format!("Replay of {}", self.name)).truncate());
                 let run = self.snapshot.run.as_ref();
                 let words = match run.and_then(|run| run.prompt.as_ref()) {
-                    Some(prompt) => format!("asked: {}", prompt.message),
+                    Some(prompt) => format!("prompt: {}", prompt.message),
                     None if !self.is_same_engine => {
-                        "decided anew: another version of palpate recorded it".to_owned()
+                        "decisions computed again: another version of palpate recorded it"
+                            .to_owned()
                     }
-                    None => "as it was recorded; nothing here moves a rig".to_owned(),
+                    None => "as recorded; nothing here moves a rig".to_owned(),
                 };
                 ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).truncate());
             });
@@ -157,7 +156,7 @@ impl eframe::App for PlaybackApp {
             });
         CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));
         // The only thing that the events ask for here.
-        if commands.take().contains(&Command::SwitchTheme) {
+        if commands.take().contains(&UiCommand::SwitchTheme) {
             theme::switch(ui.ctx());
         }
     }

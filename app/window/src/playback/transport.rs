@@ -1,6 +1,6 @@
-//! Play, pause, speed and place, as on any recorder.
+//! Play, pause, speed and position, as on a recorder.
 
-use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{Button, Context, Key, RichText, Slider, Ui, vec2};
 use palpate_figures::uncertain::clock;
 use palpate_runner::TimeScale;
@@ -17,12 +17,12 @@ const SPEEDS: [(&str, TimeScale); 6] = [
 /// A jump of the arrow keys, in s of session time.
 const JUMP_S: f64 = 10.0;
 
-/// Where it stands and how it goes on.
+/// Position and speed of the replay.
 #[derive(Clone, Debug)]
 pub(super) struct Transport {
     end: f64,
     at: f64,
-    asked: Option<f64>,
+    requested: Option<f64>,
     is_playing: bool,
     scale: TimeScale,
 }
@@ -30,7 +30,7 @@ pub(super) struct Transport {
 impl Transport {
     /// Plays from the beginning of a session of so many seconds.
     pub fn new(end: f64, scale: TimeScale) -> Self {
-        Self { end, at: 0.0, asked: None, is_playing: true, scale }
+        Self { end, at: 0.0, requested: None, is_playing: true, scale }
     }
 
     pub fn is_playing(&self) -> bool {
@@ -51,13 +51,15 @@ impl Transport {
         if self.at >= self.end && shown >= self.end {
             self.is_playing = false;
         }
-        (self.asked != Some(self.at)).then(|| *self.asked.insert(self.at))
+        (self.requested != Some(self.at)).then(|| *self.requested.insert(self.at))
     }
 
-    /// Whether what is shown is more than a second of the wall behind what was asked for.
+    /// Whether what is shown is more than a second of the wall behind what was requested for.
     fn is_behind(&self, shown: f64) -> bool {
         match self.scale {
-            TimeScale::Factor(factor) => self.asked.is_some_and(|asked| asked > shown + factor),
+            TimeScale::Factor(factor) => {
+                self.requested.is_some_and(|requested| requested > shown + factor)
+            }
             TimeScale::Max => false,
         }
     }
@@ -76,7 +78,7 @@ impl Transport {
         self.at = (shown + by).clamp(0.0, self.end);
     }
 
-    /// Space plays and pauses, arrows jump, Home and End go there; not while somebody types.
+    /// Space plays and pauses, arrows jump, Home and End go there; not while text is typed.
     pub fn read_keys(&mut self, ctx: &Context, shown: f64) {
         if ctx.egui_wants_keyboard_input() {
             return;
@@ -97,16 +99,15 @@ impl Transport {
         }
     }
 
-    /// Draws the bar.
     pub fn ui(&mut self, ui: &mut Ui, shown: f64) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         ui.horizontal(|ui| {
             let text = if self.is_playing { "Pause" } else { "Play" };
             if ui.add(Button::new(text).min_size(vec2(64.0, 28.0))).on_hover_text("Space").clicked()
             {
                 self.toggle(shown);
             }
-            for (text, by) in [("Back 10 s", -JUMP_S), ("On 10 s", JUMP_S)] {
+            for (text, by) in [("Back 10 s", -JUMP_S), ("Forward 10 s", JUMP_S)] {
                 if ui.button(text).clicked() {
                     self.jump(by, shown);
                 }
@@ -164,7 +165,7 @@ mod tests {
         let mut transport = Transport::new(1e4, TimeScale::Factor(1000.0));
         assert_eq!(transport.pass(1.0, 0.0), Some(1000.0));
         assert_eq!(transport.pass(1.0, 0.0), Some(2000.0));
-        // Two seconds behind at this speed: nothing more is asked for.
+        // Two seconds behind at this speed: nothing more is requested for.
         assert_eq!(transport.pass(1.0, 10.0), None);
         assert_eq!(transport.pass(1.0, 1500.0), Some(3000.0));
     }

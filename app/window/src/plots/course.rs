@@ -1,19 +1,18 @@
 //! Depth, speed and force over time as a plan is expected to go, before anything moves.
 
 use super::figure::{PlotLook, plot_ui};
-use crate::theme::Tokens;
-use eframe::egui::{RichText, Ui, vec2};
+use crate::widgets::{heading_ui, quiet_ui};
+use eframe::egui::{Ui, vec2};
 pub use palpate_analysis::report::plan_picture::CourseLimits;
 use palpate_analysis::report::plan_picture::{EXPECTED, course};
 use palpate_protocols::preview::OutlinePoint;
 
 /// Draws the curves in the space there is.
 pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let look = PlotLook { link: Some("course"), ..PlotLook::default() };
     let height = (ui.available_height() - 112.0) / 3.0;
     for plot in course(outline, Some(limits)) {
-        ui.label(RichText::new(&plot.title).heading().strong());
+        heading_ui(ui, &plot.title);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
             plot_ui(ui, &plot.title, &plot, look);
         });
@@ -22,5 +21,5 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
         "{EXPECTED}. A force of {} ends the run; the rig moves at up to {}.",
         limits.force, limits.speed
     );
-    ui.label(RichText::new(words).color(tokens.text_quiet).small());
+    quiet_ui(ui, words);
 }

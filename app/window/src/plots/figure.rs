@@ -2,6 +2,7 @@
 
 use super::style::{quiet, round_marks};
 use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{Align2, Color32, Id, RichText, Sense, Ui, vec2};
 use egui_plot::{
     FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, PlotPoint, PlotPoints,
@@ -13,7 +14,7 @@ use palpate_figures::figure::{Axis, Ink, Labels, Plot, Scale, Series, Shape};
 /// Opacity of a shaded stretch that has an ink of its own.
 const SHADE: f32 = 0.16;
 
-/// How a plot stands among others.
+/// Options of a plot among others.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PlotLook<'a> {
     /// Labelled steps across it and up it, at most, where it is smaller than others.
@@ -32,7 +33,6 @@ pub struct PlotLook<'a> {
 /// change from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub struct PlacedPlot {
-    /// What it shows.
     pub plot: Plot,
     points: Vec<Vec<PlotPoint>>,
 }
@@ -68,7 +68,7 @@ fn show(
     points: &[Vec<PlotPoint>],
     look: PlotLook<'_>,
 ) -> [f64; 2] {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let (x_text, y_unit) = (look.x_text, unit(&plot.y));
     let mut drawn = quiet(ui, egui_plot::Plot::new(id.to_owned()), tokens)
         .x_axis_label(plot.x.name.as_str())
@@ -148,7 +148,7 @@ pub fn legend_ui(ui: &mut Ui, plots: &[&Plot]) {
 
 /// Draws a patch of an ink and the words that it stands for.
 pub fn patch_ui(ui: &mut Ui, ink: Ink, words: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::empty());
     ui.painter().rect_filled(rect, 2.0, ink.of(tokens));
     ui.label(RichText::new(words).small());
@@ -168,9 +168,7 @@ pub fn strip_ui(ui: &mut Ui, [x, y]: [&str; 2], curves: Vec<Series>, shown: [f64
 /// The label of a point, shown under the pointer.
 fn label_at<'a>(plot: &'a Plot, points: &[Vec<PlotPoint>], at: &PlotPoint) -> Option<&'a str> {
     plot.series.iter().zip(points).find_map(|(one, points)| {
-        let Labels::Each(labels) = &one.labels else {
-            return None;
-        };
+        let Labels::Each(labels) = &one.labels else { return None };
         let is_it = |point: &PlotPoint| point.x == at.x && point.y == at.y;
         points.iter().position(is_it).map(|index| labels[index][1].as_str())
     })

@@ -12,9 +12,7 @@ const IN_SIGHT: f64 = 3.0;
 /// The cut is so many times further than the end of the spike.
 const CUT_PAST: f64 = 2.0;
 
-/// What is drawn.
 pub struct MarginPicture<'a> {
-    /// Damping needed.
     pub curve: &'a [MarginPoint],
     /// Damping that the device has, in N s/m.
     pub has: f64,

@@ -1,5 +1,5 @@
 //! Plots of the run in progress, drawn from points converted once per snapshot, and of recorded sessions, drawn
-//! from what is left of their samples at the zoom at hand.
+//! from the samples that are needed at the zoom shown.
 
 pub mod course;
 pub mod figure;

@@ -1,8 +1,8 @@
-//! What of an axis is shown, and moving it by pointer, wheel, keys and buttons.
+//! The part of an axis that is shown, moved by pointer, wheel, keys and buttons.
 
 use eframe::egui::{Response, Ui};
 
-/// By how much a key or a button zooms.
+/// Factor by which a key or a button zooms.
 pub const ZOOM_STEP: f64 = 2.0;
 /// Share of what is shown by which a key or a button moves.
 pub const PAN_STEP: f64 = 0.25;
@@ -13,37 +13,30 @@ const LEAST_SHARE: f64 = 1e-9;
 
 /// A stretch of an axis and the whole it is a part of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
+pub struct AxisRange {
     whole: [f64; 2],
-    /// What is shown; none while that is the whole.
+    /// The part shown; none while that is the whole.
     part: Option<[f64; 2]>,
 }
 
-impl Default for Span {
+impl Default for AxisRange {
     fn default() -> Self {
         Self { whole: [0.0, 1.0], part: None }
     }
 }
 
-impl Span {
-    /// What there is; what is shown stays, or goes on to be the whole.
+impl AxisRange {
+    /// Sets the whole; the part that is shown stays.
     pub fn set_whole(&mut self, [low, high]: [f64; 2]) {
         if low.is_finite() && high.is_finite() {
             self.whole = [low, if high > low { high } else { low + 1.0 }];
         }
     }
 
-    /// What is shown.
     pub fn shown(&self) -> [f64; 2] {
         self.part.unwrap_or(self.whole)
     }
 
-    /// Whether all is shown.
-    pub fn is_whole(&self) -> bool {
-        self.part.is_none()
-    }
-
-    /// Shows all.
     pub fn show_all(&mut self) {
         self.part = None;
     }
@@ -76,6 +69,19 @@ impl Span {
         self.show([low + by, high + by]);
     }
 
+    /// Zooms and moves as the pointer did along an axis of a plot: 0 across, 1 up. A double click shows all.
+    pub fn follow(&mut self, gesture: &Gesture, axis: usize) {
+        if gesture.pan[axis] != 0.0 {
+            self.pan(gesture.pan[axis]);
+        }
+        if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
+            self.zoom(gesture.zoom, self.at(gesture.at[axis]));
+        }
+        if gesture.is_double {
+            self.show_all();
+        }
+    }
+
     /// The place at a share of what is shown.
     pub fn at(&self, share: f64) -> f64 {
         let [low, high] = self.shown();
@@ -86,15 +92,12 @@ impl Span {
 /// What the pointer did in a plot, as shares of its width and height, up and to the right.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gesture {
-    /// Moved by.
     pub pan: [f64; 2],
-    /// Zoomed by.
     pub zoom: f64,
     /// Where the pointer was.
     pub at: [f64; 2],
-    /// Pressed there, with Shift or without.
+    /// A click, with Shift or without.
     pub click: Option<bool>,
-    /// Pressed twice.
     pub is_double: bool,
 }
 
@@ -131,9 +134,9 @@ mod tests {
 
     #[test]
     fn the_place_under_the_pointer_stays_where_it_is() {
-        let mut span = Span::default();
+        let mut span = AxisRange::default();
         span.set_whole([0.0, 100.0]);
-        assert!(span.is_whole() && span.shown() == [0.0, 100.0]);
+        assert_eq!(span.shown(), [0.0, 100.0]);
         span.zoom(4.0, 20.0);
         assert_eq!(span.shown(), [15.0, 40.0]);
         span.pan(1.0);
@@ -148,7 +151,7 @@ mod tests {
 
     #[test]
     fn nothing_is_lost_out_of_sight() {
-        let mut span = Span::default();
+        let mut span = AxisRange::default();
         span.set_whole([10.0, 20.0]);
         for _ in 0..200 {
             span.pan(0.7);

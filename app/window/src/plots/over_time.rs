@@ -1,55 +1,45 @@
 //! Quantities of sessions over time, above each other with one time axis.
 
-use super::navigate::{Gesture, Span, gesture};
+use super::navigate::{AxisRange, Gesture, gesture};
 use super::stretches::Stretches;
 use super::style::{round_marks, still};
 use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{Align2, Color32, RichText, Ui};
 use egui_plot::{HLine, LineStyle, Plot, PlotPoint, PlotUi, Span as Shade, Text, VLine};
 use palpate_model::rig::Phase;
 
-/// One line.
-pub struct Layer<'a> {
-    /// What it is.
+pub struct TimeLayer<'a> {
     pub name: &'a str,
-    /// Its colour.
     pub color: Color32,
-    /// Its points.
     pub stretches: &'a Stretches,
 }
 
-/// A moment that is marked.
+/// A vertical mark at a time.
 #[derive(Clone, Debug)]
-pub struct Moment {
-    /// When, on the axis.
+pub struct TimeMark {
     pub t: f64,
-    /// Whether it needs attention.
     pub is_alarm: bool,
-    /// Whether a person wrote it down.
+    /// A person wrote it.
     pub is_note: bool,
 }
 
-/// What stands behind and before the lines of every plot.
+/// Drawn behind and before the lines of every plot.
 #[derive(Clone, Debug, Default)]
-pub struct Setting {
-    /// Phases of the session in front: from, to, which.
+pub struct TimeBackdrop {
+    /// Start, end and phase, of the session in front.
     pub phases: Vec<(f64, f64, Phase)>,
     /// Stretches whose forces do not count.
     pub left_out: Vec<[f64; 2]>,
-    /// What happened.
-    pub moments: Vec<Moment>,
-    /// Both cursors.
+    pub moments: Vec<TimeMark>,
     pub cursors: [Option<f64>; 2],
 }
 
-/// One of the plots.
-pub struct Panel<'a> {
-    /// Its name.
+pub struct TimePanel<'a> {
     pub id: &'static str,
-    /// What stands at its axis.
     pub axis: &'static str,
-    /// Its lines, the one in front last.
-    pub layers: Vec<Layer<'a>>,
+    /// The line in front comes last.
+    pub layers: Vec<TimeLayer<'a>>,
     /// Whether the axis' zero is drawn.
     pub has_zero: bool,
 }
@@ -62,7 +52,7 @@ const NAMES: f64 = 0.1;
 const NAME_SHARE: f64 = 0.03;
 
 /// Lowest and highest of all lines with room around them.
-fn heights(panel: &Panel<'_>) -> [f64; 2] {
+fn heights(panel: &TimePanel<'_>) -> [f64; 2] {
     let known = panel.layers.iter().filter_map(|layer| layer.stretches.y());
     let ends = known.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let [low, high] = ends.unwrap_or([0.0, 1.0]);
@@ -72,7 +62,7 @@ fn heights(panel: &Panel<'_>) -> [f64; 2] {
 }
 
 /// Draws what all plots of a session have behind their lines: phases, what is left out, what happened.
-fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], tokens: &Tokens) {
+fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &TimeBackdrop, shown: [f64; 2], tokens: &Tokens) {
     for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
         if *to < shown[0] || *from > shown[1] {
             continue;
@@ -110,12 +100,12 @@ fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], toke
 /// Draws one plot in the space there is and returns what the pointer did in it. `is_last`: it has the time's name.
 pub fn over_time_ui(
     ui: &mut Ui,
-    panel: &Panel<'_>,
-    span: &Span,
-    setting: &Setting,
+    panel: &TimePanel<'_>,
+    span: &AxisRange,
+    setting: &TimeBackdrop,
     time_axis: Option<&str>,
 ) -> Gesture {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let (shown, [low, high]) = (span.shown(), heights(panel));
     let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
     let plot = still(ui, Plot::new(panel.id), tokens)

@@ -1,8 +1,7 @@
 //! Force over time and over depth of the run that is shown, with what its exact fit found and left over.
 
 use super::figure::{PlacedPlot, PlotLook};
-use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
@@ -72,11 +71,11 @@ impl PlotCache {
 
     /// Draws both in the space there is, the exact fit over the measured force once there is one.
     pub fn ui(&mut self, ui: &mut Ui, exact: Option<&ExactFit>) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         ui.horizontal(|ui| {
             ui.label(RichText::new(&self.force_time.plot.title).heading().strong());
             for (view, name) in [(false, "Whole run"), (true, "From ramp")] {
-                ui.selectable_value(&mut self.is_from_ramp, view, name).place(name);
+                ui.selectable_value(&mut self.is_from_ramp, view, name).named(name);
             }
             if let Some(remark) = &self.remark {
                 ui.label(RichText::new(remark).color(tokens.text_quiet).small());
@@ -99,7 +98,7 @@ impl PlotCache {
                 exact.residual.ui(ui, "residual", look);
             });
         }
-        ui.label(RichText::new(&self.force_depth.plot.title).heading().strong());
+        heading_ui(ui, &self.force_depth.plot.title);
         self.force_depth.ui(ui, "force_depth", PlotLook::default());
     }
 }

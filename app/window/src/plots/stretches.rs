@@ -1,37 +1,28 @@
-//! What is drawn of one quantity of one session: found anew when the stretch shown, the width or the samples
-//! changed, and kept otherwise.
+//! The points that are drawn of one quantity of one session, found again when the part shown, the width or the samples
+//! change.
 
 use eframe::egui::Color32;
 use egui_plot::{Line, PlotPoint, PlotPoints};
 use palpate_model::signal::track::{Drawn, Track};
 use std::ops::Range;
 
-/// What the points were found for.
+/// What the points of a line depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Key {
-    window: [f64; 2],
-    pixels: f64,
-    shift: f64,
-    version: u64,
-}
-
-/// What is asked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Wanted {
-    /// The stretch of the axis shown, in s.
+pub struct LineWindow {
+    /// The part of the axis that is shown, in s.
     pub window: [f64; 2],
     /// Pixels across it.
     pub pixels: f64,
-    /// Time of the track that stands at zero, in s.
+    /// Time of the track at the axis' zero, in s.
     pub shift: f64,
-    /// Number that changes with the track.
+    /// Changes with the track.
     pub version: u64,
 }
 
 /// Points of one line without gaps in between them, and which belong together.
 #[derive(Debug, Default)]
 pub struct Stretches {
-    key: Option<Key>,
+    key: Option<LineWindow>,
     points: Vec<PlotPoint>,
     ranges: Vec<Range<usize>>,
     y: Option<[f64; 2]>,
@@ -41,28 +32,21 @@ pub struct Stretches {
 
 impl Stretches {
     /// Finds the points again where something changed.
-    pub fn update(&mut self, track: &Track, column: usize, wanted: Wanted) {
-        let key = Key {
-            window: wanted.window,
-            pixels: wanted.pixels,
-            shift: wanted.shift,
-            version: wanted.version,
-        };
-        if self.key == Some(key) {
+    pub fn update(&mut self, track: &Track, column: usize, window: LineWindow) {
+        if self.key.replace(window) == Some(window) {
             return;
         }
-        self.key = Some(key);
         self.found += 1;
         self.points.clear();
         self.ranges.clear();
         let (points, ranges) = (&mut self.points, &mut self.ranges);
         let mut start = 0;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let own = wanted.window.map(|end| end + wanted.shift);
-        self.drawn = track.draw(column, own, wanted.pixels, |point| match point {
+        let own = window.window.map(|end| end + window.shift);
+        self.drawn = track.draw(column, own, window.pixels, |point| match point {
             Some([t, value]) => {
                 (low, high) = (low.min(value), high.max(value));
-                points.push(PlotPoint::new(t - wanted.shift, value));
+                points.push(PlotPoint::new(t - window.shift, value));
             }
             None => {
                 if points.len() > start {
@@ -93,11 +77,6 @@ impl Stretches {
         })
     }
 
-    /// The points of each stretch.
-    pub fn pieces(&self) -> impl Iterator<Item = &[PlotPoint]> {
-        self.ranges.iter().map(|range| &self.points[range.clone()])
-    }
-
     /// Lowest and highest of what is drawn.
     pub fn y(&self) -> Option<[f64; 2]> {
         self.y
@@ -126,23 +105,27 @@ mod tests {
         let mut track = Track::default();
         track.push(Arc::new(Segment::new(times, &[values.collect()])));
         let mut stretches = Stretches::default();
-        let mut wanted = Wanted { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
+        let mut window = LineWindow { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
         for _ in 0..3 {
-            stretches.update(&track, 0, wanted);
+            stretches.update(&track, 0, window);
         }
         assert_eq!((stretches.found, stretches.y()), (1, Some([1.0, 9.0])));
         assert!(stretches.drawn().points <= 202 && stretches.drawn().samples_per_column == 64);
-        let ends: Vec<[f64; 2]> =
-            stretches.pieces().map(|piece| [piece[0].x, piece[piece.len() - 1].x]).collect();
+        let ends: Vec<[f64; 2]> = stretches
+            .ranges
+            .iter()
+            .map(|one| [one.start, one.end - 1])
+            .map(|ends| ends.map(|at| stretches.points[at].x))
+            .collect();
         assert_eq!(ends.len(), 2);
-        // The first and the last sample, on the axis that begins where it was told to.
+        // The first and the last sample, on the axis that begins where it was asked to.
         assert_eq!((ends[0][0], ends[1][1]), (-1.0, 4999.0 * 1e-3 - 1.0));
         assert!(ends[0][1] < 1.0 && ends[1][0] >= 1.6);
         assert_eq!(stretches.lines("force", 0, Color32::TRANSPARENT).count(), 2);
-        wanted.version = 2;
-        stretches.update(&track, 0, wanted);
-        wanted.window = [2.0, 2.5];
-        stretches.update(&track, 0, wanted);
+        window.version = 2;
+        stretches.update(&track, 0, window);
+        window.window = [2.0, 2.5];
+        stretches.update(&track, 0, window);
         assert_eq!(stretches.found, 3);
     }
 }

@@ -1,4 +1,4 @@
-//! Where a scene is looked at from, and where its points are in a picture.
+//! The camera of a scene, and the projection of its points into a picture.
 //!
 //! Scene: x along columns, y along rows, z up, in mm. Picture: x to the right, y down, in points.
 
@@ -13,10 +13,9 @@ const ELEVATION: [f64; 2] = [0.08, 1.54];
 /// Distance from what is looked at, in lengths of the scene.
 const DISTANCE: [f64; 2] = [0.3, 6.0];
 
-/// A place or direction in the scene, in mm.
+/// A position or direction in the scene, in mm.
 pub type Vec3 = [f64; 3];
 
-/// Sum of the products of the parts.
 #[must_use]
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -28,12 +27,11 @@ pub fn along(from: Vec3, direction: Vec3, length: f64) -> Vec3 {
     [0, 1, 2].map(|axis| from[axis] + length * direction[axis])
 }
 
-/// An eye on a sphere about what it looks at.
+/// A camera on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What is looked at.
     target: Vec3,
-    /// A length of the scene in mm: distances are told in it.
+    /// A length of the scene in mm: the unit of distances.
     size: f64,
     /// Angle about z, 0 with the eye on the side of negative y.
     azimuth: f64,
@@ -43,12 +41,11 @@ pub struct Camera {
     distance: f64,
 }
 
-/// A point as it is seen.
+/// A point in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
-    /// Where in the picture.
+pub struct ProjectedPoint {
     pub at: Pos2,
-    /// How far along the line of sight, in mm.
+    /// Along the line of sight, in mm.
     pub distance: f64,
 }
 
@@ -65,7 +62,6 @@ impl Camera {
         }
     }
 
-    /// Goes around by angles in radians.
     pub fn orbit(&mut self, about: f64, up: f64) {
         self.azimuth = (self.azimuth + about).rem_euclid(std::f64::consts::TAU);
         self.elevation = (self.elevation + up).clamp(ELEVATION[0], ELEVATION[1]);
@@ -87,7 +83,6 @@ impl Camera {
         ]
     }
 
-    /// Where the eye is.
     pub fn eye(&self) -> Vec3 {
         let [_, _, away] = self.axes();
         along(self.target, away, -self.distance * self.size)
@@ -112,7 +107,6 @@ impl Camera {
     }
 }
 
-/// A camera before a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Lens {
     eye: Vec3,
@@ -124,7 +118,7 @@ pub struct Lens {
 
 impl Lens {
     /// Where a point is seen; `None` for one beside or behind the eye.
-    pub fn see(&self, point: Vec3) -> Option<Seen> {
+    pub fn see(&self, point: Vec3) -> Option<ProjectedPoint> {
         let from = along(point, self.eye, -1.0);
         let [right, up, distance] = self.axes.map(|axis| dot(from, axis));
         if distance.is_nan() || distance <= self.near {
@@ -134,7 +128,7 @@ impl Lens {
             self.centre.x + (self.scale * right / distance) as f32,
             self.centre.y - (self.scale * up / distance) as f32,
         );
-        Some(Seen { at, distance })
+        Some(ProjectedPoint { at, distance })
     }
 
     /// How many points of the picture a millimetre across the line of sight takes at a distance in mm.
@@ -153,7 +147,6 @@ impl Lens {
         (length > 0.0 && length.is_finite()).then_some([place[0], place[1]])
     }
 
-    /// Where the eye is.
     pub fn eye(&self) -> Vec3 {
         self.eye
     }

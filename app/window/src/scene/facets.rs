@@ -1,6 +1,6 @@
 //! A surface as triangles: which nodes are drawn, in which order, and how light each is.
 
-use super::camera::{Lens, Seen, Vec3, dot};
+use super::camera::{Lens, ProjectedPoint, Vec3, dot};
 use eframe::egui::epaint::{Mesh, Vertex, WHITE_UV};
 use eframe::egui::{Color32, Pos2};
 use palpate_figures::tokens::{dimmed, viridis};
@@ -10,16 +10,16 @@ use palpate_haptics::surface::{Grid, Heights, Node};
 pub const CELLS_MAX: usize = 128;
 /// Points that a cell takes at least: smaller ones would be less than is seen.
 const CELL_POINTS: f32 = 4.0;
-/// From the surface to the light.
+/// Unit vector from the surface to the light.
 const LIGHT: Vec3 = [-0.4, -0.5, 0.768_114_574_786_860_8];
 /// Light where no light comes from the lamp.
 const AMBIENT: f64 = 0.4;
 /// Half the width of a mesh line in points.
 const LINE: f32 = 0.5;
 
-/// What is drawn of a surface.
+/// Colours of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct SurfaceStyle {
     /// The depth that has the last colour, in mm.
     pub deepest: f64,
     /// Colour of the lines between the cells; `None` for none.
@@ -39,7 +39,7 @@ pub fn colour_depth(deepest: f64) -> f64 {
     palpate_figures::drawing::round_up(deepest.clamp(1.0, 1e6))
 }
 
-/// Which of so many nodes in a row are drawn: all, or the first, the last, and every so manieth such that `keep`, where
+/// Which of so many nodes in a row are drawn: all, or the first, the last, and every n-th such that `keep`, where
 /// the tool is, is among them.
 #[must_use]
 pub fn drawn(count: usize, cells_max: usize, keep: usize) -> Vec<usize> {
@@ -69,7 +69,7 @@ pub fn far_to_near(edges: &[f64], eye: f64) -> Vec<usize> {
 pub struct Facets {
     /// Its triangles, back to front.
     pub mesh: Mesh,
-    /// Every so manieth node is drawn.
+    /// Every n-th node is drawn.
     pub every: usize,
     /// The deepest depth of the nodes that are drawn, in mm.
     pub deepest: f64,
@@ -104,14 +104,14 @@ pub fn facets(
     now: Heights,
     rest: &[f64],
     lens: &Lens,
-    look: Look,
+    look: SurfaceStyle,
     side_points: f32,
     tool: Option<Node>,
 ) -> Facets {
     let grid = *now.grid();
     let lattice = Lattice::of(&grid, side_points, tool, look.lines.is_some());
     let mut mesh = Mesh::default();
-    let mut seen: Vec<Option<Seen>> = Vec::new();
+    let mut seen: Vec<Option<ProjectedPoint>> = Vec::new();
     let mut deepest: f64 = 0.0;
     for node in lattice.nodes() {
         let index = grid.index(node);
@@ -177,7 +177,7 @@ mod tests {
         Rect::from_min_max(pos2(0.0, 0.0), pos2(800.0, 600.0))
     }
 
-    const LOOK: Look = Look { deepest: 5.0, lines: None };
+    const LOOK: SurfaceStyle = SurfaceStyle { deepest: 5.0, lines: None };
 
     #[test]
     fn colours_end_at_a_round_depth() {
@@ -291,7 +291,7 @@ mod tests {
         assert!(drawn.every > 1);
         assert!(drawn.mesh.vertices.len() <= (CELLS_MAX + 3).pow(2));
         assert!((drawn.deepest - 3.0).abs() < 1e-12);
-        let lines = Look { lines: Some(Color32::BLACK), ..LOOK };
+        let lines = SurfaceStyle { lines: Some(Color32::BLACK), ..LOOK };
         let lined = facets(now, &rest, &lens, lines, 800.0, Some(tool));
         assert!(lined.every > drawn.every);
         assert!(lined.mesh.indices.len() <= (CELLS_MAX / 2 + 2).pow(2) * 30);

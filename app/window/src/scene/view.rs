@@ -1,10 +1,10 @@
 //! The picture of a scene: surface, contact point, stylus and force, and what the pointer and the keys do in it.
 
 use super::camera::{Camera, Lens, Vec3, along};
-use super::facets::{Look, colour_depth, facets};
-use super::hand::{Hand, stylus};
+use super::facets::{SurfaceStyle, colour_depth, facets};
+use super::hand::{HandTarget, stylus};
 use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::widgets::{NamedControl, tokens_of};
 use eframe::egui::epaint::Mesh;
 use eframe::egui::{
     Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
@@ -32,29 +32,28 @@ const WHEEL_MM: f64 = 0.02;
 const BAR: [f32; 2] = [12.0, 160.0];
 const EDGE: f32 = 12.0;
 
-/// What is shown at one moment.
+/// The scene at one moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown<'a> {
-    /// The surface.
+pub struct ScenePicture<'a> {
     pub now: Heights<'a>,
     /// Its heights at rest, in mm.
     pub rest: &'a [f64],
     /// Where the tip of the device is, in mm.
     pub device: Vec3,
-    /// How its stylus is turned: yaw, pitch and roll in rad.
+    /// Yaw, pitch and roll of the stylus in rad.
     pub turn: Vec3,
-    /// Where it touches; `None` where it does not.
+    /// The contact point; `None` without contact.
     pub contact: Option<Vec3>,
     /// Force on the hand, in N.
     pub force: Vec3,
 }
 
-/// How a scene is looked at, and where the hand in the window is.
+/// Camera and hand of a scene.
 #[derive(Clone, Debug)]
 pub struct SceneView {
     camera: Camera,
     extent: [f64; 2],
-    hand: Hand,
+    hand: HandTarget,
     /// Whether the lines of the mesh are drawn.
     pub has_lines: bool,
     /// The deepest depth since the scene began: colours do not change their meaning while one looks.
@@ -68,27 +67,26 @@ impl SceneView {
         Self {
             camera: Camera::of(extent),
             extent,
-            hand: Hand::above(extent),
+            hand: HandTarget::above(extent),
             has_lines: false,
             deepest: 0.0,
         }
     }
 
     /// Where the pointer and the keys want the tool.
-    pub fn hand(&self) -> &Hand {
+    pub fn hand(&self) -> &HandTarget {
         &self.hand
     }
 
-    /// Looks from where it looked at first.
     pub fn reset(&mut self) {
         self.camera = Camera::of(self.extent);
     }
 
     /// Draws the scene in the space there is; the hand follows pointer and keys.
-    pub fn ui(&mut self, ui: &mut Ui, shown: &Shown) -> Response {
+    pub fn ui(&mut self, ui: &mut Ui, shown: &ScenePicture) -> Response {
         let size = ui.available_size().max(vec2(80.0, 80.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
-        let response = response.place(NAME);
+        let response = response.named(NAME);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, NAME));
         self.take_pointer(ui, &response, rect);
         self.take_keys(ui, &response);
@@ -96,7 +94,7 @@ impl SceneView {
             let painter = ui.painter().with_clip_rect(rect);
             self.paint(&painter, ui, rect, shown);
             if response.has_focus() {
-                let focus = Stroke::new(1.5, Tokens::of(ui.visuals().dark_mode).focus);
+                let focus = Stroke::new(1.5, tokens_of(ui).focus);
                 painter.rect_stroke(rect.shrink(1.0), 2.0, focus, eframe::egui::StrokeKind::Inside);
             }
         }
@@ -174,12 +172,12 @@ impl SceneView {
         }
     }
 
-    fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &Shown) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+    fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &ScenePicture) {
+        let tokens = tokens_of(ui);
         let font = TextStyle::Small.resolve(ui.style());
         let lens = self.camera.lens(rect);
         let size = self.extent[0].max(self.extent[1]);
-        let look = Look {
+        let look = SurfaceStyle {
             deepest: colour_depth(self.deepest),
             // White in both themes: the colours before which they stand are the same.
             lines: self.has_lines.then_some(tokens.on_alarm.gamma_multiply(0.5)),
@@ -206,12 +204,10 @@ impl SceneView {
 }
 
 /// A stylus: a cone from the tip, its button to one side.
-fn stylus_shape(painter: &Painter, lens: &Lens, shown: &Shown, size: f64, tokens: &Tokens) {
+fn stylus_shape(painter: &Painter, lens: &Lens, shown: &ScenePicture, size: f64, tokens: &Tokens) {
     let [length, button] = stylus(shown.turn);
     let end = along(shown.device, length, STYLUS * size);
-    let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else {
-        return;
-    };
+    let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else { return };
     let thick = |radius: f64, distance: f64| (radius * size * lens.points_per_mm(distance)) as f32;
     let aside = (top.at - tip.at).normalized().rot90();
     let (thin, wide) = (thick(0.003, tip.distance), thick(0.014, top.distance));
@@ -234,7 +230,7 @@ fn stylus_shape(painter: &Painter, lens: &Lens, shown: &Shown, size: f64, tokens
 fn force_shape(
     painter: &Painter,
     lens: &Lens,
-    shown: &Shown,
+    shown: &ScenePicture,
     size: f64,
     tokens: &Tokens,
     font: &FontId,
@@ -304,7 +300,7 @@ mod tests {
     fn frame(ctx: &Context, view: &mut SceneView, time: f64, events: Vec<Event>) -> Response {
         let grid = Grid::new(31, 31, 2.0).unwrap();
         let heights = vec![0.0; grid.nodes()];
-        let shown = Shown {
+        let shown = ScenePicture {
             now: Heights::new(grid, &heights).unwrap(),
             rest: &heights,
             device: view.hand().at(),

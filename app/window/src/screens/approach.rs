@@ -1,13 +1,14 @@
-//! The search for the surface as the probe feels it: force over position, and what each pass found.
+//! Contact detection: force over position, and the result of each pass.
 
 use crate::plots::figure::{PlacedPlot, PlotLook};
-use eframe::egui::{RichText, Ui};
+use crate::widgets::heading_ui;
+use eframe::egui::Ui;
 use palpate_analysis::report::live::{approach, touches};
 use palpate_model::signal::LiveTrace;
 use palpate_runner::RunView;
 use std::sync::Arc;
 
-/// The points of the newest search, converted when it changed.
+/// The points of the newest search, converted when they change.
 #[derive(Debug, Default)]
 pub struct Approach {
     trace: Option<Arc<LiveTrace>>,
@@ -21,7 +22,7 @@ impl Approach {
             self.plot = approach(&run.approach).into();
             self.trace = Some(Arc::clone(&run.approach));
         }
-        ui.label(RichText::new(&self.plot.plot.title).heading().strong());
+        heading_ui(ui, &self.plot.plot.title);
         for line in words(run) {
             ui.label(line);
         }
@@ -32,22 +33,20 @@ impl Approach {
     }
 }
 
-/// What was felt and found, for those who do not see the plot.
+/// The results in words, for a screen reader.
 fn words(run: &RunView) -> Vec<String> {
     let mut words: Vec<String> = run
         .touches
         .iter()
-        .map(|touch| {
-            format!("pass {} felt {:.3} at {:.3}", touch.pass, touch.force, touch.position)
-        })
+        .map(|touch| format!("pass {}: {:.3} at {:.3}", touch.pass, touch.force, touch.position))
         .collect();
     words.push(match run.contact {
         Some(contact) => format!(
-            "the surface is at {:.3} ± {:.3} mm from home",
+            "the contact point is at {:.3} ± {:.3} mm from home",
             contact.position.0, contact.std_error_mm
         ),
-        None if run.touches.is_empty() => "nothing felt yet".into(),
-        None => "the surface is not known yet".into(),
+        None if run.touches.is_empty() => "no contact yet".into(),
+        None => "the contact point is not known yet".into(),
     });
     words
 }

@@ -1,21 +1,18 @@
-//! The daily checks of the rig over time: how far its zero and a known weight were off, and what was allowed.
+//! The daily checks of the rig over time: deviations of its zero and of a known weight, and their limits.
 
-use super::screen::{Screen, ScreenEntry};
-use crate::command::Commands;
+use super::screen::{Commands, Screen, ScreenEntry, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
-use crate::widgets::task_bar::work_ui;
-use crate::workbench::Workbench;
-use crate::workers::task::Task;
+use crate::widgets::{
+    Column, Emphasis, TableRow, alarm_ui, answer_ui, fact_ui, heading_ui, quiet_ui, section_ui,
+    table_ui, work_ui,
+};
+use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
-use eframe::egui::{Context, Key, RichText, Ui, vec2};
+use eframe::egui::{Context, Key, Ui, vec2};
 use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
 use palpate_analysis::report::live::deviations;
 use std::path::PathBuf;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Checks",
     purpose: "the rig's daily checks over time",
@@ -24,7 +21,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
         Box::new(ChecksScreen {
             library: workbench.library.clone(),
             rig: workbench.snapshot.rig.description.name.clone(),
-            task: Task::default(),
+            task: BackgroundTask::default(),
             is_read: false,
         })
     },
@@ -39,20 +36,17 @@ const PLOT_SHARE: f32 = 0.6;
 /// Seconds in a day: the unit of the time axis.
 const DAY_S: f64 = 86_400.0;
 
-/// What a plot shows.
 type Measured = fn(&PastCheck) -> Option<Deviation>;
 
-/// The two plots: head, what they show.
 const PLOTS: [(&str, Measured); 2] = [
     ("Known weight: measured - expected (N)", |one| one.weight),
     ("Zero: measured - expected (N)", |one| one.zero),
 ];
 
-/// The screen's state.
 pub struct ChecksScreen {
     library: Result<PathBuf, String>,
     rig: String,
-    task: Task<Vec<PastCheck>>,
+    task: BackgroundTask<Vec<PastCheck>>,
     is_read: bool,
 }
 
@@ -79,29 +73,28 @@ impl Screen for ChecksScreen {
         );
         ui.add_space(8.0);
         work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);
-        section_ui(ui, "A new one");
-        quiet_ui(ui, &format!("Run '{HOW}' on the command line."));
+        section_ui(ui, "New check");
+        quiet_ui(ui, format!("Run '{HOW}' on the command line."));
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let checks = match self.task.answer() {
-            Some(Ok(checks)) => checks,
-            Some(Err(reason)) => return alarm_ui(ui, reason),
-            None => return quiet_ui(ui, "reading the library"),
-        };
+        let before = "reading the library";
+        let Some(checks) = answer_ui(ui, &self.task, before) else { return };
         if checks.is_empty() {
-            ui.label(RichText::new("No daily check of this rig yet").heading().strong());
-            let words = format!(
-                "Run '{HOW}' once a day before the first specimen; then how far zero and weight drift stands here."
-            );
-            ui.label(words);
+            heading_ui(ui, "No daily check of this rig yet");
+            ui.label(format!(
+                "Run '{HOW}' once a day before the first specimen; this screen then shows the drift of zero and weight."
+            ));
             return;
         }
         let height = ui.available_height() * PLOT_SHARE / PLOTS.len() as f32 - 26.0;
         for (head, measured) in PLOTS {
-            ui.label(RichText::new(head).heading().strong());
+            heading_ui(ui, head);
             ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-                deviations_ui(ui, head, checks, measured);
+                let known: Vec<(f64, Deviation)> =
+                    checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
+                let look = PlotLook { x_text: Some(day_text), ..PlotLook::default() };
+                plot_ui(ui, head, &deviations(head, &known), look);
             });
         }
         let columns = [
@@ -114,15 +107,13 @@ impl Screen for ChecksScreen {
             Column::numbers("allowed (N)", 78.0),
             Column::words("calibration", 160.0),
         ];
-        let rows: Vec<Row> = checks.iter().rev().map(row).collect();
+        let rows: Vec<TableRow> = checks.iter().rev().map(row).collect();
         table_ui(ui, "daily_checks", &columns, &rows);
     }
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         section_ui(ui, "Last check");
-        let Some(Ok(checks)) = self.task.answer() else {
-            return;
-        };
+        let Some(Ok(checks)) = self.task.answer() else { return };
         let Some(PastCheck { check, .. }) = checks.last() else {
             return quiet_ui(ui, "none");
         };
@@ -130,13 +121,10 @@ impl Screen for ChecksScreen {
         fact_ui(ui, "by", &check.by);
         for part in &check.parts {
             section_ui(ui, &part.what);
-            match part.is_passed {
-                true => quiet_ui(ui, &part.sentence),
-                false => alarm_ui(ui, &part.sentence),
-            }
+            if part.is_passed { quiet_ui(ui, &part.sentence) } else { alarm_ui(ui, &part.sentence) }
         }
         let failed = checks.iter().filter(|one| !one.check.is_passed).count();
-        section_ui(ui, "All of them");
+        section_ui(ui, "All checks");
         fact_ui(ui, "failed", format!("{failed} of {}", checks.len()));
     }
 
@@ -159,7 +147,7 @@ impl Screen for ChecksScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.is_busy()
     }
 }
 
@@ -179,26 +167,13 @@ fn day_text(days: f64) -> String {
     at.map_or_else(String::new, |at| at.format("%Y-%m-%d").to_string())
 }
 
-/// Draws how far one reading of each check was off, between what was allowed.
-fn deviations_ui(ui: &mut Ui, head: &str, checks: &[PastCheck], measured: Measured) {
-    let known: Vec<(f64, Deviation)> =
-        checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
-    let look = PlotLook { x_text: Some(day_text), ..PlotLook::default() };
-    plot_ui(ui, head, &deviations(head, &known), look);
-}
-
-fn row(past: &PastCheck) -> Row {
+fn row(past: &PastCheck) -> TableRow {
     let check = &past.check;
-    let force = |one: Option<Deviation>| {
-        let newtons = one.map(|one| format!("{:+.4}", one.newtons));
-        newtons.unwrap_or_else(|| "-".into())
-    };
-    let limit = |one: Option<Deviation>| {
-        let limit = one.map(|one| format!("{:.4}", one.limit));
-        limit.unwrap_or_else(|| "-".into())
-    };
+    let force =
+        |one: Option<Deviation>| one.map_or("-".into(), |one| format!("{:+.4}", one.newtons));
+    let limit = |one: Option<Deviation>| one.map_or("-".into(), |one| format!("{:.4}", one.limit));
     let sentences = check.parts.iter().map(|part| part.sentence.as_str());
-    Row {
+    TableRow {
         cells: vec![
             time_text(check.at),
             check.by.clone(),
@@ -209,10 +184,7 @@ fn row(past: &PastCheck) -> Row {
             limit(past.zero),
             check.calibration.clone(),
         ],
-        look: match check.is_passed {
-            true => RowLook::Plain,
-            false => RowLook::Alarm,
-        },
+        emphasis: if check.is_passed { Emphasis::Plain } else { Emphasis::Alarm },
         hint: Some(sentences.collect::<Vec<_>>().join("\n")),
     }
 }

@@ -1,15 +1,13 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{cell, tight};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
+use super::parameters::{cell, tight, value_ui};
+use crate::widgets::{section_ui, sentence_ui, tokens_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::text::{ParameterText, quality};
 use palpate_rheology::fit::FitReport;
 
 /// Draws the report: parameters with their intervals, quality, every sentence.
 pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     section_ui(ui, "Exact fit");
     tight(ui, |ui| {
         for parameter in &report.parameters {
@@ -17,29 +15,17 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
         }
     });
     ui.label(quality(report));
-    for sentence in report.sentences() {
-        ui.add(Label::new(RichText::new(sentence).color(tokens.text)).wrap());
-    }
+    report.sentences().for_each(|sentence| sentence_ui(ui, sentence));
 }
 
 fn row_ui(ui: &mut Ui, text: &ParameterText) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.horizontal(|ui| {
-        cell(ui, 60.0, |ui| {
-            ui.label(RichText::new(&text.name).color(tokens.text_quiet));
-        });
-        cell(ui, 166.0, |ui| {
-            ui.label(RichText::new(&text.value).monospace());
-        });
-        ui.label(RichText::new(&text.unit).color(tokens.text_quiet).small());
-    });
+    value_ui(ui, &text.name, RichText::new(&text.value), &text.unit);
     if !text.interval.is_empty() {
+        let quiet = tokens_of(ui).text_quiet;
         ui.horizontal(|ui| {
-            cell(ui, 60.0, |ui| {
-                ui.label(RichText::new("95 %").color(tokens.text_quiet).small());
-            });
+            cell(ui, 60.0, |ui| ui.label(RichText::new("95 %").color(quiet).small()));
             let interval = RichText::new(&text.interval).monospace().small();
-            ui.add(Label::new(interval.color(tokens.text_quiet)).wrap());
+            ui.add(Label::new(interval.color(quiet)).wrap());
         });
     }
 }

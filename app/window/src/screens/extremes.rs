@@ -1,51 +1,43 @@
-//! What is right and what is refused at the ends of every range.
+//! Which cases at the ends of every range are right and which are refused.
 
-use super::screen::{Screen, ScreenEntry};
-use crate::command::Commands;
-use crate::theme::Tokens;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
-use crate::widgets::task_bar::work_ui;
-use crate::workbench::Workbench;
-use crate::workers::task::Task;
+use super::screen::{Commands, Screen, ScreenEntry, Workbench};
+use crate::widgets::{
+    Column, Emphasis, TableRow, answer_ui, choice_ui, heading_ui, placeholder_ui, quiet_ui,
+    section_ui, table_ui, tokens_of, work_ui,
+};
+use crate::workers::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{GroupSummary, summary};
 use palpate_rheology::extremes::{Extent, Row, Verdict};
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
-    purpose: "what is right and what is refused at the ends of every range",
+    purpose: "which cases at the ends of every range are right or refused",
     key: Key::Num8,
     open: |_| Box::new(ExtremesScreen::default()),
 };
 
-/// How much is run, in words.
 const EXTENTS: [(Extent, &str); 2] =
     [(Extent::Quick, "corners: seconds"), (Extent::Whole, "everything: minutes")];
 
-/// What was found.
-pub struct Found {
+struct ExtremesResult {
     rows: Vec<Row>,
     groups: Vec<GroupSummary>,
 }
 
-/// The screen's state.
 pub struct ExtremesScreen {
     extent: Extent,
-    /// Shown alone; all groups if none.
+    /// All groups if none.
     group: Option<&'static str>,
-    /// Shown alone; all verdicts if none.
+    /// All verdicts if none.
     verdict: Option<Verdict>,
-    task: Task<Found>,
+    task: BackgroundTask<ExtremesResult>,
 }
 
 impl Default for ExtremesScreen {
     fn default() -> Self {
-        Self { extent: Extent::Quick, group: None, verdict: None, task: Task::default() }
+        Self { extent: Extent::Quick, group: None, verdict: None, task: BackgroundTask::default() }
     }
 }
 
@@ -82,18 +74,8 @@ impl Screen for ExtremesScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let found = match self.task.answer() {
-            Some(Ok(found)) => found,
-            Some(Err(reason)) => {
-                alarm_ui(ui, reason);
-                return;
-            }
-            None => {
-                ui.label(RichText::new("nothing tested yet").color(tokens.text_quiet));
-                return;
-            }
-        };
+        let before = "nothing tested yet";
+        let Some(found) = answer_ui(ui, &self.task, before) else { return };
         let rows: Vec<TableRow> = found
             .rows
             .iter()
@@ -102,7 +84,7 @@ impl Screen for ExtremesScreen {
             .map(table_row)
             .collect();
         let title = format!("Cases, {} of {}", rows.len(), found.rows.len());
-        ui.label(RichText::new(title).heading().strong());
+        heading_ui(ui, title);
         let columns = [
             Column::words("subject", 130.0),
             Column::words("case", 240.0),
@@ -115,10 +97,10 @@ impl Screen for ExtremesScreen {
     }
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {
-            ui.label(RichText::new("nothing tested yet").color(tokens.text_quiet));
+            placeholder_ui(ui, "nothing tested yet");
             return;
         };
         let wrong: usize = found.groups.iter().map(|one| one.counts[3]).sum();
@@ -139,8 +121,7 @@ impl Screen for ExtremesScreen {
                 .collect();
             ui.label(counts.join(", "));
             if let Some(tightest) = &facts.tightest {
-                let text = format!("closest to its tolerance: {tightest}");
-                quiet_ui(ui, &text);
+                quiet_ui(ui, format!("closest to its tolerance: {tightest}"));
             }
         }
     }
@@ -153,8 +134,8 @@ impl Screen for ExtremesScreen {
         let extent = self.extent;
         self.task.start("extremes", ctx, move |progress| {
             let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
-            let rows = rows.ok_or("ended before it was done")?;
-            Ok(Found { groups: summary(&rows), rows })
+            let rows = rows.ok_or("cancelled before it was done")?;
+            Ok(ExtremesResult { groups: summary(&rows), rows })
         });
     }
 
@@ -163,7 +144,7 @@ impl Screen for ExtremesScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.is_busy()
     }
 }
 
@@ -177,10 +158,10 @@ fn table_row(row: &Row) -> TableRow {
             format!("{:.0e}", row.tolerance),
             row.group.to_owned(),
         ],
-        look: match row.verdict {
-            Verdict::Wrong => RowLook::Alarm,
-            Verdict::Right => RowLook::Plain,
-            Verdict::Refused | Verdict::Flagged => RowLook::Quiet,
+        emphasis: match row.verdict {
+            Verdict::Wrong => Emphasis::Alarm,
+            Verdict::Right => Emphasis::Plain,
+            Verdict::Refused | Verdict::Flagged => Emphasis::Quiet,
         },
         hint: (!row.sentence.is_empty()).then(|| row.sentence.clone()),
     }

@@ -18,7 +18,7 @@ pub mod review;
 pub mod rig;
 pub mod rig_panel;
 pub mod run;
-pub mod run_middle;
+pub mod run_panes;
 pub mod scene;
 pub mod screen;
 pub mod table;

@@ -1,7 +1,7 @@
 //! The force model's parameters as they become known, each with its uncertainty.
 
-use crate::theme::Tokens;
-use eframe::egui::{Align, Layout, RichText, Ui, vec2};
+use crate::widgets::{quiet_ui, tokens_of};
+use eframe::egui::{Align, Layout, Response, RichText, Ui, vec2};
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{LiveEstimate, Parameter};
 use palpate_model::rig::Phase;
@@ -20,7 +20,6 @@ const SHOWN: [(&str, &str); 7] = [
 
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let live = run.and_then(|run| run.live.as_ref());
     let found = live.map_or(&[][..], |live| live.parameters.as_slice());
     tight(ui, |ui| {
@@ -42,17 +41,17 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
         (Some(run), None) => remark(run.phase, found),
     };
     if let Some(live) = live {
-        for words in worth(live) {
-            ui.label(RichText::new(words).color(tokens.text_quiet).small());
+        for words in quality_words(live) {
+            quiet_ui(ui, words);
         }
     }
     if let Some(remark) = remark {
-        ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+        quiet_ui(ui, remark);
     }
 }
 
-/// What the numbers are worth, and what their errors leave out.
-fn worth(live: &LiveEstimate) -> [String; 2] {
+/// RMSE of the live fit, and what its errors leave out.
+fn quality_words(live: &LiveEstimate) -> [String; 2] {
     let residual =
         format!("weighted residual {:.1} mN, {} samples", live.rmse_weighted_n * 1e3, live.samples);
     let alone = "± is statistical; the exact fit adds the calibration's".to_owned();
@@ -68,7 +67,7 @@ pub(super) fn tight(ui: &mut Ui, rows: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// What the live fit says of a parameter that it cannot identify yet.
+/// Why the live fit cannot identify a parameter yet.
 fn reason<'a>(live: &'a LiveEstimate, name: &str) -> Option<&'a str> {
     let verdict = live.verdicts.iter().find(|verdict| verdict.parameter == name)?;
     verdict.reason.as_deref()
@@ -81,30 +80,34 @@ fn row_ui(
     parameter: Option<&Parameter>,
     reason: Option<&str>,
 ) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.horizontal(|ui| {
-        cell(ui, 54.0, |ui| {
-            ui.label(RichText::new(name).color(tokens.text_quiet));
-        });
-        cell(ui, 166.0, |ui| {
-            let text = value_text(parameter);
-            let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
-            let label = ui.label(RichText::new(text).monospace().color(ink));
-            if let Some(reason) = reason {
-                label.on_hover_text(reason);
-            }
-        });
-        let unit = typeset(unit);
-        ui.label(RichText::new(unit).color(tokens.text_quiet).small());
-    });
+    let tokens = tokens_of(ui);
+    let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
+    let value = RichText::new(value_text(parameter)).color(ink);
+    let label = value_ui(ui, name, value, &typeset(unit));
+    if let Some(reason) = reason {
+        label.on_hover_text(reason);
+    }
 }
 
-pub(super) fn cell(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui)) {
-    let size = vec2(width, 18.0);
-    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+/// Draws name, value and unit of a parameter; returns the value.
+pub(super) fn value_ui(ui: &mut Ui, name: &str, value: RichText, unit: &str) -> Response {
+    let quiet = tokens_of(ui).text_quiet;
+    let row = |ui: &mut Ui| {
+        cell(ui, 60.0, |ui| ui.label(RichText::new(name).color(quiet)));
+        let value = cell(ui, 166.0, |ui| ui.label(value.monospace()));
+        ui.label(RichText::new(unit).color(quiet).small());
+        value
+    };
+    ui.horizontal(row).inner
+}
+
+pub(super) fn cell<R>(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
+    let layout = Layout::left_to_right(Align::Center);
+    let content = |ui: &mut Ui| {
         ui.set_min_width(width);
-        content(ui);
-    });
+        content(ui)
+    };
+    ui.allocate_ui_with_layout(vec2(width, 18.0), layout, content).inner
 }
 
 fn is_known(parameter: Option<&Parameter>) -> bool {
@@ -129,22 +132,11 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
     if missing.is_empty() {
         return None;
     }
-    let names = if missing.len() == SHOWN.len() {
-        "none known".to_string()
-    } else {
-        format!("{} not yet", missing.join(", "))
+    let names = match missing.len() == SHOWN.len() {
+        true => "none known".to_owned(),
+        false => format!("{} not yet", missing.join(", ")),
     };
     let why = match phase {
-        Phase::Idle
-        | Phase::SelfTest
-        | Phase::Home
-        | Phase::Tare
-        | Phase::Contact
-        | Phase::Prompt
-        | Phase::Weigh
-        | Phase::CheckHome
-        | Phase::Imported
-        | Phase::Rest => "the probe has not indented",
         Phase::Ramp => "more of the ramp is needed",
         Phase::Hold => "more of the hold is needed",
         Phase::Creep | Phase::Sine | Phase::Follow => "the live fit follows ramps and holds",
@@ -154,6 +146,7 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
         | Phase::Ended
         | Phase::Paused
         | Phase::Jog => "the ramp and hold were too short",
+        _ => "the probe has not indented",
     };
     Some(format!("{names}: {why}"))
 }
@@ -182,14 +175,14 @@ mod tests {
     }
 
     #[test]
-    fn live_errors_are_told_to_be_statistical_alone() {
+    fn live_errors_are_called_statistical() {
         let live = LiveEstimate {
             parameters: Vec::new(),
             rmse_weighted_n: 0.0123,
             samples: 1000,
             verdicts: Vec::new(),
         };
-        let [residual, alone] = worth(&live);
+        let [residual, alone] = quality_words(&live);
         assert_eq!(residual, "weighted residual 12.3 mN, 1000 samples");
         assert!(alone.contains("statistical") && alone.contains("calibration"));
     }

@@ -1,47 +1,40 @@
 //! What the plan will do, before anything moves.
 
 use super::form::ProtocolForm;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::fact_ui;
-use crate::widgets::tick_box::tick_box;
-use eframe::egui::{RichText, Ui};
+use crate::widgets::{alarm_ui, fact_ui, placeholder_ui, quiet_ui, tick_box};
+use eframe::egui::Ui;
 use palpate_figures::uncertain::clock;
 use palpate_protocols::preview::Preview;
 
 /// Draws durations, forces and storage, then refusals and notes.
 pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let Some(checked) = form.checked() else {
-        ui.label(
-            RichText::new("No preview until the protocol and its values are right")
-                .color(tokens.text_quiet),
-        );
+        placeholder_ui(ui, "No preview until the protocol and its values are right");
         for problem in form.problems() {
-            ui.label(RichText::new(problem.to_string()).color(tokens.alarm_text));
+            alarm_ui(ui, problem.to_string());
         }
         return;
     };
     let preview = &checked.preview;
     numbers_ui(ui, preview);
     for refusal in &preview.refusals {
-        ui.label(RichText::new(format!("Refused: {refusal}")).color(tokens.alarm_text));
+        alarm_ui(ui, format!("Refused: {refusal}"));
     }
     let warnings = checked.warnings.iter().map(ToString::to_string);
     for note in warnings.chain(preview.notes.iter().cloned()) {
-        ui.label(RichText::new(format!("Note: {note}")).color(tokens.text_quiet).small());
+        quiet_ui(ui, format!("Note: {note}"));
     }
 }
 
 /// Draws what the preview asks to acknowledge, with the box to tick; nothing if it asks nothing.
 pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let warnings =
         form.checked().map_or(Vec::new(), |checked| checked.preview.acknowledgements.clone());
     if warnings.is_empty() {
         return;
     }
     for warning in &warnings {
-        ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
+        alarm_ui(ui, format!("Mind: {warning}"));
     }
     let mut is_acknowledged = form.is_acknowledged();
     if tick_box(ui, &mut is_acknowledged, "I accept this; it is recorded").changed() {

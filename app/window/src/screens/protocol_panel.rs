@@ -1,84 +1,79 @@
-//! The protocol that was chosen: its parameters, what it asks for, where sessions go; and the start.
+//! The protocol that is chosen: its parameters, labels of the session, the folder of sessions; and the start.
 
-use super::form::{ParamField, ProtocolForm, ToldField};
+use super::form::{LabelField, ParamField, ProtocolForm};
 use super::preview_view::{acknowledgement_ui, preview_ui};
-use super::run_middle::Middle;
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::quiet_ui;
-use crate::widgets::tick_box::tick_box;
-use crate::workers::path_dialog::Ask;
+use super::run_panes::RunPane;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{
+    NamedControl, alarm_ui, form_label, quiet_ui, reason_button, section_ui, small_alarm_ui,
+    small_ui, tick_box, tokens_of,
+};
+use crate::workbench::Workbench;
+use crate::workers::PathPurpose;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
 use palpate_protocols::file::{Kind, What};
 
-/// What the panel must know beside the form.
+/// What the panel needs from the run screen.
 pub struct ProtocolFacts<'a> {
-    /// Whether a run is in progress or about to start: the form then shows what runs.
-    pub is_busy: bool,
-    /// Where sessions go if no folder is chosen, or why nowhere.
+    /// Where sessions go if no folder is chosen, or why there is none.
     pub library: &'a Result<String, String>,
-    /// What was recovered of sessions that a crash left unfinished, a line each.
+    /// Sessions that were recovered after a crash, a line each.
     pub recovered: &'a [String],
-    /// Whether the folder dialog is open.
-    pub is_dialog_open: bool,
 }
 
 /// Opacity of locked fields; enough contrast is left to read their values.
 const LOCKED_ALPHA: f32 = 0.8;
 
-/// Things to tell that every session has a field for; the others are folded away until asked for.
+/// Labels that every session has a field for; the others are folded away until a protocol requires them.
 const ALWAYS: [&str; 3] = ["operator", "specimen", "indenter"];
 
 /// Draws the form and the preview.
 pub fn protocol_ui(
     ui: &mut Ui,
-    form: &mut ProtocolForm,
+    workbench: &mut Workbench,
     facts: &ProtocolFacts<'_>,
     commands: &mut Commands,
 ) {
-    head_ui(ui, form, facts, commands);
+    let is_busy = workbench.is_busy();
+    let is_dialog_open = workbench.dialog.is_open();
+    let form = &mut workbench.form;
+    head_ui(ui, form);
+    if ui.add_enabled(!is_busy, Button::new("Change protocol...")).clicked() {
+        commands.push(UiCommand::View(RunPane::Choose));
+    }
     ui.scope(|ui| {
-        // Locked while a run goes on, but still to be read: it says what is running.
+        // Locked during a run, but still readable: it says what is running.
         ui.visuals_mut().disabled_alpha = LOCKED_ALPHA;
-        ui.add_enabled_ui(!facts.is_busy, |ui| {
-            for field in form.told.iter_mut().filter(|one| is_shown(one)) {
-                one_told_ui(ui, field);
+        ui.add_enabled_ui(!is_busy, |ui| {
+            for field in form.label_fields.iter_mut().filter(|one| is_shown(one)) {
+                label_ui(ui, field);
             }
             for field in &mut form.fields {
                 parameter_ui(ui, field);
             }
-            more_told_ui(ui, &mut form.told);
-            folder_ui(ui, form, facts, commands);
+            more_labels_ui(ui, &mut form.label_fields);
+            folder_ui(ui, &mut form.folder, facts, is_dialog_open, commands);
         });
     });
     section_ui(ui, "Preview");
     preview_ui(ui, form);
 }
 
-fn head_ui(ui: &mut Ui, form: &ProtocolForm, facts: &ProtocolFacts<'_>, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let title = match (&form.protocol, &form.file) {
-        (Ok(protocol), _) => protocol.title.clone(),
-        (Err(_), Some(file)) => file.display().to_string(),
-        (Err(_), None) => "No protocol".into(),
-    };
-    section_ui(ui, &title);
-    if let Ok(protocol) = &form.protocol {
-        let about = RichText::new(&protocol.about).color(tokens.text_quiet).small();
-        ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
-    }
-    let button = Button::new("Change protocol...");
-    if ui.add_enabled(!facts.is_busy, button).clicked() {
-        commands.push(Command::View(Middle::Choose));
+fn head_ui(ui: &mut Ui, form: &ProtocolForm) {
+    match (&form.protocol, &form.file) {
+        (Ok(protocol), _) => {
+            section_ui(ui, &protocol.title);
+            let ink = tokens_of(ui).text_quiet;
+            let about = RichText::new(&protocol.about).color(ink).small();
+            ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
+        }
+        (Err(_), Some(file)) => section_ui(ui, &file.display().to_string()),
+        (Err(_), None) => section_ui(ui, "No protocol"),
     }
 }
 
 fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let hint = field.hint();
     if field.parameter.kind == Kind::Flag {
         let mut is_on = field.text == "true";
@@ -98,15 +93,12 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             } else {
                 input.desired_width(76.0).align(Align2::RIGHT_CENTER)
             };
-            let is_left_out = field.parameter.default.what == What::None;
-            let input = if is_left_out { input.hint_text("none") } else { input };
-            let input = ui
-                .add(input)
-                .labelled_by(label.id)
-                .place(&field.parameter.name)
-                .on_hover_text(&hint);
+            let is_optional = field.parameter.default.what == What::None;
+            let input = ui.add(input.hint_text(if is_optional { "none" } else { "" }));
+            let input = input.labelled_by(label.id).named(&field.parameter.name);
+            let input = input.on_hover_text(&hint);
             if !is_wide {
-                ui.label(RichText::new(field.unit_beside()).color(tokens.text_quiet));
+                ui.label(RichText::new(field.shown_unit()).color(tokens.text_quiet));
             }
             input.has_focus()
         })
@@ -115,32 +107,29 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
         quiet_ui(ui, &hint);
     }
     if let Err(reason) = &field.value {
-        ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+        small_alarm_ui(ui, reason);
     }
 }
 
-/// Whether it stands in the form: it always does, or the protocol asks for it.
-fn is_shown(field: &ToldField) -> bool {
-    field.is_asked || ALWAYS.contains(&field.key.name)
+fn is_shown(field: &LabelField) -> bool {
+    field.is_required || ALWAYS.contains(&field.key.name)
 }
 
-/// What else can be told, folded away.
-fn more_told_ui(ui: &mut Ui, told: &mut [ToldField]) {
-    let is_told = |one: &ToldField| !is_shown(one) && !one.text.is_empty();
-    let count = told.iter().filter(|one| is_told(one)).count();
-    let title = match count {
+/// The other labels, folded away.
+fn more_labels_ui(ui: &mut Ui, fields: &mut [LabelField]) {
+    let is_filled = |one: &&LabelField| !is_shown(one) && !one.text.is_empty();
+    let title = match fields.iter().filter(is_filled).count() {
         0 => "More about specimen, probe and series".into(),
-        count => format!("More about specimen, probe and series ({count} told)"),
+        count => format!("More about specimen, probe and series ({count} filled in)"),
     };
-    CollapsingHeader::new(title).id_salt("more_told").show(ui, |ui| {
-        for field in told.iter_mut().filter(|one| !is_shown(one)) {
-            one_told_ui(ui, field);
+    CollapsingHeader::new(title).id_salt("more_labels").show(ui, |ui| {
+        for field in fields.iter_mut().filter(|one| !is_shown(one)) {
+            label_ui(ui, field);
         }
     });
 }
 
-fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn label_ui(ui: &mut Ui, field: &mut LabelField) {
     ui.horizontal(|ui| {
         let label = if ALWAYS.contains(&field.key.name) {
             form_label(ui, field.key.name)
@@ -148,89 +137,62 @@ fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
             ui.label(field.key.name)
         };
         let width = ui.available_width() - 10.0;
+        let hint = if field.is_required { "required" } else { "" };
         let input = TextEdit::singleline(&mut field.text).desired_width(width).char_limit(200);
-        let input = match field.is_asked {
-            true => input.hint_text("asked for"),
-            false => input,
-        };
-        ui.add(input).labelled_by(label.id).place(field.key.name).on_hover_text(field.key.meaning);
+        let input = ui.add(input.hint_text(hint)).labelled_by(label.id).named(field.key.name);
+        input.on_hover_text(field.key.meaning);
     });
     if let Some(reason) = &field.error {
-        ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+        small_alarm_ui(ui, reason);
     }
 }
+
 fn folder_ui(
     ui: &mut Ui,
-    form: &mut ProtocolForm,
+    folder: &mut String,
     facts: &ProtocolFacts<'_>,
+    is_dialog_open: bool,
     commands: &mut Commands,
 ) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         let label = form_label(ui, "sessions in");
-        let hint = match facts.library {
-            Ok(library) => library.as_str(),
-            Err(_) => "choose a folder",
-        };
+        let hint = facts.library.as_deref().unwrap_or("choose a folder");
         let width = ui.available_width() - 84.0;
-        let input = TextEdit::singleline(&mut form.folder)
-            .desired_width(width)
-            .char_limit(4096)
-            .hint_text(hint.to_owned());
-        ui.add(input).labelled_by(label.id).place("sessions in");
-        let button = Button::new("Choose...");
-        if ui.add_enabled(!facts.is_dialog_open, button).clicked() {
-            commands.push(Command::Choose(Ask::NewSessions));
+        let input = TextEdit::singleline(folder).desired_width(width).char_limit(4096);
+        ui.add(input.hint_text(hint)).labelled_by(label.id).named("sessions in");
+        if ui.add_enabled(!is_dialog_open, Button::new("Choose...")).clicked() {
+            commands.push(UiCommand::Choose(PathPurpose::NewSessions));
         }
     });
-    if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {
-        ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    if let (Err(reason), true) = (facts.library, folder.trim().is_empty()) {
+        small_alarm_ui(ui, reason);
     }
     if !facts.recovered.is_empty() {
         ui.label("Recovered after a crash");
-        for line in facts.recovered {
-            ui.add(Label::new(RichText::new(line).small()).wrap());
-        }
+        facts.recovered.iter().for_each(|line| small_ui(ui, line));
     }
 }
 
-/// What the start strip says.
-pub struct StartFacts<'a> {
-    /// Whether a run is in progress or about to start.
-    pub is_busy: bool,
-    /// Whether the form may start a run, or why not.
-    pub verdict: &'a Result<(), String>,
-    /// Why the last start was refused.
-    pub refusal: Option<&'a str>,
-    /// Whether the link to the rig is lost.
-    pub is_link_lost: bool,
-}
-
-/// Draws the start strip, which never scrolls away: what to acknowledge, the button, why it cannot
-/// be pressed, and the last refusal.
-pub fn start_ui(
-    ui: &mut Ui,
-    form: &mut ProtocolForm,
-    facts: &StartFacts<'_>,
-    commands: &mut Commands,
-) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    if !facts.is_busy {
-        acknowledgement_ui(ui, form);
+/// Draws the start strip, which never scrolls away: what to acknowledge, the button and why it is closed, and the last
+/// refusal.
+pub fn start_ui(ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+    let (is_busy, verdict) = (workbench.is_busy(), workbench.start_verdict());
+    if !is_busy {
+        acknowledgement_ui(ui, &mut workbench.form);
     }
     ui.horizontal(|ui| {
-        if reason_button(ui, "Start  F5", vec2(104.0, 34.0), facts.verdict) {
-            commands.push(Command::Start);
+        if reason_button(ui, "Start  F5", vec2(104.0, 34.0), &verdict) {
+            commands.push(UiCommand::Start);
         }
     });
-    if facts.is_link_lost {
-        let hint = "opens the devices again and stops the axis; nothing moves, and position zero has to be found again";
-        let button = ui.add_enabled(!facts.is_busy, Button::new("Connect again"));
+    if workbench.snapshot.rig.link_error.is_some() {
+        let hint = "opens the devices again and stops the axis; nothing moves, and the axis must be homed again";
+        let button = ui.add_enabled(!is_busy, Button::new("Connect again"));
         if button.on_hover_text(hint).clicked() {
-            commands.push(Command::Reconnect);
+            commands.push(UiCommand::Reconnect);
         }
     }
-    if let Some(refusal) = facts.refusal {
-        ui.label(RichText::new(format!("Not started: {refusal}")).color(tokens.alarm_text));
+    if let Some(refusal) = &workbench.refusal {
+        alarm_ui(ui, format!("Not started: {refusal}"));
     }
 }

@@ -1,15 +1,12 @@
-//! What is known from the run: parameters, measured facts, the steps and how it ended.
+//! Results of the run: parameters, measured values, its steps and its end.
 
 use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
 use crate::command::Commands;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::remark::alarm_ui;
-use crate::widgets::step_mark::{StepState, step_ui};
+use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
 use crate::workers::fit::Refit;
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 use palpate_analysis::report::live::Cycle;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, Snapshot};
@@ -17,7 +14,6 @@ use palpate_runner::{RunView, Snapshot};
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;
 
-/// Draws the panel.
 pub fn results_ui(
     ui: &mut Ui,
     snapshot: &Snapshot,
@@ -47,8 +43,7 @@ pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, cycles: &
     match run {
         Some(run) => facts_ui(ui, run),
         None => {
-            let tokens = Tokens::of(ui.visuals().dark_mode);
-            ui.label(RichText::new("no run yet").color(tokens.text_quiet));
+            placeholder_ui(ui, "no run yet");
         }
     }
     cycles_ui(ui, cycles);
@@ -64,10 +59,7 @@ const BUSY_SECS: f64 = 1.0;
 /// Why the parameters are still the live ones.
 fn refit_ui(ui: &mut Ui, refit: Refit<'_>) {
     match refit {
-        Refit::Refused(reason) => {
-            let text = format!("No exact fit: {reason}");
-            alarm_ui(ui, &text);
-        }
+        Refit::Refused(reason) => alarm_ui(ui, format!("No exact fit: {reason}")),
         Refit::Busy(seconds) if seconds > BUSY_SECS => {
             ui.horizontal(|ui| {
                 ui.spinner();
@@ -99,15 +91,12 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
 fn cycles_ui(ui: &mut Ui, cycles: &[Cycle]) {
-    let Some(first) = cycles.first().and_then(|one| one.peak) else {
-        return;
-    };
+    let Some(first) = cycles.first().and_then(|one| one.peak) else { return };
     section_ui(ui, "Peak of each cycle, change from the first");
     let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);
     if left_out > 0 {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let words = format!("the first {left_out} are in the session");
-        ui.label(RichText::new(words).color(tokens.text_quiet).small());
+        quiet_ui(ui, words);
     }
     for one in cycles.iter().skip(left_out) {
         if let Some(peak) = one.peak {

@@ -1,16 +1,20 @@
-//! The rig: what it is, what it says now, and the serial ports of this computer.
+//! Identity and status of the rig, and the serial ports of this computer.
 
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::workers::ports::Ports;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{alarm_ui, answer_ui, fact_ui, section_ui, tokens_of};
+use crate::workers::BackgroundTask;
 use eframe::egui::{Button, RichText, Ui};
+use palpate_drivers::serial::PortInfo;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_runner::{RigView, Snapshot};
 
-/// Draws the panel.
-pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Commands) {
+pub fn rig_ui(
+    ui: &mut Ui,
+    snapshot: &Snapshot,
+    ports: &BackgroundTask<Vec<PortInfo>>,
+    commands: &mut Commands,
+) {
     let rig = &snapshot.rig;
     section_ui(ui, &format!("Rig {}", rig.description.name));
     fact_ui(ui, "identity", &rig.description.identity);
@@ -19,23 +23,15 @@ pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Co
     if !settings.is_empty() {
         fact_ui(ui, "settings", settings.join(", "));
     }
-    link_ui(ui, rig);
+    match &rig.link_error {
+        Some(reason) => alarm_ui(ui, format!("Link lost: {reason}")),
+        None => fact_ui(ui, "link", rig.link.as_deref().unwrap_or("connected")),
+    }
     match rig.reading {
         Some(reading) => reading_ui(ui, rig, &reading),
         None => fact_ui(ui, "signal", "no sample yet"),
     }
     ports_ui(ui, ports, commands);
-}
-
-fn link_ui(ui: &mut Ui, rig: &RigView) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    match &rig.link_error {
-        Some(reason) => {
-            let text = format!("Link lost: {reason}");
-            ui.label(RichText::new(text).color(tokens.alarm_text));
-        }
-        None => fact_ui(ui, "link", rig.link.as_deref().unwrap_or("connected")),
-    }
 }
 
 fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {
@@ -69,31 +65,22 @@ fn axis_words(status: AxisStatus) -> String {
     words.join(", ")
 }
 
-fn ports_ui(ui: &mut Ui, ports: &Ports, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn ports_ui(ui: &mut Ui, ports: &BackgroundTask<Vec<PortInfo>>, commands: &mut Commands) {
+    let tokens = tokens_of(ui);
     ui.add_space(2.0);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Serial ports found").color(tokens.text_quiet));
         let button = Button::new("Refresh").small();
         if ui.add_enabled(!ports.is_busy(), button).clicked() {
-            commands.push(Command::ListPorts);
+            commands.push(UiCommand::ListPorts);
         }
     });
-    match ports.found() {
-        None => {
-            ui.label("looking for them");
-        }
-        Some(Ok([])) => {
-            ui.label("none on this computer");
-        }
-        Some(Ok(found)) => {
-            for port in found {
-                ui.label(format!("{}  {}", port.name, port.description));
-            }
-        }
-        Some(Err(reason)) => {
-            ui.label(RichText::new(reason).color(tokens.alarm_text));
-        }
+    let Some(found) = answer_ui(ui, ports, "listing them") else { return };
+    if found.is_empty() {
+        ui.label("none on this computer");
+    }
+    for port in found {
+        ui.label(format!("{}  {}", port.name, port.description));
     }
 }
 
@@ -102,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_axis_speaks_words() {
+    fn axis_status_has_words() {
         assert_eq!(axis_words(AxisStatus::default()), "motor off, at rest");
         assert_eq!(
             axis_words(AxisStatus::MOTOR_ON | AxisStatus::MOVING | AxisStatus::STOPPING),

@@ -1,32 +1,27 @@
 //! The run screen: rig and protocol on the left, what is expected or measured in the middle, what is known on the right.
 
 use super::approach::Approach;
-use super::form::Checked;
-use super::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
+use super::form::CheckedPlan;
+use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
-use super::run_middle::{Chooser, Middle, expected_ui, first_view, is_offered, views_ui};
-use super::screen::{Reply, Screen, ScreenEntry};
+use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::weighing::weighing_ui;
-use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
-use crate::shell::palette::Action;
-use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{Edge, Sizes};
-use crate::workbench::Workbench;
+use crate::widgets::require;
 use crate::workers::fit::{Refit, Refitter};
-use crate::workers::path_dialog::Ask;
-use crate::workers::recovery::Recovery;
+use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
-use palpate_runner::{RunRequest, RunView};
+use palpate_runner::{RunRequest, RunView, wall_now};
+use palpate_sessions::recover::recover_library;
 use std::path::Path;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Run",
-    purpose: "run a protocol and see what comes of it",
+    purpose: "run a protocol and see its results",
     key: Key::Num3,
     open: |workbench| Box::new(RunScreen::new(workbench)),
 };
@@ -34,13 +29,14 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 /// The screen's state. What runs belongs to the runner.
 pub struct RunScreen {
     chooser: Chooser,
-    middle: Middle,
+    middle: RunPane,
     approach: Approach,
     plots: PlotCache,
     /// The start that the plots are of.
     plotted: u64,
     refitter: Refitter,
-    recovery: Recovery,
+    /// Sessions recovered after a crash, a line each.
+    recovery: BackgroundTask<Vec<String>>,
     is_recovery_begun: bool,
     /// Where sessions go if no folder is chosen, or why nowhere.
     library: Result<String, String>,
@@ -50,12 +46,12 @@ impl RunScreen {
     fn new(workbench: &Workbench) -> Self {
         Self {
             chooser: Chooser::default(),
-            middle: Middle::default(),
+            middle: RunPane::default(),
             approach: Approach::default(),
             plots: PlotCache::for_calibration(&workbench.bench.calibration),
             plotted: 0,
             refitter: Refitter::default(),
-            recovery: Recovery::default(),
+            recovery: BackgroundTask::default(),
             is_recovery_begun: false,
             library: palpate_sessions::library_folder()
                 .map(|path| path.display().to_string())
@@ -63,23 +59,23 @@ impl RunScreen {
         }
     }
 
-    /// Where the exact fit of this run stands.
+    /// How far the exact fit of this run is.
     pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
         self.refitter.of(run)
     }
 
-    /// Takes a built-in protocol into the form, unless what stands there runs.
+    /// Takes a built-in protocol into the form, unless a run is in progress.
     fn take_protocol(&mut self, name: &str, workbench: &mut Workbench) {
         if !workbench.is_busy() {
             workbench.form.choose_built_in(name);
-            self.middle = Middle::Course;
+            self.middle = RunPane::Course;
         }
     }
 
     fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
-            workbench.want_run(request);
+            workbench.set_next_run(request);
         }
     }
 
@@ -93,55 +89,30 @@ impl RunScreen {
         }
     }
 
-    fn facts<'a>(&'a self, workbench: &Workbench) -> ProtocolFacts<'a> {
-        ProtocolFacts {
-            is_busy: workbench.is_busy(),
-            library: &self.library,
-            recovered: self.recovery.told(),
-            is_dialog_open: workbench.dialog.is_open(),
-        }
+    fn facts(&self) -> ProtocolFacts<'_> {
+        let recovered = match self.recovery.answer() {
+            None => &[],
+            Some(Ok(lines)) => lines.as_slice(),
+            Some(Err(reason)) => std::slice::from_ref(reason),
+        };
+        ProtocolFacts { library: &self.library, recovered }
     }
 }
 
 impl Screen for RunScreen {
-    fn ui(
-        &mut self,
-        ui: &mut Ui,
-        sizes: &mut Sizes,
-        workbench: &mut Workbench,
-        commands: &mut Commands,
-    ) {
-        // The start strip on the left never scrolls away, so that panel scrolls by itself.
-        let left = Panel::left("rig_and_protocol").frame(frame(ui, false));
-        let left = sizes.of(Edge::Left, left);
-        let left = left.show(ui, |ui| self.left_ui(ui, workbench, commands));
-        sizes.drag(ui, Edge::Left, left.response.rect);
-        side_ui(ui, sizes, Edge::Right, |ui| {
-            self.right_ui(ui, workbench, commands);
-        });
-        CentralPanel::default()
-            .frame(frame(ui, true))
-            .show(ui, |ui| self.middle_ui(ui, workbench, commands));
+    fn has_own_scroll(&self) -> bool {
+        // The start strip on the left never scrolls away.
+        true
     }
 
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let verdict = workbench.start_verdict();
-        let facts = self.facts(workbench);
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
-            .show(ui, |ui| {
-                let facts = StartFacts {
-                    is_busy: facts.is_busy,
-                    verdict: &verdict,
-                    refusal: workbench.refusal.as_deref(),
-                    is_link_lost: workbench.snapshot.rig.link_error.is_some(),
-                };
-                start_ui(ui, &mut workbench.form, &facts, commands);
-            });
+            .show(ui, |ui| start_ui(ui, workbench, commands));
         CentralPanel::no_frame().show(ui, |ui| {
             ScrollArea::vertical().id_salt("rig_and_protocol").auto_shrink(false).show(ui, |ui| {
-                protocol_ui(ui, &mut workbench.form, &facts, commands);
+                protocol_ui(ui, workbench, &self.facts(), commands);
                 rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
             });
         });
@@ -152,31 +123,23 @@ impl Screen for RunScreen {
         views_ui(ui, self.middle, run, commands);
         let limits = &workbench.bench.limits;
         match (self.middle, run) {
-            (Middle::Weighing, Some(run)) => {
+            (RunPane::Weighing, Some(run)) => {
                 let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
                 weighing_ui(ui, run, signal, &workbench.bench, commands);
             }
-            (Middle::Approach, Some(run)) => self.approach.ui(ui, run),
-            (Middle::Weighing | Middle::Approach, None) => {}
-            (Middle::Choose, _) => {
-                let facts = ProtocolFacts {
-                    is_busy: workbench.is_busy(),
-                    library: &self.library,
-                    recovered: self.recovery.told(),
-                    is_dialog_open: workbench.dialog.is_open(),
-                };
-                self.chooser.ui(ui, &workbench.form, &facts, commands);
-            }
-            (Middle::Course, _) => {
+            (RunPane::Approach, Some(run)) => self.approach.ui(ui, run),
+            (RunPane::Weighing | RunPane::Approach, None) => {}
+            (RunPane::Choose, _) => self.chooser.ui(ui, workbench, commands),
+            (RunPane::Course, _) => {
                 let checked = workbench.form.checked();
-                let tight = |checked: &Checked| checked.plan.limits.tighten(*limits);
+                let tight = |checked: &CheckedPlan| checked.plan.limits.tighten(*limits);
                 let limits = CourseLimits {
                     force: checked.map_or(*limits, tight).force_max,
                     speed: workbench.snapshot.rig.description.speed_max,
                 };
                 expected_ui(ui, checked, limits);
             }
-            (Middle::Measured, _) => {
+            (RunPane::Measured, _) => {
                 let exact = match self.refitter.of(run) {
                     Refit::Done(exact) => Some(exact),
                     _ => None,
@@ -193,86 +156,90 @@ impl Screen for RunScreen {
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         if !std::mem::replace(&mut self.is_recovery_begun, true)
-            && let Ok(library) = &workbench.library
+            && let Ok(library) = workbench.library.clone()
         {
-            self.recovery.start(library.clone(), ctx);
+            self.recovery.start("recovery", ctx, move |_| {
+                Ok(recover_library(&library, env!("CARGO_PKG_VERSION"), wall_now().into()))
+            });
         }
         self.recovery.poll();
-        // What runs stands in the form until it has ended.
+        // The form keeps the protocol of a run in progress.
         if let Some((path, text)) = self.chooser.poll()
             && !workbench.is_busy()
         {
             workbench.form.choose_file(&path, text);
             self.middle = match workbench.form.protocol {
-                Ok(_) => Middle::Course,
-                Err(_) => Middle::Choose,
+                Ok(_) => RunPane::Course,
+                Err(_) => RunPane::Choose,
             };
         }
         if self.plotted != workbench.starts() {
             self.plotted = workbench.starts();
             self.plots = PlotCache::for_calibration(&workbench.bench.calibration);
         }
-        let depth = workbench.form.checked().map_or(0.0, Checked::deepest_mm);
+        let depth = workbench.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
         self.plots.update(workbench.run(), workbench.bench.limits.force_max, depth);
         self.refitter.update(ctx, workbench.run());
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::Start => {
+            UiCommand::Start => {
                 let request = workbench.ready_run();
                 self.begin(request, workbench);
             }
-            Command::Aside(aside) => {
-                let request = workbench.aside_run(aside);
+            UiCommand::ManualMove(manual) => {
+                let request = workbench.manual_run(manual);
                 self.begin(request, workbench);
             }
-            Command::View(view) => {
+            UiCommand::View(view) => {
                 self.middle = *view;
-                return Reply::Show;
+                return Reaction::Show;
             }
-            Command::TakeProtocol(name) => {
+            UiCommand::TakeProtocol(name) => {
                 self.take_protocol(name, workbench);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            Command::MeasureCalibration => {
+            UiCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            Command::OpenProtocol => self.read(None, ctx, workbench),
-            Command::Chosen(Ask::Protocol, path) => self.read(Some(path), ctx, workbench),
-            Command::Chosen(Ask::NewSessions, folder) => {
+            UiCommand::OpenProtocol => self.read(None, ctx, workbench),
+            UiCommand::Chosen(PathPurpose::Protocol, path) => self.read(Some(path), ctx, workbench),
+            UiCommand::Chosen(PathPurpose::NewSessions, folder) => {
                 workbench.form.folder = folder.display().to_string();
             }
-            _ => return Reply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        Reply::Done
+        Reaction::Done
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let views = [
-            (Middle::Choose, "View: protocols"),
-            (Middle::Course, "View: expected course"),
-            (Middle::Measured, "View: measured"),
-            (Middle::Weighing, "View: weights"),
-            (Middle::Approach, "View: search for the surface"),
+            (RunPane::Choose, "View: protocols"),
+            (RunPane::Course, "View: expected course"),
+            (RunPane::Measured, "View: measured"),
+            (RunPane::Weighing, "View: weights"),
+            (RunPane::Approach, "View: search for the surface"),
         ];
-        let mut actions: Vec<Action> = views
+        let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
-                let verdict = match is_offered(view, workbench.run()) {
-                    true => Ok(()),
-                    false => Err("the run has no such thing".to_owned()),
-                };
-                Action::new(name, "", Command::View(view)).if_ok(verdict)
+                let is_offered = is_offered(view, workbench.run());
+                let verdict = require(is_offered, "the run has no such view");
+                PaletteAction::new(name, "", UiCommand::View(view)).if_ok(verdict)
             })
             .collect();
         let is_free = workbench.free_verdict();
         actions.extend(BUILT_IN.iter().map(|(name, _)| {
             let words = format!("Protocol {name}");
-            Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone())
+            PaletteAction::new(words, "", UiCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
-        actions.push(Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)));
+        actions.push(PaletteAction::new(
+            "Open a protocol file",
+            "",
+            UiCommand::Choose(PathPurpose::Protocol),
+        ));
         actions
     }
 }

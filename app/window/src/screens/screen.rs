@@ -1,58 +1,62 @@
-//! What a screen is: the one way in which the window reaches each of them.
+//! The trait of screens, through which the window reaches each of them.
 
 use super::table::SCREENS;
-use crate::command::{Command, Commands};
-use crate::shell::palette::Action;
+pub use crate::command::{Commands, UiCommand};
+pub use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{Edge, Sizes};
-use crate::workbench::{Occupation, Workbench};
+use crate::shell::sizes::{PanelEdge, Sizes};
+use crate::workbench::Occupation;
+pub use crate::workbench::Workbench;
 use eframe::egui::{CentralPanel, Context, Key, Ui};
 use std::any::Any;
 
-/// What the window knows of a screen before it is opened.
+/// A screen before it is opened.
 #[derive(Clone, Copy)]
 pub struct ScreenEntry {
-    /// Name on the rail.
     pub name: &'static str,
-    /// What it is for, for the rail's hint.
+    /// Hint on the rail.
     pub purpose: &'static str,
-    /// The key that shows it, with Ctrl (Command on a Mac).
+    /// Shows the screen with Ctrl (Command on a Mac).
     pub key: Key,
-    /// Makes it. What it reads from disk is read on a thread, once it is shown.
+    /// Reads nothing from disk: a thread does that once the screen is shown.
     pub open: fn(&Workbench) -> Box<dyn Screen>,
 }
 
-/// What a screen makes of a command.
+/// Whether a screen has done a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reply {
-    /// It is none of its own.
+pub enum Reaction {
+    /// The command belongs to another screen.
     NotMine,
-    /// Done, or refused with its reason on the screen.
+    /// Done, or refused with a reason on the screen.
     Done,
-    /// The same, and the screen is to be shown.
+    /// Done, and the screen is to be shown.
     Show,
 }
 
-/// What stands between the top bar and the event log.
+/// The part of the window between the top bar and the event log.
 ///
-/// A screen reaches the rig through [`Workbench`] and never holds a device; what takes its time is done by a worker,
-/// whose answer [`Self::poll`] fetches.
+/// A screen reaches the rig through [`Workbench`] and never holds a device. Long work is done by a worker, whose answer
+/// [`Self::poll`] fetches.
 pub trait Screen: Any {
-    /// Draws what is asked for.
+    /// Draws the inputs.
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
 
-    /// Draws what it is about.
+    /// Draws plots and tables.
     fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands);
 
-    /// Draws what is known.
+    /// Draws facts and results.
     fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {}
 
-    /// Whether there is a panel on the right.
     fn has_right(&self) -> bool {
         true
     }
 
-    /// Draws all of it.
+    /// Whether the left panel scrolls its parts by itself.
+    fn has_own_scroll(&self) -> bool {
+        false
+    }
+
+    /// Draws all panels.
     fn ui(
         &mut self,
         ui: &mut Ui,
@@ -60,11 +64,11 @@ pub trait Screen: Any {
         workbench: &mut Workbench,
         commands: &mut Commands,
     ) {
-        side_ui(ui, sizes, Edge::Left, |ui| {
+        side_ui(ui, sizes, PanelEdge::Left, !self.has_own_scroll(), |ui| {
             self.left_ui(ui, workbench, commands);
         });
         if self.has_right() {
-            side_ui(ui, sizes, Edge::Right, |ui| {
+            side_ui(ui, sizes, PanelEdge::Right, true, |ui| {
                 self.right_ui(ui, workbench, commands);
             });
         }
@@ -73,24 +77,28 @@ pub trait Screen: Any {
             .show(ui, |ui| self.middle_ui(ui, workbench, commands));
     }
 
-    /// Fetches what workers have answered, in every frame whatever is shown.
+    /// Fetches the answers of workers; called in every frame for every screen.
     fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {}
 
-    /// Called in every frame in which it is shown.
+    /// Called in every frame in which the screen is shown.
     fn shown(&mut self, _ctx: &Context) {}
 
-    /// Does what was asked for, if it is for this screen.
-    fn act(&mut self, _ctx: &Context, _command: &Command, _workbench: &mut Workbench) -> Reply {
-        Reply::NotMine
+    /// Does a command, if it is for this screen.
+    fn act(
+        &mut self,
+        _ctx: &Context,
+        _command: &UiCommand,
+        _workbench: &mut Workbench,
+    ) -> Reaction {
+        Reaction::NotMine
     }
 
     /// Begins the work of the screen (F6).
     fn work(&mut self, _ctx: &Context, _workbench: &mut Workbench) {}
 
-    /// Ends it.
     fn cancel(&mut self) {}
 
-    /// Whether times measured now would be disturbed.
+    /// Whether its work would disturb a measurement of times.
     fn is_busy(&self) -> bool {
         false
     }
@@ -100,19 +108,18 @@ pub trait Screen: Any {
         None
     }
 
-    /// Stops that loop.
     fn stop(&mut self) {}
 
-    /// The window closes: what is recorded reaches the disk.
+    /// Finishes recordings before the window closes.
     fn close(&mut self) {}
 
-    /// Whether somebody at the rig may look at live values without touching key or pointer.
+    /// Whether a person at the rig may watch live values without using key or pointer.
     fn is_watched(&self) -> bool {
         false
     }
 
-    /// What can be asked of it by name, and of the rest why not.
-    fn actions(&self, _workbench: &Workbench) -> Vec<Action> {
+    /// Its actions for the palette, each possible or with the reason why not.
+    fn actions(&self, _workbench: &Workbench) -> Vec<PaletteAction> {
         Vec::new()
     }
 }
@@ -124,7 +131,7 @@ pub struct Screens {
 }
 
 impl Screens {
-    /// Opens all of them; the one of this name is shown, or that for runs.
+    /// Opens all screens and shows the one of this name, or the run screen.
     #[must_use]
     pub fn open(workbench: &Workbench, name: &str) -> Self {
         let all = SCREENS.iter().map(|one| (one.name, (one.open)(workbench)));
@@ -134,29 +141,25 @@ impl Screens {
         screens
     }
 
-    /// Shows a screen. What goes on goes on; a name that is none changes nothing.
+    /// Shows a screen; an unknown name changes nothing.
     pub fn show(&mut self, name: &str) {
         let found = self.all.iter().position(|(own, _)| *own == name);
         self.shown = found.unwrap_or(self.shown);
     }
 
-    /// Name of the one shown.
     pub fn shown(&self) -> &'static str {
         self.all[self.shown].0
     }
 
-    /// The one shown.
     pub fn shown_mut(&mut self) -> &mut dyn Screen {
         self.all[self.shown].1.as_mut()
     }
 
-    /// A screen by its type.
     pub fn get<T: Screen>(&self) -> Option<&T> {
         let mut all = self.all.iter();
         all.find_map(|(_, one)| (one.as_ref() as &dyn Any).downcast_ref())
     }
 
-    /// Fetches what workers have answered.
     pub fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         for (_, screen) in &mut self.all {
             screen.poll(ctx, workbench);
@@ -164,13 +167,13 @@ impl Screens {
         self.shown_mut().shown(ctx);
     }
 
-    /// Has the screen do a command whose own it is.
-    pub fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) {
+    /// Passes a command to the screen that it is for.
+    pub fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) {
         for (index, (_, screen)) in self.all.iter_mut().enumerate() {
             match screen.act(ctx, command, workbench) {
-                Reply::NotMine => {}
-                Reply::Done => return,
-                Reply::Show => {
+                Reaction::NotMine => {}
+                Reaction::Done => return,
+                Reaction::Show => {
                     self.shown = index;
                     return;
                 }
@@ -178,17 +181,14 @@ impl Screens {
         }
     }
 
-    /// Stops every loop.
     pub fn stop(&mut self) {
         self.all.iter_mut().for_each(|(_, screen)| screen.stop());
     }
 
-    /// The window closes.
     pub fn close(&mut self) {
         self.all.iter_mut().for_each(|(_, screen)| screen.close());
     }
 
-    /// What they are at.
     pub fn occupation(&self) -> Occupation {
         let running = |(name, one): &(&'static str, Box<dyn Screen>)| Some((*name, one.running()?));
         Occupation {
@@ -197,8 +197,7 @@ impl Screens {
         }
     }
 
-    /// What can be asked of them by name.
-    pub fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+    pub fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
         let each = self.all.iter().map(|(_, one)| one.actions(workbench));
         each.flatten().collect()
     }

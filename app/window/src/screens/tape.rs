@@ -1,32 +1,46 @@
-//! A loop's recording: the folder that the next run is written to, what the last one left, and a recording computed again.
+//! Recording of a loop: the folder of the next recording, the result of the last one, and the replay of one.
 
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::task_ui;
-use crate::widgets::text_row::text_row;
-use crate::workers::Job;
-use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
-use eframe::egui::{Context, Ui};
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{alarm_ui, quiet_ui, reason_button, require, section_ui, task_ui, text_row};
+use crate::workers::{BackgroundTask, Dialog, Job};
+use eframe::egui::{Context, Ui, vec2};
 use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::{Ended, Replayed, ended_words};
 use std::path::{Path, PathBuf};
 
-/// How a recording is computed again.
+/// Draws the button that starts a loop, or the one that stops it while it runs.
+pub(super) fn loop_button_ui(
+    ui: &mut Ui,
+    name: &str,
+    is_running: bool,
+    verdict: &Result<(), String>,
+    [start, stop]: [UiCommand; 2],
+    commands: &mut Commands,
+) {
+    let size = vec2(170.0, 34.0);
+    if is_running {
+        if reason_button(ui, &format!("Stop the {name}"), size, &Ok(())) {
+            commands.push(stop);
+        }
+    } else if reason_button(ui, &format!("Start the {name}"), size, verdict) {
+        commands.push(start);
+    }
+}
+
+/// Computes a recording again.
 pub(super) type Replay = fn(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String>;
 
-/// The panel.
 #[derive(Default)]
 pub(super) struct TapePanel {
     to: String,
     from: String,
     dialog: Dialog<PathBuf>,
-    /// The window of a recording on its way, which is drawn again when that has ended.
+    /// The window to draw again when the recording in progress has ended.
     recording: Option<Context>,
     /// The end of a recording, which waits for the disk.
     ending: Job<Ended>,
-    told: Option<Result<String, String>>,
-    task: Task<Replayed>,
+    message: Option<Result<String, String>>,
+    task: BackgroundTask<Replayed>,
 }
 
 impl TapePanel {
@@ -37,9 +51,9 @@ impl TapePanel {
         start: impl FnOnce(&Path) -> Result<R, String>,
     ) -> Result<Option<R>, String> {
         if self.ending.is_busy() {
-            return Err("the last recording is still being written; wait a moment".into());
+            return Err("the last recording is still being written; try again in a moment".into());
         }
-        self.told = None;
+        self.message = None;
         let to = self.to.trim();
         if to.is_empty() {
             return Ok(None);
@@ -47,29 +61,28 @@ impl TapePanel {
         let recorder = start(Path::new(to))?;
         // What is recorded can be replayed, and the next run needs a folder of its own.
         self.from = std::mem::take(&mut self.to);
-        self.told = Some(Ok("every tick is recorded".to_owned()));
+        self.message = Some(Ok("every tick is recorded".to_owned()));
         self.recording = Some(ctx.clone());
         Ok(Some(recorder))
     }
 
-    /// Ends a loop, and on a thread its recording if it has one: nobody who stops a loop waits for a disk.
+    /// Ends a loop, and its recording on a thread: a stop never waits for the disk.
     pub fn end(&mut self, work: impl FnOnce() -> Ended + Send + 'static) {
         let Some(ctx) = self.recording.clone() else {
-            // Let go, the loop ends.
+            // Dropping it ends the loop.
             drop(work);
             return;
         };
-        let wake = move || ctx.request_repaint();
-        if self.ending.start("recording-end", work, wake).is_err() {
+        if self.ending.start("recording-end", &ctx, work).is_err() {
             self.ended(None);
         }
     }
 
     fn ended(&mut self, ended: Ended) {
         if self.recording.take().is_some() {
-            self.told = Some(match ended {
+            self.message = Some(match ended {
                 Some(ended) => ended.map(ended_words),
-                None => Err("the loop failed, and its recording was cut off".to_owned()),
+                None => Err("the loop failed, and its recording has no end".to_owned()),
             });
         }
     }
@@ -97,10 +110,9 @@ impl TapePanel {
 
     /// Whether a recording is computed again.
     pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.is_busy()
     }
 
-    /// Fetches answers that have come.
     pub fn poll(&mut self) {
         self.task.poll();
         if self.ending.is_busy() {
@@ -123,10 +135,10 @@ impl TapePanel {
     pub fn ui(&mut self, ui: &mut Ui, is_running: bool, replay: Replay) {
         section_ui(ui, "Recording");
         ui.add_enabled_ui(!is_running, |ui| {
-            let hint = "a new folder; not recorded without";
+            let hint = "a new folder; empty for no recording";
             text_row(ui, "record to", hint, &mut self.to);
         });
-        match &self.told {
+        match &self.message {
             Some(Ok(words)) => quiet_ui(ui, words),
             Some(Err(reason)) => alarm_ui(ui, reason),
             None => {}
@@ -135,12 +147,9 @@ impl TapePanel {
         self.dialog.button_ui(ui, "Choose a recording...", |dialog| {
             dialog.set_title("Folder of a recording").pick_folder()
         });
-        let may = match (is_running || self.ending.is_busy(), self.from.trim()) {
-            (true, _) => Err("the loop runs".to_owned()),
-            (false, "") => Err("name the folder of a recording first".to_owned()),
-            (false, _) => Ok(()),
-        };
-        if task_ui(ui, "Replay it", &self.task, &may) {
+        let is_free = require(!is_running && !self.ending.is_busy(), "the loop runs");
+        let has_folder = require(!self.from.trim().is_empty(), "type the folder of a recording");
+        if task_ui(ui, "Replay recording", &self.task, &is_free.and(has_folder)) {
             let from = PathBuf::from(self.from.trim());
             self.task.start("replay", ui.ctx(), move |progress| {
                 replay(&from, &mut |share| progress.share(share, "the recording"))
@@ -148,11 +157,9 @@ impl TapePanel {
         }
         match self.task.answer() {
             Some(Ok(replayed)) => {
-                for line in replayed.words().lines() {
-                    quiet_ui(ui, line);
-                }
-                if let Some(why) = replayed.failure() {
-                    alarm_ui(ui, &why);
+                replayed.words().lines().for_each(|line| quiet_ui(ui, line));
+                if let Some(reason) = replayed.failure() {
+                    alarm_ui(ui, reason);
                 }
             }
             Some(Err(reason)) => alarm_ui(ui, reason),

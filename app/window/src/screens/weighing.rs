@@ -1,14 +1,15 @@
-//! One weight after the other: what is asked for, whether the signal is steady, what was read against what the
-//! calibration in use expects, and how far both are apart.
+//! Calibration weights one by one: the next weight, whether the signal is steady, and each reading next to the value that
+//! the calibration in use expects.
 
-use super::form::Bench;
-use crate::command::{Command, Commands};
+use super::form::RunSetup;
+use crate::command::{Commands, UiCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
-use crate::shell::run_strip::{Wish, is_controllable};
-use crate::theme::{Tokens, reading_style};
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
-use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
+use crate::shell::run_strip::{RunControl, is_controllable};
+use crate::theme::reading_style;
+use crate::widgets::{
+    Column, Emphasis, TableRow, heading_ui, reason_button, require, share_ui, table_ui, tokens_of,
+};
+use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing;
 use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
 use palpate_model::units::Volts;
@@ -23,22 +24,20 @@ pub fn weighing_ui(
     ui: &mut Ui,
     run: &RunView,
     signal: Option<Volts>,
-    bench: &Bench,
+    bench: &RunSetup,
     commands: &mut Commands,
 ) {
     let next = next_of(run);
     now_ui(ui, run, next, signal, &bench.curve);
-    let verdict = match is_controllable(run) {
-        true => run.can_redo.clone(),
-        false => Err("the run does not go on".into()),
-    };
+    let verdict = require(is_controllable(run), "the run has stopped");
+    let verdict = verdict.and(run.can_redo.clone());
     ui.horizontal(|ui| {
         if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
-            commands.push(Command::Wish(Wish::Redo));
+            commands.push(UiCommand::RunControl(RunControl::Redo));
         }
     });
     ui.add_space(4.0);
-    let rows: Vec<Row> =
+    let rows: Vec<TableRow> =
         run.to_weigh.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
     let columns = [
         Column::numbers("pass", 34.0),
@@ -70,7 +69,7 @@ fn now_ui(
     signal: Option<Volts>,
     curve: &Curve,
 ) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let place = match next {
         Some(next) => {
             let done = run.weighed.len();
@@ -85,7 +84,7 @@ fn now_ui(
         }
         None => format!("{} of {} readings taken", run.weighed.len(), run.to_weigh.len()),
     };
-    ui.label(RichText::new(place).heading().strong());
+    heading_ui(ui, place);
     ui.horizontal(|ui| {
         let signal = signal.map_or_else(|| "--".to_owned(), |volts| format!("{volts:.4}"));
         ui.label(RichText::new(signal).text_style(reading_style()));
@@ -93,24 +92,18 @@ fn now_ui(
         match &run.settling {
             Some(settling) => steady_ui(ui, settling),
             None => {
-                let words = "The signal is watched once the weight lies on the cell and Done F2 is pressed.";
+                let words = "Put the weight on the load cell and press Done F2; the signal is then checked.";
                 ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
             }
         }
     });
 }
 
-/// The stability indicator: how full the window is that must be steady, and what keeps it from being so.
+/// The stability indicator: how full the window is that must be steady, and what is not steady yet.
 fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.vertical(|ui| {
-        ui.add(
-            ProgressBar::new(settling.filled as f32)
-                .desired_width(240.0)
-                .desired_height(10.0)
-                .corner_radius(2)
-                .fill(tokens.text_quiet),
-        );
+        ui.set_width(240.0);
+        share_ui(ui, settling.filled);
         ui.label(steady_words(settling));
     });
 }
@@ -121,55 +114,57 @@ fn steady_words(settling: &SettlingNow) -> String {
     match &settling.last {
         None => format!("watching for {:.1} s; {left:.0} s left", settling.waited.0),
         Some(last) if last.noise.0 > settling.noise_max.0 => format!(
-            "it scatters by {:.2} mV, {:.2} mV are steady; {left:.0} s left",
+            "noise of {:.2} mV, steady at {:.2} mV; {left:.0} s left",
             last.noise.0 * 1e3,
             settling.noise_max.0 * 1e3
         ),
         Some(last) => format!(
-            "it moves by {:+.2} mV/s, {:.2} mV/s are steady; {left:.0} s left",
+            "drift of {:+.2} mV/s, steady at {:.2} mV/s; {left:.0} s left",
             last.slope_v_per_s * 1e3,
             settling.slope_max_v_per_s * 1e3
         ),
     }
 }
 
-fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> Row {
+fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> TableRow {
     let taken = run.weighed.iter().find(|one| one.step_index == planned.step_index);
     let is_next = next == Some(planned);
     let expected = curve.volts_from_newtons(newtons_of(planned.mass_g));
-    let apart = taken.map(|one| Apart::of(one, curve));
+    let deviation = taken.map(|one| WeightDeviation::of(one, curve));
     let cells = vec![
         planned.repeat.to_string(),
         if planned.is_loading { "up" } else { "down" }.into(),
         planned.mass_g.to_string(),
         format!("{:.4}", expected.0),
         taken.map_or_else(String::new, |one| format!("{:.4}", one.volts().0)),
-        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.1}", apart.mv)),
-        apart.as_ref().map_or_else(String::new, |apart| format!("{:+.3}", apart.newtons)),
+        deviation.as_ref().map_or_else(String::new, |deviation| format!("{:+.1}", deviation.mv)),
+        deviation
+            .as_ref()
+            .map_or_else(String::new, |deviation| format!("{:+.3}", deviation.newtons)),
         match (taken, is_next) {
             (Some(_), _) => "read".into(),
             (None, true) => "now".into(),
             (None, false) => String::new(),
         },
     ];
-    Row {
+    TableRow {
         cells,
-        look: match (taken, is_next) {
-            (_, true) => RowLook::Marked,
-            (None, false) => RowLook::Quiet,
-            (Some(_), false) => RowLook::Plain,
+        emphasis: match (taken, is_next) {
+            (_, true) => Emphasis::Marked,
+            (None, false) => Emphasis::Quiet,
+            (Some(_), false) => Emphasis::Plain,
         },
         hint: None,
     }
 }
 
 /// A reading against what the calibration in use expects.
-struct Apart {
+struct WeightDeviation {
     mv: f64,
     newtons: f64,
 }
 
-impl Apart {
+impl WeightDeviation {
     fn of(one: &Weighed, curve: &Curve) -> Self {
         let known = newtons_of(one.mass_g());
         Self {
@@ -179,9 +174,8 @@ impl Apart {
     }
 }
 
-fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
-    let words =
-        format!("Force by the calibration in use ({}) less the weight's", bench.calibration.name);
+fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
+    let words = format!("Force by the calibration in use ({}) - weight", bench.calibration.name);
     ui.label(RichText::new(words).strong());
     let plot = weighing(run, &bench.curve);
     legend_ui(ui, &[&plot]);
@@ -213,9 +207,9 @@ mod tests {
             waited: Seconds(2.5),
         };
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("it scatters by 20.00 mV, 5.00 mV are"));
+        assert!(steady_words(&settling).starts_with("noise of 20.00 mV, steady at 5.00 mV"));
         steady.noise = Volts(0.001);
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("it moves by +4.00 mV/s"));
+        assert!(steady_words(&settling).starts_with("drift of +4.00 mV/s"));
     }
 }

@@ -1,64 +1,41 @@
-//! What the rig and the run are doing, as word, shape and tone. Never colour alone.
+//! State of the rig and the run as word, glyph and tone, never as colour alone.
 
+use crate::widgets::Glyph;
 use palpate_model::rig::AxisStatus;
 use palpate_protocols::engine::{EndingKind, PauseView};
 use palpate_runner::{RunView, Snapshot};
 
-/// Drawn beside the word, so that the state is read without colour.
+/// Urgency of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
-    /// Nothing goes on.
-    Ring,
-    /// Something moves or may move.
-    Triangle,
-    /// Stopped.
-    Square,
-    /// Something is wrong.
-    Diamond,
-    /// Paused.
-    Bars,
-    /// A person is asked for something.
-    Question,
-}
-
-/// How loud the state is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
-    /// Nothing to look at.
+pub enum StateTone {
     Quiet,
-    /// Under way as planned.
+    /// In progress as planned.
     Active,
     /// Waits for the operator.
     Notice,
-    /// Something went wrong.
     Alarm,
 }
 
-/// The state badge.
+/// The state badge: one or two words and a glyph, so that it is readable without colour.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Activity {
-    /// One or two words.
     pub word: String,
-    /// Its shape.
-    pub shape: Shape,
-    /// Its tone.
-    pub tone: Tone,
+    pub glyph: Glyph,
+    pub tone: StateTone,
 }
 
 impl Activity {
-    fn new(word: impl Into<String>, shape: Shape, tone: Tone) -> Self {
-        Self { word: word.into(), shape, tone }
+    fn new(word: impl Into<String>, glyph: Glyph, tone: StateTone) -> Self {
+        Self { word: word.into(), glyph, tone }
     }
 }
 
-/// What the window itself is in the middle of.
+/// A start or a close of the window that is not done yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Intent {
-    /// Nothing of its own.
     None,
-    /// A start was asked for and not answered yet.
     Starting,
-    /// The window closes as soon as the axis rests.
+    /// The window closes as soon as the axis is at rest.
     Closing,
 }
 
@@ -71,7 +48,7 @@ pub fn run_in_progress(snapshot: &Snapshot) -> Option<&RunView> {
 /// Whether the axis moves or may begin to, in a run or without one.
 #[must_use]
 pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
-    // What a lost link last said is no longer known; it must not hold the window open for ever.
+    // The last reading of a lost link is out of date, and must not keep the window open for ever.
     let is_axis_moving = snapshot
         .rig
         .reading
@@ -80,42 +57,43 @@ pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
     is_axis_moving || run_in_progress(snapshot).is_some_and(|run| run.is_motion_possible)
 }
 
-/// What to show in the badge.
 #[must_use]
 pub fn activity(snapshot: &Snapshot, intent: Intent) -> Activity {
     use palpate_model::rig::Phase;
     if snapshot.rig.link_error.is_some() {
-        return Activity::new("LINK LOST", Shape::Diamond, Tone::Alarm);
+        return Activity::new("LINK LOST", Glyph::Diamond, StateTone::Alarm);
     }
     if intent == Intent::Closing {
-        return Activity::new("CLOSING", Shape::Square, Tone::Notice);
+        return Activity::new("CLOSING", Glyph::Square, StateTone::Notice);
     }
     let Some(run) = run_in_progress(snapshot) else {
         return if intent == Intent::Starting {
-            Activity::new("STARTING", Shape::Triangle, Tone::Active)
+            Activity::new("STARTING", Glyph::Triangle, StateTone::Active)
         } else if is_motion_possible(snapshot) {
-            Activity::new("MOVING", Shape::Triangle, Tone::Active)
+            Activity::new("MOVING", Glyph::Triangle, StateTone::Active)
         } else {
-            Activity::new("IDLE", Shape::Ring, Tone::Quiet)
+            Activity::new("IDLE", Glyph::Ring, StateTone::Quiet)
         };
     };
     match (&run.holding, run.phase) {
         (Some(ending), _) if is_planned(ending.ending) => {
-            Activity::new("STOPPED", Shape::Square, Tone::Notice)
+            Activity::new("STOPPED", Glyph::Square, StateTone::Notice)
         }
-        (Some(_), _) => Activity::new("STOPPED", Shape::Diamond, Tone::Alarm),
-        (None, Phase::Stopped) => Activity::new("STOPPING", Shape::Square, Tone::Notice),
+        (Some(_), _) => Activity::new("STOPPED", Glyph::Diamond, StateTone::Alarm),
+        (None, Phase::Stopped) => Activity::new("STOPPING", Glyph::Square, StateTone::Notice),
         (None, _) if matches!(run.pause, PauseView::Paused { .. }) => {
-            Activity::new("PAUSED", Shape::Bars, Tone::Notice)
+            Activity::new("PAUSED", Glyph::Bars, StateTone::Notice)
         }
         (None, _) if run.prompt.is_some() => {
-            Activity::new("YOUR TURN", Shape::Question, Tone::Notice)
+            Activity::new("YOUR TURN", Glyph::Question, StateTone::Notice)
         }
-        (None, phase) => Activity::new(phase.name().to_uppercase(), Shape::Triangle, Tone::Active),
+        (None, phase) => {
+            Activity::new(phase.name().to_uppercase(), Glyph::Triangle, StateTone::Active)
+        }
     }
 }
 
-/// Whether a run ended the way somebody wanted.
+/// Whether a run ended as a person intended.
 #[must_use]
 pub fn is_planned(ending: EndingKind) -> bool {
     matches!(ending, EndingKind::Finish | EndingKind::Stop)

@@ -1,8 +1,7 @@
-//! What happened, newest last, with a filter and a copy of what is shown.
+//! Events of the run, newest last, with a filter and a copy of the lines shown.
 
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{NamedControl, placeholder_ui, tokens_of};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, Snapshot};
 
@@ -19,14 +18,11 @@ impl EventLog {
         let shown: Vec<&LogLine> =
             events.iter().filter(|line| is_shown(line, &self.filter)).collect();
         self.head_ui(ui, &shown, commands);
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         if shown.is_empty() {
-            let text = if events.is_empty() {
-                "nothing happened yet"
-            } else {
-                "no event matches the filter"
-            };
-            ui.label(RichText::new(text).color(tokens.text_quiet));
+            let text =
+                if events.is_empty() { "no event yet" } else { "no event matches the filter" };
+            placeholder_ui(ui, text);
             return;
         }
         let height = ui.text_style_height(&TextStyle::Monospace);
@@ -50,7 +46,7 @@ impl EventLog {
             let label = ui.label("filter");
             ui.add(TextEdit::singleline(&mut self.filter).desired_width(160.0).char_limit(100))
                 .labelled_by(label.id)
-                .place("filter of the events");
+                .named("filter of the events");
             if ui.button("Copy").clicked() {
                 let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
                 ui.ctx().copy_text(lines.join("\n"));
@@ -58,7 +54,7 @@ impl EventLog {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
                 if ui.button(name).clicked() {
-                    commands.push(Command::SwitchTheme);
+                    commands.push(UiCommand::SwitchTheme);
                 }
             });
         });

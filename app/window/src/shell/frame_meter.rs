@@ -17,19 +17,25 @@ pub struct FrameMeter {
     ui_cpu_ms: Times,
     frame_cpu_ms: Times,
     frame_ms: Times,
+    run: RunTimes,
+}
+
+/// The part of the report that is written as it is measured.
+#[derive(Clone, Debug, Default, Serialize)]
+struct RunTimes {
+    /// CPU seconds of all threads, graphics driver included, until the first frame was painted.
     first_frame_cpu_s: Option<f64>,
+    /// CPU seconds of the window's own thread until then.
     first_frame_main_thread_cpu_s: Option<f64>,
+    /// The most of a run's session time that was not in its log at a frame.
     unsaved_s_max: f64,
+    /// The furthest that the last run was behind the wall clock, and how much it gave up.
     late_worst_s: Option<f64>,
     late_given_up_s: Option<f64>,
 }
 
 #[derive(Serialize)]
-struct Report {
-    /// CPU seconds of all threads, graphics driver included, until the first frame was painted.
-    first_frame_cpu_s: Option<f64>,
-    /// CPU seconds of the window's own thread until then.
-    first_frame_main_thread_cpu_s: Option<f64>,
+struct FrameReport {
     frames: u64,
     /// Wall time of whole frames as eframe gives it: logic, layout, tessellation and painting
     /// without the wait for the screen.
@@ -42,11 +48,8 @@ struct Report {
     /// CPU time of logic and layout alone.
     ui_cpu_ms_max: f64,
     ui_cpu_ms_median: f64,
-    /// The most of a run's session time that was not in its log at a frame.
-    unsaved_s_max: f64,
-    /// The furthest that the last run was behind the wall, and what it gave up.
-    late_worst_s: Option<f64>,
-    late_given_up_s: Option<f64>,
+    #[serde(flatten)]
+    run: RunTimes,
 }
 
 /// Milliseconds of many frames.
@@ -88,8 +91,8 @@ impl FrameMeter {
         }
         let now = thread_cpu_s();
         if self.frames == 1 {
-            self.first_frame_cpu_s = cpu_s(Clock::Process);
-            self.first_frame_main_thread_cpu_s = now;
+            self.run.first_frame_cpu_s = cpu_s(Clock::Process);
+            self.run.first_frame_main_thread_cpu_s = now;
         }
         // The first frame compiles shaders and lays out fonts: it counts towards the start.
         if self.frames > 1 {
@@ -109,9 +112,9 @@ impl FrameMeter {
             return;
         }
         let unsaved = run.now.since(run.saved_through).seconds().0;
-        self.unsaved_s_max = self.unsaved_s_max.max(unsaved);
-        self.late_worst_s = run.lateness.map(|late| late.worst.0);
-        self.late_given_up_s = run.lateness.map(|late| late.given_up.0);
+        self.run.unsaved_s_max = self.run.unsaved_s_max.max(unsaved);
+        self.run.late_worst_s = run.lateness.map(|late| late.worst.0);
+        self.run.late_given_up_s = run.lateness.map(|late| late.given_up.0);
     }
 
     /// The frame's logic and layout are done.
@@ -130,9 +133,7 @@ impl FrameMeter {
         let Some(path) = &self.report_path else {
             return Ok(());
         };
-        let report = Report {
-            first_frame_cpu_s: self.first_frame_cpu_s,
-            first_frame_main_thread_cpu_s: self.first_frame_main_thread_cpu_s,
+        let report = FrameReport {
             frames: self.frames,
             frame_ms_max: self.frame_ms.max,
             frame_ms_median: self.frame_ms.median(),
@@ -140,16 +141,13 @@ impl FrameMeter {
             frame_cpu_ms_median: self.frame_cpu_ms.median(),
             ui_cpu_ms_max: self.ui_cpu_ms.max,
             ui_cpu_ms_median: self.ui_cpu_ms.median(),
-            unsaved_s_max: self.unsaved_s_max,
-            late_worst_s: self.late_worst_s,
-            late_given_up_s: self.late_given_up_s,
+            run: self.run.clone(),
         };
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::other)?;
         palpate_sessions::atomic::replace(path, text.as_bytes())
     }
 }
 
-/// Whose CPU time.
 #[derive(Clone, Copy)]
 enum Clock {
     Process,

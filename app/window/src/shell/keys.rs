@@ -1,39 +1,39 @@
 //! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
 
-use super::run_strip::Wish;
+use super::run_strip::RunControl;
 use super::top_bar::push_stop_buttons;
-use crate::command::{Command, Commands};
+use crate::command::{Commands, UiCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Context, Event, Key};
 
-/// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
-pub const KEYS: [(Key, Command); 13] = [
-    (Key::F1, Command::Palette),
-    (Key::F12, Command::Stop),
-    (Key::Escape, Command::Stop),
-    (Key::F11, Command::Halt),
-    (Key::F2, Command::Wish(Wish::Confirm)),
-    (Key::F3, Command::NoteTyped),
-    (Key::F4, Command::Wish(Wish::PauseAfter)),
-    (Key::F5, Command::Start),
-    (Key::F6, Command::Work),
-    (Key::F7, Command::Wish(Wish::Pause)),
-    (Key::F8, Command::Retract),
-    (Key::F9, Command::Wish(Wish::Resume)),
-    (Key::F10, Command::Wish(Wish::Finish)),
+/// The keys and their commands. Escape stops too: a startled hand finds it.
+pub const KEYS: [(Key, UiCommand); 13] = [
+    (Key::F1, UiCommand::Palette),
+    (Key::F12, UiCommand::Stop),
+    (Key::Escape, UiCommand::Stop),
+    (Key::F11, UiCommand::Halt),
+    (Key::F2, UiCommand::RunControl(RunControl::Confirm)),
+    (Key::F3, UiCommand::NoteTyped),
+    (Key::F4, UiCommand::RunControl(RunControl::PauseAfter)),
+    (Key::F5, UiCommand::Start),
+    (Key::F6, UiCommand::Work),
+    (Key::F7, UiCommand::RunControl(RunControl::Pause)),
+    (Key::F8, UiCommand::Retract),
+    (Key::F9, UiCommand::RunControl(RunControl::Resume)),
+    (Key::F10, UiCommand::RunControl(RunControl::Finish)),
 ];
 
 /// Reads the keys once per frame, those that stop before all others.
 #[derive(Debug, Default)]
-pub struct Keys {
+pub struct KeyReader {
     frame_read: Option<u64>,
     /// The frame whose events were looked at before it began, and how many of them.
     looked_at: Option<(u64, usize)>,
     frame_stopped: Option<u64>,
 }
 
-impl Keys {
-    /// Asks for the stops among the events of a frame that is about to begin: the earliest that they can be seen.
+impl KeyReader {
+    /// Pushes the stops among the events of a frame that is about to begin, as early as possible.
     pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut Commands) {
         let frame = ctx.cumulative_frame_nr();
         // Events that wait while the window is hidden come again, before those that are new.
@@ -42,7 +42,7 @@ impl Keys {
             _ => 0,
         };
         self.looked_at = Some((frame, events.len()));
-        // Repeats are not told apart yet: a key that is held went down before.
+        // Repeats are not marked yet: a key that is held went down before.
         let is_new = |event: &&Event| match event {
             Event::Key { key, .. } => !ctx.input(|input| input.key_down(*key)),
             _ => false,
@@ -51,8 +51,8 @@ impl Keys {
         push_keys(&new, true, commands);
     }
 
-    /// Asks for the stops of this frame: keys that nobody looked at before it began, and the buttons of the top bar,
-    /// which are asked before anything is drawn.
+    /// Pushes the stops of this frame, before anything is drawn: keys that [`Self::read_early`] has not read, and the
+    /// buttons of the top bar.
     pub fn read_stops(&mut self, ctx: &Context, commands: &mut Commands) {
         // A frame may have several passes, and while the window is hidden its input is that of the last frame
         // shown: pressing once must not act again and again.
@@ -66,7 +66,7 @@ impl Keys {
         push_stop_buttons(ctx, commands);
     }
 
-    /// Asks for what else was pressed since the last frame; whether this frame is read for the first time.
+    /// Pushes the commands of other keys; true if this frame is read for the first time.
     pub fn read(&mut self, ctx: &Context, commands: &mut Commands) -> bool {
         let frame = ctx.cumulative_frame_nr();
         if self.frame_read.replace(frame) == Some(frame) {
@@ -75,11 +75,11 @@ impl Keys {
         ctx.input(|input| {
             push_keys(&input.events, false, commands);
             if is_pressed(&input.events, Key::K, true) {
-                commands.push(Command::Palette);
+                commands.push(UiCommand::Palette);
             }
             for screen in SCREENS {
                 if is_pressed(&input.events, screen.key, true) {
-                    commands.push(Command::Show(screen.name));
+                    commands.push(UiCommand::Show(screen.name));
                 }
             }
         });
@@ -87,7 +87,7 @@ impl Keys {
     }
 }
 
-/// Asks for the keys of [`KEYS`] among events: for those that stop, or for the others.
+/// Pushes the commands of [`KEYS`] among events: the stops, or the others.
 fn push_keys(events: &[Event], are_stops: bool, commands: &mut Commands) {
     for (key, command) in KEYS {
         if command.is_stop() == are_stops && is_pressed(events, key, false) {

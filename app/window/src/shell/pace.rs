@@ -1,4 +1,4 @@
-//! How often the window is drawn: as often as an eye needs, and hardly ever while nobody looks.
+//! How often the window is drawn: as often as an eye needs, and rarely while no key or pointer is used.
 
 use eframe::egui::Context;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ const MOVING: Duration = Duration::from_millis(33);
 const RESTING: Duration = Duration::from_millis(250);
 /// The same with no key or pointer used for [`UNUSED_S`]: what goes wrong by itself is still seen soon.
 const UNUSED: Duration = Duration::from_millis(1500);
-/// So long after the last key or move of the pointer somebody is still there.
+/// Seconds after the last key or move of the pointer until the window counts as unused.
 const UNUSED_S: f64 = 5.0;
 
 /// How often the window is drawn.
@@ -24,7 +24,7 @@ pub struct FramePace {
 }
 
 impl FramePace {
-    /// Asks for the next frame.
+    /// Requests the next frame.
     pub fn next(&mut self, ctx: &Context, is_moving: bool, is_watched: bool) {
         let (now, is_used) = ctx.input(|input| (input.time, !input.events.is_empty()));
         if is_used || is_moving || is_watched {
@@ -33,13 +33,10 @@ impl FramePace {
         let is_unused = now > self.used_at + UNUSED_S;
         self.is_unused.store(is_unused, Ordering::Relaxed);
         self.is_asked.store(false, Ordering::Relaxed);
-        ctx.request_repaint_after(match is_moving {
-            true => MOVING,
-            false => resting(is_unused),
-        });
+        ctx.request_repaint_after(if is_moving { MOVING } else { resting(is_unused) });
     }
 
-    /// Asks for a frame from another thread, where there is news.
+    /// Requests a frame from another thread.
     pub fn waker(&self, ctx: &Context) -> impl Fn() + Send + 'static {
         let (is_unused, is_asked) = (Arc::clone(&self.is_unused), Arc::clone(&self.is_asked));
         let ctx = ctx.clone();

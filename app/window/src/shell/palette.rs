@@ -1,40 +1,37 @@
-//! Everything that can be asked for, by name: the command palette, which is the list of keys too.
+//! The command palette: all commands by name, with their keys.
 
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{placeholder_ui, tokens_of};
 use eframe::egui::{
     Align, Align2, Area, Button, Frame, Id, Key, Label, Layout, Margin, Modifiers, Order, RichText,
     ScrollArea, Stroke, TextEdit, Ui, vec2,
 };
 
-/// One thing that can be asked for.
+/// A command in the palette.
 #[derive(Clone, Debug)]
-pub struct Action {
-    /// What it does, as a person would say it.
+pub struct PaletteAction {
     pub name: String,
-    /// Its keys; empty if it has none.
+    /// Empty if it has none.
     pub keys: String,
-    /// What is sent.
-    pub command: Command,
-    /// Whether it can be asked for now, or why not.
+    pub command: UiCommand,
+    /// Whether it is possible now, or why not.
     pub verdict: Result<(), String>,
 }
 
-impl Action {
-    /// One that is always possible.
+impl PaletteAction {
+    /// An action that is always possible.
     #[must_use]
-    pub fn new(name: impl Into<String>, keys: &str, command: Command) -> Self {
+    pub fn new(name: impl Into<String>, keys: &str, command: UiCommand) -> Self {
         Self { name: name.into(), keys: keys.into(), command, verdict: Ok(()) }
     }
 
-    /// The same, if this allows it.
+    /// The same with a condition.
     #[must_use]
     pub fn if_ok(self, verdict: Result<(), String>) -> Self {
         Self { verdict, ..self }
     }
 }
 
-/// The palette, which may be open.
 #[derive(Debug, Default)]
 pub struct Palette {
     is_open: bool,
@@ -50,23 +47,21 @@ impl Palette {
         *self = Self { is_open, is_fresh: is_open, ..Self::default() };
     }
 
-    /// Closes it.
     pub fn close(&mut self) {
         *self = Self::default();
     }
 
-    /// Whether it is open.
     pub fn is_open(&self) -> bool {
         self.is_open
     }
 
-    /// Draws it over everything but in nobody's way: what is beneath can still be pressed.
-    pub fn ui(&mut self, ui: &Ui, actions: &[Action], commands: &mut Commands) {
+    /// Draws it above the window; controls beneath can still be pressed.
+    pub fn ui(&mut self, ui: &Ui, actions: &[PaletteAction], commands: &mut Commands) {
         if !self.is_open {
             return;
         }
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        // Beside the stop control, never over it.
+        let tokens = tokens_of(ui);
+        // Never over the stop button.
         Area::new(Id::unique("palette"))
             .order(Order::Foreground)
             .anchor(Align2::CENTER_TOP, vec2(0.0, 74.0))
@@ -82,8 +77,7 @@ impl Palette {
             });
     }
 
-    fn content_ui(&mut self, ui: &mut Ui, actions: &[Action], commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+    fn content_ui(&mut self, ui: &mut Ui, actions: &[PaletteAction], commands: &mut Commands) {
         let (mut moved, mut is_taken) = (0_isize, false);
         ui.input_mut(|input| {
             for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
@@ -94,11 +88,11 @@ impl Palette {
             is_taken = input.consume_key(Modifiers::NONE, Key::Enter);
         });
         ui.horizontal(|ui| {
-            let label = ui.label("what to do");
+            let label = ui.label("command");
             let input = TextEdit::singleline(&mut self.typed)
                 .desired_width(ui.available_width() - 90.0)
                 .char_limit(100)
-                .hint_text("a few letters of it");
+                .hint_text("a few letters of its name");
             let response = ui.add(input).labelled_by(label.id);
             if std::mem::take(&mut self.is_fresh) {
                 response.request_focus();
@@ -110,13 +104,13 @@ impl Palette {
                 self.is_open = false;
             }
         });
-        let found: Vec<&Action> =
+        let found: Vec<&PaletteAction> =
             actions.iter().filter(|one| is_found(&one.name, &self.typed)).collect();
         let last = found.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(moved).min(last);
         ui.add_space(4.0);
         if found.is_empty() {
-            ui.label(RichText::new("nothing is called so").color(tokens.text_quiet));
+            placeholder_ui(ui, "no command has this name");
         }
         ScrollArea::vertical()
             .id_salt("actions")
@@ -132,7 +126,7 @@ impl Palette {
             });
     }
 
-    fn take(&mut self, action: &Action, commands: &mut Commands) {
+    fn take(&mut self, action: &PaletteAction, commands: &mut Commands) {
         if action.verdict.is_ok() {
             commands.push(action.command.clone());
             self.is_open = false;
@@ -141,8 +135,8 @@ impl Palette {
 }
 
 /// One line; true when it is pressed.
-fn action_ui(ui: &mut Ui, action: &Action, is_chosen: bool, is_followed: bool) -> bool {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn action_ui(ui: &mut Ui, action: &PaletteAction, is_chosen: bool, is_followed: bool) -> bool {
+    let tokens = tokens_of(ui);
     ui.horizontal(|ui| {
         let button = Button::selectable(is_chosen, &action.name);
         let response = ui.add_enabled(action.verdict.is_ok(), button);
@@ -161,7 +155,7 @@ fn action_ui(ui: &mut Ui, action: &Action, is_chosen: bool, is_followed: bool) -
     .inner
 }
 
-/// Whether every word typed stands somewhere in the name.
+/// Whether the name contains every word typed.
 fn is_found(name: &str, typed: &str) -> bool {
     let name = name.to_lowercase();
     let typed = typed.to_lowercase();

@@ -1,12 +1,12 @@
 //! The panels of a screen.
 
-use super::sizes::{Edge, Sizes};
-use crate::theme::Tokens;
+use super::sizes::{PanelEdge, Sizes};
+use crate::widgets::tokens_of;
 use eframe::egui::{Color32, Frame, Margin, Panel, ScrollArea, Stroke, Ui};
 
 /// The frame of a panel; the canvas is what plots and tables stand on.
 pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     Frame::new()
         // The window is cleared in this colour already. Filling canvases and plots again delays a stop key on a software
         // renderer: median 27 ms with, 14 ms without (`scripts/key-to-wire`).
@@ -15,14 +15,21 @@ pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
         .stroke(Stroke::NONE)
 }
 
-/// A panel beside the middle that scrolls.
-pub(crate) fn side_ui(ui: &mut Ui, sizes: &mut Sizes, edge: Edge, content: impl FnOnce(&mut Ui)) {
+/// A panel to the left or right of the middle, which scrolls as a whole or not.
+pub(crate) fn side_ui(
+    ui: &mut Ui,
+    sizes: &mut Sizes,
+    edge: PanelEdge,
+    scrolls: bool,
+    content: impl FnOnce(&mut Ui),
+) {
     let panel = match edge {
-        Edge::Left => Panel::left("left"),
+        PanelEdge::Left => Panel::left("left"),
         _ => Panel::right("right"),
     };
     let scrolled = |ui: &mut Ui| {
-        ScrollArea::vertical().id_salt("side").auto_shrink(false).show(ui, content);
+        let area = ScrollArea::vertical().id_salt("side").auto_shrink(false);
+        if scrolls { area.show(ui, content).inner } else { content(ui) }
     };
     let panel = sizes.of(edge, panel).frame(frame(ui, false));
     let shown = panel.show(ui, scrolled);

@@ -1,13 +1,12 @@
 //! The rail that switches between the screens.
 
-use crate::command::{Command, Commands};
+use crate::command::{Commands, UiCommand};
 use crate::screens::table::SCREENS;
 use eframe::egui::{Button, Ui, vec2};
 
 /// Width of the rail in points.
 pub const WIDTH: f32 = 100.0;
 
-/// Draws the rail.
 pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
     for screen in SCREENS {
         let button = Button::selectable(screen.name == shown, screen.name)
@@ -15,7 +14,7 @@ pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
         let keys = screen.key.symbol_or_name();
         let hint = format!("{} (Ctrl+{keys})", screen.purpose);
         if ui.add(button).on_hover_text(hint).clicked() {
-            commands.push(Command::Show(screen.name));
+            commands.push(UiCommand::Show(screen.name));
         }
     }
 }

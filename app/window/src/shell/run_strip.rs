@@ -1,9 +1,8 @@
-//! What an operator may ask of the run in progress, on every screen: pause, resume, finish early, abort, and the
-//! answer to a prompt. Stop and halt have their own place in the top bar.
+//! Controls of the run in progress, on every screen: pause, resume, finish early, abort, and the answer to a prompt. Stop
+//! and halt are in the top bar.
 
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::places::Place;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{NamedControl, tokens_of};
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
 };
@@ -12,29 +11,28 @@ use palpate_model::rig::Phase;
 use palpate_protocols::engine::{Operator, PauseView};
 use palpate_runner::{PromptView, RunView};
 
-/// Something to ask of a run that goes on.
+/// A control of a run in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish {
-    /// Pause as soon as it is sound.
+pub enum RunControl {
     Pause,
-    /// Pause at the next place where that spoils nothing.
+    /// Pause at the next checkpoint.
     PauseAfter,
-    /// Go on, or forget a pause that was asked for.
+    /// Go on, or cancel a pause that is pending.
     Resume,
-    /// While paused: leave out what is left to measure.
+    /// While paused: skip the remaining measurements.
     Finish,
     /// Stop and mark the run failed.
     Abort,
-    /// The prompt's work is done.
+    /// The work of the prompt is done.
     Confirm,
-    /// The prompt's work will not be done.
+    /// The work of the prompt will not be done.
     Decline,
     /// Read the last weight again.
     Redo,
 }
 
-impl Wish {
-    /// The operator's choice that asks for it, or why it cannot be asked for now.
+impl RunControl {
+    /// The choice to send to the runner, or why it is not possible now.
     pub fn operator(self, run: &RunView) -> Result<Operator, String> {
         let is_paused = matches!(run.pause, PauseView::Paused { .. });
         let refuse = |reason: &str| Err(reason.to_owned());
@@ -44,7 +42,7 @@ impl Wish {
         match (self, run.pause) {
             (Self::Pause | Self::PauseAfter, _) if is_paused => refuse("the run is paused"),
             (Self::Pause, _) => Ok(Operator::Pause),
-            (Self::PauseAfter, PauseView::Pending { .. }) => refuse("a pause is asked for already"),
+            (Self::PauseAfter, PauseView::Pending { .. }) => refuse("a pause is pending already"),
             (Self::PauseAfter, _) => match &run.next_checkpoint {
                 Some((step_index, _)) => Ok(Operator::PauseAfter { step_index: *step_index }),
                 None => refuse("no checkpoint is ahead"),
@@ -56,7 +54,7 @@ impl Wish {
             (Self::Finish, _) => refuse("pause first"),
             (Self::Abort, _) => Ok(Operator::Abort),
             (Self::Confirm | Self::Decline, _) if run.prompt.is_none() => {
-                refuse("nothing is asked for")
+                refuse("there is no prompt")
             }
             (Self::Confirm, _) => Ok(Operator::Confirm),
             (Self::Decline, _) => Ok(Operator::Decline),
@@ -65,7 +63,7 @@ impl Wish {
     }
 }
 
-/// Whether the run goes on and takes wishes: not stopping, stopped or ended.
+/// Whether the run can be controlled: not stopping, stopped or ended.
 #[must_use]
 pub fn is_controllable(run: &RunView) -> bool {
     run.outcome.is_none() && run.holding.is_none() && run.phase != Phase::Stopped
@@ -73,21 +71,21 @@ pub fn is_controllable(run: &RunView) -> bool {
 
 /// Draws the buttons, the state of the pause in words, and the prompt if there is one.
 pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     ui.horizontal(|ui| {
         let after = match &run.next_checkpoint {
             Some((_, name)) if name.starts_with("after ") => format!("Pause {name}  F4"),
             Some((_, name)) => format!("Pause at {name}  F4"),
             None => "Pause at a checkpoint  F4".into(),
         };
-        for (wish, text) in [
-            (Wish::Pause, "Pause  F7"),
-            (Wish::PauseAfter, after.as_str()),
-            (Wish::Resume, "Resume  F9"),
-            (Wish::Finish, "Finish early  F10"),
-            (Wish::Abort, "Abort"),
+        for (control, text) in [
+            (RunControl::Pause, "Pause  F7"),
+            (RunControl::PauseAfter, after.as_str()),
+            (RunControl::Resume, "Resume  F9"),
+            (RunControl::Finish, "Finish early  F10"),
+            (RunControl::Abort, "Abort"),
         ] {
-            wish_ui(ui, run, wish, text, commands);
+            control_ui(ui, run, control, text, commands);
         }
         let words = RichText::new(pause_words(run)).color(tokens.text_quiet);
         ui.add(Label::new(words).truncate());
@@ -103,28 +101,31 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mu
 /// Most characters of a note.
 const NOTE_MAX: usize = 300;
 
-/// What somebody at the rig wants to have written down, at the time at which it is.
+/// A note of the operator with the time at which it is written.
 fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
-    let name = match note.trim().is_empty() {
-        true => "Mark  F3",
-        false => "Note  F3",
-    };
+    let name = if note.trim().is_empty() { "Mark  F3" } else { "Note  F3" };
     if ui.add(Button::new(name).min_size(vec2(74.0, 28.0))).clicked() {
-        commands.push(Command::NoteTyped);
+        commands.push(UiCommand::NoteTyped);
     }
     let input = TextEdit::singleline(note).desired_width(180.0).char_limit(NOTE_MAX);
     // Drawn from the right, so the label comes after its field.
-    let input = ui.add(input).place("note");
+    let input = ui.add(input).named("note");
     let label = ui.label("note");
     let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     input.labelled_by(label.id);
     if is_taken {
-        commands.push(Command::NoteTyped);
+        commands.push(UiCommand::NoteTyped);
     }
 }
 
-fn wish_ui(ui: &mut Ui, run: &RunView, wish: Wish, text: &str, commands: &mut Commands) {
-    let verdict = wish.operator(run);
+fn control_ui(
+    ui: &mut Ui,
+    run: &RunView,
+    control: RunControl,
+    text: &str,
+    commands: &mut Commands,
+) {
+    let verdict = control.operator(run);
     let button = Button::new(text).min_size(vec2(0.0, 28.0));
     let response = ui.add_enabled(verdict.is_ok(), button);
     let response = match verdict {
@@ -132,24 +133,24 @@ fn wish_ui(ui: &mut Ui, run: &RunView, wish: Wish, text: &str, commands: &mut Co
         Ok(_) => response,
     };
     if response.clicked() {
-        commands.push(Command::Wish(wish));
+        commands.push(UiCommand::RunControl(control));
     }
 }
 
-/// How the run stands, and why a button beside it is closed.
+/// State of the run, and why a button is closed.
 fn pause_words(run: &RunView) -> String {
     match run.pause {
         PauseView::Paused { no_resume: None } => {
-            "Paused. Resume goes on; finish early leaves out the rest and retracts.".into()
+            "Paused. Resume continues; finish early skips the rest and retracts.".into()
         }
         PauseView::Paused { no_resume: Some(why) } => {
             format!("Paused. No resume: {why}. Finish early keeps the data and retracts.")
         }
         PauseView::Pending { step_index } => match &run.next_checkpoint {
             Some((index, name)) if *index == step_index => {
-                format!("Will pause {name}; resume takes that back.")
+                format!("Will pause {name}; resume cancels that.")
             }
-            _ => format!("Will pause behind step {}; resume takes that back.", step_index + 1),
+            _ => format!("Will pause after step {}; resume cancels that.", step_index + 1),
         },
         PauseView::None if run.next_checkpoint.is_none() => {
             "Running. No checkpoint is ahead; resume and finish early need a pause first.".into()
@@ -158,19 +159,19 @@ fn pause_words(run: &RunView) -> String {
     }
 }
 
-/// The question, not in the way of anything: motion can still be stopped and panels still be used.
+/// The prompt. It blocks nothing: motion can be stopped and panels used.
 fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     Frame::new()
         .fill(tokens.canvas)
         .stroke(Stroke::new(2.0, tokens.notice_fill))
         .inner_margin(Margin::symmetric(10, 8))
         .show(ui, |ui| {
             ui.horizontal(|ui| {
-                wish_ui(ui, run, Wish::Confirm, "Done  F2", commands);
-                wish_ui(ui, run, Wish::Decline, "Not done", commands);
+                control_ui(ui, run, RunControl::Confirm, "Done  F2", commands);
+                control_ui(ui, run, RunControl::Decline, "Not done", commands);
                 if run.can_redo.is_ok() {
-                    wish_ui(ui, run, Wish::Redo, "Last weight again", commands);
+                    control_ui(ui, run, RunControl::Redo, "Last weight again", commands);
                 }
                 let left = match run.pause {
                     PauseView::Paused { .. } => "the pause stops this clock".into(),

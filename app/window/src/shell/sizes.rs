@@ -1,22 +1,19 @@
 //! How wide the panels beside the middle are and how high the event log: dragged at their edges, or by name.
 
-use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{CursorIcon, Id, Panel, Rect, Response, Sense, Stroke, Ui};
 
 palpate_model::named! {
     /// A panel whose size can be changed.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Edge {
-        /// What is asked for.
+    pub enum PanelEdge {
         Left = "left panel",
-        /// What is known.
         Right = "right panel",
-        /// The event log.
         Log = "event log",
     }
 }
 
-impl Edge {
+impl PanelEdge {
     /// Smallest, usual and largest size in points: the rows of the forms are made for the usual one, what is smaller
     /// cuts them, and the plots of the smallest window are to stay wider than a panel.
     const fn sizes(self) -> [f32; 3] {
@@ -34,67 +31,66 @@ pub const STEP: f32 = 40.0;
 /// Half the width in points of what can be dragged.
 const GRIP: f32 = 3.0;
 
-/// The sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes([f32; 3]);
 
 impl Default for Sizes {
     fn default() -> Self {
-        Self(Edge::ALL.map(|edge| edge.sizes()[1]))
+        Self(PanelEdge::ALL.map(|edge| edge.sizes()[1]))
     }
 }
 
 impl Sizes {
-    /// Those remembered, the usual ones where there is none.
+    /// The usual sizes where there is none.
     #[must_use]
-    pub fn remembered(sizes: [Option<f32>; 3]) -> Self {
+    pub fn from_changes(sizes: [Option<f32>; 3]) -> Self {
         let mut all = Self::default();
-        for (edge, size) in Edge::ALL.into_iter().zip(sizes) {
+        for (edge, size) in PanelEdge::ALL.into_iter().zip(sizes) {
             all.set(edge, size.unwrap_or(f32::NAN));
         }
         all
     }
 
     /// Size of one in points.
-    pub fn get(&self, edge: Edge) -> f32 {
+    pub fn get(&self, edge: PanelEdge) -> f32 {
         self.0[edge as usize]
     }
 
-    fn set(&mut self, edge: Edge, size: f32) {
+    fn set(&mut self, edge: PanelEdge, size: f32) {
         let [least, usual, most] = edge.sizes();
         let size = if size.is_finite() { size } else { usual };
         self.0[edge as usize] = size.clamp(least, most);
     }
 
     /// Makes one larger by so many points, or smaller.
-    pub fn grow(&mut self, edge: Edge, by: f32) {
+    pub fn grow(&mut self, edge: PanelEdge, by: f32) {
         self.set(edge, self.get(edge) + by);
     }
 
-    /// What is to be remembered: none where a size is the usual one.
-    pub fn told(&self) -> [Option<f32>; 3] {
-        Edge::ALL.map(|edge| Some(self.get(edge)).filter(|size| *size != edge.sizes()[1]))
+    /// Sizes in points; none for the usual ones.
+    pub fn changes(&self) -> [Option<f32>; 3] {
+        PanelEdge::ALL.map(|edge| Some(self.get(edge)).filter(|size| *size != edge.sizes()[1]))
     }
 
     /// A panel of this size.
-    pub fn of(&self, edge: Edge, panel: Panel) -> Panel {
+    pub fn of(&self, edge: PanelEdge, panel: Panel) -> Panel {
         panel.exact_size(self.get(edge)).resizable(false)
     }
 
     /// Lets the edge towards the middle be dragged; a double click makes the size the usual one.
-    pub fn drag(&mut self, ui: &Ui, edge: Edge, panel: Rect) {
+    pub fn drag(&mut self, ui: &Ui, edge: PanelEdge, panel: Rect) {
         let id = Id::unique(("panel edge", edge.name()));
         let near = match edge {
-            Edge::Left => Rect::from_x_y_ranges(around(panel.right()), panel.y_range()),
-            Edge::Right => Rect::from_x_y_ranges(around(panel.left()), panel.y_range()),
-            Edge::Log => Rect::from_x_y_ranges(panel.x_range(), around(panel.top())),
+            PanelEdge::Left => Rect::from_x_y_ranges(around(panel.right()), panel.y_range()),
+            PanelEdge::Right => Rect::from_x_y_ranges(around(panel.left()), panel.y_range()),
+            PanelEdge::Log => Rect::from_x_y_ranges(panel.x_range(), around(panel.top())),
         };
         let grip = ui.interact(near, id, Sense::click_and_drag());
         let moved = grip.drag_delta();
         match edge {
-            Edge::Left => self.grow(edge, moved.x),
-            Edge::Right => self.grow(edge, -moved.x),
-            Edge::Log => self.grow(edge, -moved.y),
+            PanelEdge::Left => self.grow(edge, moved.x),
+            PanelEdge::Right => self.grow(edge, -moved.x),
+            PanelEdge::Log => self.grow(edge, -moved.y),
         }
         if grip.double_clicked() {
             self.set(edge, f32::NAN);
@@ -108,31 +104,31 @@ fn around(place: f32) -> std::ops::RangeInclusive<f32> {
 }
 
 /// Shows that an edge can be dragged while the pointer is there.
-fn shown(ui: &Ui, edge: Edge, near: Rect, grip: &Response) {
+fn shown(ui: &Ui, edge: PanelEdge, near: Rect, grip: &Response) {
     if !(grip.hovered() || grip.dragged()) {
         return;
     }
     let (icon, line) = match edge {
-        Edge::Log => (CursorIcon::ResizeVertical, [near.left_center(), near.right_center()]),
+        PanelEdge::Log => (CursorIcon::ResizeVertical, [near.left_center(), near.right_center()]),
         _ => (CursorIcon::ResizeHorizontal, [near.center_top(), near.center_bottom()]),
     };
     ui.ctx().set_cursor_icon(icon);
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     ui.painter().line_segment(line, Stroke::new(2.0, tokens.text_quiet));
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Edge, STEP, Sizes};
+    use super::{PanelEdge, STEP, Sizes};
 
     #[test]
-    fn sizes_stay_within_their_bounds_and_the_usual_ones_are_not_told() {
-        let mut sizes = Sizes::remembered([None, Some(1.0), Some(f32::NAN)]);
-        assert_eq!(sizes.told(), [None, Some(280.0), None]);
-        sizes.grow(Edge::Left, 1e9);
-        sizes.grow(Edge::Log, -1e9);
-        assert_eq!(sizes.told(), [Some(460.0), Some(280.0), Some(70.0)]);
-        sizes.grow(Edge::Left, -STEP);
-        assert_eq!(Sizes::remembered(sizes.told()), sizes);
+    fn sizes_stay_within_their_bounds_and_the_usual_ones_are_not_changes() {
+        let mut sizes = Sizes::from_changes([None, Some(1.0), Some(f32::NAN)]);
+        assert_eq!(sizes.changes(), [None, Some(280.0), None]);
+        sizes.grow(PanelEdge::Left, 1e9);
+        sizes.grow(PanelEdge::Log, -1e9);
+        assert_eq!(sizes.changes(), [Some(460.0), Some(280.0), Some(70.0)]);
+        sizes.grow(PanelEdge::Left, -STEP);
+        assert_eq!(Sizes::from_changes(sizes.changes()), sizes);
     }
 }

@@ -1,12 +1,10 @@
 //! The bar that stands on every screen: state, run, progress, the numbers, the stop control.
 
 use super::activity::{Activity, is_motion_possible, run_in_progress};
-use crate::command::{Command, Commands};
-use crate::theme::{Tokens, reading_style};
-use crate::widgets::state_badge::badge_ui;
-use eframe::egui::{
-    Align, Button, Context, Id, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2,
-};
+use crate::command::{Commands, UiCommand};
+use crate::theme::reading_style;
+use crate::widgets::{badge_ui, quiet_ui, share_ui, tokens_of};
+use eframe::egui::{Align, Button, Context, Id, Label, Layout, RichText, Stroke, Ui, vec2};
 use palpate_figures::uncertain::clock;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_runner::{RunView, Snapshot};
@@ -40,14 +38,12 @@ struct StopButtons {
     halt: Id,
 }
 
-/// Asks for what the two buttons say, where they were pressed since they were drawn last: before anything of a frame
-/// is drawn, so that no screen can hold up a stop.
+/// Pushes the commands of the two buttons if they were pressed since the last frame: before anything is drawn, so that no
+/// screen can delay a stop.
 pub fn push_stop_buttons(ctx: &Context, commands: &mut Commands) {
     let drawn = ctx.data(|data| data.get_temp::<StopButtons>(Id::unique("stop buttons")));
-    let Some(StopButtons { stop, halt }) = drawn else {
-        return;
-    };
-    for (button, command) in [(stop, Command::Stop), (halt, Command::Halt)] {
+    let Some(StopButtons { stop, halt }) = drawn else { return };
+    for (button, command) in [(stop, UiCommand::Stop), (halt, UiCommand::Halt)] {
         if ctx.read_response(button).is_some_and(|one| one.clicked()) {
             commands.push(command);
         }
@@ -55,7 +51,7 @@ pub fn push_stop_buttons(ctx: &Context, commands: &mut Commands) {
 }
 
 fn stop_ui(ui: &mut Ui, is_motion_possible: bool) -> Id {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let text = RichText::new("Stop motion  F12").size(17.0).strong();
     // Grey while nothing can move, and always there: it also stops what we do not know of.
     let button = if is_motion_possible {
@@ -67,19 +63,19 @@ fn stop_ui(ui: &mut Ui, is_motion_possible: bool) -> Id {
     ui.add(button).id
 }
 
-/// The harder way to stop: no braking, and position zero is lost.
+/// Immediate stop: no braking, and the axis must be homed again.
 fn halt_ui(ui: &mut Ui) -> Id {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let button = Button::new("Halt  F11")
         .fill(tokens.control)
         .stroke(Stroke::new(1.0, tokens.alarm_fill))
         .min_size(vec2(72.0, HEIGHT));
-    let hint = "cut the motion without braking; the axis must be homed again";
+    let hint = "stops the motion without braking; the axis must be homed again";
     ui.add(button).on_hover_text(hint).id
 }
 
 fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let size = vec2(RUN_WIDTH, HEIGHT);
     ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
         ui.set_width(RUN_WIDTH);
@@ -92,12 +88,7 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
         let line = run.map_or_else(|| "no run yet".into(), run_line);
         ui.add(Label::new(RichText::new(line).color(tokens.text_quiet)).truncate());
         if let Some(run) = run {
-            ui.add(
-                ProgressBar::new(run.fraction as f32)
-                    .desired_height(10.0)
-                    .corner_radius(2)
-                    .fill(tokens.text_quiet),
-            );
+            share_ui(ui, run.fraction);
         }
     });
 }
@@ -147,12 +138,11 @@ fn number(value: Option<f64>, decimals: usize) -> String {
 }
 
 fn number_ui(ui: &mut Ui, name: &str, unit: &str, text: String, width: f32) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.allocate_ui_with_layout(vec2(width, HEIGHT), Layout::top_down(Align::Max), |ui| {
         ui.set_width(width);
         ui.spacing_mut().item_spacing.y = 0.0;
         let head = format!("{name} ({unit})");
-        ui.label(RichText::new(head).color(tokens.text_quiet).small());
+        quiet_ui(ui, head);
         ui.label(RichText::new(text).text_style(reading_style()));
     });
 }

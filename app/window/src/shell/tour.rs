@@ -1,15 +1,15 @@
-//! The first-run tour: a strip of a few sentences, each about what is on the screen, in nobody's way.
+//! The first-run tour: a strip of a few sentences, each about a part of the screen, that covers no control.
 
-use crate::command::{Command, Commands};
+use crate::command::{Commands, UiCommand};
 use crate::screens::{calibration, library, review, rig, run};
-use crate::theme::Tokens;
+use crate::widgets::tokens_of;
 use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
 
-/// Where it stands; none when it is over.
+/// The number of the stop; none when the tour is closed.
 #[derive(Debug, Default)]
 pub struct Tour(Option<usize>);
 
-/// Screen and what is said of it.
+/// Screens with their texts.
 const STOPS: [(&str, &str); 7] = [
     (
         run::SCREEN.name,
@@ -17,59 +17,55 @@ const STOPS: [(&str, &str); 7] = [
     ),
     (
         run::SCREEN.name,
-        "The left panel has the protocol and what it asks for; Expected course draws it before anything moves. While Start is closed, the reason stands beside it.",
+        "The left panel has the protocol and its values; Expected course draws it before anything moves. While Start is closed, the reason is shown below it.",
     ),
     (
         rig::SCREEN.name,
-        "What the rig reports, large, and moving it by hand. A rig on wires is opened with 'palpate window --rig FILE.toml'.",
+        "Readings of the rig in large letters, and manual moves. Start palpate with 'palpate window --rig FILE.toml' to open a rig on wires.",
     ),
     (
         calibration::SCREEN.name,
-        "Volts to newtons. Measure... asks for one weight after the other, shows when the signal is steady, and lets you read any of them again.",
+        "Volts to newtons. Measure... asks for one weight after the other, shows when the signal is steady, and can read a weight again.",
     ),
     (
         library::SCREEN.name,
-        "Every session, found by words, names and values. What is chosen here opens in Review with Enter.",
+        "Search all sessions by words, names and values. Enter opens the chosen sessions in Review.",
     ),
     (
         review::SCREEN.name,
-        "One session closely or several beside each other: cursors, phases, fits, other calibrations, a report.",
+        "One session in detail or several next to each other: cursors, phases, fits, other calibrations, a report.",
     ),
     (
         run::SCREEN.name,
-        "Ctrl+K opens everything by name, with its keys. Press Start F5 when you like.",
+        "Ctrl+K lists all commands by name, with their keys. Press Start F5 when you are ready.",
     ),
 ];
 
 impl Tour {
-    /// Begins it.
     pub fn start(&mut self) {
         self.0 = Some(0);
     }
 
-    /// Ends it.
     pub fn end(&mut self) {
         self.0 = None;
     }
 
-    /// Whether it is under way.
     pub fn is_on(&self) -> bool {
         self.0.is_some()
     }
 
-    /// Goes on to the next stop, or ends; gives the screen to show.
+    /// Goes to the next stop, or ends; returns the screen to show.
     pub fn go_on(&mut self) -> Option<&'static str> {
         let next = self.0? + 1;
         self.0 = (next < STOPS.len()).then_some(next);
         self.0.map(|at| STOPS[at].0)
     }
 
-    /// Draws the strip.
     pub fn ui(&self, ui: &mut Ui, commands: &mut Commands) {
         let Some((at, (_, words))) = self.0.and_then(|at| Some((at, STOPS.get(at)?))) else {
             return;
         };
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         Frame::new()
             .fill(tokens.canvas)
             .stroke(Stroke::new(2.0, tokens.focus))
@@ -80,10 +76,10 @@ impl Tour {
                     ui.label(RichText::new(place).strong());
                     let name = if at + 1 == STOPS.len() { "Done with the tour" } else { "Next" };
                     if ui.button(name).clicked() {
-                        commands.push(Command::TourNext);
+                        commands.push(UiCommand::TourNext);
                     }
                     if at + 1 < STOPS.len() && ui.button("End the tour").clicked() {
-                        commands.push(Command::TourEnd);
+                        commands.push(UiCommand::TourEnd);
                     }
                     ui.add(Label::new(*words).wrap());
                 });

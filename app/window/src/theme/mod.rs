@@ -27,7 +27,6 @@ pub fn clear_color(visuals: &Visuals) -> [f32; 4] {
     visuals.extreme_bg_color.to_normalized_gamma_f32()
 }
 
-/// The other theme.
 pub fn switch(ctx: &Context) {
     ctx.set_theme(match ctx.theme() {
         Theme::Dark => Theme::Light,

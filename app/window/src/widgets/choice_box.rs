@@ -1,7 +1,7 @@
 //! One of many names, or any: a list with a field that narrows it; only names in sight are laid out.
 
-use super::places::Place;
-use super::quantity_input::form_label;
+use super::fields::form_label;
+use super::places::NamedControl;
 use eframe::egui::{ComboBox, PopupCloseBehavior, ScrollArea, TextEdit, Ui};
 
 /// More names than this have a field that narrows them.
@@ -64,7 +64,7 @@ pub fn choice_box_ui(
             })
             .response
             .labelled_by(label.id)
-            .place(name);
+            .named(name);
     });
     *chosen != before
 }

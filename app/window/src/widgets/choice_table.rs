@@ -1,126 +1,96 @@
 //! A long table whose rows can be chosen, by pointer and by keys: only rows in sight are made and laid out.
 
-use super::mark::{self, Mark, mark_at};
-use super::table::{Column, GAP, ROW, row_ui};
-use crate::theme::Tokens;
+use super::glyph::{GLYPH_RADIUS, GLYPH_WIDTH, Glyph, glyph_at};
+use super::table::{Column, Emphasis, GAP, ROW, row_ui, width_of};
+use super::text::tokens_of;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
 use eframe::egui::{
-    Align2, Button, Color32, EventFilter, InputState, Key, Popup, Rect, Role, ScrollArea, Sense,
-    Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Button, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
+    ScrollArea, Sense, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 use std::ops::Range;
 
-/// How a text stands out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tone {
-    /// As the others.
-    #[default]
-    Plain,
-    /// Of less use.
-    Quiet,
-    /// Wrong.
-    Alarm,
-}
-
-/// One cell.
+/// One cell, with a glyph before its text where it has one.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cell {
-    /// Shape before the text.
-    pub mark: Option<Mark>,
-    /// The text.
+pub struct TableCell {
+    pub glyph: Option<Glyph>,
     pub text: String,
-    /// How it stands out.
-    pub tone: Tone,
+    pub emphasis: Emphasis,
 }
 
-impl Cell {
-    /// A plain text.
+impl TableCell {
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
         Self { text: text.into(), ..Self::default() }
     }
 
-    /// A shape and its word.
     #[must_use]
-    pub fn marked(mark: Mark, text: impl Into<String>, tone: Tone) -> Self {
-        Self { mark: Some(mark), text: text.into(), tone }
+    pub fn marked(glyph: Glyph, text: impl Into<String>, emphasis: Emphasis) -> Self {
+        Self { glyph: Some(glyph), text: text.into(), emphasis }
     }
 }
 
-/// One row.
+/// One row: a cell for each column.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
-    /// What it is called where it is not seen.
+pub struct TableLine {
+    /// Read aloud in the place of the cells.
     pub name: String,
-    /// A cell for each column.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<TableCell>,
 }
 
-/// A column that rows may be sorted by.
-#[derive(Clone, Debug)]
-pub struct Head {
-    /// The column.
-    pub column: Column,
-    /// Whether its head sorts.
-    pub can_sort: bool,
-}
-
-/// Where the table is scrolled to.
+/// How far a table is scrolled.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Scrolled {
+pub struct ScrollPosition {
     offset: f32,
     height: f32,
-    wanted: Option<f32>,
+    target: Option<f32>,
 }
 
 /// How a row is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum How {
-    /// That one alone.
+pub enum SelectionMode {
     Only,
-    /// That one too, or that one no more.
+    /// Adds the row, or takes it away.
     Toggle,
-    /// All from where it began.
+    /// All rows from the one that was chosen first.
     Extend,
 }
 
 /// What was done with the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
-    /// A row was chosen.
-    Choose(usize, How),
-    /// All were chosen.
-    All,
-    /// Those chosen are wanted.
+pub enum TableAction {
+    Choose(usize, SelectionMode),
+    ChooseAll,
+    /// Opens the rows that are chosen.
     Open,
-    /// A head was pressed.
+    /// Sorts by the column of this number.
     Sort(usize),
 }
 
-/// What a table shows.
+/// A table of which a row is made when it is drawn.
 pub struct ChoiceTable<'a> {
-    /// What it is called.
     pub name: &'a str,
-    /// Its columns.
-    pub heads: &'a [Head],
-    /// Column that the rows are sorted by, and whether the other way round.
+    pub columns: &'a [Column],
+    /// Whether the heading of a column sorts.
+    pub can_sort: &'a dyn Fn(usize) -> bool,
+    /// Column that the rows are sorted by, and whether in reverse.
     pub sorted: Option<(usize, bool)>,
-    /// Rows in all.
     pub count: usize,
-    /// The row that keys go from.
+    /// The row from which keys move.
     pub at: Option<usize>,
-    /// Makes a row.
-    pub line: &'a dyn Fn(usize) -> Line,
-    /// Whether a row is chosen.
+    pub line: &'a dyn Fn(usize) -> TableLine,
     pub is_chosen: &'a dyn Fn(usize) -> bool,
 }
 
 impl ChoiceTable<'_> {
     /// Draws the table in the space there is; tells what was done and which rows are in sight.
-    pub fn ui(&self, ui: &mut Ui, scrolled: &mut Scrolled) -> (Vec<Act>, Range<usize>) {
+    pub fn ui(
+        &self,
+        ui: &mut Ui,
+        scrolled: &mut ScrollPosition,
+    ) -> (Vec<TableAction>, Range<usize>) {
         let (mut acts, mut shown) = (Vec::new(), 0..0);
-        let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
-        let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
+        let width = width_of(self.columns);
         let id = ui.make_persistent_id((self.name, "table"));
         ScrollArea::horizontal().id_salt((self.name, "across")).auto_shrink(false).show(ui, |ui| {
             let width = width.max(ui.available_width());
@@ -132,7 +102,7 @@ impl ChoiceTable<'_> {
                 ui.interact(ui.available_rect_before_wrap(), id, Sense::focusable_noninteractive());
             body.widget_info(|| WidgetInfo::labeled(Role::ListBox, true, self.name));
             if body.has_focus() {
-                let tokens = Tokens::of(ui.visuals().dark_mode);
+                let tokens = tokens_of(ui);
                 let stroke = Stroke::new(1.0, tokens.focus);
                 ui.painter().rect_stroke(body.rect, 0.0, stroke, StrokeKind::Inside);
                 // Up and down are the table's, not the way to another control.
@@ -148,25 +118,24 @@ impl ChoiceTable<'_> {
         (acts, shown)
     }
 
-    fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<Act>) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let columns: Vec<&Column> = self.heads.iter().map(|head| &head.column).collect();
-        row_ui(ui, &columns, width, |ui, index, column| {
-            let text = eframe::egui::RichText::new(&column.head).color(tokens.text_quiet).small();
-            if !self.heads[index].can_sort {
-                ui.add(eframe::egui::Label::new(text).truncate());
+    fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<TableAction>) {
+        let tokens = tokens_of(ui);
+        row_ui(ui, self.columns, width, |ui, index, column| {
+            let text = RichText::new(&column.head).color(tokens.text_quiet).small();
+            if !(self.can_sort)(index) {
+                ui.add(Label::new(text).truncate());
                 return;
             }
             ui.spacing_mut().button_padding.x = 0.0;
             let head = ui.add(Button::new(text).frame(false));
             if let Some((_, is_reversed)) = self.sorted.filter(|(by, _)| *by == index) {
-                let mark = if is_reversed { Mark::Up } else { Mark::Down };
+                let glyph = if is_reversed { Glyph::Up } else { Glyph::Down };
                 let place = head.rect.right_center() + vec2(8.0, 0.0);
-                mark_at(ui.painter(), mark, place, tokens.text_quiet);
+                glyph_at(ui.painter(), glyph, place, GLYPH_RADIUS, tokens.text_quiet);
             }
             let head = head.accessible_name(format!("sort by {}", column.head));
-            if head.on_hover_text("sort; once more for the other way round").clicked() {
-                acts.push(Act::Sort(index));
+            if head.on_hover_text("sort; press again to reverse").clicked() {
+                acts.push(TableAction::Sort(index));
             }
         });
     }
@@ -175,12 +144,12 @@ impl ChoiceTable<'_> {
         &self,
         ui: &mut Ui,
         width: f32,
-        id: eframe::egui::Id,
-        scrolled: &mut Scrolled,
-        acts: &mut Vec<Act>,
+        id: Id,
+        scrolled: &mut ScrollPosition,
+        acts: &mut Vec<TableAction>,
     ) -> Range<usize> {
         let mut area = ScrollArea::vertical().id_salt((self.name, "rows")).auto_shrink(false);
-        if let Some(offset) = scrolled.wanted.take() {
+        if let Some(offset) = scrolled.target.take() {
             area = area.vertical_scroll_offset(offset);
         }
         let drawn = area.show_rows(ui, ROW, self.count, |ui, rows| {
@@ -194,15 +163,8 @@ impl ChoiceTable<'_> {
         drawn.inner
     }
 
-    fn line_ui(
-        &self,
-        ui: &mut Ui,
-        width: f32,
-        id: eframe::egui::Id,
-        index: usize,
-        acts: &mut Vec<Act>,
-    ) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+    fn line_ui(&self, ui: &mut Ui, width: f32, id: Id, index: usize, acts: &mut Vec<TableAction>) {
+        let tokens = tokens_of(ui);
         let (line, is_chosen) = ((self.line)(index), (self.is_chosen)(index));
         let (rect, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
         // Not to be walked through by Tab: the table has the focus, and keys choose in it.
@@ -220,61 +182,61 @@ impl ChoiceTable<'_> {
             ui.painter().rect_filled(mark, 0.0, tokens.text);
         }
         let mut left = rect.left() + GAP * 0.5;
-        for (cell, head) in line.cells.iter().zip(self.heads) {
-            let place = Rect::from_min_size(pos2(left, rect.top()), vec2(head.column.width, ROW));
-            cell_ui(ui, cell, place, head.column.is_number, is_chosen);
-            left += head.column.width + GAP;
+        for (cell, column) in line.cells.iter().zip(self.columns) {
+            let place = Rect::from_min_size(pos2(left, rect.top()), vec2(column.width, ROW));
+            cell_ui(ui, cell, place, column.is_number, is_chosen);
+            left += column.width + GAP;
         }
         if row.double_clicked() {
-            acts.extend([Act::Choose(index, How::Only), Act::Open]);
+            acts.extend([TableAction::Choose(index, SelectionMode::Only), TableAction::Open]);
         } else if row.clicked() {
             ui.memory_mut(|memory| memory.request_focus(id));
             let how = ui.input(|input| match input.modifiers {
-                held if held.command => How::Toggle,
-                held if held.shift => How::Extend,
-                _ => How::Only,
+                held if held.command => SelectionMode::Toggle,
+                held if held.shift => SelectionMode::Extend,
+                _ => SelectionMode::Only,
             });
-            acts.push(Act::Choose(index, how));
+            acts.push(TableAction::Choose(index, how));
         }
-        if row.hovered() && line.cells.iter().any(|cell| cell.tone == Tone::Alarm) {
+        if row.hovered() && line.cells.iter().any(|cell| cell.emphasis == Emphasis::Alarm) {
             row.on_hover_text(&line.name);
         }
     }
 
-    fn keys(&self, ui: &Ui, scrolled: &mut Scrolled, acts: &mut Vec<Act>) {
+    fn keys(&self, ui: &Ui, scrolled: &mut ScrollPosition, acts: &mut Vec<TableAction>) {
         if self.count == 0 {
             return;
         }
         let page = ((scrolled.height / ROW) as usize).max(1);
-        let (mut went, mut how) = (None, How::Only);
+        let (mut went, mut how) = (None, SelectionMode::Only);
         ui.input(|input| {
-            went = self.gone_to(input, page);
+            went = self.key_target(input, page);
             if input.modifiers.shift {
-                how = How::Extend;
+                how = SelectionMode::Extend;
             }
             if input.modifiers.command && input.key_pressed(Key::A) {
-                acts.push(Act::All);
+                acts.push(TableAction::ChooseAll);
             }
             if let Some(at) = self.at.filter(|_| input.key_pressed(Key::Space)) {
-                acts.push(Act::Choose(at, How::Toggle));
+                acts.push(TableAction::Choose(at, SelectionMode::Toggle));
             }
             if input.key_pressed(Key::Enter) {
-                acts.push(Act::Open);
+                acts.push(TableAction::Open);
             }
         });
         if let Some(to) = went {
-            acts.push(Act::Choose(to, how));
+            acts.push(TableAction::Choose(to, how));
             let (top, bottom) = (to as f32 * ROW, (to + 1) as f32 * ROW);
             if top < scrolled.offset {
-                scrolled.wanted = Some(top);
+                scrolled.target = Some(top);
             } else if bottom > scrolled.offset + scrolled.height {
-                scrolled.wanted = Some(bottom - scrolled.height);
+                scrolled.target = Some(bottom - scrolled.height);
             }
         }
     }
 
     /// The row that keys lead to.
-    fn gone_to(&self, input: &InputState, page: usize) -> Option<usize> {
+    fn key_target(&self, input: &InputState, page: usize) -> Option<usize> {
         let last = self.count - 1;
         let from = |step: isize| match self.at {
             Some(at) => at.saturating_add_signed(step).min(last),
@@ -294,20 +256,16 @@ impl ChoiceTable<'_> {
     }
 }
 
-fn cell_ui(ui: &Ui, cell: &Cell, place: Rect, is_number: bool, is_chosen: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink: Color32 = match cell.tone {
-        // A chosen row's ground is darker: only full ink is readable on it.
-        _ if is_chosen => tokens.text,
-        Tone::Plain => tokens.text,
-        Tone::Quiet => tokens.text_quiet,
-        Tone::Alarm => tokens.alarm_text,
-    };
+fn cell_ui(ui: &Ui, cell: &TableCell, place: Rect, is_number: bool, is_chosen: bool) {
+    let tokens = tokens_of(ui);
+    // The ground of a chosen row is darker: only full ink is readable on it.
+    let emphasis = if is_chosen { Emphasis::Plain } else { cell.emphasis };
+    let ink = emphasis.ink(tokens);
     let mut left = place.left();
-    if let Some(mark) = cell.mark {
-        let center = pos2(left + mark::WIDTH * 0.4, place.center().y);
-        mark_at(ui.painter(), mark, center, ink);
-        left += mark::WIDTH;
+    if let Some(glyph) = cell.glyph {
+        let center = pos2(left + GLYPH_WIDTH * 0.4, place.center().y);
+        glyph_at(ui.painter(), glyph, center, GLYPH_RADIUS, ink);
+        left += GLYPH_WIDTH;
     }
     let font = TextStyle::Body.resolve(ui.style());
     let mut job = LayoutJob::single_section(cell.text.clone(), TextFormat::simple(font, ink));

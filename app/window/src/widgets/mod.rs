@@ -1,20 +1,23 @@
 //! Small controls used in more than one place.
 
-pub mod choice;
-pub mod choice_box;
-pub mod choice_table;
-pub mod fact_row;
-pub mod loop_times;
-pub mod mark;
-pub mod model_choice;
+mod buttons;
+mod choice_box;
+mod choice_table;
+mod fields;
+mod glyph;
+mod loop_times;
 pub mod places;
-pub mod quantity_input;
-pub mod reason_button;
-pub mod remark;
-pub mod state_badge;
-pub mod steady;
-pub mod step_mark;
-pub mod table;
-pub mod task_bar;
-pub mod text_row;
-pub mod tick_box;
+mod table;
+mod task_bar;
+mod text;
+
+pub use buttons::*;
+pub use choice_box::choice_box_ui;
+pub use choice_table::*;
+pub use fields::*;
+pub use glyph::*;
+pub use loop_times::loop_times_ui;
+pub use places::{NamedControl, places};
+pub use table::{Column, Emphasis, TableRow, table_ui};
+pub use task_bar::*;
+pub use text::*;

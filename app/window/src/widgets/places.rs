@@ -10,13 +10,13 @@ struct Places {
 }
 
 /// Something that the palette can lead to.
-pub trait Place {
+pub trait NamedControl {
     /// Says under which name.
-    fn place(self, name: &str) -> Self;
+    fn named(self, name: &str) -> Self;
 }
 
-impl Place for Response {
-    fn place(self, name: &str) -> Self {
+impl NamedControl for Response {
+    fn named(self, name: &str) -> Self {
         // Who comes here by key finds it in sight.
         if self.gained_focus() {
             self.scroll_to_me(None);

@@ -1,43 +1,42 @@
 //! A table of short texts: headings, aligned columns, a marked row; only rows in sight are laid out.
 
+use super::text::tokens_of;
 use crate::theme::Tokens;
-use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, Ui, UiBuilder, Vec2, pos2, vec2};
-use eframe::egui::{Rect, Sense};
+use eframe::egui::{
+    Align, Color32, Label, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2, pos2,
+    vec2,
+};
 
 /// Height of a row in points.
 pub(super) const ROW: f32 = 22.0;
 /// Space between columns in points.
 pub(super) const GAP: f32 = 10.0;
 
-/// One column.
+/// One column; its heading includes the unit.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// Heading with its unit.
     pub head: String,
-    /// Width in points.
+    /// In points.
     pub width: f32,
-    /// Whether its texts are numbers, which stand on the right.
+    /// Numbers stand on the right.
     pub is_number: bool,
 }
 
 impl Column {
-    /// A column of words.
     #[must_use]
     pub fn words(head: &str, width: f32) -> Self {
         Self { head: head.to_owned(), width, is_number: false }
     }
 
-    /// A column of numbers.
     #[must_use]
     pub fn numbers(head: &str, width: f32) -> Self {
         Self { head: head.to_owned(), width, is_number: true }
     }
 }
 
-/// How a row stands out.
+/// How a row or a cell stands out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RowLook {
-    /// As the others.
+pub enum Emphasis {
     #[default]
     Plain,
     /// The one to look at.
@@ -48,26 +47,33 @@ pub enum RowLook {
     Alarm,
 }
 
-/// One row.
+impl Emphasis {
+    pub(super) fn ink(self, tokens: &Tokens) -> Color32 {
+        match self {
+            Self::Plain | Self::Marked => tokens.text,
+            Self::Quiet => tokens.text_quiet,
+            Self::Alarm => tokens.alarm_text,
+        }
+    }
+}
+
+/// One row: a text for each column.
 #[derive(Clone, Debug, Default)]
-pub struct Row {
-    /// A text for each column.
+pub struct TableRow {
     pub cells: Vec<String>,
-    /// How it stands out.
-    pub look: RowLook,
-    /// What is said of it under the pointer.
+    pub emphasis: Emphasis,
+    /// Shown under the pointer.
     pub hint: Option<String>,
 }
 
 /// Draws the table in the space there is; scrolls both ways.
-pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
+pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) {
+    let tokens = tokens_of(ui);
+    let width = width_of(columns);
     ScrollArea::horizontal().id_salt((name, "across")).auto_shrink(false).show(ui, |ui| {
         ui.set_min_width(width);
         ui.spacing_mut().item_spacing = Vec2::ZERO;
-        let columns: Vec<&Column> = columns.iter().collect();
-        row_ui(ui, &columns, width, |ui, _, column| {
+        row_ui(ui, columns, width, |ui, _, column| {
             let text = RichText::new(&column.head).color(tokens.text_quiet).small();
             ui.add(Label::new(text).truncate());
         });
@@ -78,22 +84,16 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
             rows.len(),
             |ui, shown| {
                 for row in &rows[shown] {
-                    let ink = match row.look {
-                        RowLook::Plain | RowLook::Marked => tokens.text,
-                        RowLook::Quiet => tokens.text_quiet,
-                        RowLook::Alarm => tokens.alarm_text,
-                    };
-                    let rect = row_ui(ui, &columns, width, |ui, index, _| {
-                        let Some(cell) = row.cells.get(index) else {
-                            return;
-                        };
+                    let ink = row.emphasis.ink(tokens);
+                    let rect = row_ui(ui, columns, width, |ui, index, _| {
+                        let Some(cell) = row.cells.get(index) else { return };
                         let mut text = RichText::new(cell).color(ink);
-                        if row.look == RowLook::Marked {
+                        if row.emphasis == Emphasis::Marked {
                             text = text.strong();
                         }
                         ui.add(Label::new(text).truncate());
                     });
-                    if row.look == RowLook::Marked {
+                    if row.emphasis == Emphasis::Marked {
                         let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
                         ui.painter().rect_filled(mark, 0.0, tokens.text);
                     }
@@ -107,10 +107,15 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
     });
 }
 
+/// Width in points of all columns with the space between them.
+pub(super) fn width_of(columns: &[Column]) -> f32 {
+    columns.iter().map(|column| column.width + GAP).sum()
+}
+
 /// One line of cells; returns where it stands.
 pub(super) fn row_ui(
     ui: &mut Ui,
-    columns: &[&Column],
+    columns: &[Column],
     width: f32,
     mut cell_ui: impl FnMut(&mut Ui, usize, &Column),
 ) -> Rect {
@@ -118,10 +123,9 @@ pub(super) fn row_ui(
     let mut left = rect.left() + GAP * 0.5;
     for (index, column) in columns.iter().enumerate() {
         let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(column.width, ROW));
-        let layout = if column.is_number {
-            Layout::right_to_left(Align::Center)
-        } else {
-            Layout::left_to_right(Align::Center)
+        let layout = match column.is_number {
+            true => Layout::right_to_left(Align::Center),
+            false => Layout::left_to_right(Align::Center),
         };
         // A child of its own: the row has its space already, whatever the cell takes of it.
         let mut cell = ui.new_child(UiBuilder::new().max_rect(cell).layout(layout));

@@ -5,14 +5,14 @@ use eframe::egui::Context;
 
 /// Questions of one kind and their answers.
 #[derive(Debug)]
-pub struct Latest<Q, A> {
+pub struct LatestAnswer<Q, A> {
     name: &'static str,
     work: fn(&Q) -> Result<A, String>,
     job: Job<Result<A, String>>,
     next: Option<Q>,
 }
 
-impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
+impl<Q: Send + 'static, A: Send + 'static> LatestAnswer<Q, A> {
     /// Nothing asked yet. The threads have this name and do this work.
     #[must_use]
     pub fn new(name: &'static str, work: fn(&Q) -> Result<A, String>) -> Self {
@@ -34,14 +34,11 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
         if self.job.is_busy() {
             return;
         }
-        let Some(question) = self.next.take() else {
-            return;
-        };
-        let (work, wake) = (self.work, ctx.clone());
-        let started =
-            self.job.start(self.name, move || work(&question), move || wake.request_repaint());
+        let Some(question) = self.next.take() else { return };
+        let work = self.work;
+        let started = self.job.start(self.name, ctx, move || work(&question));
         if started.is_err() {
-            // No thread is to be had now; the next poll tells.
+            // The next poll tries again.
             ctx.request_repaint();
         }
     }
@@ -69,7 +66,7 @@ mod tests {
     use std::sync::mpsc::{Receiver, sync_channel};
 
     fn answers<Q: Send + 'static>(
-        latest: &mut Latest<Q, u32>,
+        latest: &mut LatestAnswer<Q, u32>,
         count: usize,
     ) -> Vec<Result<u32, String>> {
         let ctx = Context::default();
@@ -88,11 +85,12 @@ mod tests {
         let (go, wait) = sync_channel::<()>(8);
         type Question = (u32, std::sync::Arc<Mutex<Receiver<()>>>);
         let wait = std::sync::Arc::new(Mutex::new(wait));
-        let mut latest: Latest<Question, u32> = Latest::new("test", |(number, wait)| {
-            let wait = wait.lock().map_err(|err| err.to_string())?;
-            wait.recv().map_err(|err| err.to_string())?;
-            Ok(*number)
-        });
+        let mut latest: LatestAnswer<Question, u32> =
+            LatestAnswer::new("test", |(number, wait)| {
+                let wait = wait.lock().map_err(|err| err.to_string())?;
+                wait.recv().map_err(|err| err.to_string())?;
+                Ok(*number)
+            });
         for number in 0..5 {
             latest.ask((number, wait.clone()), &ctx);
         }
@@ -106,7 +104,7 @@ mod tests {
     #[test]
     fn work_that_dies_says_so_and_the_next_is_done() {
         let ctx = Context::default();
-        let mut latest: Latest<u32, u32> = Latest::new("test", |number| {
+        let mut latest: LatestAnswer<u32, u32> = LatestAnswer::new("test", |number| {
             assert!(*number != 0, "on purpose");
             Ok(*number)
         });

@@ -1,18 +1,20 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
-pub mod feel;
 pub mod fit;
-pub mod latest;
-pub mod path_dialog;
+pub mod haptic_loop;
+mod latest;
+pub mod live_scene;
+mod path_dialog;
 pub mod player;
-pub mod ports;
-pub mod recovery;
 pub mod review;
-pub mod task;
-pub mod touch;
+mod task;
 pub mod trail;
 
+use eframe::egui::Context;
+pub use latest::LatestAnswer;
+pub use path_dialog::{Dialog, PathPurpose, pick};
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+pub use task::{BackgroundTask, TaskState};
 
 /// One job at a time on a named thread; the answer is fetched when it is there.
 #[derive(Debug)]
@@ -32,25 +34,26 @@ impl<T: Send + 'static> Job<T> {
         self.answer.is_some()
     }
 
-    /// Starts the job, unless one is under way. `done` is called when the answer is there.
+    /// Starts the job, unless one is in progress. The window is drawn again when the answer is there.
     pub fn start(
         &mut self,
         name: &str,
+        ctx: &Context,
         work: impl FnOnce() -> T + Send + 'static,
-        done: impl FnOnce() + Send + 'static,
     ) -> std::io::Result<()> {
         if self.is_busy() {
             return Ok(());
         }
         let (sender, receiver) = sync_channel(1);
+        let ctx = ctx.clone();
         let span = tracing::info_span!("worker", name);
         std::thread::Builder::new().name(name.into()).spawn(move || {
             let _in = span.entered();
             tracing::debug!("started");
-            // Nobody may wait any more when the window has closed.
+            // The receiver is gone when the window has closed.
             let _ = sender.try_send(work());
             tracing::debug!("ended");
-            done();
+            ctx.request_repaint();
         })?;
         self.answer = Some(receiver);
         Ok(())
@@ -80,23 +83,16 @@ impl<T: Send + 'static> Job<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_test_support::wait::until;
 
     #[test]
     fn an_answer_is_fetched_once_and_then_a_new_job_may_start() {
         let mut job = Job::default();
         for round in 0..2 {
-            let (done, is_done) = sync_channel(1);
-            job.start(
-                "test-job",
-                move || round + 40,
-                move || {
-                    let _ = done.try_send(());
-                },
-            )
-            .unwrap();
+            job.start("test-job", &Context::default(), move || round + 40).unwrap();
             assert!(job.is_busy());
-            is_done.recv().unwrap();
-            assert_eq!(job.poll(), Some(round + 40));
+            let answer = until(|| job.poll(), || "an answer".into());
+            assert_eq!(answer, round + 40);
             assert_eq!(job.poll(), None);
             assert!(!job.is_busy());
         }
@@ -105,12 +101,12 @@ mod tests {
     #[test]
     fn a_job_that_dies_does_not_stay_busy() {
         let mut job: Job<u32> = Job::default();
-        job.start("test-job", || panic!("on purpose"), || {}).unwrap();
+        job.start("test-job", &Context::default(), || panic!("on purpose")).unwrap();
         let is_idle = || {
             let is_idle = !job.is_busy();
             assert_eq!(job.poll(), None);
             is_idle.then_some(())
         };
-        palpate_test_support::wait::until(is_idle, || "a job that is not busy".into());
+        until(is_idle, || "a job that is not busy".into());
     }
 }

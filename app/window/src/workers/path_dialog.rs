@@ -1,14 +1,14 @@
 //! The desktop's own dialogs for folders and files, each on its own thread: they block whoever opens them.
 
 use super::Job;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::{alarm_ui, quiet_ui};
 use eframe::egui::{Button, Context, Ui};
 use rfd::FileDialog;
 use std::path::PathBuf;
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ask {
+pub enum PathPurpose {
     /// Where new sessions go.
     NewSessions,
     /// A recorded session to compare models on.
@@ -48,9 +48,7 @@ impl<T: Send + 'static> Dialog<T> {
         ctx: &Context,
         pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
     ) -> Result<(), String> {
-        let ctx = ctx.clone();
-        let pick = move || pick(FileDialog::new());
-        let opened = self.job.start("dialog", pick, move || ctx.request_repaint());
+        let opened = self.job.start("dialog", ctx, move || pick(FileDialog::new()));
         opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
 
@@ -81,17 +79,19 @@ impl<T: Send + 'static> Dialog<T> {
 
 /// Chooses what is asked for.
 #[must_use]
-pub fn pick(ask: Ask, dialog: FileDialog) -> Option<(Ask, PathBuf)> {
+pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBuf)> {
     let of_kind = |title: &str, kind: &str, endings: &[&str]| {
         let dialog = dialog.clone().set_title(title);
         dialog.add_filter(kind, endings).pick_file()
     };
     let path = match ask {
-        Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-        Ask::Session | Ask::Body => dialog.set_title("Folder of a session").pick_folder(),
-        Ask::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
-        Ask::Scene => of_kind("Scene", "scenes", &["toml"]),
-        Ask::Protocol => of_kind("Protocol", "protocols", &["toml"]),
+        PathPurpose::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
+        PathPurpose::Session | PathPurpose::Body => {
+            dialog.set_title("Folder of a session").pick_folder()
+        }
+        PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
+        PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
+        PathPurpose::Protocol => of_kind("Protocol", "protocols", &["toml"]),
     };
     Some((ask, path?))
 }

@@ -6,35 +6,38 @@ use palpate_analysis::progress::TaskProgress;
 use palpate_runner::Stopwatch;
 use std::sync::Arc;
 
-/// How far a task is, for drawing.
+/// How far a task is.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing {
-    /// Share done, 0 to 1.
+pub struct TaskState {
+    /// Done, 0 to 1.
     pub fraction: f64,
-    /// What it is at.
+    /// The piece of work in progress.
     pub what: String,
-    /// Seconds since it began.
+    /// Since the start.
     pub seconds: f64,
-    /// Seconds left at this pace, once a piece is done.
+    /// At this pace, once a piece is done.
     pub seconds_left: Option<f64>,
 }
 
 /// One task at a time and its last answer.
-pub struct Task<T> {
+pub struct BackgroundTask<T> {
     job: Job<Result<T, String>>,
     progress: Arc<TaskProgress>,
     since: Option<Stopwatch>,
     answer: Option<Result<T, String>>,
+    /// The last start failed, which the next poll reports as an end.
+    has_failed: bool,
 }
 
-impl<T> Default for Task<T> {
+impl<T> Default for BackgroundTask<T> {
     fn default() -> Self {
-        Self { job: Job::default(), progress: Arc::default(), since: None, answer: None }
+        let (job, progress) = (Job::default(), Arc::default());
+        Self { job, progress, since: None, answer: None, has_failed: false }
     }
 }
 
-impl<T: Send + 'static> Task<T> {
-    /// Starts work, unless some is under way. The last answer stays until the new one is there.
+impl<T: Send + 'static> BackgroundTask<T> {
+    /// Starts work, unless some is in progress. The last answer stays until the new one is there.
     pub fn start(
         &mut self,
         name: &str,
@@ -45,31 +48,29 @@ impl<T: Send + 'static> Task<T> {
             return;
         }
         self.progress = Arc::default();
-        let (progress, wake) = (Arc::clone(&self.progress), ctx.clone());
-        let started = self.job.start(
-            name,
-            move || logged(|| work(&progress)),
-            move || wake.request_repaint(),
-        );
-        match started {
+        let progress = Arc::clone(&self.progress);
+        match self.job.start(name, ctx, move || logged(|| work(&progress))) {
             Ok(()) => self.since = Some(Stopwatch::start()),
-            Err(err) => self.answer = Some(Err(format!("the work cannot be started: {err}"))),
+            Err(err) => {
+                self.answer = Some(Err(format!("the work cannot be started: {err}")));
+                self.has_failed = true;
+            }
         }
     }
 
-    /// Fetches the answer if it has come.
-    pub fn poll(&mut self) {
+    /// Fetches the answer if it has come; true when the work has just ended.
+    pub fn poll(&mut self) -> bool {
         if !self.job.is_busy() {
-            return;
+            return std::mem::take(&mut self.has_failed);
         }
         let answer = self.job.poll();
         if self.job.is_busy() {
-            return;
+            return false;
         }
         self.since = None;
         let is_cancelled = self.progress.is_cancelled();
         match answer {
-            // A cancelled task has no answer; what was known before stays.
+            // A cancelled task has no answer; the one before stays.
             Some(Err(_)) if is_cancelled => {}
             Some(answer) => self.answer = Some(answer),
             None => {
@@ -77,6 +78,11 @@ impl<T: Send + 'static> Task<T> {
                 self.answer = Some(Err(gone.to_owned()));
             }
         }
+        true
+    }
+
+    pub fn is_busy(&self) -> bool {
+        self.job.is_busy()
     }
 
     /// Asks the work to end at its next piece.
@@ -84,22 +90,21 @@ impl<T: Send + 'static> Task<T> {
         self.progress.cancel();
     }
 
-    /// Whether it was asked to end and has not yet.
+    /// Whether it is cancelled and has not ended yet.
     pub fn is_ending(&self) -> bool {
         self.job.is_busy() && self.progress.is_cancelled()
     }
 
-    /// The last answer.
     pub fn answer(&self) -> Option<&Result<T, String>> {
         self.answer.as_ref()
     }
 
-    /// How far it is; none when nothing is under way.
-    pub fn standing(&self) -> Option<Standing> {
+    /// None while no work is in progress.
+    pub fn state(&self) -> Option<TaskState> {
         let seconds = self.since.as_ref()?.seconds();
         let (done, of, what) = self.progress.read();
         let (done, of) = (done as f64, of as f64);
-        Some(Standing {
+        Some(TaskState {
             fraction: if of > 0.0 { (done / of).min(1.0) } else { 0.0 },
             what,
             seconds,
@@ -127,16 +132,16 @@ mod tests {
     use std::sync::mpsc::{Receiver, sync_channel};
     use std::time::Duration;
 
-    fn finish<T: Send + 'static>(task: &mut Task<T>) {
+    fn finish<T: Send + 'static>(task: &mut BackgroundTask<T>) {
         let is_done = || {
             task.poll();
-            task.standing().is_none().then_some(())
+            task.state().is_none().then_some(())
         };
         until(is_done, || "the end of the task".into());
     }
 
     /// A task that does `of` pieces, each when `go` says so.
-    fn stepwise(task: &mut Task<usize>, of: usize, go: Receiver<()>) {
+    fn stepwise(task: &mut BackgroundTask<usize>, of: usize, go: Receiver<()>) {
         task.start("test", &Context::default(), move |progress| {
             for done in 0..of {
                 if progress.tell(done, of, "a piece").is_break() {
@@ -149,22 +154,22 @@ mod tests {
     }
 
     #[test]
-    fn progress_is_told_and_the_answer_stays() {
+    fn progress_is_reported_and_the_answer_stays() {
         let (step, go) = sync_channel(8);
-        let mut task = Task::default();
+        let mut task = BackgroundTask::default();
         stepwise(&mut task, 4, go);
         for _ in 0..2 {
             step.send(()).unwrap();
         }
-        let standing = loop {
-            let standing = task.standing().unwrap();
-            if standing.fraction == 0.5 {
-                break standing;
+        let state = loop {
+            let state = task.state().unwrap();
+            if state.fraction == 0.5 {
+                break state;
             }
             std::thread::sleep(Duration::from_millis(1));
         };
-        assert_eq!(standing.what, "a piece");
-        assert!(standing.seconds_left.is_some());
+        assert_eq!(state.what, "a piece");
+        assert!(state.seconds_left.is_some());
         for _ in 0..2 {
             step.send(()).unwrap();
         }
@@ -174,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_cancelled_task_keeps_the_answer_before() {
-        let mut task = Task::default();
+        let mut task = BackgroundTask::default();
         task.start("test", &Context::default(), |_| Ok(7));
         finish(&mut task);
         let (step, go) = sync_channel(8);
@@ -189,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_task_that_dies_says_so() {
-        let mut task: Task<u32> = Task::default();
+        let mut task: BackgroundTask<u32> = BackgroundTask::default();
         task.start("test", &Context::default(), |_| panic!("on purpose"));
         finish(&mut task);
         assert!(matches!(task.answer(), Some(Err(text)) if text.contains("unexpectedly")));

@@ -1,17 +1,17 @@
-//! The past of a loop as it was seen, for plots and for looks at how it keeps its time.
+//! The past of a loop for plots.
 
 use std::collections::VecDeque;
 
-/// How much of the past is kept for the plots, in s.
+/// Past of a loop on the plots, in s.
 pub const PAST_S: f64 = 10.0;
 
-/// Between two looks at how a loop keeps its time, in s: numbers that change faster cannot be read.
-pub(super) const LOOK_S: f64 = 0.5;
+/// Between two readings of a loop's timing, in s: numbers that change faster cannot be read.
+pub(super) const TIMING_S: f64 = 0.5;
 
-/// Forgets the points, in order of their times in s, that are older at `now` than is kept.
+/// Forgets the points, in order of their times in s, that are older at `now`.
 pub(super) fn forget_old<T>(trail: &mut VecDeque<T>, now: f64, time: impl Fn(&T) -> f64) {
-    let kept = trail.partition_point(|point| time(point) < now - PAST_S);
-    trail.drain(..kept);
+    let old = trail.partition_point(|point| time(point) < now - PAST_S);
+    trail.drain(..old);
 }
 
 #[cfg(test)]
@@ -19,7 +19,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_as_old_as_is_kept_stays_and_what_is_older_goes() {
+    fn points_older_than_the_past_are_dropped() {
         let mut trail: VecDeque<f64> = (0..40).map(f64::from).collect();
         forget_old(&mut trail, 35.0, |t| *t);
         assert!(trail.iter().copied().eq((25..40).map(f64::from)));

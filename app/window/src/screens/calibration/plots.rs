@@ -1,29 +1,24 @@
 //! The chosen calibration as four plots over force: signal, residual, slope and uncertainty.
 
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
-use eframe::egui::{RichText, Ui, vec2};
+use crate::widgets::heading_ui;
+use eframe::egui::{Ui, vec2};
 use palpate_figures::figure::Plot;
 
-/// How each looks: it is half as wide as the plots of a run.
-const LOOK: PlotLook<'_> = PlotLook {
-    steps: [Some(4.0), None],
-    link: Some("calibration_force"),
-    shown: None,
-    x_text: None,
-    over: None,
-};
-
-/// Draws all four in the space there is, two beside each other.
+/// Draws all four in the space there is, two in a row.
 pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
     let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 62.0) * 0.5);
+    // Half as wide as the plots of a run.
+    let steps = [Some(4.0), None];
+    let look = PlotLook { steps, link: Some("calibration_force"), ..PlotLook::default() };
     for row in plots.chunks(2) {
         ui.horizontal(|ui| {
             for plot in row {
                 ui.vertical(|ui| {
-                    ui.label(RichText::new(&plot.title).heading().strong());
+                    heading_ui(ui, &plot.title);
                     ui.allocate_ui(size, |ui| {
                         ui.set_min_size(size);
-                        plot_ui(ui, &plot.title, plot, LOOK);
+                        plot_ui(ui, &plot.title, plot, look);
                     });
                 });
             }

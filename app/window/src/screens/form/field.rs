@@ -1,4 +1,4 @@
-//! A parameter of a protocol as it is typed, and a thing that is told about the session.
+//! A parameter of a protocol as it is typed, and a label of the session.
 
 use palpate_model::about::Key;
 use palpate_model::rig::RigDescription;
@@ -8,13 +8,11 @@ use palpate_protocols::file::{Given, Kind, Parameter, What};
 /// A parameter being typed.
 #[derive(Clone, Debug)]
 pub struct ParamField {
-    /// What may be typed.
     pub parameter: Parameter,
-    /// As typed.
     pub text: String,
-    /// The unit of a number that is typed without one; empty where there is none.
+    /// Of a number that is typed without a unit; empty where there is none.
     pub unit: &'static str,
-    /// The value as the protocol takes it, or what is wrong in one sentence.
+    /// As the protocol takes it, or what is wrong.
     pub value: Result<String, String>,
 }
 
@@ -46,25 +44,23 @@ impl ParamField {
         if text.is_empty() {
             return match (&self.parameter.default.what, self.parameter.kind) {
                 (What::None, _) => Ok("none".into()),
-                (_, Kind::Text) => Err("some words are missing here".into()),
+                (_, Kind::Text) => Err("type a text here".into()),
                 _ => Err(format!(
                     "a number is missing here; write it like {}",
                     self.parameter.default.text
                 )),
             };
         }
-        let value = if self.parameter.is_list {
-            let items: Vec<String> = text.split(',').map(|one| self.with_unit(one)).collect();
-            items.join(", ")
-        } else {
-            self.with_unit(text)
+        let value = match self.parameter.is_list {
+            true => text.split(',').map(|one| self.with_unit(one)).collect::<Vec<_>>().join(", "),
+            false => self.with_unit(text),
         };
         let given = self.parameter.read(&value)?;
         check_speeds(&given, rig)?;
         Ok(value)
     }
 
-    /// A bare number gets the unit that stands beside the field.
+    /// A number without a unit gets the one of the field.
     fn with_unit(&self, text: &str) -> String {
         let text = text.trim();
         if self.unit.is_empty() || text.parse::<f64>().is_err() {
@@ -74,13 +70,13 @@ impl ParamField {
         }
     }
 
-    /// The unit to show beside the field: none where the text has one of its own.
-    pub fn unit_beside(&self) -> &'static str {
+    /// The unit to show next to the field: none where the text has a unit of its own.
+    pub fn shown_unit(&self) -> &'static str {
         let text = self.text.trim();
         if text.is_empty() || text.parse::<f64>().is_ok() { self.unit } else { "" }
     }
 
-    /// What it is, its range and where the usual value comes from, a line each.
+    /// Meaning, range and source of the usual value, a line each.
     pub fn hint(&self) -> String {
         let one = &self.parameter;
         let mut lines = vec![one.about.clone()];
@@ -92,11 +88,11 @@ impl ParamField {
             (None, None) => None,
         };
         lines.extend(range.map(|range| range.trim_end().to_owned()));
-        let source = match one.source.as_str() {
-            "" => String::new(),
-            source => format!(" ({source})"),
-        };
-        lines.push(format!("usual: {}{source}", one.default.text));
+        let usual = &one.default.text;
+        lines.push(match one.source.as_str() {
+            "" => format!("usual: {usual}"),
+            source => format!("usual: {usual} ({source})"),
+        });
         lines.join("\n")
     }
 }
@@ -120,17 +116,14 @@ fn split(given: &Given, kind: Kind) -> (String, &'static str) {
     parts.unwrap_or_else(|| (given.text.clone(), kind.unit()))
 }
 
-/// Something that is told about the session.
+/// A label of the session as it is typed, such as its operator.
 #[derive(Clone, Debug)]
-pub struct ToldField {
-    /// What.
+pub struct LabelField {
     pub key: &'static Key,
-    /// As typed; empty where nothing is told.
     pub text: String,
-    /// What is wrong with it.
     pub error: Option<String>,
-    /// Whether the protocol asks for it.
-    pub is_asked: bool,
+    /// The protocol requires it.
+    pub is_required: bool,
 }
 
 #[cfg(test)]
@@ -153,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bare_number_has_the_unit_beside_the_field() {
+    fn a_number_without_a_unit_has_that_of_the_field() {
         let of = |name: &str, field: &str| {
             let mut all = fields(name).into_iter();
             all.find(|one| one.parameter.name == field).unwrap()
@@ -162,9 +155,9 @@ mod tests {
         assert_eq!((rest.text.as_str(), rest.unit), ("3", "min"));
         assert_eq!(read(&rest, " 2 ").unwrap(), "2 min");
         assert_eq!(read(&rest, "5 s").unwrap(), "5 s");
-        assert_eq!(rest.unit_beside(), "min");
+        assert_eq!(rest.shown_unit(), "min");
         let own = ParamField { text: "5 s".into(), ..rest.clone() };
-        assert_eq!(own.unit_beside(), "");
+        assert_eq!(own.shown_unit(), "");
         let masses = of("load-cell-calibration", "masses");
         assert_eq!(read(&masses, "500, 0.6 kg").unwrap(), "500 g, 0.6 kg");
         let unload = of("ramp-hold", "unload");

@@ -1,13 +1,13 @@
-//! What the technician chooses and types, checked on every change and previewed before anything moves.
+//! The protocol and its values as typed, checked on every change and previewed before anything moves.
 
 mod field;
 
-pub use field::{ParamField, ToldField};
+pub use field::{LabelField, ParamField};
 
-use crate::command::Aside;
+use crate::command::ManualMove;
+use crate::widgets::require;
 use palpate_analysis::daily::is_gated;
-use palpate_model::about::KEYS;
-use palpate_model::about::Labels;
+use palpate_model::about::{KEYS, Labels};
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::file::{Problem, Protocol, built_in};
@@ -23,56 +23,49 @@ const FIRST: &str = "ramp-hold";
 /// Numbered session folders in a chosen folder. More in one folder are hard to find again.
 const SESSIONS_MAX: u32 = 9_999;
 
-/// What is known about the load cell and its limits.
+/// Calibration and limits of new sessions.
 #[derive(Clone, Debug)]
-pub struct Bench {
-    /// Volts to newtons, as recorded in each session.
+pub struct RunSetup {
     pub calibration: Calibration,
-    /// The same as a curve.
+    /// Of the calibration.
     pub curve: Curve,
-    /// Interlock thresholds.
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
 }
 
-/// A protocol that was chosen, with what is typed for it.
+/// The protocol that is chosen, with the values typed for it.
 #[derive(Clone, Debug)]
 pub struct ProtocolForm {
-    /// The protocol, or what is wrong with its file.
+    /// Or the problems of its file.
     pub protocol: Result<Protocol, Vec<Problem>>,
-    /// The file it was read from; none for a built-in one.
+    /// None for a built-in protocol.
     pub file: Option<PathBuf>,
-    /// Its parameters.
     pub fields: Vec<ParamField>,
-    /// What can be told about the session, in the order of [`KEYS`].
-    pub told: Vec<ToldField>,
+    /// In the order of [`KEYS`].
+    pub label_fields: Vec<LabelField>,
     /// Folder for new sessions; empty for the library.
     pub folder: String,
     labels: Labels,
     acknowledged: Vec<String>,
-    checked: Option<(CheckKey, Result<Checked, Vec<Problem>>)>,
+    checked: Option<(CheckKey, Result<CheckedPlan, Vec<Problem>>)>,
 }
 
-/// What a preview depends on beside the protocol: values by name and whether the axis is homed. `None` while a
-/// value is wrong.
+/// What a preview depends on apart from the protocol: values by name, `None` while one is wrong, and whether the axis is
+/// homed.
 type CheckKey = (Option<BTreeMap<String, String>>, bool);
 
-/// A plan written out for what was typed, with its preview.
+/// The plan for the values typed, with its preview.
 #[derive(Clone, Debug)]
-pub struct Checked {
-    /// The plan.
+pub struct CheckedPlan {
     pub plan: Plan,
-    /// What to look at before the start.
     pub warnings: Vec<Problem>,
-    /// What the plan will do.
     pub preview: Preview,
-    /// Depth and force over time as an average specimen would answer.
+    /// Expected depth and force over time for an average specimen.
     pub outline: Vec<OutlinePoint>,
 }
 
-impl Checked {
-    /// Greatest depth in mm.
+impl CheckedPlan {
     pub fn deepest_mm(&self) -> f64 {
         let depths = self.outline.iter().map(|point| point.depth.0);
         depths.fold(0.0, f64::max)
@@ -81,32 +74,25 @@ impl Checked {
 
 impl Default for ProtocolForm {
     fn default() -> Self {
-        let told = KEYS.iter().map(|key| ToldField {
-            key,
-            text: match key.name {
-                "indenter" => "blunt 12 mm probe".into(),
-                _ => String::new(),
-            },
-            error: None,
-            is_asked: false,
-        });
+        let empty = |key| LabelField { key, text: String::new(), error: None, is_required: false };
         let mut form = Self {
             protocol: Err(Vec::new()),
             file: None,
             fields: Vec::new(),
-            told: told.collect(),
+            label_fields: KEYS.iter().map(empty).collect(),
             folder: String::new(),
             labels: Labels::default(),
             acknowledged: Vec::new(),
             checked: None,
         };
+        form.set_label("indenter", "blunt 12 mm probe");
         form.choose_built_in(FIRST);
         form
     }
 }
 
 impl ProtocolForm {
-    /// Takes a built-in protocol; a name that is none changes nothing.
+    /// Takes a built-in protocol; an unknown name changes nothing.
     pub fn choose_built_in(&mut self, name: &str) {
         if let Some(protocol) = built_in(name) {
             self.choose(protocol, None);
@@ -125,34 +111,29 @@ impl ProtocolForm {
     fn choose(&mut self, protocol: Result<Protocol, Vec<Problem>>, file: Option<PathBuf>) {
         let parameters = protocol.iter().flat_map(|one| one.parameters.iter());
         self.fields = parameters.cloned().map(ParamField::new).collect();
-        for told in &mut self.told {
-            let mut asked = protocol.iter().flat_map(|one| one.ask.iter());
-            told.is_asked = asked.any(|name| name == told.key.name);
+        for field in &mut self.label_fields {
+            let mut required = protocol.iter().flat_map(|one| one.ask.iter());
+            field.is_required = required.any(|name| name == field.key.name);
         }
         self.protocol = protocol;
         self.file = file;
         self.forget();
     }
 
-    /// Previews again at the next chance: the protocol or the calibration is another.
+    /// Drops the preview, because the protocol or the calibration has changed.
     pub fn forget(&mut self) {
         self.checked = None;
         self.acknowledged.clear();
     }
 
-    /// Checks what was typed and previews the plan again, if anything it depends on changed.
-    pub fn refresh(&mut self, rig: &RigDescription, bench: &Bench, is_homed: bool) {
-        self.tell();
-        for field in &mut self.fields {
-            field.check(rig);
-        }
-        let Ok(protocol) = &self.protocol else {
-            return;
-        };
-        let name = |field: &ParamField| field.parameter.name.clone();
+    /// Checks what is typed, and previews the plan again if something that it depends on has changed.
+    pub fn refresh(&mut self, rig: &RigDescription, bench: &RunSetup, is_homed: bool) {
+        self.read_labels();
+        self.fields.iter_mut().for_each(|field| field.check(rig));
+        let Ok(protocol) = &self.protocol else { return };
         let values = self.fields.iter().map(|field| {
             let value = field.value.as_ref().ok()?;
-            Some((name(field), value.clone()))
+            Some((field.parameter.name.clone(), value.clone()))
         });
         let key = (values.collect(), is_homed);
         if self.checked.as_ref().is_some_and(|(old, _)| *old == key) {
@@ -164,9 +145,8 @@ impl ProtocolForm {
         };
         let checked = protocol.write_out(values).map(|written| {
             let mut preview = preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed);
-            let beside = bench.to_acknowledge.iter().cloned();
-            preview.acknowledgements.extend(beside);
-            Checked {
+            preview.acknowledgements.extend(bench.to_acknowledge.iter().cloned());
+            CheckedPlan {
                 preview,
                 outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
                 warnings: written.warnings,
@@ -176,73 +156,79 @@ impl ProtocolForm {
         self.checked = Some((key, checked));
     }
 
-    fn tell(&mut self) {
+    fn read_labels(&mut self) {
         self.labels = Labels::default();
-        for field in &mut self.told {
+        for field in &mut self.label_fields {
             field.error = None;
             if !field.text.trim().is_empty() {
-                let told = self.labels.tell(field.key.name, &field.text);
-                field.error = told.err().map(|err| err.to_string());
+                let read = self.labels.tell(field.key.name, &field.text);
+                field.error = read.err().map(|err| err.to_string());
             }
         }
     }
 
-    /// Writes into a field of what is told; a name that is none changes nothing.
-    pub fn set_told(&mut self, name: &str, text: &str) {
-        let field = self.told.iter_mut().find(|field| field.key.name == name);
-        if let Some(field) = field {
+    /// Writes into the field of a label; an unknown name changes nothing.
+    pub fn set_label(&mut self, name: &str, text: &str) {
+        let mut fields = self.label_fields.iter_mut();
+        if let Some(field) = fields.find(|field| field.key.name == name) {
             text.clone_into(&mut field.text);
         }
     }
 
-    /// What stands in a field of what is told.
-    pub fn told_text(&self, name: &str) -> &str {
-        let field = self.told.iter().find(|field| field.key.name == name);
+    pub fn label_text(&self, name: &str) -> &str {
+        let field = self.label_fields.iter().find(|field| field.key.name == name);
         field.map_or("", |field| &field.text)
     }
 
-    /// The request for a run beside what stands in the form, or why there is none.
-    pub fn aside(&self, aside: &Aside, rig: &RigView, bench: &Bench) -> Result<RunRequest, String> {
+    /// The request for a manual move, or why there is none.
+    pub fn manual_request(
+        &self,
+        manual: &ManualMove,
+        rig: &RigView,
+        bench: &RunSetup,
+    ) -> Result<RunRequest, String> {
         let words =
-            |problems: &[Problem]| problems.first().map_or_else(String::new, ToString::to_string);
-        let protocol = built_in(aside.protocol)
-            .ok_or("the protocol is not built in")?
-            .map_err(|problems| words(&problems))?;
-        let plan = protocol.plan(&aside.values).map_err(|problems| words(&problems))?;
+            |problems: Vec<Problem>| problems.first().map_or_else(String::new, ToString::to_string);
+        let protocol = built_in(manual.protocol).ok_or("the protocol is not built in")?;
+        let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
-        // What must be acknowledged is not acknowledged by a button that is pressed in passing.
+        // A button of a manual move acknowledges nothing.
         if let (true, Some(reason)) = (is_gated(&plan), bench.to_acknowledge.first()) {
             return Err(format!(
                 "{reason}; make the daily check, or accept it on the run screen with the protocol {}",
-                aside.protocol
+                manual.protocol
             ));
         }
         preview.verdict(false)?;
-        Ok(RunRequest {
+        Ok(RunRequest { to_acknowledge: Vec::new(), ..self.request_for(plan, bench, false) })
+    }
+
+    fn request_for(&self, plan: Plan, bench: &RunSetup, is_acknowledged: bool) -> RunRequest {
+        RunRequest {
             plan,
             calibration: bench.calibration.clone(),
             limits: bench.limits,
             out: self.session_folder(),
             labels: self.labels.clone(),
-            is_acknowledged: false,
-            to_acknowledge: Vec::new(),
+            is_acknowledged,
+            to_acknowledge: bench.to_acknowledge.clone(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
             leader: None,
-        })
+        }
     }
 
-    /// What is indented, as far as it is told.
+    /// Empty where none is typed.
     pub fn specimen(&self) -> &str {
         &self.labels.specimen
     }
 
     /// The plan and its preview; `None` while something is wrong.
-    pub fn checked(&self) -> Option<&Checked> {
+    pub fn checked(&self) -> Option<&CheckedPlan> {
         self.checked.as_ref()?.1.as_ref().ok()
     }
 
-    /// What is wrong with the file, or with the values together.
+    /// Problems of the file, or of the values together.
     pub fn problems(&self) -> &[Problem] {
         match (&self.protocol, &self.checked) {
             (Err(problems), _) | (Ok(_), Some((_, Err(problems)))) => problems,
@@ -250,7 +236,7 @@ impl ProtocolForm {
         }
     }
 
-    /// Whether everything the preview asks to acknowledge is acknowledged, in its present words.
+    /// Whether all warnings of the preview are acknowledged in their present words.
     pub fn is_acknowledged(&self) -> bool {
         self.checked().is_some_and(|checked| {
             !checked.preview.acknowledgements.is_empty()
@@ -258,7 +244,7 @@ impl ProtocolForm {
         })
     }
 
-    /// Ticks or unticks the acknowledgement. It holds for these words only: other forces ask anew.
+    /// Ticks or clears the acknowledgement. It holds for these words only: other forces need another one.
     pub fn acknowledge(&mut self, is_acknowledged: bool) {
         self.acknowledged = match self.checked() {
             Some(checked) if is_acknowledged => checked.preview.acknowledgements.clone(),
@@ -266,55 +252,36 @@ impl ProtocolForm {
         };
     }
 
-    /// Whether the plan may start as it stands in the form, or the reason why not.
+    /// Whether the plan may start, or why not.
     pub fn verdict(&self) -> Result<(), String> {
-        if self.protocol.is_err() {
-            return Err("correct the protocol file or choose another protocol".into());
-        }
+        let is_read = self.protocol.is_ok();
+        require(is_read, "correct the protocol file or choose another protocol")?;
         let wrong = self.fields.iter().find(|field| field.value.is_err());
         let wrong = wrong.map(|field| field.parameter.name.as_str());
-        let told = self.told.iter().find(|field| field.error.is_some());
-        if let Some(name) = wrong.or(told.map(|field| field.key.name)) {
+        let mut labels = self.label_fields.iter();
+        let wrong_label = labels.find(|field| field.error.is_some()).map(|field| field.key.name);
+        if let Some(name) = wrong.or(wrong_label) {
             return Err(format!("correct the {name} first"));
         }
         self.labels.check().map_err(|err| err.to_string())?;
-        let open = self.told.iter();
-        let open = open.filter(|field| field.is_asked && field.text.trim().is_empty());
-        let open: Vec<&str> = open.map(|field| field.key.name).collect();
-        if !open.is_empty() {
-            return Err(format!("fill in {} first", open.join(", ")));
-        }
+        let missing = self.label_fields.iter();
+        let missing = missing.filter(|field| field.is_required && field.text.trim().is_empty());
+        let missing: Vec<&str> = missing.map(|field| field.key.name).collect();
+        require(missing.is_empty(), format!("fill in {} first", missing.join(", ")))?;
         if let Some(problem) = self.problems().first() {
             return Err(problem.to_string());
         }
-        let Some(checked) = self.checked() else {
-            return Err("the plan is not checked yet".into());
-        };
-        if checked.preview.refusals.is_empty()
-            && !checked.preview.acknowledgements.is_empty()
-            && !self.is_acknowledged()
-        {
-            return Err("tick the box above first".into());
-        }
-        checked.preview.verdict(self.is_acknowledged())
+        let checked = self.checked().ok_or("the plan is not checked yet")?;
+        let preview = &checked.preview;
+        let is_box_open = preview.refusals.is_empty() && !preview.acknowledgements.is_empty();
+        require(!is_box_open || self.is_acknowledged(), "tick the box above first")?;
+        preview.verdict(self.is_acknowledged())
     }
 
-    /// The request to run what stands in the form; `None` while it may not start.
-    pub fn request(&self, bench: &Bench) -> Option<RunRequest> {
+    /// The request to run the plan; `None` while it may not start.
+    pub fn request(&self, bench: &RunSetup) -> Option<RunRequest> {
         self.verdict().ok()?;
-        let checked = self.checked()?;
-        Some(RunRequest {
-            plan: checked.plan.clone(),
-            calibration: bench.calibration.clone(),
-            limits: bench.limits,
-            out: self.session_folder(),
-            labels: self.labels.clone(),
-            is_acknowledged: self.is_acknowledged(),
-            to_acknowledge: bench.to_acknowledge.clone(),
-            after_stop: AfterStop::Wait,
-            answers: Answers::Operator,
-            leader: None,
-        })
+        Some(self.request_for(self.checked()?.plan.clone(), bench, self.is_acknowledged()))
     }
 
     /// The next free numbered folder in the chosen folder; `None` leaves the choice to the library.

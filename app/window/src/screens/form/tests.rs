@@ -3,11 +3,11 @@ use palpate_drivers::sim::SimSettings;
 use palpate_model::units::MmPerS;
 use palpate_protocols::plans::{Hold, RampHold, Step, Unload};
 
-fn bench() -> (RigDescription, Bench) {
+fn bench() -> (RigDescription, RunSetup) {
     let settings = SimSettings::default();
     let rig = palpate_drivers::open("sim", &settings).unwrap();
     let calibration = palpate_drivers::sim::calibration(settings.profile);
-    let bench = Bench {
+    let bench = RunSetup {
         curve: calibration.curve().unwrap(),
         calibration,
         limits: Limits::for_travel(rig.description().travel),
@@ -23,8 +23,8 @@ fn type_into(form: &mut ProtocolForm, pairs: &[(&str, &str)]) {
         match field {
             Some(field) => field.text = (*text).into(),
             None => {
-                let told = form.told.iter_mut().find(|one| one.key.name == *name);
-                told.unwrap().text = (*text).into();
+                let label = form.label_fields.iter_mut().find(|one| one.key.name == *name);
+                label.unwrap().text = (*text).into();
             }
         }
     }
@@ -32,7 +32,7 @@ fn type_into(form: &mut ProtocolForm, pairs: &[(&str, &str)]) {
     form.refresh(&rig, &bench, false);
 }
 
-fn form_with(pairs: &[(&str, &str)]) -> (ProtocolForm, Bench) {
+fn form_with(pairs: &[(&str, &str)]) -> (ProtocolForm, RunSetup) {
     let mut form = ProtocolForm::default();
     type_into(&mut form, pairs);
     (form, bench().1)
@@ -102,7 +102,7 @@ fn an_empty_rule_holds_the_whole_time_and_a_wrong_one_refuses() {
 }
 
 #[test]
-fn an_unload_speed_adds_a_recorded_way_back() {
+fn an_unload_speed_adds_a_recorded_unloading() {
     let (mut form, bench) = form_with(&[("unload", "0.6")]);
     let plan = form.request(&bench).unwrap().plan;
     let has_unload = plan
@@ -127,7 +127,7 @@ fn an_acknowledgement_holds_for_its_words_only() {
 }
 
 #[test]
-fn what_a_protocol_asks_for_must_be_filled_in() {
+fn labels_that_a_protocol_requires_must_be_filled_in() {
     let mut form = ProtocolForm::default();
     form.choose_built_in("preconditioning");
     type_into(&mut form, &[("operator", "Ada")]);
@@ -143,7 +143,7 @@ fn what_a_protocol_asks_for_must_be_filled_in() {
 }
 
 #[test]
-fn a_file_with_mistakes_tells_their_lines_and_does_not_start() {
+fn a_file_with_mistakes_names_their_lines_and_does_not_start() {
     let mut form = ProtocolForm::default();
     let text = "palpate = 1\nname = \"x\"\nversion = 1\ntitle = \"X\"\nabout = \"x\"\n[procedure]\nsteps = [\n  { do = \"rmap\" },\n]\n";
     form.choose_file(Path::new("x.toml"), Ok(text.into()));

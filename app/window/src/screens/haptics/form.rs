@@ -1,18 +1,16 @@
-//! The body, the device, the loop and the hand as typed.
+//! The material, the device, the loop and the hand as typed.
 
-use crate::screens::haptics::Offered;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
-use crate::widgets::text_row::text_row;
-use eframe::egui::{Button, RichText, Ui};
+use crate::widgets::{
+    NamedControl, QuantityField, check_rate, form_label, quantity_ui, quiet_ui, require,
+    section_ui, text_row,
+};
+use crate::workbench::ScreenOffers;
+use eframe::egui::{Button, Ui};
 use palpate_analysis::haptics::{Setting, THESIS};
 use palpate_haptics::{DriveKind, Period, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use std::path::{Path, PathBuf};
 
-/// What is asked for.
 pub(super) struct HapticsForm {
     body: String,
     is_current: bool,
@@ -24,7 +22,7 @@ pub(super) struct HapticsForm {
     speed: QuantityField,
 }
 
-/// Friction of the source's motor at the rack in N, as it stands in the form until another is typed.
+/// Friction of the source's motor at the rack in N, the first text of its field.
 fn usual_friction() -> String {
     format!("{:.3}", TorqueSettings::default().friction().0)
 }
@@ -46,96 +44,84 @@ impl Default for HapticsForm {
 }
 
 impl HapticsForm {
-    /// Takes a session or a table as the body's.
+    /// Takes a session or a table whose fit is felt.
     pub fn take(&mut self, path: &Path) {
         self.body = path.display().to_string();
     }
 
     /// Checks every field.
     pub fn check(&mut self) {
-        let not_negative = |value: f64| match value >= 0.0 {
-            true => Ok(()),
-            false => Err("must be 0 or more".to_owned()),
-        };
-        let up_to = |value: f64, most: f64| match value > 0.0 && value <= most {
-            true => Ok(()),
-            false => Err(format!("must be above 0 and at most {most}")),
+        let not_negative = |value: f64| require(value >= 0.0, "must be 0 or more");
+        let up_to = |value: f64, most: f64| {
+            require(value > 0.0 && value <= most, format!("must be above 0 and at most {most}"))
         };
         self.damping.check(not_negative);
         self.friction.check(not_negative);
-        self.rate.check(|rate| {
-            let period = Period::of_rate(rate);
-            period.map(|_| ()).map_err(|err| err.to_string())
-        });
+        self.rate.check(check_rate);
         let most = f64::from(Setting::DELAY_MAX);
-        self.delay.check(|delay| match (0.0..=most).contains(&delay) && delay.fract() == 0.0 {
-            true => Ok(()),
-            false => Err(format!("must be a whole number from 0 to {most}")),
+        self.delay.check(|delay| {
+            let is_valid = (0.0..=most).contains(&delay) && delay.fract() == 0.0;
+            require(is_valid, format!("must be a whole number from 0 to {most}"))
         });
         self.depth.check(|depth| up_to(depth, Setting::DEPTH_MAX));
         self.speed.check(|speed| up_to(speed, Setting::SPEED_MAX));
     }
 
-    /// What is asked for, or the first thing that is wrong.
-    pub fn wanted(&self) -> Result<(PathBuf, Setting), String> {
+    /// The source of the material and the setting, or the first thing that is wrong.
+    pub fn request(&self) -> Result<(PathBuf, Setting), String> {
         let body = self.body.trim();
-        if body.is_empty() {
-            return Err(format!("name a body: the folder of a session, a table, or '{THESIS}'"));
-        }
-        let value = |name: &str, field: &QuantityField| {
-            let value = field.value.clone();
-            value.map_err(|reason| format!("{name}: {reason}"))
-        };
-        let period = Period::of_rate(value("rate", &self.rate)?).map_err(|err| err.to_string())?;
+        let words = format!("type the folder of a session, a table, or '{THESIS}'");
+        require(!body.is_empty(), words)?;
+        let rate = self.rate.named_value("rate")?;
+        let period = Period::of_rate(rate).map_err(|err| err.to_string())?;
         let usual = Setting::source(period);
-        let friction = value("friction", &self.friction)?;
+        let friction = self.friction.named_value("friction")?;
         let setting = Setting {
             period,
             drive: match self.is_current {
                 false => usual.drive,
                 true => DriveKind::Current { amps_per_volt: 1.0 },
             },
-            // N s/m as catalogues have it, N s/mm inside.
-            damping: 1e-3 * value("damping", &self.damping)?,
-            // Untouched it is the motor's own, to the last digit.
+            // N s/m in catalogues, N s/mm in the model.
+            damping: 1e-3 * self.damping.named_value("damping")?,
+            // Unchanged it is the motor's own, to the last digit.
             friction: (self.friction.text != usual_friction()).then_some(Newtons(friction)),
-            delay: value("delay", &self.delay)? as usize,
-            deepest: Depth(value("depth", &self.depth)?),
-            speed: MmPerS(value("speed", &self.speed)?),
+            delay: self.delay.named_value("delay")? as usize,
+            deepest: Depth(self.depth.named_value("depth")?),
+            speed: MmPerS(self.speed.named_value("speed")?),
         };
         Ok((PathBuf::from(body), setting))
     }
 
-    /// Draws the fields; true when a dialog for a session is wanted.
-    pub fn ui(&mut self, ui: &mut Ui, offered: &Offered<'_>) -> bool {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        section_ui(ui, "Body");
+    /// Draws the fields; true when the button of the session dialog is pressed.
+    pub fn ui(&mut self, ui: &mut Ui, offers: &ScreenOffers) -> bool {
+        section_ui(ui, "Material");
         text_row(ui, "body", "a session's folder, a table, or thesis", &mut self.body);
-        let mut is_dialog_wanted = false;
+        let mut is_dialog_pressed = false;
         ui.horizontal_wrapped(|ui| {
             if ui.button("Source thesis").clicked() {
                 self.body = THESIS.into();
             }
-            for (name, session) in [("In review", offered.review), ("In library", offered.library)]
+            for (name, session) in [("In review", &offers.review), ("In library", &offers.library)]
             {
                 let button = ui.add_enabled(session.is_some(), Button::new(name));
                 if let (true, Some(session)) = (button.clicked(), session) {
                     self.take(session);
                 }
             }
-            is_dialog_wanted = ui.button("Choose a session...").clicked();
+            is_dialog_pressed = ui.button("Choose a session...").clicked();
         });
         section_ui(ui, "Device");
         ui.horizontal(|ui| {
             form_label(ui, "drive");
-            ui.radio_value(&mut self.is_current, false, "voltage").place("voltage");
-            ui.radio_value(&mut self.is_current, true, "current").place("current");
+            ui.radio_value(&mut self.is_current, false, "voltage").named("voltage");
+            ui.radio_value(&mut self.is_current, true, "current").named("current");
         });
         let damps = match self.is_current {
             false => "the motor's back-EMF damps",
-            true => "the motor damps nothing",
+            true => "the motor does not damp",
         };
-        ui.label(RichText::new(damps).color(tokens.text_quiet).small());
+        quiet_ui(ui, damps);
         quantity_ui(ui, "damping", "N s/m, own", &mut self.damping);
         quantity_ui(ui, "friction", "N", &mut self.friction);
         section_ui(ui, "Loop");
@@ -144,7 +130,7 @@ impl HapticsForm {
         section_ui(ui, "Hand");
         quantity_ui(ui, "depth", "mm, stroke", &mut self.depth);
         quantity_ui(ui, "speed", "mm/s", &mut self.speed);
-        is_dialog_wanted
+        is_dialog_pressed
     }
 }
 
@@ -153,10 +139,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn untouched_the_form_asks_for_the_source_device_itself() {
+    fn the_unchanged_form_is_the_source_device() {
         let mut form = HapticsForm::default();
         form.check();
-        let (body, setting) = form.wanted().unwrap();
+        let (body, setting) = form.request().unwrap();
         assert_eq!(body, Path::new(THESIS));
         assert_eq!(setting, Setting::source(Period::MILLISECOND));
     }
@@ -175,8 +161,8 @@ mod tests {
             field.text = text.into();
         }
         form.check();
-        let (_, setting) = form.wanted().unwrap();
-        let wanted = Setting {
+        let (_, setting) = form.request().unwrap();
+        let expected = Setting {
             period: Period::of_rate(2000.0).unwrap(),
             drive: DriveKind::Current { amps_per_volt: 1.0 },
             damping: 0.5e-3,
@@ -185,16 +171,16 @@ mod tests {
             deepest: Depth(25.0),
             speed: MmPerS(80.0),
         };
-        assert_eq!(setting, wanted);
+        assert_eq!(setting, expected);
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_its_name() {
+    fn impossible_values_are_refused_by_name() {
         let refusal = |change: fn(&mut HapticsForm) -> &mut QuantityField, text: &str| {
             let mut form = HapticsForm::default();
             change(&mut form).text = text.into();
             form.check();
-            form.wanted().unwrap_err()
+            form.request().unwrap_err()
         };
         assert!(refusal(|form| &mut form.rate, "100").contains("250 Hz"));
         assert!(refusal(|form| &mut form.delay, "1.5").contains("delay: must be a whole"));

@@ -1,25 +1,18 @@
-//! From model to touch: what damping a body needs of a device, and the loop itself with a hand led from here.
+//! From model to touch: the damping that a material needs of a device, and the haptic loop with a hand that is led from
+//! here.
 
 mod form;
 mod middle;
 mod right;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use super::tape::TapePanel;
-use crate::command::{Command, Commands};
-use crate::shell::palette::Action;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::work_ui;
-use crate::widgets::tick_box::tick_box;
-use crate::workbench::Workbench;
-use crate::workers::feel::Feel;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
-use eframe::egui::{Button, Context, Key, Slider, Ui, vec2};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use super::tape::{TapePanel, loop_button_ui};
+use crate::widgets::{
+    NamedControl, alarm_ui, form_label, quiet_ui, require, section_ui, tick_box, work_ui,
+};
+use crate::workers::haptic_loop::HapticLoop;
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Slider, Ui};
 use form::HapticsForm;
 use middle::View;
 use palpate_analysis::haptics::{Checked, Setting, body_of, check};
@@ -31,71 +24,57 @@ use std::path::{Path, PathBuf};
 /// How far above the surface a hand can be led, in mm.
 const ABOVE: f64 = 2.0;
 
-/// Sessions that other screens have in front.
-#[derive(Clone, Copy, Debug)]
-pub struct Offered<'a> {
-    /// On the review screen.
-    pub review: Option<&'a Path>,
-    /// In the library.
-    pub library: Option<&'a Path>,
-}
-
-/// A body on a device, looked at.
-pub struct Looked {
+/// A material on a device, checked.
+pub struct HapticsCheck {
     source: PathBuf,
     setting: Setting,
     notes: Vec<String>,
-    /// What was found.
     pub checked: Checked,
 }
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
-    purpose: "feel a body through a device: margin, buzz and loop",
+    purpose: "feel a material through a device: stability margin, limit cycle and loop",
     key: Key::Num9,
     open: |_| Box::new(HapticsScreen::default()),
 };
 
-/// The screen's state.
 #[derive(Default)]
 pub struct HapticsScreen {
     form: HapticsForm,
     is_open: bool,
-    task: Task<Looked>,
-    feel: Option<Feel>,
+    task: BackgroundTask<HapticsCheck>,
+    live_loop: Option<HapticLoop>,
     refusal: Option<String>,
     tape: TapePanel,
     view: View,
 }
 
 impl HapticsScreen {
-    /// Whether the loop runs.
     pub fn is_running(&self) -> bool {
-        self.feel.as_ref().is_some_and(Feel::is_running)
+        self.live_loop.as_ref().is_some_and(HapticLoop::is_running)
     }
 
-    /// What was found of the body and device checked last.
-    pub fn looked(&self) -> Option<&Result<Looked, String>> {
+    /// The last check.
+    pub fn looked(&self) -> Option<&Result<HapticsCheck, String>> {
         self.task.answer()
     }
 
     /// The loop that runs or ran last.
-    pub fn feel(&self) -> Option<&Feel> {
-        self.feel.as_ref()
+    pub fn feel(&self) -> Option<&HapticLoop> {
+        self.live_loop.as_ref()
     }
 
-    /// A recording that was computed again last.
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }
 
-    /// The check of what stands in the form, or why the loop may not start.
-    fn checked(&self) -> Result<&Looked, String> {
-        let wanted = self.form.wanted()?;
+    /// The check of the setting in the form, or why the loop may not start.
+    fn checked(&self) -> Result<&HapticsCheck, String> {
+        let request = self.form.request()?;
         match self.task.answer() {
-            Some(Ok(looked)) if (&looked.source, &looked.setting) == (&wanted.0, &wanted.1) => {
-                Ok(looked)
+            Some(Ok(check)) if (&check.source, &check.setting) == (&request.0, &request.1) => {
+                Ok(check)
             }
             _ => Err("check this setting first".into()),
         }
@@ -107,17 +86,17 @@ impl HapticsScreen {
             return;
         }
         let checked = self.checked();
-        let checked = checked.map(|looked| (looked.setting, looked.checked.body));
+        let checked = checked.map(|check| (check.setting, check.checked.body));
         let started = checked.and_then(|(setting, body)| {
             let is_guarded = !self.is_open;
             let begin = |folder: &Path| led_recorder(folder, body, &setting, is_guarded);
             let recorder = self.tape.begin(ctx, begin)?;
             let settings = setting.simulation(body, is_guarded);
-            Feel::start(&settings, setting.speed, recorder)
+            HapticLoop::start(&settings, setting.speed, recorder)
         });
         match started {
-            Ok(feel) => {
-                self.feel = Some(feel);
+            Ok(live_loop) => {
+                self.live_loop = Some(live_loop);
                 self.view = View::Live;
                 self.refusal = None;
             }
@@ -137,66 +116,46 @@ impl HapticsScreen {
         if let Some(reason) = &self.refusal {
             alarm_ui(ui, reason);
         }
-        let size = vec2(170.0, 34.0);
-        if is_running {
-            let stop = Button::new("Stop the loop").min_size(size);
-            if ui.add(stop).place("Stop the loop").clicked() {
-                commands.push(Command::LoopStop);
-            }
-        } else {
-            let may = verdict.clone().and_then(|()| self.checked().map(|_| ()));
-            if reason_button(ui, "Start the loop", size, &may) {
-                commands.push(Command::LoopStart);
-            }
-        }
-        let (Some(feel), Some(Ok(looked))) = (&self.feel, self.task.answer()) else {
-            return;
-        };
-        if !is_running {
-            return;
-        }
-        let deepest = looked.setting.deepest.0;
-        let mut place = feel.place();
+        let verdict = verdict.clone().and_then(|()| self.checked().map(|_| ()));
+        let both = [UiCommand::LoopStart, UiCommand::LoopStop];
+        loop_button_ui(ui, "loop", is_running, &verdict, both, commands);
+        let answer = self.task.answer().filter(|_| is_running);
+        let (Some(live_loop), Some(Ok(check))) = (&self.live_loop, answer) else { return };
+        let deepest = check.setting.deepest.0;
+        let mut place = live_loop.place();
         ui.horizontal(|ui| {
             let label = form_label(ui, "hand");
             let slider = Slider::new(&mut place, -ABOVE..=deepest).step_by(0.1).suffix(" mm");
-            let slider = ui.add(slider).labelled_by(label.id).place("hand");
+            let slider = ui.add(slider).labelled_by(label.id).named("hand");
             if slider.changed() {
-                feel.lead(place);
+                live_loop.lead(place);
             }
         });
         ui.horizontal(|ui| {
             for (name, place) in [("Ramp and hold", deepest), ("Lift off", -ABOVE)] {
-                if ui.button(name).place(name).clicked() {
-                    feel.lead(place);
+                if ui.button(name).named(name).clicked() {
+                    live_loop.lead(place);
                 }
             }
         });
         let words =
-            "the hand goes there at its speed; arrow keys move the slider when it has the focus";
+            "The hand moves there at its speed; arrow keys move the slider while it has the focus.";
         quiet_ui(ui, words);
     }
 }
 
 impl Screen for HapticsScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let offered = Offered {
-            review: workbench.front.review.as_deref(),
-            library: workbench.front.library.as_deref(),
-        };
-        // What runs is what was checked: it is not to be changed under a hand.
+        // A running loop keeps the setting that was checked.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
-            if self.form.ui(ui, &offered) {
-                commands.push(Command::Choose(Ask::Body));
+            if self.form.ui(ui, &workbench.front) {
+                commands.push(UiCommand::Choose(PathPurpose::Body));
             }
         });
         ui.add_space(6.0);
-        let wanted = match is_running {
-            true => Err("the loop runs".into()),
-            false => self.form.wanted().map(|_| ()),
-        };
-        work_ui(ui, "Check  F6", &self.task, &wanted, commands);
+        let verdict = require(!is_running, "the loop runs").and(self.form.request().map(|_| ()));
+        work_ui(ui, "Check  F6", &self.task, &verdict, commands);
         self.feel_ui(ui, &workbench.loop_verdict(SCREEN.name), commands);
         self.tape.ui(ui, is_running, replay);
     }
@@ -213,44 +172,42 @@ impl Screen for HapticsScreen {
         self.task.poll();
         self.form.check();
         self.tape.poll();
-        if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
+        if let Some(Err(reason)) = self.live_loop.as_mut().map(HapticLoop::poll) {
             self.refusal = Some(reason);
             self.tape.cut_off();
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
+            UiCommand::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
                 self.start_loop(ctx);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            Command::LoopStart => {}
-            Command::LoopStop => self.stop(),
-            Command::Chosen(Ask::Body, path) => self.form.take(path),
-            Command::ReplayLoop(folder) => {
+            UiCommand::LoopStart => {}
+            UiCommand::LoopStop => self.stop(),
+            UiCommand::Chosen(PathPurpose::Body, path) => self.form.take(path),
+            UiCommand::ReplayLoop(folder) => {
                 self.tape.take(folder);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            _ => return Reply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        Reply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        let Ok((source, setting)) = self.form.wanted() else {
-            return;
-        };
+        let Ok((source, setting)) = self.form.request() else { return };
         self.view = View::Margin;
         self.task.start("haptics-check", ctx, move |progress| {
-            let tell = |share: f64, what: &str| progress.share(share, what);
-            tell(0.0, "the body's fit");
+            progress.share(0.0, "the fit");
             let body = body_of(&source)?;
-            let checked =
-                check(body.body, &setting, &mut |share| tell(share, "the simulated device"))?;
+            let checked = check(body.body, &setting, &mut |share| {
+                progress.share(share, "the simulated device")
+            })?;
             let mut notes = body.notes.clone();
             notes.extend(body.beyond(setting.deepest));
-            Ok(Looked { source, setting, notes, checked })
+            Ok(HapticsCheck { source, setting, notes, checked })
         });
     }
 
@@ -259,7 +216,7 @@ impl Screen for HapticsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.tape.is_busy() || self.is_running()
+        self.task.is_busy() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -267,7 +224,7 @@ impl Screen for HapticsScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
+        if let Some(beat) = self.live_loop.as_mut().and_then(HapticLoop::stop) {
             self.tape.end(move || beat.end().and_then(recorded));
         }
     }
@@ -277,15 +234,12 @@ impl Screen for HapticsScreen {
         self.tape.settle();
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
-        let can_stop = match self.is_running() {
-            true => Ok(()),
-            false => Err("the loop does not run".to_owned()),
-        };
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
+        let can_stop = require(self.is_running(), "the loop does not run");
         let can_start = workbench.loop_verdict(SCREEN.name);
         vec![
-            Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(can_start),
-            Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(can_stop),
+            PaletteAction::new("Start the haptic loop", "", UiCommand::LoopStart).if_ok(can_start),
+            PaletteAction::new("Stop the haptic loop", "", UiCommand::LoopStop).if_ok(can_stop),
         ]
     }
 }

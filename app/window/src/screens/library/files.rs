@@ -1,19 +1,14 @@
-//! Sessions chosen written as tables or into a lake.
+//! Export of the sessions chosen as tables or into a lake.
 
-use super::say::sentence;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::task_bar::task_ui;
-use crate::widgets::text_row::text_row;
-use crate::workers::path_dialog::Dialog;
-use crate::workers::task::Task;
-use eframe::egui::{Context, Ui};
+use crate::widgets::{choice_ui, quiet_ui, require, section_ui, small_alarm_ui, task_ui, text_row};
+use crate::workers::{BackgroundTask, Dialog};
+use eframe::egui::Ui;
 use palpate_analysis::exports::{Destination, Exported, export_all};
 use palpate_tables::export::Format;
 use std::path::PathBuf;
 
 palpate_model::named! {
-    /// What sessions are written as.
+    /// Format of an export.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     enum Kind {
         #[default]
@@ -35,17 +30,15 @@ impl Kind {
     }
 }
 
-/// The panel.
 #[derive(Default)]
 pub(super) struct FilesPanel {
     kind: Kind,
     to: String,
     dialog: Dialog<PathBuf>,
-    task: Task<Exported>,
+    task: BackgroundTask<Exported>,
 }
 
 impl FilesPanel {
-    /// Fetches answers that have come.
     pub fn poll(&mut self) {
         self.task.poll();
         if let Some(folder) = self.dialog.poll() {
@@ -54,22 +47,16 @@ impl FilesPanel {
     }
 
     fn verdict(&self, chosen: usize) -> Result<(), String> {
-        if chosen == 0 {
-            return Err("choose sessions first".into());
-        }
-        match self.to.trim() {
-            "" => Err("write the folder that they go to first".into()),
-            _ => Ok(()),
-        }
+        require(chosen > 0, "choose sessions first")?;
+        require(!self.to.trim().is_empty(), "type the folder of the export first")
     }
 
     /// Draws the form; `sessions` are the folders of those chosen.
     pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
-        let ctx: Context = ui.ctx().clone();
-        section_ui(ui, "Export the sessions chosen");
+        section_ui(ui, "Export chosen sessions");
         let kinds = Kind::ALL.map(|kind| (kind, kind.name()));
         choice_ui(ui, "as", &mut self.kind, &kinds);
-        text_row(ui, "to folder", "made if there is none", &mut self.to);
+        text_row(ui, "to folder", "created if there is none", &mut self.to);
         self.dialog.button_ui(ui, "Choose folder...", |dialog| {
             dialog.set_title("Folder for exports").pick_folder()
         });
@@ -78,28 +65,25 @@ impl FilesPanel {
             let to = self.kind.destination(PathBuf::from(self.to.trim()));
             let sessions = sessions.to_vec();
             self.task
-                .start("export", &ctx, move |progress| Ok(export_all(sessions, &to, progress)));
+                .start("export", ui.ctx(), move |progress| Ok(export_all(sessions, &to, progress)));
         }
-        if self.task.standing().is_none() {
-            match self.task.answer() {
-                Some(Ok(done)) => {
-                    sentence(ui, &done.sentence, false);
-                    remarks_ui(ui, &done.remarks);
-                }
-                Some(Err(err)) => sentence(ui, err, true),
-                None => {}
+        match self.task.answer().filter(|_| !self.task.is_busy()) {
+            Some(Ok(done)) => {
+                quiet_ui(ui, &done.sentence);
+                remarks_ui(ui, &done.remarks);
             }
+            Some(Err(err)) => small_alarm_ui(ui, err),
+            None => {}
         }
     }
 }
 
-/// Remarks that are read here at most; the rest is counted.
+/// Remarks shown; the others are counted.
 const REMARKS: usize = 20;
 
 fn remarks_ui(ui: &mut Ui, remarks: &[String]) {
-    remarks.iter().take(REMARKS).for_each(|remark| sentence(ui, remark, true));
+    remarks.iter().take(REMARKS).for_each(|remark| small_alarm_ui(ui, remark));
     if remarks.len() > REMARKS {
-        let text = format!("and {} more remarks", remarks.len() - REMARKS);
-        sentence(ui, &text, true);
+        small_alarm_ui(ui, format!("and {} more remarks", remarks.len() - REMARKS));
     }
 }

@@ -1,42 +1,37 @@
-//! What is searched for, as typed and chosen.
+//! The search of the library as typed and chosen.
 
-use crate::theme::Tokens;
-use crate::widgets::choice_box::choice_box_ui;
-use crate::widgets::text_row::text_row;
+use crate::widgets::{choice_box_ui, small_alarm_ui, text_row};
 use chrono::{DateTime, Utc};
-use eframe::egui::{Label, RichText, Ui};
+use eframe::egui::Ui;
 use palpate_sessions::catalog::{
     Choices, DayError, Order, Query, beginning, ending, words_and_conditions,
 };
 
-/// What a verdict may be.
 const VERDICTS: [&str; 4] = ["valid", "suspect", "rejected", "none"];
-/// What a review may have come to.
 const REVIEWS: [&str; 5] = ["accepted", "rejected", "repeat", "outdated", "none"];
 
-/// A name that may be chosen.
+/// A name that is chosen, and the text that narrows the list of names.
 #[derive(Clone, Debug, Default)]
-struct Pick {
+struct NamePick {
     chosen: Option<String>,
     narrow: String,
 }
 
-impl Pick {
+impl NamePick {
     fn ui(&mut self, ui: &mut Ui, name: &str, choices: &[String]) {
         choice_box_ui(ui, name, &mut self.chosen, choices, &mut self.narrow);
     }
 }
 
-/// The form.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SearchForm {
     line: String,
-    specimen: Pick,
-    operator: Pick,
-    protocol: Pick,
-    tag: Pick,
-    verdict: Pick,
-    review: Pick,
+    specimen: NamePick,
+    operator: NamePick,
+    protocol: NamePick,
+    tag: NamePick,
+    verdict: NamePick,
+    review: NamePick,
     since: String,
     until: String,
     pub order: Order,
@@ -55,19 +50,17 @@ fn day(
 }
 
 impl SearchForm {
-    /// What is asked for, or what is wrong with it in one sentence.
     pub fn query(&self) -> Result<Query, String> {
         let (words, conditions) =
             words_and_conditions(&self.line).map_err(|err| err.to_string())?;
-        let read = |pick: &Pick| pick.chosen.as_deref().map(str::to_owned);
         let verdict = self.verdict.chosen.as_deref().map(str::parse);
         let review = self.review.chosen.as_deref().map(str::parse);
         Ok(Query {
             words,
             conditions,
-            specimen: read(&self.specimen),
-            operator: read(&self.operator),
-            protocol: read(&self.protocol),
+            specimen: self.specimen.chosen.clone(),
+            operator: self.operator.chosen.clone(),
+            protocol: self.protocol.chosen.clone(),
             tags: self.tag.chosen.iter().cloned().collect(),
             verdict: verdict.transpose()?,
             review: review.transpose()?,
@@ -79,25 +72,22 @@ impl SearchForm {
         })
     }
 
-    /// Sorts by this, or the other way round where it is sorted so already.
+    /// Sorts by a column, in reverse where it is sorted by it already.
     pub fn sort(&mut self, order: Order) {
         self.is_reversed = self.order == order && !self.is_reversed;
         self.order = order;
     }
 
-    /// Asks for all sessions again; the order stays.
+    /// Removes all conditions; the order stays.
     pub fn clear(&mut self) {
         *self = Self { order: self.order, is_reversed: self.is_reversed, ..Self::default() };
     }
 
-    /// Draws the fields.
     pub fn ui(&mut self, ui: &mut Ui, choices: &Choices) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
         text_row(ui, "find", "words, depth>=20mm", &mut self.line);
         if let Err(err) = words_and_conditions(&self.line) {
-            let text = RichText::new(err.to_string());
-            ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
+            small_alarm_ui(ui, err.to_string());
         }
         self.specimen.ui(ui, "specimen is", &choices.specimens);
         self.operator.ui(ui, "operator is", &choices.operators);
@@ -109,8 +99,7 @@ impl SearchForm {
         text_row(ui, "until", "2026-03-31", &mut self.until);
         for (text, read) in [(&self.since, beginning as fn(&str) -> _), (&self.until, ending)] {
             if let Err(err) = day(text, read) {
-                let text = RichText::new(format!("'{text}' is no day: {err}"));
-                ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
+                small_alarm_ui(ui, format!("'{text}' is not a day: {err}"));
             }
         }
     }

@@ -1,8 +1,9 @@
-//! The sessions found: what is known of those in sight, and which are chosen.
+//! The sessions found: catalog entries of those in sight, and which are chosen.
 
-use crate::widgets::choice_table::{Act, Cell, ChoiceTable, Head, How, Line, Scrolled, Tone};
-use crate::widgets::mark::Mark;
-use crate::widgets::table::Column;
+use crate::widgets::{
+    ChoiceTable, Column, Emphasis, Glyph, ScrollPosition, SelectionMode, TableAction, TableCell,
+    TableLine,
+};
 use eframe::egui::Ui;
 use palpate_analysis::find::Found;
 use palpate_analysis::report::catalog::one_line;
@@ -11,12 +12,12 @@ use palpate_sessions::edits::{Decision, Verdict};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// Entries that are kept at most, apart from those just read.
-const KEPT: usize = 5000;
+/// Entries that are kept, apart from those just read.
+const ENTRIES_MAX: usize = 5000;
 /// Rows above and below those in sight that are read with them.
 const MARGIN: usize = 60;
 
-/// The columns, and by what their heads sort.
+/// Heading, width, whether it has numbers, and the order that the heading sorts by.
 const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
     ("started (UTC)", 134.0, false, Some(Order::Started)),
     ("specimen", 92.0, false, Some(Order::Specimen)),
@@ -30,32 +31,30 @@ const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
     ("folder", 320.0, false, None),
 ];
 
-/// The list.
 #[derive(Debug, Default)]
-pub(super) struct List {
+pub(super) struct SessionList {
     folders: Vec<String>,
     entries: BTreeMap<String, (Entry, u64)>,
     generation: u64,
     chosen: BTreeSet<String>,
-    /// Counts up whenever others are chosen.
+    /// Raised with every change of those chosen.
     choice: u64,
     at: Option<String>,
     anchor: Option<String>,
-    scrolled: Scrolled,
+    scrolled: ScrollPosition,
     in_sight: Range<usize>,
 }
 
-/// What was done with the list that others must do.
+/// What the list asks of its screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wanted {
-    /// Those chosen are to be looked at.
+pub(super) enum ListRequest {
+    /// Review the sessions chosen.
     Open,
-    /// Another order.
     Sort(Order),
 }
 
-impl List {
-    /// Takes what a search found. What is found no more is chosen no more.
+impl SessionList {
+    /// Takes the result of a search. Sessions that it does not have are no longer chosen.
     pub fn take(&mut self, found: &mut Found) {
         self.folders = std::mem::take(&mut found.folders);
         self.generation += 1;
@@ -68,17 +67,17 @@ impl List {
         }
     }
 
-    /// Takes what was read of some sessions.
+    /// Takes catalog entries.
     pub fn learn(&mut self, entries: Vec<Entry>) {
         let now = self.generation;
-        if self.entries.len() > KEPT {
+        if self.entries.len() > ENTRIES_MAX {
             self.entries.retain(|_, (_, of)| *of == now);
         }
         let entries = entries.into_iter();
         self.entries.extend(entries.map(|entry| (entry.folder.clone(), (entry, now))));
     }
 
-    /// Sessions in sight or chosen of which nothing new enough is known.
+    /// Sessions in sight or chosen whose entry is missing or old.
     pub fn unknown(&self) -> Vec<String> {
         let from = self.in_sight.start.saturating_sub(MARGIN);
         let to = (self.in_sight.end + MARGIN).min(self.folders.len());
@@ -91,7 +90,6 @@ impl List {
         in_sight.iter().chain(chosen).filter(is_old).cloned().collect()
     }
 
-    /// How many were found.
     pub fn count(&self) -> usize {
         self.folders.len()
     }
@@ -102,71 +100,65 @@ impl List {
         self.folders.iter().filter(is_chosen).cloned().collect()
     }
 
-    /// Another number whenever those chosen, or their order, may be others.
+    /// Another number whenever the sessions chosen, or their order, may have changed.
     pub fn choice(&self) -> u64 {
         self.choice
     }
 
-    /// How many are chosen.
     pub fn chosen_count(&self) -> usize {
         self.chosen.len()
     }
 
-    /// What is known of those chosen, as far as it was read.
+    /// Of the sessions chosen, as far as they are read.
     pub fn chosen_entries(&self) -> impl Iterator<Item = &Entry> {
         let known = self.chosen.iter().filter_map(|one| self.entries.get(one));
         known.map(|(entry, _)| entry)
     }
 
-    /// The only one chosen, and how new what is known of it is.
+    /// The only session chosen, and the generation of its entry.
     pub fn only(&self) -> Option<(&Entry, u64)> {
         let folder = self.chosen.first().filter(|_| self.chosen.len() == 1)?;
         let (entry, of) = self.entries.get(folder)?;
         Some((entry, *of))
     }
 
-    fn choose(&mut self, row: usize, how: How) {
-        let Some(folder) = self.folders.get(row).cloned() else {
-            return;
-        };
+    fn choose(&mut self, row: usize, how: SelectionMode) {
+        let Some(folder) = self.folders.get(row).cloned() else { return };
         self.choice += 1;
         let place = |one: &Option<String>| {
             let one = one.as_ref()?;
             self.folders.iter().position(|folder| folder == one)
         };
         match how {
-            How::Only => self.chosen = BTreeSet::from([folder.clone()]),
-            How::Toggle => {
+            SelectionMode::Only => self.chosen = BTreeSet::from([folder.clone()]),
+            SelectionMode::Toggle => {
                 if !self.chosen.remove(&folder) {
                     self.chosen.insert(folder.clone());
                 }
             }
-            How::Extend => {
+            SelectionMode::Extend => {
                 let from = place(&self.anchor).unwrap_or(row);
                 let rows = from.min(row)..=from.max(row);
                 self.chosen = self.folders[rows].iter().cloned().collect();
             }
         }
-        if how != How::Extend || self.anchor.is_none() {
+        if how != SelectionMode::Extend || self.anchor.is_none() {
             self.anchor = Some(folder.clone());
         }
         self.at = Some(folder);
     }
 
-    /// Draws the list; tells what is wanted of others.
-    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<Wanted> {
-        let heads = COLUMNS.map(|(head, width, is_number, order)| Head {
-            column: match is_number {
-                true => Column::numbers(head, width),
-                false => Column::words(head, width),
-            },
-            can_sort: order.is_some(),
+    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<ListRequest> {
+        let columns = COLUMNS.map(|(head, width, is_number, _)| {
+            let head = head.to_owned();
+            Column { head, width, is_number }
         });
         let by = COLUMNS.iter().position(|column| column.3 == Some(sorted.0));
         let at = self.at.as_ref();
         let table = ChoiceTable {
             name: "Sessions",
-            heads: &heads,
+            columns: &columns,
+            can_sort: &|column| COLUMNS[column].3.is_some(),
             sorted: by.map(|by| (by, sorted.1)),
             count: self.folders.len(),
             at: at.and_then(|at| self.folders.iter().position(|folder| folder == at)),
@@ -183,60 +175,60 @@ impl List {
         let (acts, in_sight) = table.ui(ui, &mut scrolled);
         self.scrolled = scrolled;
         self.in_sight = in_sight;
-        let mut wanted = Vec::new();
+        let mut requests = Vec::new();
         for act in acts {
             match act {
-                Act::Choose(row, how) => self.choose(row, how),
-                Act::All => {
+                TableAction::Choose(row, how) => self.choose(row, how),
+                TableAction::ChooseAll => {
                     self.choice += 1;
                     self.chosen = self.folders.iter().cloned().collect();
                 }
-                Act::Open => wanted.push(Wanted::Open),
-                Act::Sort(column) => wanted.extend(COLUMNS[column].3.map(Wanted::Sort)),
+                TableAction::Open => requests.push(ListRequest::Open),
+                TableAction::Sort(column) => {
+                    requests.extend(COLUMNS[column].3.map(ListRequest::Sort))
+                }
             }
         }
-        wanted
+        requests
     }
 }
 
-/// A row of which nothing is known yet.
-fn unread(folder: &str) -> Line {
-    let mut cells = vec![Cell::default(); COLUMNS.len()];
+/// The row of a session whose entry is not read yet.
+fn unread(folder: &str) -> TableLine {
+    let mut cells = vec![TableCell::default(); COLUMNS.len()];
     if let Some(last) = cells.last_mut() {
-        *last = Cell { text: folder.to_owned(), tone: Tone::Quiet, mark: None };
+        *last = TableCell { emphasis: Emphasis::Quiet, ..TableCell::text(folder) };
     }
-    Line { name: format!("Session {folder}"), cells }
+    TableLine { name: format!("Session {folder}"), cells }
 }
 
-/// In which state a session's files are, as far as the catalog looks: a shape, a word, and what is wrong.
-pub(super) fn health(entry: &Entry) -> (Mark, &'static str, Option<&str>) {
+/// State of a session's files according to the catalog: a glyph, a word, and what is wrong.
+pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
     match (&entry.trouble, &entry.ending) {
-        (Some(trouble), _) => (Mark::Diamond, "damaged", Some(trouble)),
-        (None, None) => (Mark::Half, "unfinished", None),
-        (None, Some(_)) => (Mark::Disc, "whole", None),
+        (Some(trouble), _) => (Glyph::Diamond, "damaged", Some(trouble)),
+        (None, None) => (Glyph::Half, "unfinished", None),
+        (None, Some(_)) => (Glyph::Disc, "whole", None),
     }
 }
 
-/// What a session is worth, as a shape and a word.
-pub(super) fn verdict(entry: &Entry) -> (Mark, &'static str) {
+pub(super) fn verdict(entry: &Entry) -> (Glyph, &'static str) {
     match entry.verdict {
-        Some(Verdict::Valid) => (Mark::Tick, "valid"),
-        Some(Verdict::Suspect) => (Mark::Question, "suspect"),
-        Some(Verdict::Rejected) => (Mark::Cross, "rejected"),
-        None if entry.trouble.is_some() => (Mark::Dash, "unknown"),
-        None => (Mark::Dash, "none"),
+        Some(Verdict::Valid) => (Glyph::Tick, "valid"),
+        Some(Verdict::Suspect) => (Glyph::Question, "suspect"),
+        Some(Verdict::Rejected) => (Glyph::Cross, "rejected"),
+        None if entry.trouble.is_some() => (Glyph::Dash, "unknown"),
+        None => (Glyph::Dash, "none"),
     }
 }
 
-/// What its review came to, as a shape and a word.
-pub(super) fn review(entry: &Entry) -> (Mark, &'static str) {
+pub(super) fn review(entry: &Entry) -> (Glyph, &'static str) {
     let review = ReviewIs::of(entry.review.as_ref());
     let mark = match review {
-        ReviewIs::Given(Decision::Accepted) => Mark::Tick,
-        ReviewIs::Given(Decision::Rejected) => Mark::Cross,
-        ReviewIs::Given(Decision::Repeat) => Mark::Again,
-        ReviewIs::Outdated => Mark::Question,
-        ReviewIs::None => Mark::Dash,
+        ReviewIs::Given(Decision::Accepted) => Glyph::Tick,
+        ReviewIs::Given(Decision::Rejected) => Glyph::Cross,
+        ReviewIs::Given(Decision::Repeat) => Glyph::Repeat,
+        ReviewIs::Outdated => Glyph::Question,
+        ReviewIs::None => Glyph::Dash,
     };
     match review {
         ReviewIs::None if entry.trouble.is_some() => (mark, "unknown"),
@@ -249,7 +241,7 @@ pub(super) fn second(at: &str) -> String {
     at.get(..19).unwrap_or(at).replace('T', " ")
 }
 
-fn line(entry: &Entry) -> Line {
+fn line(entry: &Entry) -> TableLine {
     let or_dash = |text: &str| match one_line(text) {
         text if text.is_empty() => "-".to_owned(),
         text => text,
@@ -257,13 +249,10 @@ fn line(entry: &Entry) -> Line {
     let started = second(&entry.started_at);
     let (health_mark, health, trouble) = health(entry);
     let ((verdict_mark, verdict), (review_mark, review)) = (verdict(entry), review(entry));
-    let tone = match trouble {
-        Some(_) => Tone::Alarm,
-        None => Tone::Plain,
-    };
-    let quiet = |word: &str| match word {
-        "none" | "unknown" => Tone::Quiet,
-        _ => Tone::Plain,
+    let health_emphasis = trouble.map_or(Emphasis::Plain, |_| Emphasis::Alarm);
+    let emphasis = |word: &str| match word {
+        "none" | "unknown" => Emphasis::Quiet,
+        _ => Emphasis::Plain,
     };
     let why = trouble.map_or(String::new(), |why| format!(": {}", one_line(why)));
     let name = format!(
@@ -274,18 +263,18 @@ fn line(entry: &Entry) -> Line {
         one_line(&entry.folder)
     );
     let cells = vec![
-        Cell::text(started),
-        Cell::text(or_dash(&entry.specimen)),
-        Cell::marked(verdict_mark, verdict, quiet(verdict)),
-        Cell::marked(review_mark, review, quiet(review)),
-        Cell::marked(health_mark, health, tone),
-        Cell::text(or_dash(&entry.protocol)),
-        Cell::text(or_dash(&entry.operator)),
-        Cell::text(format!("{:.1} s", entry.duration_s)),
-        Cell::text(one_line(&entry.tags.join(", "))),
-        Cell { tone: Tone::Quiet, ..Cell::text(one_line(&entry.folder)) },
+        TableCell::text(started),
+        TableCell::text(or_dash(&entry.specimen)),
+        TableCell::marked(verdict_mark, verdict, emphasis(verdict)),
+        TableCell::marked(review_mark, review, emphasis(review)),
+        TableCell::marked(health_mark, health, health_emphasis),
+        TableCell::text(or_dash(&entry.protocol)),
+        TableCell::text(or_dash(&entry.operator)),
+        TableCell::text(format!("{:.1} s", entry.duration_s)),
+        TableCell::text(one_line(&entry.tags.join(", "))),
+        TableCell { emphasis: Emphasis::Quiet, ..TableCell::text(one_line(&entry.folder)) },
     ];
-    Line { name, cells }
+    TableLine { name, cells }
 }
 
 #[cfg(test)]
@@ -303,16 +292,16 @@ mod tests {
 
     #[test]
     fn rows_are_chosen_one_several_and_from_to() {
-        let mut list = List::default();
+        let mut list = SessionList::default();
         list.take(&mut found(&["a", "b", "c", "d", "e"]));
-        list.choose(1, How::Only);
+        list.choose(1, SelectionMode::Only);
         assert_eq!(list.chosen(), ["b"]);
-        list.choose(3, How::Extend);
+        list.choose(3, SelectionMode::Extend);
         assert_eq!(list.chosen(), ["b", "c", "d"]);
-        list.choose(0, How::Extend);
+        list.choose(0, SelectionMode::Extend);
         assert_eq!(list.chosen(), ["a", "b"]);
-        list.choose(4, How::Toggle);
-        list.choose(0, How::Toggle);
+        list.choose(4, SelectionMode::Toggle);
+        list.choose(0, SelectionMode::Toggle);
         assert_eq!(list.chosen(), ["b", "e"]);
         // Another search: what is gone is chosen no more, the rest stays, in the new order.
         list.take(&mut found(&["e", "x", "b"]));
@@ -320,13 +309,13 @@ mod tests {
         list.take(&mut found(&["e"]));
         assert_eq!(list.chosen(), ["e"]);
         assert_eq!(list.only().map(|(entry, _)| entry.folder.as_str()), Some("e"));
-        list.choose(9, How::Only);
+        list.choose(9, SelectionMode::Only);
         assert_eq!(list.chosen(), ["e"]);
     }
 
     #[test]
-    fn what_is_in_sight_and_old_is_asked_for() {
-        let mut list = List::default();
+    fn old_entries_in_sight_are_read_again() {
+        let mut list = SessionList::default();
         list.take(&mut found(&["a", "b", "c"]));
         list.in_sight = 0..3;
         assert_eq!(list.unknown(), ["c"]);
@@ -339,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_tells_its_state_in_words_and_shapes() {
+    fn a_row_has_its_state_in_words_and_shapes() {
         let mut entry = Entry {
             folder: "s/1".into(),
             ending: Some("finish".into()),
@@ -347,10 +336,10 @@ mod tests {
             ..Entry::default()
         };
         assert_eq!(health(&entry).1, "whole");
-        assert_eq!(verdict(&entry), (Mark::Question, "suspect"));
-        assert_eq!(review(&entry), (Mark::Dash, "none"));
+        assert_eq!(verdict(&entry), (Glyph::Question, "suspect"));
+        assert_eq!(review(&entry), (Glyph::Dash, "none"));
         entry.ending = None;
-        assert_eq!(health(&entry), (Mark::Half, "unfinished", None));
+        assert_eq!(health(&entry), (Glyph::Half, "unfinished", None));
         entry.trouble = Some("chunk 3 is\ndamaged".into());
         entry.verdict = None;
         let name = line(&entry).name;

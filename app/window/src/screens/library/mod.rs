@@ -1,34 +1,28 @@
-//! The library's screen: sessions found by what is known of them, looked at, spoken of and written out.
+//! The library's screen: search, edit, export and import of sessions.
 //!
-//! A search asks what the catalog knows already; reading what is new goes on beside it, and what it finds is searched again.
+//! A search uses the catalog as it is; an update of the catalog runs at the same time and is followed by another search.
 
+mod edits;
 mod files;
 mod form;
 mod import;
 mod list;
-mod say;
 mod session;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::task_bar::standing_ui;
-use crate::workbench::Workbench;
-use crate::workers::latest::Latest;
-use crate::workers::task::Task;
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use crate::widgets::{progress_ui, quiet_ui, reason_button, require, section_ui, small_alarm_ui};
+use crate::workers::{BackgroundTask, LatestAnswer};
+use edits::EditPanel;
 use eframe::egui::{Context, Key, Label, RichText, TextStyle, Ui, vec2};
 use files::FilesPanel;
 use form::SearchForm;
 use import::ImportPanel;
-use list::{List, Wanted};
+use list::{ListRequest, SessionList};
 use palpate_analysis::find::{Found, Search, Told, entries, search, told, update};
 use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
-use say::{SayPanel, sentence};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Library",
     purpose: "find sessions",
@@ -36,51 +30,42 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |workbench| Box::new(LibraryScreen::new(workbench.library.clone())),
 };
 
-/// Sessions of which all that is known comes with the search.
+/// Entries that come with a search.
 const PAGE: usize = 120;
 
-/// Seconds of work that nobody needs a bar for.
+/// Work of fewer seconds has no progress bar.
 const SHORT_S: f64 = 1.0;
 
-/// Sessions that the review screen takes at a time.
+/// Sessions on the review screen.
 const REVIEW_MAX: usize = 50;
 
-/// What stands above the list.
-#[derive(Debug, Default)]
-struct Heading {
-    count: usize,
-    seconds: f64,
-    doubts: Vec<String>,
-    remarks: Vec<String>,
-}
-
-/// What was said of the session chosen.
-struct Known {
+/// Notes and history of the session chosen.
+struct SessionDetails {
     folder: String,
-    /// Of which reading of the catalog it is.
+    /// Of its catalog entry.
     generation: u64,
-    told: Option<Result<Told, String>>,
+    history: Option<Result<Told, String>>,
 }
 
-/// The search and what it found.
 pub struct LibraryScreen {
     library: Result<PathBuf, String>,
     form: SearchForm,
-    asked: Option<Query>,
-    search: Latest<Search, Found>,
-    pages: Latest<(PathBuf, Vec<String>), Vec<Entry>>,
+    /// The query of the search shown or in progress.
+    query: Option<Query>,
+    search: LatestAnswer<Search, Found>,
+    pages: LatestAnswer<(PathBuf, Vec<String>), Vec<Entry>>,
     last_page: (u64, Vec<String>),
     searches: u64,
-    told: Latest<(PathBuf, Entry), Told>,
-    known: Option<Known>,
-    update: Task<Changes>,
+    histories: LatestAnswer<(PathBuf, Entry), Told>,
+    details: Option<SessionDetails>,
+    update: BackgroundTask<Changes>,
     is_update_wanted: bool,
     choices: Choices,
-    heading: Option<Result<Heading, String>>,
-    list: List,
-    /// Folders of those chosen, and of which choice they are: a list of thousands is not made in every frame.
+    found: Option<Result<Found, String>>,
+    list: SessionList,
+    /// Folders of the sessions chosen, and the number of the choice: thousands are not joined in every frame.
     chosen: (u64, Rc<Vec<PathBuf>>),
-    say: SayPanel,
+    edits: EditPanel,
     files: FilesPanel,
     import: ImportPanel,
     was_shown: bool,
@@ -92,20 +77,20 @@ impl LibraryScreen {
         Self {
             library,
             form: SearchForm::default(),
-            asked: None,
-            search: Latest::new("search", search),
-            pages: Latest::new("entries", entries),
+            query: None,
+            search: LatestAnswer::new("search", search),
+            pages: LatestAnswer::new("entries", entries),
             last_page: (0, Vec::new()),
             searches: 0,
-            told: Latest::new("told", told),
-            known: None,
-            update: Task::default(),
+            histories: LatestAnswer::new("history", told),
+            details: None,
+            update: BackgroundTask::default(),
             is_update_wanted: false,
             choices: Choices::default(),
-            heading: None,
-            list: List::default(),
+            found: None,
+            list: SessionList::default(),
             chosen: (0, Rc::default()),
-            say: SayPanel::default(),
+            edits: EditPanel::default(),
             files: FilesPanel::default(),
             import: ImportPanel::default(),
             was_shown: false,
@@ -113,19 +98,16 @@ impl LibraryScreen {
         }
     }
 
-    /// Whether sessions are being read or searched.
     fn is_busy(&self) -> bool {
-        self.search.is_busy() || self.is_update_wanted || self.update.standing().is_some()
+        self.search.is_busy() || self.is_update_wanted || self.update.is_busy()
     }
 
     fn poll_update(&mut self, ctx: &Context) {
-        let was_busy = self.update.standing().is_some();
-        self.update.poll();
-        if was_busy && self.update.standing().is_none() {
-            self.ask(ctx);
+        if self.update.poll() {
+            self.start_search(ctx);
         }
         if self.is_update_wanted
-            && self.update.standing().is_none()
+            && !self.update.is_busy()
             && let Ok(library) = self.library.clone()
         {
             self.is_update_wanted = false;
@@ -133,48 +115,37 @@ impl LibraryScreen {
         }
     }
 
-    /// Asks for what is in sight or chosen and not known yet, and for what was said of the one chosen.
-    fn ask_for_more(&mut self, ctx: &Context) {
+    /// Reads missing entries, and notes and history of a single session chosen.
+    fn read_details(&mut self, ctx: &Context) {
         let Ok(library) = &self.library else { return };
         let page = (self.searches, self.list.unknown());
         if !page.1.is_empty() && page != self.last_page {
             self.last_page = page.clone();
             self.pages.ask((library.clone(), page.1), ctx);
         }
-        let only = self.list.only();
-        let Some((entry, generation)) = only else {
-            self.known = None;
+        let Some((entry, generation)) = self.list.only() else {
+            self.details = None;
             return;
         };
-        let is_known = self
-            .known
-            .as_ref()
-            .is_some_and(|known| known.folder == entry.folder && known.generation == generation);
-        if !is_known {
-            // What was read before stays until the new is there.
-            let before = self.known.take();
-            let before = before.filter(|known| known.folder == entry.folder);
-            self.known = Some(Known {
-                folder: entry.folder.clone(),
-                generation,
-                told: before.and_then(|known| known.told),
-            });
-            self.told.ask((library.clone(), entry.clone()), ctx);
+        let old = self.details.take().filter(|old| old.folder == entry.folder);
+        if !old.as_ref().is_some_and(|old| old.generation == generation) {
+            self.histories.ask((library.clone(), entry.clone()), ctx);
         }
+        // The old history stays until the new one is read.
+        let history = old.and_then(|old| old.history);
+        self.details = Some(SessionDetails { folder: entry.folder.clone(), generation, history });
     }
 
-    /// Searches, and reads what has changed.
-    fn look_again(&mut self, ctx: &Context) {
-        self.ask(ctx);
+    /// Searches, and updates the catalog.
+    fn refresh(&mut self, ctx: &Context) {
+        self.start_search(ctx);
         self.is_update_wanted = true;
     }
 
-    /// Searches for what stands in the form, if that can be.
-    fn ask(&mut self, ctx: &Context) {
-        let (Ok(library), Ok(query)) = (&self.library, self.form.query()) else {
-            return;
-        };
-        self.asked = Some(query.clone());
+    /// Searches, unless the form has an error.
+    fn start_search(&mut self, ctx: &Context) {
+        let (Ok(library), Ok(query)) = (&self.library, self.form.query()) else { return };
+        self.query = Some(query.clone());
         let library = library.clone();
         self.search.ask(Search { library, query, page: PAGE }, ctx);
     }
@@ -191,29 +162,26 @@ impl LibraryScreen {
         Rc::clone(&self.chosen.1)
     }
 
-    /// Whether the sessions chosen can be looked at, or why not.
-    fn may_review(&self) -> Result<(), String> {
-        match self.list.chosen_count() {
-            0 => Err("choose sessions first".into()),
-            count if count > REVIEW_MAX => Err(format!(
-                "{count} sessions are more than the {REVIEW_MAX} that can be looked at together"
-            )),
-            _ => Ok(()),
-        }
+    /// Whether the sessions chosen can be reviewed, or why not.
+    fn review_verdict(&self) -> Result<(), String> {
+        let count = self.list.chosen_count();
+        require(count > 0, "choose sessions first")?;
+        let words = format!("{count} sessions are chosen; choose at most {REVIEW_MAX}");
+        require(count <= REVIEW_MAX, words)
     }
 
     fn review(&mut self, commands: &mut Commands) {
-        if self.may_review().is_ok() {
-            commands.push(Command::Review(self.chosen().to_vec()));
+        if self.review_verdict().is_ok() {
+            commands.push(UiCommand::Review(self.chosen().to_vec()));
         }
     }
 
     fn heading_ui(&self, ui: &mut Ui) {
-        match &self.heading {
-            None => sentence(ui, "searching", false),
-            Some(Err(err)) => sentence(ui, err, true),
-            Some(Ok(heading)) => {
-                let sessions = match heading.count {
+        match &self.found {
+            None => quiet_ui(ui, "searching"),
+            Some(Err(err)) => small_alarm_ui(ui, err),
+            Some(Ok(found)) => {
+                let sessions = match self.list.count() {
                     1 => "1 session".to_owned(),
                     count => format!("{count} sessions"),
                 };
@@ -223,19 +191,18 @@ impl LibraryScreen {
                 };
                 let text = format!(
                     "{sessions}{chosen}, found in {:.0} ms",
-                    (heading.seconds * 1e3).max(1.0)
+                    (found.seconds * 1e3).max(1.0)
                 );
                 ui.label(RichText::new(text).text_style(TextStyle::Heading).strong());
-                let remarks = heading.doubts.iter().chain(&heading.remarks);
-                remarks.for_each(|remark| sentence(ui, remark, true));
-                if heading.count == 0 && !self.is_busy() {
-                    sentence(ui, "No session is like that.", false);
+                let remarks = found.doubts.iter().chain(&found.remarks);
+                remarks.for_each(|remark| small_alarm_ui(ui, remark));
+                if self.list.count() == 0 && !self.is_busy() {
+                    quiet_ui(ui, "No session matches the search.");
                 }
             }
         }
         if let Some(Ok(changes)) = self.update.answer() {
-            let remarks = changes.remarks.iter();
-            remarks.for_each(|remark| sentence(ui, remark, true));
+            changes.remarks.iter().for_each(|remark| small_alarm_ui(ui, remark));
         }
     }
 }
@@ -245,57 +212,48 @@ impl Screen for LibraryScreen {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Find sessions");
         if let Err(err) = &self.library {
-            sentence(ui, err, true);
-            return;
+            return small_alarm_ui(ui, err);
         }
         self.form.ui(ui, &self.choices);
         ui.horizontal(|ui| {
-            if ui.button("Show all").clicked() {
+            if ui.button("Clear search").clicked() {
                 self.form.clear();
             }
-            if ui.button("Look for new sessions").clicked() {
-                self.look_again(&ctx);
+            if ui.button("Refresh").clicked() {
+                self.refresh(&ctx);
             }
         });
-        match self.update.standing() {
-            Some(standing) if standing.seconds > SHORT_S => {
-                if standing_ui(ui, &standing, "Stop reading") {
+        match (self.update.state(), self.update.answer()) {
+            (Some(state), _) if state.seconds > SHORT_S => {
+                if progress_ui(ui, &state, "Stop reading") {
                     self.update.cancel();
                 }
             }
-            Some(_) => {}
-            None => {
-                if let Some(Err(err)) = self.update.answer() {
-                    sentence(ui, err, true);
-                }
-            }
+            (None, Some(Err(err))) => small_alarm_ui(ui, err),
+            _ => {}
         }
         let chosen = self.chosen();
         self.files.ui(ui, &chosen);
         if let Ok(library) = &self.library {
             self.import.ui(ui, library);
         }
-        let is_new = match self.form.query() {
-            Ok(query) => self.asked.as_ref() != Some(&query),
-            // What is wrong is told beside its field; the list stays as it was.
-            Err(_) => false,
-        };
-        if is_new {
-            self.ask(&ctx);
+        // With an error in the form the list stays as it was.
+        if self.form.query().is_ok_and(|query| self.query.as_ref() != Some(&query)) {
+            self.start_search(&ctx);
         }
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.heading_ui(ui);
-        let help = "Arrows choose, Shift extends, Space and Ctrl with a click add, Ctrl+A takes all, Enter reviews.";
+        let help = "Arrows choose, Shift extends, Space or Ctrl with a click adds, Ctrl+A chooses all, Enter reviews.";
         ui.add(Label::new(RichText::new(help).small().weak()).truncate());
         let sorted = (self.form.order, self.form.is_reversed);
-        for wanted in self.list.ui(ui, sorted) {
-            match wanted {
-                Wanted::Open => self.review(commands),
-                Wanted::Sort(order) => {
+        for request in self.list.ui(ui, sorted) {
+            match request {
+                ListRequest::Open => self.review(commands),
+                ListRequest::Sort(order) => {
                     self.form.sort(order);
-                    self.ask(&ui.ctx().clone());
+                    self.start_search(&ui.ctx().clone());
                 }
             }
         }
@@ -305,9 +263,9 @@ impl Screen for LibraryScreen {
         let chosen = self.chosen();
         if chosen.is_empty() {
             section_ui(ui, "Session");
-            sentence(ui, "Choose one in the list, or several.", false);
+            quiet_ui(ui, "Choose sessions in the list.");
         } else {
-            let may = self.may_review();
+            let may = self.review_verdict();
             let key = Key::Enter.name();
             if reason_button(ui, &format!("Review  {key}"), vec2(170.0, 30.0), &may) {
                 self.review(commands);
@@ -315,48 +273,41 @@ impl Screen for LibraryScreen {
         }
         match (self.list.only(), chosen.as_slice()) {
             (Some((entry, _)), [folder]) => {
-                let told = self.known.as_ref().and_then(|known| known.told.as_ref());
-                session::session_ui(ui, entry, told);
-                self.say.ui(ui, &chosen);
+                let history = self.details.as_ref().and_then(|one| one.history.as_ref());
+                session::session_ui(ui, entry, history);
+                self.edits.ui(ui, &chosen);
                 session::replay_ui(ui, folder);
             }
-            (_, []) => self.say.ui(ui, &chosen),
+            (_, []) => self.edits.ui(ui, &chosen),
             _ => {
                 session::several_ui(ui, chosen.len(), self.list.chosen_entries());
-                self.say.ui(ui, &chosen);
+                self.edits.ui(ui, &chosen);
             }
         }
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         self.is_back |= !std::mem::take(&mut self.was_shown);
-        if let Some(found) = self.search.poll(ctx) {
+        if let Some(mut answer) = self.search.poll(ctx) {
             self.searches += 1;
-            self.heading = Some(found.map(|mut found| {
-                self.list.take(&mut found);
-                self.choices = found.choices;
-                // A file that was set aside has been replaced by an empty one.
+            if let Ok(found) = &mut answer {
+                self.list.take(found);
+                self.choices = std::mem::take(&mut found.choices);
+                // A damaged catalog was replaced by an empty one.
                 self.is_update_wanted |= !found.remarks.is_empty();
-                Heading {
-                    count: self.list.count(),
-                    seconds: found.seconds,
-                    doubts: found.doubts,
-                    remarks: found.remarks,
-                }
-            }));
+            }
+            self.found = Some(answer);
         }
         if let Some(Ok(entries)) = self.pages.poll(ctx) {
             self.list.learn(entries);
         }
-        if let Some(told) = self.told.poll(ctx)
-            && let Some(known) = &mut self.known
-        {
-            known.told = Some(told);
+        if let (Some(history), Some(details)) = (self.histories.poll(ctx), &mut self.details) {
+            details.history = Some(history);
         }
-        self.is_update_wanted |= self.say.poll() | self.import.poll();
+        self.is_update_wanted |= self.edits.poll() | self.import.poll();
         self.files.poll();
         self.poll_update(ctx);
-        self.ask_for_more(ctx);
+        self.read_details(ctx);
         let chosen = self.chosen();
         if workbench.front.library.as_ref() != chosen.first() {
             workbench.front.library = chosen.first().cloned();
@@ -366,16 +317,16 @@ impl Screen for LibraryScreen {
     fn shown(&mut self, ctx: &Context) {
         self.was_shown = true;
         if std::mem::take(&mut self.is_back) {
-            self.look_again(ctx);
+            self.refresh(ctx);
         }
-        self.say.keys(ctx);
+        self.edits.read_keys(ctx);
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::Import(files) => self.import.add(files),
-            _ => return Reply::NotMine,
+            UiCommand::Import(files) => self.import.add(files),
+            _ => return Reaction::NotMine,
         }
-        Reply::Show
+        Reaction::Show
     }
 }

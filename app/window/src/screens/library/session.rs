@@ -1,10 +1,10 @@
-//! What is known of the sessions chosen.
+//! Facts of the sessions chosen.
 
 use super::list::{health, review, second, verdict};
-use super::say::sentence;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{NAME_WIDTH, fact_ui, section_ui};
-use crate::widgets::mark::{self, Mark, mark_at};
+use crate::widgets::{
+    GLYPH_RADIUS, GLYPH_WIDTH, Glyph, fact_name_ui, fact_ui, glyph_at, quiet_ui, section_ui,
+    small_alarm_ui, small_ui, tokens_of,
+};
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_analysis::find::Told;
 use palpate_analysis::report::catalog::one_line;
@@ -12,39 +12,28 @@ use palpate_sessions::catalog::{Entry, Origin, Source};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Values told of one kind at most.
+/// Values shown of one kind.
 const VALUES: usize = 24;
-/// Names told of several sessions at most.
+/// Names shown of several sessions.
 const NAMES: usize = 6;
 /// Height of the history in points.
 const HISTORY: f32 = 150.0;
 
-fn name_ui(ui: &mut Ui, name: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.allocate_ui(vec2(NAME_WIDTH, 0.0), |ui| {
-        ui.set_min_width(NAME_WIDTH);
-        ui.label(RichText::new(name).color(tokens.text_quiet));
-    });
-}
-
-/// A fact with its shape before its word.
-fn marked_ui(ui: &mut Ui, name: &str, mark: Mark, word: &str, is_wrong: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink = match is_wrong {
-        true => tokens.alarm_text,
-        false => tokens.text,
-    };
+/// A fact with a glyph before its word.
+fn marked_ui(ui: &mut Ui, name: &str, mark: Glyph, word: &str, is_wrong: bool) {
+    let tokens = tokens_of(ui);
+    let ink = if is_wrong { tokens.alarm_text } else { tokens.text };
     ui.horizontal_top(|ui| {
-        name_ui(ui, name);
+        fact_name_ui(ui, name);
         let height = ui.text_style_height(&eframe::egui::TextStyle::Body);
-        let (place, _) = ui.allocate_exact_size(vec2(mark::WIDTH * 0.6, height), Sense::hover());
-        mark_at(ui.painter(), mark, place.center(), ink);
+        let (place, _) = ui.allocate_exact_size(vec2(GLYPH_WIDTH * 0.6, height), Sense::hover());
+        glyph_at(ui.painter(), mark, place.center(), GLYPH_RADIUS, ink);
         ui.add(Label::new(RichText::new(word).color(ink)).wrap());
     });
 }
 
-/// Draws one session. `told` is what was said of it, once that was read.
-pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, String>>) {
+/// Draws one session. `history` is none until it is read.
+pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, history: Option<&Result<Told, String>>) {
     section_ui(ui, "Session");
     let mut fact = |name: &str, value: &str| {
         if !value.is_empty() {
@@ -70,17 +59,13 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
         },
     );
     let ending = entry.ending.as_deref().unwrap_or_default();
-    let reason = match entry.reason.as_str() {
-        "" => ending.to_owned(),
-        reason => format!("{ending}: {reason}"),
-    };
-    fact("ending", &reason);
+    fact("ending", &with_reason(ending, &entry.reason));
     fact("folder", &entry.folder);
     let (mark, word, trouble) = health(entry);
     let word = trouble.map_or(word.to_owned(), |why| format!("{word}: {}", one_line(why)));
     marked_ui(ui, "health", mark, &word, trouble.is_some());
     let (mark, word) = verdict(entry);
-    marked_ui(ui, "verdict", mark, &why(word, &entry.verdict_reason), false);
+    marked_ui(ui, "verdict", mark, &with_reason(word, &entry.verdict_reason), false);
     let (mark, word) = review(entry);
     let reviewed = entry.review.as_ref().map_or(word.to_owned(), |review| {
         let by = format!("{word}, by {}", review.by);
@@ -88,7 +73,7 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
             [] => String::new(),
             changed => format!("; changed since: {}", changed.join(", ")),
         };
-        why(&by, &review.reason) + &changed
+        with_reason(&by, &review.reason) + &changed
     });
     marked_ui(ui, "review", mark, &reviewed, false);
     let tags = match entry.tags.as_slice() {
@@ -104,31 +89,31 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
     if !analyses.is_empty() {
         fact_ui(ui, "analyses", analyses.join(", "));
     }
-    told_ui(ui, told);
+    history_ui(ui, history);
     values_ui(ui, entry);
 }
 
-fn why(word: &str, reason: &str) -> String {
+fn with_reason(word: &str, reason: &str) -> String {
     match reason {
         "" => word.to_owned(),
         reason => format!("{word}: {}", one_line(reason)),
     }
 }
 
-fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
-    match told {
-        None => sentence(ui, "reading what was said of it", false),
-        Some(Err(err)) => sentence(ui, err, true),
-        Some(Ok(told)) => {
-            for note in &told.notes {
+fn history_ui(ui: &mut Ui, history: Option<&Result<Told, String>>) {
+    match history {
+        None => quiet_ui(ui, "reading notes and history"),
+        Some(Err(err)) => small_alarm_ui(ui, err),
+        Some(Ok(history)) => {
+            for note in &history.notes {
                 fact_ui(ui, "noted", format!("{} ({})", one_line(&note.reason), note.by));
             }
-            if told.events.is_empty() {
+            if history.events.is_empty() {
                 return;
             }
             section_ui(ui, "History");
             ScrollArea::vertical().id_salt("history").max_height(HISTORY).show(ui, |ui| {
-                for event in &told.events {
+                for event in &history.events {
                     let words = format!(
                         "{} {} {}: {}",
                         second(&event.at),
@@ -136,7 +121,7 @@ fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
                         event.what,
                         one_line(&event.sentence)
                     );
-                    ui.add(Label::new(RichText::new(words).small()).wrap());
+                    small_ui(ui, words);
                 }
             });
         }
@@ -144,11 +129,9 @@ fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
 }
 
 fn values_ui(ui: &mut Ui, entry: &Entry) {
-    for (source, title) in [
-        (Source::About, "Told of it"),
-        (Source::Plan, "Protocol's values"),
-        (Source::Fit, "Saved fits"),
-    ] {
+    for (source, title) in
+        [(Source::About, "Labels"), (Source::Plan, "Protocol values"), (Source::Fit, "Saved fits")]
+    {
         let values: Vec<_> = entry.named.iter().filter(|one| one.source == source).collect();
         if values.is_empty() {
             continue;
@@ -163,12 +146,12 @@ fn values_ui(ui: &mut Ui, entry: &Entry) {
             ui.add(Label::new(one_line(&format!("{} {text}", one.name))).truncate());
         }
         if values.len() > VALUES {
-            sentence(ui, &format!("and {} more", values.len() - VALUES), false);
+            quiet_ui(ui, format!("and {} more", values.len() - VALUES));
         }
     }
 }
 
-/// Draws several sessions: what they have in common. `count` are chosen.
+/// Draws what several sessions have in common. `count` are chosen.
 pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<Item = &'a Entry>) {
     section_ui(ui, &format!("{count} sessions chosen"));
     let entries: Vec<&Entry> = entries.collect();
@@ -201,12 +184,12 @@ pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<I
     }
 }
 
-/// How a session is replayed: a matter of the command line.
+/// Draws the command line that replays a session.
 pub(super) fn replay_ui(ui: &mut Ui, folder: &Path) {
     section_ui(ui, "Replay");
     let line = format!("palpate replay \"{}\" --window", folder.display());
     ui.add(Label::new(RichText::new(&line).monospace()).wrap());
-    if ui.button("Copy this line").clicked() {
+    if ui.button("Copy command").clicked() {
         ui.ctx().copy_text(line);
     }
 }

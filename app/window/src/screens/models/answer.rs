@@ -1,10 +1,10 @@
 //! A comparison of models, drawn.
 
 use crate::plots::figure::{PlotLook, plot_ui};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::remark::quiet_ui;
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::{
+    Column, Emphasis, TableRow, fact_ui, heading_ui, placeholder_ui, quiet_ui, section_ui,
+    sentences_ui, small_ui, table_ui, tokens_of,
+};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
 use palpate_analysis::report::selection_plot::plot;
@@ -33,13 +33,13 @@ const COLUMNS: [(&str, f32); 11] = [
 /// Draws every family over its cost, and the table beneath.
 pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
     let plot = plot(selection);
-    ui.label(RichText::new(&plot.title).heading().strong());
+    heading_ui(ui, &plot.title);
     let height = ui.available_height() * PLOT_SHARE;
     ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
         plot_ui(ui, "families", &plot, PlotLook::default());
     });
     ui.add_space(4.0);
-    ui.label(RichText::new("Families").heading().strong());
+    heading_ui(ui, "Families");
     let mut table = selection::table(selection).into_iter();
     let heads = table.next().unwrap_or_default();
     let places: Vec<(usize, f32)> = COLUMNS
@@ -48,19 +48,19 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
         .collect();
     let columns: Vec<Column> =
         places.iter().map(|&(place, width)| column(&heads[place], width)).collect();
-    let mut rows: Vec<Row> = selection
+    let mut rows: Vec<TableRow> = selection
         .candidates
         .iter()
         .zip(table)
-        .map(|(one, cells)| Row {
+        .map(|(one, cells)| TableRow {
             cells: places.iter().map(|&(place, _)| cells[place].clone()).collect(),
-            look: look(selection, one),
+            emphasis: emphasis(selection, one),
             hint: Some(hint(one)),
         })
         .collect();
-    rows.extend(selection.refused.iter().map(|one| Row {
+    rows.extend(selection.refused.iter().map(|one| TableRow {
         cells: vec![one.family.clone(), "refused".into()],
-        look: RowLook::Quiet,
+        emphasis: Emphasis::Quiet,
         hint: Some(one.reason.clone()),
     }));
     table_ui(ui, "families_table", &columns, &rows);
@@ -73,11 +73,11 @@ fn column(head: &str, width: f32) -> Column {
     }
 }
 
-fn look(selection: &Selection, one: &Candidate) -> RowLook {
+fn emphasis(selection: &Selection, one: &Candidate) -> Emphasis {
     match (&selection.verdict.family, one.is_within) {
-        (Some(chosen), _) if *chosen == one.family => RowLook::Marked,
-        (_, Some(false)) => RowLook::Quiet,
-        _ => RowLook::Plain,
+        (Some(chosen), _) if *chosen == one.family => Emphasis::Marked,
+        (_, Some(false)) => Emphasis::Quiet,
+        _ => Emphasis::Plain,
     }
 }
 
@@ -89,17 +89,10 @@ fn hint(one: &Candidate) -> String {
 
 /// Draws the choice in words, what each term buys, and the recordings.
 pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let selection = &selected.selection;
     section_ui(ui, "Choice");
-    for (index, sentence) in selection.verdict.sentences.iter().enumerate() {
-        let mut text = RichText::new(sentence);
-        if index == 0 {
-            text = text.strong();
-        }
-        ui.add(Label::new(text).wrap());
-        ui.add_space(4.0);
-    }
+    sentences_ui(ui, &selection.verdict.sentences);
     if let Some(chosen) = &selection.verdict.family
         && let Some(one) = selection.candidates.iter().find(|one| one.family == *chosen)
         && let Ok(parameters) = one.model.parameters()
@@ -110,11 +103,11 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
             fact_ui(ui, &parameter.name, value.trim().to_owned());
         }
     }
-    section_ui(ui, "What each term buys");
+    section_ui(ui, "Gain of each term");
     let ladder = selection::ladder(selection);
     let steps = ladder.get(1..).unwrap_or_default();
     if steps.is_empty() {
-        ui.label(RichText::new("no two families of one kind").color(tokens.text_quiet));
+        placeholder_ui(ui, "no two families of one kind");
     }
     for step in steps {
         let line = |words: RichText| Label::new(words.small()).wrap();
@@ -125,7 +118,7 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
     }
     section_ui(ui, "Recordings");
     for text in [selection::records(selection), selection::tested(selection)] {
-        ui.add(Label::new(RichText::new(text).small()).wrap());
+        small_ui(ui, text);
     }
     for note in &selected.notes {
         quiet_ui(ui, note);

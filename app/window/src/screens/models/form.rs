@@ -1,13 +1,11 @@
-//! What is compared, and how.
+//! Recordings to compare, and the options of the comparison.
 
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::choice::choice_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::tick_box::tick_box;
-use crate::workers::path_dialog::Ask;
-use eframe::egui::{Button, Label, RichText, TextEdit, Ui};
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{
+    NamedControl, choice_ui, form_label, placeholder_ui, quiet_ui, require, tick_box, tolerance_ui,
+};
+use crate::workers::PathPurpose;
+use eframe::egui::{Button, Label, TextEdit, Ui};
 use palpate_analysis::select::SelectRequest;
 use palpate_analysis::source::Stretch;
 use palpate_analysis::sources::Naming;
@@ -18,7 +16,6 @@ use std::path::{Path, PathBuf};
 /// More recordings than this compared by hand are a job for the command line.
 const SOURCES_MAX: usize = 24;
 
-/// What may be held out and predicted, with its words.
 const HOLD_OUTS: [(HoldOut, &str); 5] = [
     (HoldOut::Auto, "each recording in turn"),
     (HoldOut::Speed, "each speed in turn"),
@@ -57,11 +54,9 @@ impl ModelsForm {
         }
     }
 
-    /// What the form asks for, or why it asks for nothing.
+    /// The comparison to make, or why there is none.
     pub fn request(&self) -> Result<SelectRequest, String> {
-        if self.sources.is_empty() {
-            return Err("add a recording first".into());
-        }
+        require(!self.sources.is_empty(), "add a recording first")?;
         Ok(SelectRequest {
             paths: self.sources.clone(),
             wanted: Stretch::with_unload(self.with_unload).into(),
@@ -88,21 +83,13 @@ impl ModelsForm {
         last_run: Option<&Path>,
         commands: &mut Commands,
     ) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         let mut dropped = None;
         for (index, path) in self.sources.iter().enumerate() {
             ui.horizontal(|ui| {
                 let name = short(path);
-                let button = Button::new("×").small();
-                let button = ui.add(button).on_hover_text(format!("leave out {name}"));
-                button.widget_info(|| {
-                    eframe::egui::WidgetInfo::labeled(
-                        eframe::egui::Role::Button,
-                        true,
-                        format!("leave out {name}"),
-                    )
-                });
-                if button.clicked() {
+                let hint = format!("leave out {name}");
+                let button = ui.add(Button::new("×").small()).on_hover_text(&hint);
+                if button.accessible_name(hint).clicked() {
                     dropped = Some(index);
                 }
                 ui.add(Label::new(name).truncate()).on_hover_text(path.display().to_string());
@@ -112,7 +99,7 @@ impl ModelsForm {
             self.sources.remove(index);
         }
         if self.sources.is_empty() {
-            ui.label(RichText::new("none yet").color(tokens.text_quiet));
+            placeholder_ui(ui, "none yet");
         }
         ui.horizontal(|ui| {
             let label = form_label(ui, "path");
@@ -121,7 +108,7 @@ impl ModelsForm {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("session folder or table");
-            let typed = ui.add(input).labelled_by(label.id).place("path");
+            let typed = ui.add(input).labelled_by(label.id).named("path");
             let is_entered =
                 typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
             let is_pressed = ui.button("Add").clicked();
@@ -133,10 +120,10 @@ impl ModelsForm {
         });
         ui.horizontal_wrapped(|ui| {
             if ui.button("Choose table...").clicked() {
-                commands.push(Command::Choose(Ask::Table));
+                commands.push(UiCommand::Choose(PathPurpose::Table));
             }
             if ui.button("Choose session...").clicked() {
-                commands.push(Command::Choose(Ask::Session));
+                commands.push(UiCommand::Choose(PathPurpose::Session));
             }
             let button = Button::new("Add the last run");
             if ui.add_enabled(last_run.is_some(), button).clicked()
@@ -146,35 +133,15 @@ impl ModelsForm {
             }
         });
         if last_run.is_none() {
-            let text = "the run screen has no run that ended";
-            ui.label(RichText::new(text).color(tokens.text_quiet).small());
+            quiet_ui(ui, "no run has ended on the run screen yet");
         }
     }
 
     pub(super) fn choices_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "tolerance");
-            let input = TextEdit::singleline(&mut self.tolerance)
-                .desired_width(96.0)
-                .char_limit(24)
-                .hint_text("none");
-            ui.add(input).labelled_by(label.id).place("tolerance");
-        });
-        match self.tolerance() {
-            Err(reason) => {
-                ui.label(RichText::new(reason).color(tokens.alarm_text).small());
-            }
-            Ok(tolerance) => {
-                let text = tolerance.map_or_else(
-                    || "none: information criteria alone decide".to_owned(),
-                    |tolerance| format!("an error of {tolerance} does not matter"),
-                );
-                ui.label(RichText::new(text).color(tokens.text_quiet).small());
-            }
-        }
+        let without = Some("none: information criteria alone decide");
+        tolerance_ui(ui, &mut self.tolerance, without);
         choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
-        tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
+        tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
     }
 }
 

@@ -1,23 +1,16 @@
-//! Which model recordings need: what is compared on the left, the families in the middle, the choice on
-//! the right.
+//! Model selection: recordings on the left, families in the middle, the choice on the right.
 
 mod answer;
 mod form;
 
 pub use form::ModelsForm;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::task_bar::work_ui;
-use crate::workbench::Workbench;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
-use eframe::egui::{Context, Key, Label, RichText, Ui};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use crate::widgets::{answer_ui, placeholder_ui, section_ui, work_ui};
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Ui};
 use palpate_analysis::select::{Selected, select_sources};
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
     purpose: "how much model a recording needs",
@@ -25,11 +18,10 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(ModelsScreen::default()),
 };
 
-/// The screen's state.
 #[derive(Default)]
 pub struct ModelsScreen {
     form: ModelsForm,
-    task: Task<Selected>,
+    task: BackgroundTask<Selected>,
 }
 
 impl ModelsScreen {
@@ -53,14 +45,9 @@ impl Screen for ModelsScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        match self.task.answer() {
-            Some(Ok(selected)) => answer::families_ui(ui, &selected.selection),
-            Some(Err(reason)) => sentence_ui(ui, reason, true),
-            None => sentence_ui(
-                ui,
-                "Add recordings on the left and compare. Two speeds or depths of one specimen tell more than one: what is held out of each fit is then predicted.",
-                false,
-            ),
+        let before = "Add recordings on the left and compare them. Two speeds or depths of one specimen are better than one: each fit then predicts the recordings that are held out.";
+        if let Some(selected) = answer_ui(ui, &self.task, before) {
+            answer::families_ui(ui, &selected.selection);
         }
     }
 
@@ -69,7 +56,7 @@ impl Screen for ModelsScreen {
             Some(Ok(selected)) => answer::choice_ui(ui, selected),
             _ => {
                 section_ui(ui, "Choice");
-                sentence_ui(ui, "nothing compared yet", false);
+                placeholder_ui(ui, "nothing compared yet");
             }
         }
     }
@@ -78,18 +65,18 @@ impl Screen for ModelsScreen {
         self.task.poll();
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::Chosen(Ask::Session | Ask::Table, path) => self.form.add(path),
-            _ => return Reply::NotMine,
+            UiCommand::Chosen(PathPurpose::Session | PathPurpose::Table, path) => {
+                self.form.add(path)
+            }
+            _ => return Reaction::NotMine,
         }
-        Reply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        let Ok(request) = self.form.request() else {
-            return;
-        };
+        let Ok(request) = self.form.request() else { return };
         self.task.start("select", ctx, move |progress| {
             select_sources(request, progress).map_err(|err| err.to_string())
         });
@@ -100,12 +87,6 @@ impl Screen for ModelsScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
+        self.task.is_busy()
     }
-}
-
-fn sentence_ui(ui: &mut Ui, text: &str, is_wrong: bool) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let ink = if is_wrong { tokens.alarm_text } else { tokens.text_quiet };
-    ui.add(Label::new(RichText::new(text).color(ink)).wrap());
 }

@@ -1,36 +1,30 @@
-//! Every cycle: the loops of the session in front over each other, and of every session shown the peaks, where they
-//! were, and how they compare with the first.
+//! Every cycle: hysteresis loops of the session in front over each other, and the peaks of every session shown, next to
+//! the first.
 
 use super::ReviewScreen;
 use super::middle::head_ui;
-use super::subject::Subject;
-use crate::plots::over_depth::{Layer, Source, over_depth_ui};
-use crate::theme::Tokens;
-use crate::widgets::remark::quiet_ui;
-use crate::widgets::table::{Column, Row, table_ui};
-use crate::widgets::tick_box::tick_box;
+use super::subject::ReviewSubject;
+use crate::plots::over_depth::{DepthLine, DepthLineKey};
+use crate::widgets::{Column, TableRow, quiet_ui, table_ui, tick_box, tokens_of};
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};
 
 /// A cycle of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cycle {
-    /// Its number, from 1.
+    /// From 1.
     pub number: u32,
-    /// Highest force in N.
     pub peak_n: f64,
-    /// When, in s since the first sample.
-    pub peak_t: f64,
-    /// Depth there in mm.
+    /// Depth at the peak.
     pub depth_mm: Option<f64>,
-    /// When it began and ended.
+    /// Start and end in s since the first sample.
     pub t: [f64; 2],
     /// Its first sample and the one behind its last.
     pub rows: [usize; 2],
 }
 
 /// The cycles of a session, as far as it was read.
-pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
+pub(super) fn cycles(subject: &ReviewSubject) -> Vec<Cycle> {
     let recording = &subject.recording;
     let track = &recording.track;
     let mut found = Vec::new();
@@ -49,7 +43,6 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
         found.push(Cycle {
             number: stretch.what,
             peak_n,
-            peak_t,
             depth_mm: place.and_then(|place| track.value(Quantity::Depth as usize, place)),
             t: [stretch.t, track.time_of(end.saturating_sub(1)).unwrap_or(stretch.t)],
             rows: [stretch.first, end],
@@ -58,15 +51,15 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
     found
 }
 
-/// The rows of the table, and what they were made of: made anew only where that is other.
+/// The rows of the table, and the versions of the sessions for which they were made.
 #[derive(Debug, Default)]
 pub(super) struct CycleRows {
     key: Vec<(u64, u64)>,
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
 }
 
 impl CycleRows {
-    fn update(&mut self, subjects: &[Subject]) {
+    fn update(&mut self, subjects: &[ReviewSubject]) {
         let versions = subjects.iter().map(|one| (one.id, one.recording.version));
         if versions.clone().eq(self.key.iter().copied()) {
             return;
@@ -76,7 +69,7 @@ impl CycleRows {
     }
 }
 
-fn rows_of(subject: &Subject) -> Vec<Row> {
+fn rows_of(subject: &ReviewSubject) -> Vec<TableRow> {
     let own = cycles(subject);
     let first = own.first().map(|cycle| cycle.peak_n);
     let row = |cycle: &Cycle| {
@@ -91,7 +84,7 @@ fn rows_of(subject: &Subject) -> Vec<Row> {
             cycle.depth_mm.map_or("-".into(), |depth| format!("{depth:.4}")),
             share.map_or("-".into(), |share| format!("{share:.2}")),
         ];
-        Row { cells, ..Row::default() }
+        TableRow { cells, ..TableRow::default() }
     };
     own.iter().map(row).collect()
 }
@@ -103,13 +96,13 @@ impl ReviewScreen {
     pub(super) fn cycles_ui(&mut self, ui: &mut Ui) {
         self.cycle_rows.update(&self.subjects);
         if self.cycle_rows.rows.is_empty() {
-            quiet_ui(ui, "no session shown has cycles");
+            quiet_ui(ui, "No session shown has cycles.");
             return;
         }
         self.moves_ui(ui);
         let height = (0.55 * ui.available_height()).max(160.0);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
-        let words = "the highest force of every cycle; 'palpate analyse' tells hysteresis, relaxation and shift";
+        let words = "peak force of every cycle; 'palpate analyse' computes hysteresis, relaxation and shift";
         head_ui(ui, "Cycles", words);
         let columns = [
             Column::words("session", 200.0),
@@ -125,15 +118,13 @@ impl ReviewScreen {
 
     /// The loops of the session in front, from the first cycle to the last.
     fn loops_ui(&mut self, ui: &mut Ui) {
-        let Some(front) = self.subjects.first() else {
-            return;
-        };
+        let Some(front) = self.subjects.first() else { return };
         let all = cycles(front);
         if all.is_empty() {
-            quiet_ui(ui, &format!("{} has no cycles", front.name));
+            quiet_ui(ui, format!("{} has no cycles", front.name));
             return;
         }
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let colors: Vec<Color32> =
             (0..all.len()).map(|index| tokens.in_order(index, all.len())).collect();
         ui.horizontal_wrapped(|ui| {
@@ -155,29 +146,21 @@ impl ReviewScreen {
             .filter(|(index, _)| is_drawn(*index))
             .map(|(_, one)| one)
             .collect();
-        let sources: Vec<Source<'_>> = drawn
+        let lines: Vec<DepthLine<'_>> = drawn
             .iter()
-            .map(|(cycle, color)| Source {
-                track: &front.recording.track,
-                columns: [Quantity::Depth as usize, Quantity::Force as usize],
-                rows: cycle.rows,
-                version: front.fifths(),
-                id: id(cycle),
-                color: *color,
-            })
-            .collect();
-        let spans = [&self.depth, &self.force];
-        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<Layer<'_>> = drawn
-            .iter()
-            .map(|(cycle, color)| Layer {
+            .map(|(cycle, color)| DepthLine {
                 name: &front.name,
-                color: *color,
-                id: id(cycle),
+                track: &front.recording.track,
+                key: DepthLineKey {
+                    id: id(cycle),
+                    version: front.fifths(),
+                    rows: cycle.rows,
+                    color: *color,
+                },
                 cursors: [None; 2],
             })
             .collect();
-        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
-        self.follow_over_depth(drawn);
+        let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);
+        self.follow_over_depth(&gesture);
     }
 }

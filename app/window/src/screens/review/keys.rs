@@ -1,4 +1,4 @@
-//! Keys of the review screen, read while nobody types and no control has the focus.
+//! Keys of the review screen, read while no text is typed and no control has the focus.
 
 use super::{ReviewScreen, View};
 use crate::plots::navigate::{PAN_STEP, ZOOM_STEP};
@@ -9,55 +9,43 @@ const CURSOR_SHARES: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
 /// Share of what is shown by which a key moves a cursor.
 const CURSOR_STEP: f64 = 1.0 / 400.0;
 
-/// What can be asked of the plots.
+/// A change of what the plots show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Move {
-    /// See less, larger.
+pub enum ViewMove {
     ZoomIn,
-    /// See more.
     ZoomOut,
-    /// Earlier.
-    Back,
-    /// Later.
-    On,
-    /// Everything.
-    All,
-    /// Set a cursor, A or B.
+    PanLeft,
+    PanRight,
+    Reset,
+    /// Sets cursor A (0) or B (1).
     Cursor(usize),
-    /// Take both away.
-    NoCursors,
+    ClearCursors,
 }
 
 impl ReviewScreen {
     /// Does what a button or a key asks for.
-    pub(super) fn go(&mut self, to: Move) {
+    pub(super) fn go(&mut self, to: ViewMove) {
         let spans = match self.view {
             View::OverDepth | View::Cycles => vec![&mut self.depth, &mut self.force],
             _ => vec![&mut self.time],
         };
         match to {
-            Move::ZoomIn | Move::ZoomOut => {
-                let factor = match to {
-                    Move::ZoomIn => ZOOM_STEP,
-                    _ => 1.0 / ZOOM_STEP,
-                };
-                for span in spans {
-                    span.zoom(factor, span.at(0.5));
-                }
+            ViewMove::ZoomIn | ViewMove::ZoomOut => {
+                let factor = if to == ViewMove::ZoomIn { ZOOM_STEP } else { 1.0 / ZOOM_STEP };
+                spans.into_iter().for_each(|span| span.zoom(factor, span.at(0.5)));
             }
-            Move::Back | Move::On => {
-                let share = if to == Move::On { PAN_STEP } else { -PAN_STEP };
+            ViewMove::PanLeft | ViewMove::PanRight => {
+                let share = if to == ViewMove::PanRight { PAN_STEP } else { -PAN_STEP };
                 spans.into_iter().take(1).for_each(|span| span.pan(share));
             }
-            Move::All => spans.into_iter().for_each(|span| span.show_all()),
-            Move::Cursor(number) => {
+            ViewMove::Reset => spans.into_iter().for_each(|span| span.show_all()),
+            ViewMove::Cursor(number) => {
                 self.cursors[number] = Some(self.time.at(CURSOR_SHARES[number]));
             }
-            Move::NoCursors => self.cursors = [None; 2],
+            ViewMove::ClearCursors => self.cursors = [None; 2],
         }
     }
 
-    /// Reads the keys.
     pub(super) fn read_keys(&mut self, ctx: &Context) {
         if ctx.egui_wants_keyboard_input() {
             return;
@@ -73,9 +61,9 @@ impl ReviewScreen {
                 .collect()
         });
         for (key, modifiers) in pressed {
-            match asked(key, modifiers) {
-                Some(Asked::Go(to)) => self.go(to),
-                Some(Asked::Step(number, way)) => self.step_cursor(number, way),
+            match key_action(key, modifiers) {
+                Some(KeyAction::Go(to)) => self.go(to),
+                Some(KeyAction::Step(number, way)) => self.step_cursor(number, way),
                 None => {}
             }
         }
@@ -91,31 +79,31 @@ impl ReviewScreen {
 
 /// What a key asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
-    Go(Move),
+enum KeyAction {
+    Go(ViewMove),
     /// A cursor moves: which, and to which side.
     Step(usize, f64),
 }
 
 /// What a key asks for with the modifiers held; with Ctrl it belongs to the window.
-fn asked(key: Key, modifiers: Modifiers) -> Option<Asked> {
+fn key_action(key: Key, modifiers: Modifiers) -> Option<KeyAction> {
     if modifiers.command || modifiers.ctrl {
         return None;
     }
     Some(match (key, modifiers.alt, modifiers.shift) {
-        (Key::ArrowLeft, true, _) => Asked::Step(0, -1.0),
-        (Key::ArrowRight, true, _) => Asked::Step(0, 1.0),
-        (Key::ArrowLeft, _, true) => Asked::Step(1, -1.0),
-        (Key::ArrowRight, _, true) => Asked::Step(1, 1.0),
-        (Key::ArrowLeft, ..) => Asked::Go(Move::Back),
-        (Key::ArrowRight, ..) => Asked::Go(Move::On),
+        (Key::ArrowLeft, true, _) => KeyAction::Step(0, -1.0),
+        (Key::ArrowRight, true, _) => KeyAction::Step(0, 1.0),
+        (Key::ArrowLeft, _, true) => KeyAction::Step(1, -1.0),
+        (Key::ArrowRight, _, true) => KeyAction::Step(1, 1.0),
+        (Key::ArrowLeft, ..) => KeyAction::Go(ViewMove::PanLeft),
+        (Key::ArrowRight, ..) => KeyAction::Go(ViewMove::PanRight),
         // On many keyboards the plus is the shifted equals sign.
-        (Key::Plus | Key::Equals, ..) => Asked::Go(Move::ZoomIn),
-        (Key::Minus, ..) => Asked::Go(Move::ZoomOut),
-        (Key::Home, ..) => Asked::Go(Move::All),
-        (Key::A, ..) => Asked::Go(Move::Cursor(0)),
-        (Key::B, ..) => Asked::Go(Move::Cursor(1)),
-        (Key::Delete, ..) => Asked::Go(Move::NoCursors),
+        (Key::Plus | Key::Equals, ..) => KeyAction::Go(ViewMove::ZoomIn),
+        (Key::Minus, ..) => KeyAction::Go(ViewMove::ZoomOut),
+        (Key::Home, ..) => KeyAction::Go(ViewMove::Reset),
+        (Key::A, ..) => KeyAction::Go(ViewMove::Cursor(0)),
+        (Key::B, ..) => KeyAction::Go(ViewMove::Cursor(1)),
+        (Key::Delete, ..) => KeyAction::Go(ViewMove::ClearCursors),
         _ => return None,
     })
 }
@@ -127,14 +115,14 @@ mod tests {
     #[test]
     fn arrows_move_the_picture_and_with_alt_or_shift_a_cursor() {
         for (key, modifiers, wanted) in [
-            (Key::ArrowLeft, Modifiers::NONE, Some(Asked::Go(Move::Back))),
-            (Key::ArrowRight, Modifiers::ALT, Some(Asked::Step(0, 1.0))),
-            (Key::ArrowLeft, Modifiers::SHIFT, Some(Asked::Step(1, -1.0))),
-            (Key::Equals, Modifiers::SHIFT, Some(Asked::Go(Move::ZoomIn))),
+            (Key::ArrowLeft, Modifiers::NONE, Some(KeyAction::Go(ViewMove::PanLeft))),
+            (Key::ArrowRight, Modifiers::ALT, Some(KeyAction::Step(0, 1.0))),
+            (Key::ArrowLeft, Modifiers::SHIFT, Some(KeyAction::Step(1, -1.0))),
+            (Key::Equals, Modifiers::SHIFT, Some(KeyAction::Go(ViewMove::ZoomIn))),
             (Key::Plus, Modifiers::COMMAND, None),
             (Key::F5, Modifiers::NONE, None),
         ] {
-            assert_eq!(asked(key, modifiers), wanted, "{key:?} {modifiers:?}");
+            assert_eq!(key_action(key, modifiers), wanted, "{key:?} {modifiers:?}");
         }
     }
 }

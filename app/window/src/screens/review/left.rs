@@ -1,26 +1,23 @@
 //! The sessions shown, and how they are laid over each other.
 
-use super::{ReviewScreen, Subject, View};
-use crate::command::{Command, Commands};
+use super::{ReviewScreen, ReviewSubject, View};
+use crate::command::{Commands, UiCommand};
 use crate::screens::library;
 use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::task_ui;
-use crate::widgets::text_row::text_row;
-use crate::widgets::tick_box::tick_box;
-use crate::workers::review::{Leader, Quantity, Stage};
-use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, Ui, vec2};
+use crate::widgets::{
+    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, share_ui, task_ui,
+    text_row, tick_box, tokens_of,
+};
+use crate::workers::review::{Quantity, Stage, TimeOrigin};
+use eframe::egui::{Button, Color32, Label, RichText, Sense, Ui, vec2};
 use std::path::PathBuf;
 
-/// What was pressed at a session.
-enum Asked {
+/// A button of a session.
+enum SessionAction {
     Front(usize),
     Remove(usize),
     Cancel(usize),
-    Again(usize),
+    ReadAgain(usize),
 }
 
 /// The colour of a session.
@@ -33,33 +30,31 @@ fn small(text: &str) -> Button<'_> {
     Button::new(text).small().truncate()
 }
 
-/// Draws how far a session is read; what was pressed there.
-fn stage_ui(ui: &mut Ui, index: usize, subject: &Subject) -> Option<Asked> {
+/// Draws how far a session is read; returns the button that was pressed.
+fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<SessionAction> {
     let recording = &subject.recording;
     let share = recording.share();
-    let mut asked = None;
+    let mut pressed = None;
     match &recording.stage {
         Stage::Whole => return None,
-        Stage::Waiting => quiet_ui(ui, "waits to be read"),
+        Stage::Waiting => quiet_ui(ui, "waiting to be read"),
         Stage::Reading => {
-            let tokens = Tokens::of(ui.visuals().dark_mode);
-            let bar = ProgressBar::new(share as f32).desired_height(8.0);
-            ui.add(bar.fill(tokens.text_quiet));
+            share_ui(ui, share);
             ui.horizontal(|ui| {
-                quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
+                quiet_ui(ui, format!("still reading {:.0} %", 100.0 * share));
                 let cancel = format!("cancel: {}", subject.name);
                 if ui.add(small(&cancel)).clicked() {
-                    asked = Some(Asked::Cancel(index));
+                    pressed = Some(SessionAction::Cancel(index));
                 }
             });
-            return asked;
+            return pressed;
         }
-        Stage::Cancelled => quiet_ui(ui, &format!("only {:.0} % of it is read", 100.0 * share)),
+        Stage::Cancelled => quiet_ui(ui, format!("only {:.0} % of it is read", 100.0 * share)),
         Stage::Failed(reason) => alarm_ui(ui, reason),
     }
     let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
     let again = format!("read again: {}", subject.name);
-    (can_read && ui.small_button(again).clicked()).then_some(Asked::Again(index))
+    (can_read && ui.small_button(again).clicked()).then_some(SessionAction::ReadAgain(index))
 }
 
 impl ReviewScreen {
@@ -68,23 +63,22 @@ impl ReviewScreen {
         self.sessions_ui(ui);
         self.add_ui(ui);
         if ui.button("Find sessions in the library").clicked() {
-            commands.push(Command::Show(library::SCREEN.name));
+            commands.push(UiCommand::Show(library::SCREEN.name));
         }
         section_ui(ui, "Time zero at");
-        for leader in Leader::ALL {
-            ui.radio_value(&mut self.leader, leader, leader.name()).place(leader.name());
+        for time_origin in TimeOrigin::ALL {
+            ui.radio_value(&mut self.time_origin, time_origin, time_origin.name())
+                .named(time_origin.name());
         }
-        self.leaders_missing_ui(ui);
+        self.missing_origins_ui(ui);
         section_ui(ui, "Shown over time");
         for quantity in Quantity::ALL {
             let mut is_shown = self.quantities.contains(&quantity);
             if tick_box(ui, &mut is_shown, quantity.name()).changed() {
-                // In the order in which they always stand.
-                let wanted = |one: &Quantity| match *one == quantity {
-                    true => is_shown,
-                    false => self.quantities.contains(one),
-                };
-                self.quantities = Quantity::ALL.into_iter().filter(wanted).collect();
+                self.quantities.retain(|one| *one != quantity);
+                self.quantities.extend(is_shown.then_some(quantity));
+                // Always in the same order on the screen.
+                self.quantities.sort_by_key(|one| *one as usize);
             }
         }
         let has_fit = self.subjects.iter().any(|one| one.fitted().is_some());
@@ -92,7 +86,7 @@ impl ReviewScreen {
             tick_box(ui, &mut self.has_residuals, "Residuals of the fit")
         });
         if !has_fit {
-            quiet_ui(ui, "no session shown has been fitted here yet");
+            quiet_ui(ui, "fit the sessions shown first");
         }
         section_ui(ui, "Fit");
         self.model.ui(ui, "fit with", "include rejected sessions");
@@ -100,17 +94,17 @@ impl ReviewScreen {
         if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
             self.start_fits(ui.ctx());
         }
-        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.standing()) {
+        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.state()) {
             alarm_ui(ui, reason);
         }
     }
 
     fn sessions_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         if self.subjects.is_empty() {
-            quiet_ui(ui, "none yet: choose some in the library, or type the path of one");
+            quiet_ui(ui, "none yet: choose sessions in the library, or type the path of one");
         }
-        let mut asked = None;
+        let mut pressed = None;
         for (index, subject) in self.subjects.iter().enumerate() {
             ui.horizontal(|ui| {
                 let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
@@ -125,24 +119,24 @@ impl ReviewScreen {
                 if index == 0 {
                     quiet_ui(ui, "in front");
                 } else if ui.add(small(&format!("front: {}", subject.name))).clicked() {
-                    asked = Some(Asked::Front(index));
+                    pressed = Some(SessionAction::Front(index));
                 }
             });
             ui.horizontal(|ui| {
                 if ui.add(small(&format!("remove: {}", subject.name))).clicked() {
-                    asked = Some(Asked::Remove(index));
+                    pressed = Some(SessionAction::Remove(index));
                 }
             });
-            asked = asked.or(stage_ui(ui, index, subject));
+            pressed = pressed.or(stage_ui(ui, index, subject));
             ui.add_space(4.0);
         }
-        match asked {
-            Some(Asked::Front(index)) => self.subjects[..=index].rotate_right(1),
-            Some(Asked::Remove(index)) => {
+        match pressed {
+            Some(SessionAction::Front(index)) => self.subjects[..=index].rotate_right(1),
+            Some(SessionAction::Remove(index)) => {
                 self.subjects.remove(index);
             }
-            Some(Asked::Cancel(index)) => self.subjects[index].recording.cancel(),
-            Some(Asked::Again(index)) => self.subjects[index].read_again(),
+            Some(SessionAction::Cancel(index)) => self.subjects[index].recording.cancel(),
+            Some(SessionAction::ReadAgain(index)) => self.subjects[index].read_again(),
             None => {}
         }
     }
@@ -150,11 +144,8 @@ impl ReviewScreen {
     fn add_ui(&mut self, ui: &mut Ui) {
         let hint = "the folder of a session";
         let is_entered = text_row(ui, "session", hint, &mut self.path);
-        let verdict = match self.path.trim() {
-            "" => Err("type the path of a session's folder".to_owned()),
-            _ => Ok(()),
-        };
-        let is_pressed = reason_button(ui, "Show besides", vec2(0.0, 22.0), &verdict);
+        let verdict = require(!self.path.trim().is_empty(), "type the path of a session's folder");
+        let is_pressed = reason_button(ui, "Add to view", vec2(0.0, 22.0), &verdict);
         if is_pressed || (is_entered && verdict.is_ok()) {
             let path = PathBuf::from(std::mem::take(&mut self.path).trim());
             self.add(path, ui.ctx());
@@ -163,21 +154,22 @@ impl ReviewScreen {
         }
     }
 
-    /// Which sessions have no such moment.
-    fn leaders_missing_ui(&self, ui: &mut Ui) {
+    fn missing_origins_ui(&self, ui: &mut Ui) {
         for subject in &self.subjects {
-            if subject.is_settled() && subject.moment(self.leader).is_none() {
-                let words =
-                    format!("{} has no {}; it lies at its start", subject.name, self.leader.name());
+            if subject.is_settled() && subject.moment(self.time_origin).is_none() {
+                let words = format!(
+                    "{} has no {}; its time is counted from its start",
+                    subject.name,
+                    self.time_origin.name()
+                );
                 quiet_ui(ui, &words);
             }
         }
     }
 
-    /// Draws the names of the views.
     pub(super) fn views_ui(&mut self, ui: &mut Ui) {
         for view in View::ALL {
-            ui.selectable_value(&mut self.view, view, view.name()).place(view.name());
+            ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
         }
     }
 }

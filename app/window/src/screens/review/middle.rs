@@ -1,16 +1,16 @@
 //! The plots: over time above each other, over depth, and the tables.
 
-use super::keys::Move;
+use super::keys::ViewMove;
 use super::left::color_of;
-use super::subject::{LINE_MODELLED, LINE_RESIDUAL, Subject};
+use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
-use crate::plots::over_depth::{self, Source, over_depth_ui};
-use crate::plots::over_time::{Layer, Moment, Panel, Setting, over_time_ui};
-use crate::theme::Tokens;
-use crate::widgets::remark::quiet_ui;
-use crate::workers::review::{Quantity, Recording};
-use eframe::egui::{Button, Label, RichText, Ui, vec2};
+use crate::plots::over_depth::{DepthLine, DepthLineKey};
+use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
+use crate::widgets::{heading_ui, quiet_ui, sentence_ui, tokens_of};
+use crate::workers::review::{Quantity, ReviewRecording};
+use eframe::egui::{Ui, vec2};
+use palpate_model::signal::track::Track;
 
 /// Points that the axes beside and below a plot take of it.
 const AXIS_WIDTH: f32 = 58.0;
@@ -27,15 +27,13 @@ impl ReviewScreen {
             return;
         }
         match self.view {
-            View::OverTime => {
+            View::OverTime | View::OverDepth => {
                 self.moves_ui(ui);
                 self.readout_ui(ui);
-                self.over_time_ui(ui);
-            }
-            View::OverDepth => {
-                self.moves_ui(ui);
-                self.readout_ui(ui);
-                self.over_depth_ui(ui);
+                match self.view {
+                    View::OverTime => self.over_time_ui(ui),
+                    _ => self.over_depth_ui(ui),
+                }
             }
             View::Cycles => self.cycles_ui(ui),
             View::Parameters => self.parameters_ui(ui),
@@ -46,27 +44,22 @@ impl ReviewScreen {
     /// Buttons for what the pointer and the keys can do.
     pub(super) fn moves_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            let mut asked = None;
             for (text, key, to) in [
-                ("Zoom in", "+", Move::ZoomIn),
-                ("Zoom out", "-", Move::ZoomOut),
-                ("Back", "left arrow", Move::Back),
-                ("On", "right arrow", Move::On),
-                ("Everything", "Home", Move::All),
-                ("Cursor A", "A, or a click", Move::Cursor(0)),
-                ("Cursor B", "B, or a click with Shift", Move::Cursor(1)),
-                ("No cursors", "Delete", Move::NoCursors),
+                ("Zoom in", "+", ViewMove::ZoomIn),
+                ("Zoom out", "-", ViewMove::ZoomOut),
+                ("Pan left", "left arrow", ViewMove::PanLeft),
+                ("Pan right", "right arrow", ViewMove::PanRight),
+                ("Reset view", "Home", ViewMove::Reset),
+                ("Cursor A", "A, or a click", ViewMove::Cursor(0)),
+                ("Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
+                ("Clear cursors", "Delete", ViewMove::ClearCursors),
             ] {
-                let is_of_time = matches!(to, Move::Cursor(_) | Move::NoCursors);
-                if is_of_time && self.view == View::Cycles {
-                    continue;
+                // Cursors stand in time, which the view of cycles does not have.
+                let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
+                let is_offered = !is_cursor || self.view != View::Cycles;
+                if is_offered && ui.button(text).on_hover_text(key).clicked() {
+                    self.go(to);
                 }
-                if ui.add(Button::new(text)).on_hover_text(key).clicked() {
-                    asked = Some(to);
-                }
-            }
-            if let Some(to) = asked {
-                self.go(to);
             }
         });
         self.remarks_ui(ui);
@@ -74,45 +67,41 @@ impl ReviewScreen {
 
     /// What a reader of the plots must know.
     fn remarks_ui(&self, ui: &mut Ui) {
-        for subject in &self.subjects {
-            if subject.recording.is_reading() {
-                let share = 100.0 * subject.recording.share();
-                quiet_ui(ui, &format!("{}: still reading {share:.0} %", subject.name));
-            }
+        for subject in self.subjects.iter().filter(|one| one.recording.is_reading()) {
+            let share = 100.0 * subject.recording.share();
+            quiet_ui(ui, format!("{}: still reading {share:.0} %", subject.name));
         }
         let words = match self.view {
-            View::OverDepth | View::Cycles => {
-                match (self.depth_lines.is_busy(), self.depth_lines.remark()) {
-                    (true, _) => Some("finding the lines for this view".to_owned()),
-                    (false, remark) => remark,
-                }
+            View::OverDepth | View::Cycles if self.depth_lines.is_busy() => {
+                Some("finding the lines for this view".to_owned())
             }
+            View::OverDepth | View::Cycles => self.depth_lines.remark(),
             _ if self.thinned > 1 => {
                 Some(format!("thinned to min/max of {} samples", self.thinned))
             }
             _ => Some("every sample is drawn".to_owned()),
         };
         if let Some(words) = words {
-            quiet_ui(ui, &words);
+            quiet_ui(ui, words);
         }
     }
 
-    /// The setting of the plots over time, as the session in front has it.
-    fn setting(&self, front: &Subject) -> Setting {
-        let shift = front.shift(self.leader);
+    /// Phases, events and cursors of the session in front.
+    fn backdrop(&self, front: &ReviewSubject) -> TimeBackdrop {
+        let shift = front.shift(self.time_origin);
         let recording = &front.recording;
         let end = recording.track.span().map_or(0.0, |span| span[1]);
-        let phases = Recording::ended(&recording.phases, end);
-        let mut setting = Setting {
+        let phases = ReviewRecording::ended(&recording.phases, end);
+        let mut setting = TimeBackdrop {
             phases: phases.map(|(from, to, phase)| (from - shift, to - shift, phase)).collect(),
             cursors: self.cursors,
-            ..Setting::default()
+            ..TimeBackdrop::default()
         };
         if let Some(facts) = &recording.facts {
             let left_out = facts.left_out_s.iter();
             setting.left_out = left_out.map(|ends| ends.map(|end| end - shift)).collect();
             let moments = facts.events.iter().filter_map(|event| {
-                Some(Moment {
+                Some(TimeMark {
                     t: recording.track.time_of(event.after_sample)? - shift,
                     is_alarm: event.is_alarm,
                     is_note: event.is_note,
@@ -128,10 +117,10 @@ impl ReviewScreen {
             self.has_residuals && self.subjects.iter().any(|one| one.fitted().is_some());
         let count = self.quantities.len() + usize::from(has_residuals);
         if count == 0 {
-            quiet_ui(ui, "choose on the left what is shown");
+            quiet_ui(ui, "choose quantities on the left");
             return;
         }
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let tokens = tokens_of(ui);
         let width = ui.available_width();
         let scale = f64::from(ui.ctx().pixels_per_point());
         let pixels = (f64::from((width - AXIS_WIDTH).max(64.0)) * scale).round();
@@ -140,19 +129,17 @@ impl ReviewScreen {
         let window = self.time.shown();
         self.thinned = 1;
         for subject in &mut self.subjects {
-            let wanted = subject.wanted(window, pixels, self.leader);
+            let line_window = subject.line_window(window, pixels, self.time_origin);
             for quantity in &self.quantities {
-                subject.update(*quantity, wanted);
+                subject.update(*quantity, line_window);
                 let drawn = subject.lines[*quantity as usize].drawn();
                 self.thinned = self.thinned.max(drawn.samples_per_column);
             }
-            subject.update_fit(wanted);
+            subject.update_fit(line_window);
         }
-        let Some(front) = self.front() else {
-            return;
-        };
-        let setting = self.setting(front);
-        let time_axis = format!("time from {} (s)", self.leader.name());
+        let Some(front) = self.front() else { return };
+        let setting = self.backdrop(front);
+        let time_axis = format!("time from {} (s)", self.time_origin.name());
         let height = ((ui.available_height() - AXIS_HEIGHT) / count as f32).max(40.0);
         let mut gestures = Vec::new();
         for number in 0..count {
@@ -164,20 +151,20 @@ impl ReviewScreen {
                 if quantity.is_none() && subject.fitted().is_none() {
                     continue;
                 }
-                layers.push(Layer {
+                layers.push(TimeLayer {
                     name: &subject.name,
                     color: color_of(tokens, subject.id),
                     stretches: &subject.lines[place],
                 });
             }
             if quantity == Some(Quantity::Force) && front.fitted().is_some() {
-                layers.push(Layer {
+                layers.push(TimeLayer {
                     name: "fitted",
                     color: tokens.limit,
                     stretches: &front.lines[LINE_MODELLED],
                 });
             }
-            let panel = Panel {
+            let panel = TimePanel {
                 id: quantity.map_or("Residual", Quantity::name),
                 axis: quantity.map_or("residual (mN)", Quantity::axis),
                 layers,
@@ -191,82 +178,53 @@ impl ReviewScreen {
             });
         }
         for gesture in gestures {
-            self.follow(&gesture);
-        }
-    }
-
-    /// Moves the time axis and the cursors as the pointer did.
-    fn follow(&mut self, gesture: &Gesture) {
-        if gesture.pan[0] != 0.0 {
-            self.time.pan(gesture.pan[0]);
-        }
-        if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
-            self.time.zoom(gesture.zoom, self.time.at(gesture.at[0]));
-        }
-        if gesture.is_double {
-            self.time.show_all();
-        } else if let Some(is_shift) = gesture.click {
-            self.cursors[usize::from(is_shift)] = Some(self.time.at(gesture.at[0]));
+            self.time.follow(&gesture, 0);
+            if let Some(is_shift) = gesture.click.filter(|_| !gesture.is_double) {
+                self.cursors[usize::from(is_shift)] = Some(self.time.at(gesture.at[0]));
+            }
         }
     }
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let sources: Vec<Source<'_>> = self
-            .subjects
-            .iter()
-            .map(|subject| Source {
-                track: &subject.recording.track,
-                columns: [Quantity::Depth as usize, Quantity::Force as usize],
-                rows: [0, subject.recording.track.len()],
-                version: subject.fifths(),
-                id: subject.id,
-                color: color_of(tokens, subject.id),
+        let tokens = tokens_of(ui);
+        let cursors = |track: &Track, shift: f64| {
+            self.cursors.map(|cursor| {
+                let place = track.place(cursor? + shift)?;
+                let value = |quantity: Quantity| track.value(quantity as usize, place);
+                Some([value(Quantity::Depth)?, value(Quantity::Force)?])
             })
-            .collect();
-        let spans = [&self.depth, &self.force];
-        self.depth_lines.update(ui.ctx(), &sources, spans, self.depth_pixels);
-        let layers: Vec<over_depth::Layer<'_>> = self
+        };
+        let line = |subject: &'_ ReviewSubject| DepthLineKey {
+            id: subject.id,
+            version: subject.fifths(),
+            rows: [0, subject.recording.track.len()],
+            color: color_of(tokens, subject.id),
+        };
+        let lines: Vec<DepthLine<'_>> = self
             .subjects
             .iter()
-            .rev()
-            .map(|subject| over_depth::Layer {
+            .map(|subject| DepthLine {
                 name: &subject.name,
-                color: color_of(tokens, subject.id),
-                id: subject.id,
-                cursors: self.cursors.map(|cursor| {
-                    let track = &subject.recording.track;
-                    let place = track.place(cursor? + subject.shift(self.leader))?;
-                    let value = |quantity: Quantity| track.value(quantity as usize, place);
-                    Some([value(Quantity::Depth)?, value(Quantity::Force)?])
-                }),
+                track: &subject.recording.track,
+                key: line(subject),
+                cursors: cursors(&subject.recording.track, subject.shift(self.time_origin)),
             })
             .collect();
-        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
-        self.follow_over_depth(drawn);
+        let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);
+        self.follow_over_depth(&gesture);
     }
 
-    /// Moves the axes of depth and force as the pointer did in a plot of so many pixels.
-    pub(super) fn follow_over_depth(&mut self, (gesture, pixels): (Gesture, [f64; 2])) {
-        self.depth_pixels = pixels;
-        for (axis, span) in [&mut self.depth, &mut self.force].into_iter().enumerate() {
-            if gesture.pan[axis] != 0.0 {
-                span.pan(gesture.pan[axis]);
-            }
-            if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
-                span.zoom(gesture.zoom, span.at(gesture.at[axis]));
-            }
-            if gesture.is_double {
-                span.show_all();
-            }
-        }
+    /// Moves the axes of depth and force as the pointer did.
+    pub(super) fn follow_over_depth(&mut self, gesture: &Gesture) {
+        self.depth.follow(gesture, 0);
+        self.force.follow(gesture, 1);
     }
 }
 
 /// A heading with a line of words below it.
 pub(super) fn head_ui(ui: &mut Ui, title: &str, words: &str) {
-    ui.label(RichText::new(title).heading().strong());
+    heading_ui(ui, title);
     if !words.is_empty() {
-        ui.add(Label::new(words).wrap());
+        sentence_ui(ui, words);
     }
 }

@@ -9,57 +9,46 @@ mod parameters;
 mod prediction;
 mod readout;
 mod right;
-mod shown;
 mod subject;
 
-pub use parameters::{ParameterRow, parameter_rows};
-pub use shown::{Shown, ShownSeries, ShownSession};
-pub use subject::Subject;
+use subject::ReviewSubject;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
-use crate::plots::navigate::Span;
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use crate::plots::navigate::AxisRange;
 use crate::plots::over_depth::DepthLines;
-use crate::widgets::model_choice::ModelChoice;
-use crate::workbench::Workbench;
-use crate::workers::review::fit::{FitAnswer, Prediction};
-use crate::workers::review::{Leader, Quantity};
-use crate::workers::task::Task;
+use crate::widgets::ModelChoice;
+use crate::workers::BackgroundTask;
+use crate::workers::review::fit::{FitAnswer, SessionPrediction};
+use crate::workers::review::{Quantity, TimeOrigin};
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Key, Ui};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
-    purpose: "look at sessions: one closely, several beside each other",
+    purpose: "one session in detail, several next to each other",
     key: Key::Num5,
     open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),
 };
 
-/// A session as it is looked at.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A session, and the analysis by which it is read: none for the session as it was measured.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Looked {
-    /// Its folder.
     pub session: PathBuf,
-    /// The analysis that it is read by; none for the session as it was measured.
     pub analysis: Option<String>,
 }
 
 palpate_model::named! {
-    /// What of the sessions is shown.
+    /// A view of the sessions shown.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum View {
-        /// Quantities over time, above each other.
         #[default]
         OverTime = "Over time",
-        /// Force over depth.
         OverDepth = "Over depth",
-        /// The loops of the cycles over each other, and every peak.
+        /// Hysteresis loops of all cycles, and their peaks.
         Cycles = "Cycles",
-        /// The fits' parameters.
         Parameters = "Parameters",
-        /// What the fit of one session says of another.
+        /// The fit of one session applied to another.
         Prediction = "Prediction",
     }
 }
@@ -67,31 +56,30 @@ palpate_model::named! {
 /// Sessions that are read at once: the disk and two cores are busy with them.
 const READING_MAX: usize = 2;
 
-/// The sessions and how they are looked at.
+/// The sessions that are shown, and how.
+#[derive(Default)]
 pub struct ReviewScreen {
     /// The one in front comes first.
-    subjects: Vec<Subject>,
+    subjects: Vec<ReviewSubject>,
     analyses: AnalysesPanel,
     view: View,
-    leader: Leader,
+    time_origin: TimeOrigin,
     quantities: Vec<Quantity>,
     has_residuals: bool,
-    time: Span,
-    depth: Span,
-    force: Span,
+    time: AxisRange,
+    depth: AxisRange,
+    force: AxisRange,
     cursors: [Option<f64>; 2],
     depth_lines: DepthLines,
-    depth_pixels: [f64; 2],
-    fits: Task<Vec<FitAnswer>>,
-    /// What sessions are fitted with here.
+    fits: BackgroundTask<Vec<FitAnswer>>,
     model: ModelChoice,
-    /// Whether the last answer of the fits is handed out.
-    are_fits_taken: bool,
-    prediction: Task<Prediction>,
+    /// The answer of the fits under way is not handed to their sessions yet.
+    has_new_fits: bool,
+    prediction: BackgroundTask<SessionPrediction>,
     prediction_of: Option<[String; 2]>,
     prediction_lines: [crate::plots::stretches::Stretches; 2],
     cycle_rows: cycles::CycleRows,
-    /// Whether of the loops only the first and the last are drawn.
+    /// Only the first and the last loop are drawn.
     has_ends_only: bool,
     path: String,
     next_id: u64,
@@ -104,29 +92,9 @@ impl ReviewScreen {
     #[must_use]
     pub fn new(library: Result<PathBuf, String>) -> Self {
         Self {
-            subjects: Vec::new(),
             analyses: AnalysesPanel::new(library),
-            view: View::default(),
-            leader: Leader::default(),
             quantities: vec![Quantity::Force, Quantity::Depth, Quantity::Volts],
-            has_residuals: false,
-            time: Span::default(),
-            depth: Span::default(),
-            force: Span::default(),
-            cursors: [None; 2],
-            depth_lines: DepthLines::default(),
-            depth_pixels: [800.0, 500.0],
-            fits: Task::default(),
-            model: ModelChoice::default(),
-            are_fits_taken: true,
-            prediction: Task::default(),
-            prediction_of: None,
-            prediction_lines: Default::default(),
-            cycle_rows: cycles::CycleRows::default(),
-            has_ends_only: false,
-            path: String::new(),
-            next_id: 0,
-            thinned: 1,
+            ..Self::default()
         }
     }
 
@@ -137,36 +105,33 @@ impl ReviewScreen {
         self.time.show_all();
         self.depth.show_all();
         self.force.show_all();
-        for session in sessions {
-            self.add(session, ctx);
-        }
+        sessions.into_iter().for_each(|session| self.add(session, ctx));
     }
 
-    /// Shows a session besides those there; one that is there already is not shown twice.
+    /// Adds a session to the view; one that is shown already is not shown twice.
     pub fn add(&mut self, session: PathBuf, ctx: &Context) {
-        if self.subjects.iter().any(|one| one.looked.session == session) {
+        if self.subjects.iter().any(|one| one.source.session == session) {
             return;
         }
-        let looked = Looked { session, analysis: None };
-        self.subjects.push(Subject::new(looked, self.next_id));
+        let source = Looked { session, analysis: None };
+        self.subjects.push(ReviewSubject::new(source, self.next_id));
         self.next_id += 1;
         self.fetch(ctx);
     }
 
-    /// The folder of the session in front.
-    fn front_session(&self) -> Option<&Path> {
-        Some(&self.front()?.looked.session)
-    }
-
-    /// Shows another view of them.
     pub fn show(&mut self, view: View) {
         self.view = view;
     }
 
-    /// Whether nothing is being read, fitted or looked for.
+    /// Whether samples of any session have arrived.
+    pub fn has_samples(&self) -> bool {
+        self.subjects.iter().any(|one| one.recording.track.len() > 0)
+    }
+
+    /// Whether nothing is being read, fitted or searched for.
     pub fn is_settled(&self) -> bool {
-        let is_working = self.fits.standing().is_some() || self.prediction.standing().is_some();
-        let is_read = self.subjects.iter().all(Subject::is_settled);
+        let is_working = self.fits.is_busy() || self.prediction.is_busy();
+        let is_read = self.subjects.iter().all(ReviewSubject::is_settled);
         is_read && !is_working && !self.depth_lines.is_busy()
     }
 
@@ -174,7 +139,7 @@ impl ReviewScreen {
     pub fn fetch(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
         if let Some(changed) = self.analyses.take_changed() {
-            let is_it = |one: &&mut Subject| one.looked.session == changed;
+            let is_it = |one: &&mut ReviewSubject| one.source.session == changed;
             if let Some(subject) = self.subjects.iter_mut().find(is_it) {
                 subject.fit = None;
                 subject.read_again();
@@ -183,11 +148,8 @@ impl ReviewScreen {
         self.fits.poll();
         self.prediction.poll();
         self.take_fits();
-        let mut reading = 0;
-        for subject in &mut self.subjects {
-            subject.poll();
-            reading += usize::from(subject.recording.is_reading());
-        }
+        self.subjects.iter_mut().for_each(ReviewSubject::poll);
+        let mut reading = self.subjects.iter().filter(|one| one.recording.is_reading()).count();
         for subject in &mut self.subjects {
             if reading < READING_MAX && subject.begin(ctx) {
                 reading += 1;
@@ -198,16 +160,13 @@ impl ReviewScreen {
 
     /// Hands the fits that were made to their sessions, where these are still read in the same way.
     fn take_fits(&mut self) {
-        if self.are_fits_taken || self.fits.standing().is_some() {
+        if self.fits.is_busy() || !std::mem::take(&mut self.has_new_fits) {
             return;
         }
-        self.are_fits_taken = true;
-        let Some(Ok(answers)) = self.fits.answer() else {
-            return;
-        };
+        let Some(Ok(answers)) = self.fits.answer() else { return };
         for (of, answer) in answers {
-            let is_own = |one: &&mut Subject| {
-                one.looked.session == of.path && one.looked.analysis == of.analysis
+            let is_own = |one: &&mut ReviewSubject| {
+                one.source.session == of.path && one.source.analysis == of.analysis
             };
             if let Some(subject) = self.subjects.iter_mut().find(is_own) {
                 subject.set_fit(answer.clone());
@@ -218,7 +177,7 @@ impl ReviewScreen {
     /// Begins to fit every session shown.
     fn start_fits(&mut self, ctx: &Context) {
         let subjects: Vec<_> = self.subjects.iter().map(|one| one.for_fit(&self.model)).collect();
-        self.are_fits_taken = false;
+        self.has_new_fits = true;
         self.fits.start("review-fit", ctx, move |progress| {
             crate::workers::review::fit::fit_sessions(&subjects, progress)
         });
@@ -237,7 +196,7 @@ impl ReviewScreen {
     fn set_wholes(&mut self) {
         let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         let times = self.subjects.iter().map(|one| {
-            let shift = one.shift(self.leader);
+            let shift = one.shift(self.time_origin);
             one.recording.span().map(|end| end - shift)
         });
         if let Some([low, high]) = times.reduce(join) {
@@ -256,7 +215,7 @@ impl ReviewScreen {
     }
 
     /// The session in front.
-    fn front(&self) -> Option<&Subject> {
+    fn front(&self) -> Option<&ReviewSubject> {
         self.subjects.first()
     }
 }
@@ -272,36 +231,37 @@ impl Screen for ReviewScreen {
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_right(ui);
-        let shown: Vec<Looked> = self.subjects.iter().map(|one| one.looked.clone()).collect();
+        let shown: Vec<Looked> = self.subjects.iter().map(|one| one.source.clone()).collect();
         self.analyses.set_shown(&shown);
-        let shift = self.front().map_or(0.0, |one| one.shift(self.leader));
+        let shift = self.front().map_or(0.0, |one| one.shift(self.time_origin));
         let cursors = match self.cursors {
             [Some(a), Some(b)] => Some([a + shift, b + shift]),
             _ => None,
         };
         self.analyses.set_cursors(cursors);
         if let Some(front) = self.subjects.first_mut() {
-            self.analyses.ui(ui, &mut front.looked, commands);
+            self.analyses.ui(ui, &mut front.source, commands);
         }
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         self.fetch(ctx);
-        if workbench.front.review.as_deref() != self.front_session() {
-            workbench.front.review = self.front_session().map(Path::to_owned);
+        let front = self.front().map(|one| &one.source.session);
+        if workbench.front.review.as_ref() != front {
+            workbench.front.review = front.cloned();
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::Review(sessions) => self.open(sessions.clone(), ctx),
-            _ => return Reply::NotMine,
+            UiCommand::Review(sessions) => self.open(sessions.clone(), ctx),
+            _ => return Reaction::NotMine,
         }
-        Reply::Show
+        Reaction::Show
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
-        if self.fits.standing().is_none() && self.fit_verdict().is_ok() {
+        if !self.fits.is_busy() && self.fit_verdict().is_ok() {
             self.start_fits(ctx);
         }
     }

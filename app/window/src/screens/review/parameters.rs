@@ -2,54 +2,18 @@
 
 use super::ReviewScreen;
 use super::middle::head_ui;
-use super::subject::Subject;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::table::{Column, Row, table_ui};
+use super::subject::ReviewSubject;
+use crate::widgets::{Column, TableRow, alarm_ui, quiet_ui, table_ui};
 use eframe::egui::Ui;
 use palpate_analysis::report::text::{self, typeset};
-use palpate_rheology::fit::Parameter;
-
-/// A parameter of a session's fit, with numbers as they are.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterRow {
-    /// The session.
-    pub session: String,
-    /// The analysis that it was read by.
-    pub analysis: Option<String>,
-    /// What was indented.
-    pub specimen: String,
-    /// The parameter, its unit, error and 95 % interval.
-    pub parameter: Parameter,
-    /// Root mean square of what the fit leaves, in N.
-    pub rmse_n: f64,
-}
-
-/// Every parameter of every session that was fitted, session by session, those of one specimen together.
-#[must_use]
-pub fn parameter_rows(screen: &ReviewScreen) -> Vec<ParameterRow> {
-    let mut rows = Vec::new();
-    for (subject, specimen) in by_specimen(&screen.subjects) {
-        let Some(fit) = subject.fitted() else {
-            continue;
-        };
-        rows.extend(fit.report.parameters.iter().map(|parameter| ParameterRow {
-            session: subject.recording.name(),
-            analysis: subject.looked.analysis.clone(),
-            specimen: specimen.clone(),
-            parameter: parameter.clone(),
-            rmse_n: fit.report.rmse_n,
-        }));
-    }
-    rows
-}
 
 /// The sessions, those of one specimen together, in the order in which they stand.
-fn by_specimen(subjects: &[Subject]) -> Vec<(&Subject, String)> {
-    let specimen = |subject: &Subject| {
+fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {
+    let specimen = |subject: &ReviewSubject| {
         let head = subject.recording.head.as_ref();
         head.map_or(String::new(), |head| head.manifest.specimen.trim().to_owned())
     };
-    let mut all: Vec<(&Subject, String)> =
+    let mut all: Vec<(&ReviewSubject, String)> =
         subjects.iter().map(|one| (one, specimen(one))).collect();
     all.sort_by(|a, b| a.1.cmp(&b.1));
     all
@@ -78,7 +42,7 @@ impl ReviewScreen {
             columns.push(Column::numbers(&head, 230.0));
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
-        let rows: Vec<Row> = sorted
+        let rows: Vec<TableRow> = sorted
             .iter()
             .filter_map(|(subject, specimen)| {
                 let report = &subject.fitted()?.report;
@@ -87,7 +51,7 @@ impl ReviewScreen {
                 let found = names.map(|name| report.parameter(name));
                 cells.extend(found.map(|one| one.map_or(String::new(), text::cell)));
                 cells.push(format!("{:.3}", report.rmse_n * 1e3));
-                Some(Row { cells, ..Row::default() })
+                Some(TableRow { cells, ..TableRow::default() })
             })
             .collect();
         refusals_ui(ui, &self.subjects);
@@ -95,7 +59,7 @@ impl ReviewScreen {
     }
 }
 
-fn refusals_ui(ui: &mut Ui, subjects: &[Subject]) {
+fn refusals_ui(ui: &mut Ui, subjects: &[ReviewSubject]) {
     for subject in subjects {
         if let Some(Err(reason)) = &subject.fit {
             alarm_ui(ui, &format!("{}: no fit: {reason}", subject.name));

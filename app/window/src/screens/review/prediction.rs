@@ -1,36 +1,33 @@
-//! What the fit of the session in front says of the next one, beside what was measured there.
+//! The fit of the session in front, applied to the depths of the next one and compared with its measured force.
 
 use super::ReviewScreen;
 use super::left::color_of;
 use super::middle::head_ui;
-use crate::plots::navigate::Span;
-use crate::plots::over_time::{Layer, Panel, Setting, over_time_ui};
-use crate::theme::Tokens;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::task_ui;
+use crate::plots::navigate::AxisRange;
+use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
+use crate::plots::stretches::LineWindow;
+use crate::widgets::{alarm_ui, quiet_ui, require, task_ui, tokens_of};
 use crate::workers::review::Quantity;
-use crate::workers::review::fit::{MODELLED, Prediction, RESIDUAL, predict};
+use crate::workers::review::fit::{MODELLED, RESIDUAL, SessionPrediction, predict};
 use eframe::egui::{Ui, vec2};
 
 impl ReviewScreen {
     fn prediction_verdict(&self) -> Result<(), String> {
-        match self.subjects.len() {
-            0 | 1 => Err("show two sessions: the first is fitted, the second is foretold".into()),
-            _ => self.fit_verdict(),
-        }
+        let words = "show two sessions: the first is fitted, the second is predicted";
+        require(self.subjects.len() > 1, words)?;
+        self.fit_verdict()
     }
 
     pub(super) fn prediction_ui(&mut self, ui: &mut Ui) {
         let words = match self.subjects.as_slice() {
             [known, other, ..] => {
-                format!("{} is fitted, and its body is pressed as {} was", known.name, other.name)
+                format!("the fit of {} predicts the force of {}", known.name, other.name)
             }
             _ => String::new(),
         };
         head_ui(ui, "Prediction against validation", &words);
         let verdict = self.prediction_verdict();
-        const NAME: &str = "Foretell the second session";
-        if task_ui(ui, NAME, &self.prediction, &verdict)
+        if task_ui(ui, "Predict second session", &self.prediction, &verdict)
             && let [known, other, ..] = self.subjects.as_slice()
         {
             let pair = [known, other].map(|one| one.for_fit(&self.model));
@@ -45,76 +42,58 @@ impl ReviewScreen {
         };
         ui.label(sentence(&found, &known, &other));
         let Some(index) = self.subjects.iter().position(|one| one.name == other) else {
-            return quiet_ui(ui, &format!("{other} is not shown any more"));
+            return quiet_ui(ui, format!("{other} is no longer shown"));
         };
         self.prediction_plots(ui, &found, index);
     }
 
-    fn prediction_plots(&mut self, ui: &mut Ui, found: &Prediction, index: usize) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let mut span = Span::default();
-        let Some(whole) = found.track.span() else {
-            return;
-        };
+    fn prediction_plots(&mut self, ui: &mut Ui, found: &SessionPrediction, index: usize) {
+        let tokens = tokens_of(ui);
+        let Some(whole) = found.track.span() else { return };
+        let mut span = AxisRange::default();
         span.set_whole(whole);
-        let pixels = f64::from(ui.available_width() * ui.ctx().pixels_per_point()).round();
-        let wanted = crate::plots::stretches::Wanted {
+        let window = LineWindow {
             window: whole,
-            pixels,
+            pixels: f64::from(ui.available_width() * ui.ctx().pixels_per_point()).round(),
             shift: 0.0,
-            // Samples compared and what is left tell one prediction from another.
+            // Differs between two predictions.
             version: found.rms_n.to_bits() ^ found.samples as u64,
         };
         let [modelled, residual] = &mut self.prediction_lines;
-        modelled.update(&found.track, MODELLED, wanted);
-        residual.update(&found.track, RESIDUAL, wanted);
+        modelled.update(&found.track, MODELLED, window);
+        residual.update(&found.track, RESIDUAL, window);
         let subject = &mut self.subjects[index];
-        let mut own = wanted;
-        own.version = subject.recording.version;
-        subject.update(Quantity::Force, own);
-        let measured = Layer {
-            name: "measured",
-            color: color_of(tokens, subject.id),
-            stretches: &subject.lines[Quantity::Force as usize],
-        };
-        let foretold = Layer { name: "foretold", color: tokens.limit, stretches: &*modelled };
-        let left =
-            Layer { name: "left", color: color_of(tokens, subject.id), stretches: &*residual };
+        subject
+            .update(Quantity::Force, LineWindow { version: subject.recording.version, ..window });
         let (width, height) = (ui.available_width(), ui.available_height());
-        for (panel, share, axis) in [
-            (
-                Panel {
-                    id: "Foretold force",
-                    axis: Quantity::Force.axis(),
-                    layers: vec![measured, foretold],
-                    has_zero: false,
-                },
-                0.62,
-                None,
-            ),
-            (
-                Panel {
-                    id: "Left of it",
-                    axis: "measured less foretold (mN)",
-                    layers: vec![left],
-                    has_zero: true,
-                },
-                0.36,
-                Some("time from session start (s)"),
-            ),
-        ] {
+        let color = color_of(tokens, subject.id);
+        let layer = |name, color, stretches| TimeLayer { name, color, stretches };
+        let measured = layer("measured", color, &subject.lines[Quantity::Force as usize]);
+        let force = TimePanel {
+            id: "Predicted force",
+            axis: Quantity::Force.axis(),
+            layers: vec![measured, layer("predicted", tokens.limit, modelled)],
+            has_zero: false,
+        };
+        let residual = TimePanel {
+            id: "Prediction residual",
+            axis: "measured - predicted (mN)",
+            layers: vec![layer("residual", color, residual)],
+            has_zero: true,
+        };
+        let time = Some("time from session start (s)");
+        for (panel, share, axis) in [(force, 0.62, None), (residual, 0.36, time)] {
             ui.allocate_ui(vec2(width, share * height), |ui| {
-                let _ = over_time_ui(ui, &panel, &span, &Setting::default(), axis);
+                let _ = over_time_ui(ui, &panel, &span, &TimeBackdrop::default(), axis);
             });
         }
     }
 }
 
-/// What came of it, in one sentence.
-fn sentence(found: &Prediction, known: &str, other: &str) -> String {
+fn sentence(found: &SessionPrediction, known: &str, other: &str) -> String {
     let share = |part: f64| 100.0 * part / found.peak_n;
     format!(
-        "the fit of {known} foretells {other} within {:.1} mN rms, {:.2} % of its peak force of {:.3} N, over {} samples; the peak is foretold as {:.3} N, {:+.2} %",
+        "The fit of {known} predicts {other} to {:.1} mN RMSE, {:.2} % of its peak force of {:.3} N, over {} samples; the predicted peak is {:.3} N, {:+.2} % off.",
         found.rms_n * 1e3,
         share(found.rms_n),
         found.peak_n,

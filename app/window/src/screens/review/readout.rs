@@ -1,8 +1,8 @@
-//! What stands at the two cursors and between them, as labels that can be read aloud and copied.
+//! Values at the two cursors and the differences between them, as labels that can be read aloud and copied.
 
 use super::ReviewScreen;
-use super::subject::Subject;
-use crate::widgets::remark::quiet_ui;
+use super::subject::ReviewSubject;
+use crate::widgets::quiet_ui;
 use crate::workers::review::Quantity;
 use eframe::egui::{RichText, Ui};
 
@@ -14,18 +14,17 @@ const fn decimals(quantity: Quantity) -> usize {
     }
 }
 
-/// What stands at both cursors on one session.
+/// Values of one session at the cursors A and B.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Reading {
-    /// Time on the axis, of the sample read.
-    pub t: [Option<f64>; 2],
-    /// Each quantity at A and B.
-    pub values: [[Option<f64>; 2]; 4],
+struct CursorReadout {
+    /// Time on the axis, of the nearest sample.
+    t: [Option<f64>; 2],
+    values: [[Option<f64>; 2]; 4],
 }
 
-impl Reading {
-    /// Reads a session laid so many seconds earlier.
-    pub fn of(subject: &Subject, cursors: [Option<f64>; 2], shift: f64) -> Self {
+impl CursorReadout {
+    /// `shift`: time of the session in s at the axis' zero.
+    fn of(subject: &ReviewSubject, cursors: [Option<f64>; 2], shift: f64) -> Self {
         let track = &subject.recording.track;
         let places = cursors.map(|cursor| track.place(cursor? + shift));
         Self {
@@ -35,10 +34,10 @@ impl Reading {
         }
     }
 
-    /// The words, one for each label.
-    pub fn words(&self) -> Vec<String> {
+    /// One text for each label.
+    fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
-        let mut tell = |name: &str, unit: &str, digits: usize, ends: [Option<f64>; 2]| {
+        let mut add = |name: &str, unit: &str, digits: usize, ends: [Option<f64>; 2]| {
             for (cursor, value) in ["A", "B"].into_iter().zip(ends) {
                 if let Some(value) = value {
                     words.push(format!("{name} at {cursor} {value:.digits$} {unit}"));
@@ -49,7 +48,7 @@ impl Reading {
                 words.push(format!("{name} {:+.digits$} {unit}", b - a));
             }
         };
-        tell("t", "s", 4, self.t);
+        add("t", "s", 4, self.t);
         for quantity in Quantity::ALL {
             let name = match quantity {
                 Quantity::Force => "F",
@@ -57,8 +56,7 @@ impl Reading {
                 Quantity::Volts => "signal",
                 Quantity::Position => "position",
             };
-            let ends = self.values[quantity as usize];
-            tell(name, quantity.unit(), decimals(quantity), ends);
+            add(name, quantity.unit(), decimals(quantity), self.values[quantity as usize]);
         }
         words
     }
@@ -66,14 +64,12 @@ impl Reading {
 
 impl ReviewScreen {
     pub(super) fn readout_ui(&self, ui: &mut Ui) {
-        let Some(front) = self.front() else {
-            return;
-        };
+        let Some(front) = self.front() else { return };
         if self.cursors == [None; 2] {
             quiet_ui(ui, "set cursors A and B to read values and differences");
             return;
         }
-        let words = Reading::of(front, self.cursors, front.shift(self.leader)).words();
+        let words = CursorReadout::of(front, self.cursors, front.shift(self.time_origin)).words();
         ui.horizontal_wrapped(|ui| {
             for word in &words {
                 ui.label(RichText::new(word).monospace());
@@ -92,8 +88,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_are_told_where_both_ends_are_known() {
-        let reading = Reading {
+    fn readout_has_differences_where_both_cursors_have_values() {
+        let reading = CursorReadout {
             t: [Some(1.0), Some(3.5)],
             values: [[Some(0.25), Some(1.0)], [Some(0.1), None], [None, None], [None, None]],
         };
@@ -109,6 +105,6 @@ mod tests {
                 "depth at A 0.1000 mm",
             ]
         );
-        assert!(Reading::default().words().is_empty());
+        assert!(CursorReadout::default().words().is_empty());
     }
 }

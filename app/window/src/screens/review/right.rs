@@ -1,12 +1,10 @@
 //! What is known of the session in front: verdict, health, how it ended, calibration, hashes, events, the fit.
 
 use super::ReviewScreen;
-use super::subject::Subject;
+use super::subject::ReviewSubject;
 use crate::screens::exact_fit::exact_ui;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::workers::review::Facts;
+use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, tokens_of};
+use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_figures::uncertain::{interval, plain};
@@ -21,7 +19,7 @@ const EVENT_HEIGHT: f32 = 18.0;
 impl ReviewScreen {
     pub(super) fn draw_right(&mut self, ui: &mut Ui) {
         let Some(front) = self.front() else {
-            quiet_ui(ui, "what is known of a session stands here");
+            quiet_ui(ui, "no session is shown");
             return;
         };
         section_ui(ui, "Session in front");
@@ -37,49 +35,49 @@ impl ReviewScreen {
         }
         match &front.recording.facts {
             Some(facts) => facts_ui(ui, facts),
-            None => quiet_ui(ui, "more is known once all of it is read"),
+            None => quiet_ui(ui, "more facts follow when the session is read to its end"),
         }
         let moved = events_ui(ui, front);
         match &front.fit {
             Some(Ok(fit)) => fit_ui(ui, fit),
             Some(Err(reason)) => {
                 section_ui(ui, "Exact fit");
-                alarm_ui(ui, &format!("No exact fit: {reason}"));
+                alarm_ui(ui, format!("No exact fit: {reason}"));
             }
             None => {}
         }
         if let Some(t) = moved {
-            self.cursors[0] = Some(t - self.front().map_or(0.0, |one| one.shift(self.leader)));
+            self.cursors[0] = Some(t - self.front().map_or(0.0, |one| one.shift(self.time_origin)));
         }
     }
 }
 
-fn facts_ui(ui: &mut Ui, facts: &Facts) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    for (name, value) in [
+fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
+    let tokens = tokens_of(ui);
+    let names = [
         ("specimen", &facts.specimen),
         ("operator", &facts.operator),
         ("probe", &facts.indenter),
         ("protocol", &facts.protocol),
         ("rig", &facts.rig),
-    ] {
-        if !value.is_empty() {
-            fact_ui(ui, name, value.as_str());
-        }
+    ];
+    for (name, value) in names.into_iter().filter(|(_, value)| !value.is_empty()) {
+        fact_ui(ui, name, value);
     }
     match &facts.verdict {
         None => fact_ui(ui, "verdict", "none"),
         Some((Verdict::Valid, reason)) => fact_ui(ui, "verdict", format!("valid: {reason}")),
-        Some((verdict, reason)) => alarm_ui(ui, &format!("verdict: {verdict}: {reason}")),
+        Some((verdict, reason)) => alarm_ui(ui, format!("verdict: {verdict}: {reason}")),
     }
     match &facts.end {
         Some(end) => fact_ui(ui, "ending", format!("{}: {}", end.outcome, end.reason)),
         None => alarm_ui(ui, "ending: none, the recording was interrupted"),
     }
     let (health, is_well) = facts.health_words();
-    match is_well {
-        true => fact_ui(ui, "health", health),
-        false => alarm_ui(ui, &format!("health: {health}")),
+    if is_well {
+        fact_ui(ui, "health", health)
+    } else {
+        alarm_ui(ui, format!("health: {health}"))
     }
     if let Some(calibration) = &facts.calibration {
         let taken = calibration.taken_at.as_deref();
@@ -102,10 +100,10 @@ fn facts_ui(ui: &mut Ui, facts: &Facts) {
     }
 }
 
-/// Draws what happened; the time of what was pressed, for cursor A.
-fn events_ui(ui: &mut Ui, front: &Subject) -> Option<f64> {
+/// Draws the events; returns the time of the one that was pressed, for cursor A.
+fn events_ui(ui: &mut Ui, front: &ReviewSubject) -> Option<f64> {
     let facts = front.recording.facts.as_ref()?;
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     section_ui(ui, "Events and notes");
     if facts.events.is_empty() {
         quiet_ui(ui, "none");
@@ -140,7 +138,7 @@ fn fit_ui(ui: &mut Ui, fit: &SessionFit) {
     exact_ui(ui, &fit.report);
     section_ui(ui, "95 % from the profile likelihood");
     match &fit.profile {
-        Err(reason) => quiet_ui(ui, &format!("none: {reason}")),
+        Err(reason) => quiet_ui(ui, format!("none: {reason}")),
         Ok(profile) => {
             for found in profile {
                 let known = fit.report.parameter(&found.name);

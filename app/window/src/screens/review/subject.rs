@@ -1,27 +1,23 @@
 //! One session of those shown: what was read of it, its fit, and the points drawn.
 
 use super::Looked;
-use crate::plots::stretches::{Stretches, Wanted};
-use crate::widgets::model_choice::ModelChoice;
+use crate::plots::stretches::{LineWindow, Stretches};
+use crate::widgets::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
-use crate::workers::review::{Leader, Quantity, Recording, Stage};
+use crate::workers::review::{Quantity, ReviewRecording, Stage, TimeOrigin};
 use eframe::egui::Context;
 use palpate_model::rig::Phase;
 use std::sync::Arc;
 
 /// A session that is shown.
-pub struct Subject {
-    /// Which, and how it is read.
-    pub looked: Looked,
-    /// Tells it from the others as long as it is shown; its colour follows from it.
+pub struct ReviewSubject {
+    pub source: Looked,
+    /// Its own as long as it is shown; its colour follows from it.
     pub id: u64,
-    /// What it is called.
     pub name: String,
-    /// What was read of it.
-    pub recording: Recording,
-    /// Its fit, or why there is none; none before it was asked for.
+    pub recording: ReviewRecording,
+    /// None before a fit was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
-    /// The points of each quantity, of the modelled force and of what is left.
     pub lines: [Stretches; 6],
     /// Lowest and highest of each quantity, found for so many samples.
     ends: (u64, [Option<[f64; 2]>; 4]),
@@ -29,17 +25,16 @@ pub struct Subject {
 
 /// Places of the fit's lines behind those of the quantities.
 pub const LINE_MODELLED: usize = 4;
-/// What is left.
 pub const LINE_RESIDUAL: usize = 5;
 
-impl Subject {
+impl ReviewSubject {
     /// A session that is still to be read.
     #[must_use]
-    pub fn new(looked: Looked, id: u64) -> Self {
-        let recording = Recording::new(&looked.session, looked.analysis.as_deref());
+    pub fn new(source: Looked, id: u64) -> Self {
+        let recording = ReviewRecording::new(&source.session, source.analysis.as_deref());
         Self {
             name: recording.name(),
-            looked,
+            source,
             id,
             recording,
             fit: None,
@@ -48,13 +43,10 @@ impl Subject {
         }
     }
 
-    /// Fetches what was read; a session that is to be read by another analysis begins anew.
+    /// Fetches what was read; a session that is to be read by another analysis begins again.
     pub fn poll(&mut self) {
-        if self.recording.analysis != self.looked.analysis {
-            let analysis = self.looked.analysis.as_deref();
-            let version = self.recording.version + 1;
-            self.recording = Recording::new(&self.looked.session, analysis);
-            self.recording.version = version;
+        if self.recording.analysis != self.source.analysis {
+            self.read_again();
             self.fit = None;
         }
         let before = self.recording.version;
@@ -63,7 +55,7 @@ impl Subject {
             return;
         }
         self.name = self.recording.name();
-        if let Some(analysis) = &self.looked.analysis {
+        if let Some(analysis) = &self.source.analysis {
             self.name = format!("{} as {analysis}", self.name);
         }
         let track = &self.recording.track;
@@ -83,11 +75,10 @@ impl Subject {
         is_waiting && self.recording.is_reading()
     }
 
-    /// Reads it again.
     pub fn read_again(&mut self) {
         let version = self.recording.version + 1;
-        let analysis = self.looked.analysis.as_deref();
-        self.recording = Recording::new(&self.looked.session, analysis);
+        let analysis = self.source.analysis.as_deref();
+        self.recording = ReviewRecording::new(&self.source.session, analysis);
         self.recording.version = version;
     }
 
@@ -98,10 +89,7 @@ impl Subject {
 
     /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
     pub fn fifths(&self) -> u64 {
-        match self.is_settled() {
-            true => u64::MAX,
-            false => (self.recording.share() * 5.0) as u64,
-        }
+        if self.is_settled() { u64::MAX } else { (self.recording.share() * 5.0) as u64 }
     }
 
     /// Takes a fit that was made of it.
@@ -110,7 +98,6 @@ impl Subject {
         self.recording.version += 1;
     }
 
-    /// The fit, if there is one.
     pub fn fitted(&self) -> Option<&SessionFit> {
         self.fit.as_ref()?.as_ref().ok().map(Arc::as_ref)
     }
@@ -121,29 +108,29 @@ impl Subject {
     }
 
     /// Time of the session that stands at zero; none where it has no such moment.
-    pub fn moment(&self, leader: Leader) -> Option<f64> {
-        match leader {
-            Leader::Start => Some(0.0),
-            Leader::Contact => {
+    pub fn moment(&self, time_origin: TimeOrigin) -> Option<f64> {
+        match time_origin {
+            TimeOrigin::Start => Some(0.0),
+            TimeOrigin::Contact => {
                 let facts = self.recording.facts.as_ref()?;
                 facts.contact_time(&self.recording.track)
             }
-            Leader::Ramp => self.recording.phase_start(Phase::Ramp),
+            TimeOrigin::Ramp => self.recording.phase_start(Phase::Ramp),
         }
     }
 
     /// By how much it is laid earlier, in s.
-    pub fn shift(&self, leader: Leader) -> f64 {
-        self.moment(leader).unwrap_or(0.0)
+    pub fn shift(&self, time_origin: TimeOrigin) -> f64 {
+        self.moment(time_origin).unwrap_or(0.0)
     }
 
     /// What a fit takes of it.
-    pub fn for_fit(&self, model: &ModelChoice) -> fit::Subject {
+    pub fn for_fit(&self, model: &ModelChoice) -> fit::FitSubject {
         let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
         let first = begins.into_iter().flatten().reduce(f64::min);
-        fit::Subject {
-            path: self.looked.session.clone(),
-            analysis: self.looked.analysis.clone(),
+        fit::FitSubject {
+            path: self.source.session.clone(),
+            analysis: self.source.analysis.clone(),
             family: model.family.clone(),
             is_rejected_included: model.is_rejected_included,
             ramp_t: first.unwrap_or(0.0),
@@ -151,24 +138,31 @@ impl Subject {
     }
 
     /// Finds the points of a quantity again where something changed.
-    pub fn update(&mut self, quantity: Quantity, wanted: Wanted) {
+    pub fn update(&mut self, quantity: Quantity, window: LineWindow) {
         let place = quantity as usize;
-        self.lines[place].update(&self.recording.track, place, wanted);
+        self.lines[place].update(&self.recording.track, place, window);
     }
 
     /// The same of its fit.
-    pub fn update_fit(&mut self, wanted: Wanted) {
-        let Some(Ok(fit)) = &self.fit else {
-            return;
-        };
+    pub fn update_fit(&mut self, window: LineWindow) {
+        let Some(Ok(fit)) = &self.fit else { return };
         for (line, column) in [(LINE_MODELLED, fit::MODELLED), (LINE_RESIDUAL, fit::RESIDUAL)] {
-            self.lines[line].update(&fit.track, column, wanted);
+            self.lines[line].update(&fit.track, column, window);
         }
     }
 
-    /// What a shown session wants of the plots.
     #[must_use]
-    pub fn wanted(&self, window: [f64; 2], pixels: f64, leader: Leader) -> Wanted {
-        Wanted { window, pixels, shift: self.shift(leader), version: self.recording.version }
+    pub fn line_window(
+        &self,
+        window: [f64; 2],
+        pixels: f64,
+        time_origin: TimeOrigin,
+    ) -> LineWindow {
+        LineWindow {
+            window,
+            pixels,
+            shift: self.shift(time_origin),
+            version: self.recording.version,
+        }
     }
 }

@@ -1,31 +1,30 @@
-//! The rig's own screen: what it reports, large, and moving it by hand.
+//! The screen of the rig: its readings in large letters, and manual moves.
 
 use super::rig_panel::rig_ui;
-use super::screen::{Screen, ScreenEntry};
-use crate::command::{Aside, Command, Commands};
-use crate::theme::{Tokens, reading_style};
-use crate::widgets::quantity_input::{QuantityField, quantity_ui};
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::alarm_ui;
-use crate::workbench::Workbench;
+use super::screen::{Commands, Screen, ScreenEntry, UiCommand, Workbench};
+use crate::command::ManualMove;
+use crate::theme::reading_style;
+use crate::widgets::{
+    QuantityField, alarm_ui, placeholder_ui, quantity_ui, reason_button, require, section_ui,
+    tokens_of,
+};
 use eframe::egui::{Button, Grid, Key, Label, RichText, ScrollArea, Ui, vec2};
+use palpate_model::calibration::Curve;
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_model::units::{MmPerS, Newtons, Seconds};
+use palpate_model::units::{MmPerS, Seconds};
 use palpate_runner::RigView;
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
-    purpose: "what the rig reports, and moving it by hand",
+    purpose: "readings of the rig, and manual moves",
     key: Key::Num1,
     open: |_| Box::new(RigScreen::default()),
 };
 
-/// Distances that stand ready, in mm; towards the tissue is positive.
+/// Distances of the buttons, in mm; positive towards the tissue.
 const READY: [f64; 8] = [-10.0, -5.0, -1.0, -0.1, 0.1, 1.0, 5.0, 10.0];
 
-/// What is typed on the screen.
 #[derive(Debug)]
 pub struct RigScreen {
     distance: QuantityField,
@@ -38,39 +37,20 @@ impl Default for RigScreen {
     }
 }
 
-/// What the screen must know of the rest.
-struct Facts<'a> {
-    /// The interlocks.
-    limits: &'a Limits,
-    /// Force of the newest sample by the calibration in use, without tare.
-    force: Option<Newtons>,
-    /// Whether the axis may be moved now, or why not.
-    verdict: &'a Result<(), String>,
-    /// Why the last move was refused.
-    refusal: Option<&'a str>,
-}
-
 impl Screen for RigScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let curve = &workbench.bench.curve;
         let rig = &workbench.snapshot.rig;
-        let facts = Facts {
-            limits: &workbench.bench.limits,
-            force: rig.reading.map(|reading| curve.newtons_from_volts(reading.volts)),
-            verdict: &workbench.aside_verdict(),
-            refusal: workbench.refusal.as_deref(),
-        };
         ScrollArea::vertical().id_salt("rig").auto_shrink(false).show(ui, |ui| {
-            heading(ui, "Now");
-            values_ui(ui, rig, &facts);
-            heading(ui, "Move by hand");
-            self.move_ui(ui, rig, &facts, commands);
-            heading(ui, "Limits that no protocol can loosen");
-            limits_ui(ui, rig, facts.limits);
+            section_ui(ui, "Readings");
+            values_ui(ui, rig, &workbench.bench.curve);
+            section_ui(ui, "Manual move");
+            self.move_ui(ui, workbench, commands);
+            section_ui(ui, "Limits that no protocol can loosen");
+            limits_ui(ui, rig, &workbench.bench.limits);
         });
     }
 
@@ -79,97 +59,90 @@ impl Screen for RigScreen {
     }
 
     fn is_watched(&self) -> bool {
-        // Somebody may press the cell by hand.
+        // A person may press the load cell by hand.
         true
     }
 }
 
 impl RigScreen {
-    fn move_ui(&mut self, ui: &mut Ui, rig: &RigView, facts: &Facts<'_>, commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+    fn move_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
+        let (rig, verdict) = (&workbench.snapshot.rig, workbench.move_verdict());
+        let tokens = tokens_of(ui);
         let fastest = rig.description.speed_max.0;
         let furthest = rig.description.travel.0;
         ui.horizontal(|ui| {
             quantity_ui(ui, "distance", "mm", &mut self.distance);
             quantity_ui(ui, "jog speed", "mm/s", &mut self.speed);
         });
-        self.distance.check(|mm| match mm != 0.0 && mm.abs() <= furthest {
-            true => Ok(()),
-            false => Err(format!("a distance of at most {furthest:.0} mm, and not 0")),
+        self.distance.check(|mm| {
+            let words = format!("type a distance of at most {furthest:.0} mm, and not 0");
+            require(mm != 0.0 && mm.abs() <= furthest, words)
         });
-        self.speed.check(|speed| match speed > 0.0 && speed <= fastest {
-            true => Ok(()),
-            false => Err(format!("a speed above 0 and at most {fastest} mm/s")),
+        self.speed.check(|speed| {
+            let words = format!("type a speed above 0 and at most {fastest} mm/s");
+            require(speed > 0.0 && speed <= fastest, words)
         });
         let typed = self.distance.value.clone().and_then(|distance| {
             let speed = self.speed.value.clone()?;
-            facts.verdict.clone()?;
+            verdict.clone()?;
             Ok((distance, speed))
         });
         ui.horizontal_wrapped(|ui| {
-            let verdict = typed.clone().map(|_| ());
-            if reason_button(ui, "Jog", vec2(80.0, 34.0), &verdict)
+            let is_possible = typed.clone().map(|_| ());
+            if reason_button(ui, "Jog", vec2(80.0, 34.0), &is_possible)
                 && let Ok((distance, speed)) = typed
             {
-                commands.push(Command::Aside(Aside::jog(distance, speed)));
+                commands.push(UiCommand::ManualMove(ManualMove::jog(distance, speed)));
             }
         });
         ui.horizontal_wrapped(|ui| {
             let speed = self.speed.value.clone();
             for distance in READY {
                 let button = Button::new(format!("{distance:+} mm")).min_size(vec2(66.0, 30.0));
-                let is_possible = facts.verdict.is_ok() && speed.is_ok();
+                let is_possible = verdict.is_ok() && speed.is_ok();
                 if ui.add_enabled(is_possible, button).clicked()
                     && let Ok(speed) = speed
                 {
-                    commands.push(Command::Aside(Aside::jog(distance, speed)));
+                    commands.push(UiCommand::ManualMove(ManualMove::jog(distance, speed)));
                 }
             }
         });
-        let words = "Plus goes towards the tissue. Every move is a run of its own: recorded, with all interlocks, and Stop motion stops it.";
-        ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
+        let words = "Plus moves towards the tissue. Every move is a run of its own: it is recorded and has all interlocks, and Stop motion stops it.";
+        placeholder_ui(ui, words);
         ui.add_space(6.0);
         ui.horizontal_wrapped(|ui| {
-            if reason_button(ui, "Find home", vec2(110.0, 34.0), facts.verdict) {
-                commands.push(Command::Aside(Aside::home()));
+            if reason_button(ui, "Find home", vec2(110.0, 34.0), &verdict) {
+                commands.push(UiCommand::ManualMove(ManualMove::home()));
             }
             let words = if rig.is_homed {
-                "Position zero is known. Home is touched once more and compared."
+                "Position zero is known. The axis touches the home switch again and compares."
             } else {
-                "Position zero is not known; the probe goes away from the tissue until the home switch closes."
+                "Position zero is not known. The probe moves away from the tissue until the home switch closes."
             };
             ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
         });
-        if let Some(reason) = facts.refusal {
+        if let Some(reason) = &workbench.refusal {
             alarm_ui(ui, reason);
         }
     }
 }
 
-fn heading(ui: &mut Ui, words: &str) {
-    ui.add_space(8.0);
-    ui.label(RichText::new(words).heading().strong());
-    ui.separator();
-}
-
-fn values_ui(ui: &mut Ui, rig: &RigView, facts: &Facts<'_>) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn values_ui(ui: &mut Ui, rig: &RigView, curve: &Curve) {
+    let tokens = tokens_of(ui);
     let none = || "--".to_owned();
     let position = rig.reading.map(|reading| {
         let place = position_from_pulses(reading.pulses, rig.description.mm_per_pulse);
         format!("{:.3} mm", place.0)
     });
-    let place = match rig.is_homed {
-        true => "position from home",
-        false => "counter, home not known",
-    };
+    let place = if rig.is_homed { "position from home" } else { "counter, home not known" };
     Grid::new("values").num_columns(3).spacing(vec2(40.0, 6.0)).show(ui, |ui| {
         for name in ["signal", "force, not tared", place] {
-            ui.label(RichText::new(name).color(tokens.text_quiet));
+            placeholder_ui(ui, name);
         }
         ui.end_row();
         let signal = rig.reading.map(|reading| format!("{:.4}", reading.volts));
-        let force = facts.force.map(|force| format!("{force:.3}"));
+        let force = rig.reading.map(|reading| curve.newtons_from_volts(reading.volts));
+        let force = force.map(|force| format!("{force:.3}"));
         for value in [signal, force, position] {
             ui.label(RichText::new(value.unwrap_or_else(none)).text_style(reading_style()));
         }

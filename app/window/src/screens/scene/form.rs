@@ -1,13 +1,10 @@
 //! The scene as typed.
 
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::{QuantityField, quantity_ui};
-use crate::widgets::remark::quiet_ui;
-use crate::widgets::text_row::text_row;
-use crate::widgets::tick_box::tick_box;
+use crate::widgets::{
+    NamedControl, QuantityField, check_rate, quantity_ui, quiet_ui, require, section_ui, text_row,
+    tick_box,
+};
 use eframe::egui::Ui;
-use palpate_haptics::Period;
 use palpate_haptics::scene::{ScenePath, SceneSettings};
 use palpate_haptics::surface::INERT;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -18,12 +15,10 @@ pub(super) const FIRST_PATH: ScenePath = ScenePath::Poke;
 /// Nodes along a side that a scene may have.
 const NODES: [f64; 2] = [3.0, 1601.0];
 
-/// What is asked for beside the fields.
+/// A button of the scene file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Asked {
-    /// A dialog for a scene file.
+pub(super) enum FileAction {
     Dialog,
-    /// The file that is named.
     Read,
 }
 
@@ -70,10 +65,10 @@ impl SceneForm {
     /// Takes what was read of a file.
     pub fn fill(&mut self, read: SceneFile, mut notes: Vec<String>) {
         if read.nodes.is_none() {
-            notes.push("the file leaves the mesh to a plan: plan it on the screen Trade".into());
+            notes.push("The file has no mesh size: plan the mesh on the screen Trade.".into());
         }
-        *self =
-            Self { file: std::mem::take(&mut self.file), path: self.path, notes, ..Self::of(read) };
+        self.notes = notes;
+        self.take(read);
     }
 
     /// Takes other numbers of the same scene.
@@ -88,21 +83,16 @@ impl SceneForm {
 
     /// Checks every field.
     pub fn check(&mut self) {
-        let within = |value: f64, [low, high]: [f64; 2]| match (low..=high).contains(&value) {
-            true => Ok(()),
-            false => Err(format!("must be from {low} to {high}")),
+        let within = |value: f64, [low, high]: [f64; 2]| {
+            require((low..=high).contains(&value), format!("must be from {low} to {high}"))
         };
         self.side.check(|side| within(side, [1.0, 1000.0]));
-        self.nodes.check(|nodes| match nodes.fract() == 0.0 {
-            true => within(nodes, NODES),
-            false => Err("must be a whole number".into()),
+        self.nodes.check(|nodes| {
+            require(nodes.fract() == 0.0, "must be a whole number").and(within(nodes, NODES))
         });
         self.slope.check(|slope| within(slope, [0.0, 1000.0]));
         self.friction.check(|friction| within(friction, [0.0, 10.0]));
-        self.rate.check(|rate| {
-            let period = Period::of_rate(rate);
-            period.map(|_| ()).map_err(|err| err.to_string())
-        });
+        self.rate.check(check_rate);
     }
 
     /// What the scene is made of, or the first thing that is wrong.
@@ -113,39 +103,34 @@ impl SceneForm {
 
     /// The same as a scene file.
     pub fn scene_file(&self) -> Result<SceneFile, String> {
-        let value = |name: &str, field: &QuantityField| {
-            let value = field.value.clone();
-            value.map_err(|reason| format!("{name}: {reason}"))
-        };
-        let nodes = value("nodes", &self.nodes)? as usize;
         Ok(SceneFile {
-            side_mm: value("side", &self.side)?,
-            nodes: Some(nodes),
-            slope: value("slope", &self.slope)?,
-            friction: value("friction", &self.friction)?,
-            rate_hz: value("rate", &self.rate)?,
+            nodes: Some(self.nodes.named_value("nodes")? as usize),
+            side_mm: self.side.named_value("side")?,
+            slope: self.slope.named_value("slope")?,
+            friction: self.friction.named_value("friction")?,
+            rate_hz: self.rate.named_value("rate")?,
             is_guarded: self.is_guarded,
             ..self.read.clone()
         })
     }
 
     /// Draws which scene it is, and what leads the hand.
-    pub fn ui(&mut self, ui: &mut Ui) -> Option<Asked> {
-        let mut asked = None;
+    pub fn ui(&mut self, ui: &mut Ui) -> Option<FileAction> {
+        let mut action = None;
         section_ui(ui, "Scene");
-        if text_row(ui, "file", "a scene file; built in without", &mut self.file) {
-            asked = Some(Asked::Read);
+        if text_row(ui, "file", "a scene file; empty for the built-in one", &mut self.file) {
+            action = Some(FileAction::Read);
         }
         ui.horizontal_wrapped(|ui| {
             if ui.button("Built in").clicked() {
                 self.file.clear();
-                asked = Some(Asked::Read);
+                action = Some(FileAction::Read);
             }
             if ui.button("Open").clicked() {
-                asked = Some(Asked::Read);
+                action = Some(FileAction::Read);
             }
             if ui.button("Choose a scene...").clicked() {
-                asked = Some(Asked::Dialog);
+                action = Some(FileAction::Dialog);
             }
         });
         quiet_ui(ui, &self.read.name);
@@ -155,11 +140,11 @@ impl SceneForm {
         section_ui(ui, "Hand");
         ui.horizontal_wrapped(|ui| {
             for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name()).place(path.name());
+                ui.radio_value(&mut self.path, Some(path), path.name()).named(path.name());
             }
-            ui.radio_value(&mut self.path, None, "pointer and keys").place("pointer and keys");
+            ui.radio_value(&mut self.path, None, "pointer and keys").named("pointer and keys");
         });
-        asked
+        action
     }
 
     /// Draws what it is made of.
@@ -170,20 +155,20 @@ impl SceneForm {
         quantity_ui(ui, "slope", "steepest", &mut self.slope);
         quantity_ui(ui, "friction", "of the tissue", &mut self.friction);
         let [(least, _), (most, _)] = INERT;
-        let words = format!("{least} and {most} do nothing here: nodes move along z alone");
-        quiet_ui(ui, &words);
+        let words = format!("{least} and {most} have no effect: nodes move along z only");
+        quiet_ui(ui, words);
         let recovery = self.read.recovery_s.unwrap_or(self.read.body.tau_eps);
         let cut = match self.read.cut_mm > 0.0 {
-            true => format!("; movements below {} mm go no further", self.read.cut_mm),
+            true => format!("; displacements below {} mm are cut", self.read.cut_mm),
             false => String::new(),
         };
-        quiet_ui(ui, &format!("back to rest with a time constant of {recovery:.3} s{cut}"));
+        quiet_ui(ui, format!("surface recovery with a time constant of {recovery:.3} s{cut}"));
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
         tick_box(ui, &mut self.is_guarded, "guards and controller");
         let device = &self.read.device;
         let words = format!(
-            "simulated device: {:.0} g, reach {:.0} x {:.0} x {:.0} mm, up to {} N, {} N for long, {} N/mm, places in steps of {} mm, friction {} N",
+            "simulated device: {:.0} g, workspace {:.0} x {:.0} x {:.0} mm, peak force {} N, continuous {} N, stiffness {} N/mm, resolution {} mm, friction {} N",
             1e3 * device.mass_kg,
             device.workspace_mm[0],
             device.workspace_mm[1],
@@ -194,7 +179,7 @@ impl SceneForm {
             device.step_mm,
             device.friction_n
         );
-        quiet_ui(ui, &words);
+        quiet_ui(ui, words);
     }
 }
 
@@ -203,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn untouched_the_form_is_the_scene_built_in() {
+    fn the_unchanged_form_is_the_built_in_scene() {
         let mut form = SceneForm::default();
         form.check();
         let built_in = SceneFile::default().settings(1).unwrap();
@@ -211,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn every_field_reaches_the_scene_and_what_cannot_be_is_refused_with_its_name() {
+    fn every_field_reaches_the_scene_and_impossible_values_are_refused_by_name() {
         let mut form = SceneForm::default();
         for (field, text) in [
             (&mut form.side, "40"),
@@ -225,7 +210,7 @@ mod tests {
         form.is_guarded = false;
         form.check();
         let settings = form.settings().unwrap();
-        let wanted = SceneFile {
+        let expected = SceneFile {
             side_mm: 40.0,
             nodes: Some(81),
             slope: 0.5,
@@ -234,7 +219,7 @@ mod tests {
             is_guarded: false,
             ..SceneFile::default()
         };
-        assert_eq!(settings, wanted.settings(1).unwrap());
+        assert_eq!(settings, expected.settings(1).unwrap());
         for (text, words) in [
             ("2", "nodes: must be from 3"),
             ("10.5", "nodes: must be a whole"),

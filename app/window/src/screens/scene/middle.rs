@@ -2,22 +2,18 @@
 
 use super::SceneScreen;
 use crate::plots::figure::strip_ui;
-use crate::scene::view::Shown;
-use crate::theme::Tokens;
-use crate::widgets::places::Place;
-use crate::widgets::remark::alarm_ui;
-use crate::widgets::tick_box::tick_box;
-use crate::workers::touch::{Ahead, Moment, Touch, TouchPoint};
+use crate::scene::view::ScenePicture;
+use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui, tick_box};
+use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene, SceneInstant};
 use crate::workers::trail::PAST_S;
-use eframe::egui::{RichText, Ui, vec2};
+use eframe::egui::{Ui, vec2};
 use palpate_figures::figure::{Ink, Series};
 
-/// What the middle shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Side {
-    /// The path that was computed.
-    Ahead,
-    /// The scene that runs or ran.
+pub(super) enum PictureSource {
+    /// A computed path.
+    Computed,
+    /// The scene that runs, or ran last.
     Live,
 }
 
@@ -26,90 +22,89 @@ const PICTURE_SHARE: f32 = 0.52;
 /// Room for a legend.
 const HEAD: f32 = 24.0;
 
-/// What the picture and the plots show.
-struct Played<'a> {
-    moment: &'a Moment,
-    trail: Vec<TouchPoint>,
+struct ShownScene<'a> {
+    instant: &'a SceneInstant,
+    trail: Vec<ForcePoint>,
     /// Seconds along the plots.
     shown: [f64; 2],
     title: String,
 }
 
-/// What was computed or runs, or why there is nothing; without a reason, nothing was asked for yet.
-fn played<'a>(
-    side: Side,
-    touch: Option<&'a Touch>,
-    ahead: Option<&'a Result<Ahead, String>>,
-) -> Result<Played<'a>, Option<&'a str>> {
-    match (side, touch, ahead) {
-        (Side::Live, Some(touch), _) => {
-            let end = touch.now().max(PAST_S);
-            let title = match (touch.is_running(), touch.is_led()) {
-                (false, _) => "stopped; as it was seen last",
+/// The scene to show, or why there is none; no reason where nothing is computed yet.
+fn shown_scene<'a>(
+    side: PictureSource,
+    live: Option<&'a LiveScene>,
+    computed: Option<&'a Result<ComputedPath, String>>,
+) -> Result<ShownScene<'a>, Option<&'a str>> {
+    match (side, live, computed) {
+        (PictureSource::Live, Some(live), _) => {
+            let end = live.now().max(PAST_S);
+            let title = match (live.is_running(), live.is_led()) {
+                (false, _) => "stopped; the last picture",
                 (true, true) => "the path leads the hand",
                 (true, false) => "the pointer and the keys lead the hand",
             };
-            Ok(Played {
-                moment: touch.moment(),
-                trail: touch.trail().copied().collect(),
+            Ok(ShownScene {
+                instant: live.moment(),
+                trail: live.trail().copied().collect(),
                 shown: [end - PAST_S, end],
                 title: title.to_owned(),
             })
         }
-        (Side::Ahead, _, Some(Ok(ahead))) => {
-            let at = ahead.settings.period.time_of(ahead.deepest.tick.tick);
-            Ok(Played {
-                moment: &ahead.deepest,
-                trail: ahead.trail.clone(),
-                shown: [0.0, ahead.path.seconds()],
+        (PictureSource::Computed, _, Some(Ok(computed))) => {
+            let at = computed.settings.period.time_of(computed.deepest.tick.tick);
+            Ok(ShownScene {
+                instant: &computed.deepest,
+                trail: computed.trail.clone(),
+                shown: [0.0, computed.path.seconds()],
                 title: format!(
-                    "{}, computed: where it is deepest, after {:.2} s",
-                    ahead.path.name(),
+                    "{}, computed: the deepest point, after {:.2} s",
+                    computed.path.name(),
                     at.seconds().0
                 ),
             })
         }
-        (Side::Ahead, _, Some(Err(reason))) => Err(Some(reason)),
-        (Side::Live, None, _) | (Side::Ahead, _, None) => Err(None),
+        (PictureSource::Computed, _, Some(Err(reason))) => Err(Some(reason)),
+        (PictureSource::Live, None, _) | (PictureSource::Computed, _, None) => Err(None),
     }
 }
 
 impl SceneScreen {
-    /// Picture and plots.
     pub fn draw_middle(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
-            for (side, name) in [(Side::Ahead, "Computed"), (Side::Live, "Live")] {
-                ui.selectable_value(&mut self.side, side, name).place(name);
+            for (side, name) in
+                [(PictureSource::Computed, "Computed"), (PictureSource::Live, "Live")]
+            {
+                ui.selectable_value(&mut self.side, side, name).named(name);
             }
             ui.separator();
             tick_box(ui, &mut self.view.has_lines, "mesh lines");
-            if ui.button("Look as at first").clicked() {
+            if ui.button("Reset camera").clicked() {
                 self.view.reset();
             }
         });
-        let Played { moment, trail, shown, title } =
-            match played(self.side, self.touch.as_ref(), self.ahead.answer()) {
-                Ok(played) => played,
+        let ShownScene { instant, trail, shown, title } =
+            match shown_scene(self.side, self.live.as_ref(), self.computed.answer()) {
+                Ok(shown_scene) => shown_scene,
                 Err(None) => {
                     let words = match self.side {
-                        Side::Live => "the scene has not run yet",
-                        Side::Ahead => "nothing computed yet",
+                        PictureSource::Live => "the scene has not run yet",
+                        PictureSource::Computed => "nothing computed yet",
                     };
-                    ui.label(RichText::new(words).color(tokens.text_quiet));
+                    placeholder_ui(ui, words);
                     return;
                 }
                 Err(Some(reason)) => return alarm_ui(ui, reason),
             };
-        ui.label(RichText::new(title).color(tokens.text_quiet).small());
-        let now = match moment.now() {
+        quiet_ui(ui, title);
+        let now = match instant.now() {
             Ok(now) => now,
             Err(reason) => return alarm_ui(ui, &reason.to_string()),
         };
-        let tick = &moment.tick;
-        let picture = Shown {
+        let tick = &instant.tick;
+        let picture = ScenePicture {
             now,
-            rest: moment.rest(),
+            rest: instant.rest(),
             device: tick.device,
             turn: tick.turn,
             contact: tick.is_contact().then_some(tick.proxy),
@@ -118,7 +113,7 @@ impl SceneScreen {
         let height = PICTURE_SHARE * ui.available_height();
         let size = vec2(ui.available_width(), height);
         ui.allocate_ui(size, |ui| self.view.ui(ui, &picture));
-        let curve = |name, ink, of: fn(&TouchPoint) -> f64| {
+        let curve = |name, ink, of: fn(&ForcePoint) -> f64| {
             Series::line(name, ink, 1.4, trail.iter().map(|point| [point.t, of(point)]).collect())
         };
         let force = curve("force on the hand", Ink::Limit, |point| point.force);

@@ -1,64 +1,52 @@
-//! A piece of tissue that is pressed with the pointer, the keys or along a path, seen in three dimensions, with the force
-//! that a hand would feel.
+//! A piece of tissue in three dimensions that is pressed with the pointer, the keys or along a path, and the force on the
+//! hand.
 
 mod form;
 mod middle;
 mod plan;
 mod right;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use super::tape::TapePanel;
-use crate::command::{Command, Commands};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use super::tape::{TapePanel, loop_button_ui};
 use crate::scene::view::SceneView;
-use crate::shell::palette::Action;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::work_ui;
-use crate::workbench::Workbench;
-use crate::workers::path_dialog::Ask;
-use crate::workers::task::Task;
-use crate::workers::touch::{Ahead, Moment, Touch, ahead};
-use eframe::egui::{Button, Context, Key, Ui, vec2};
+use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
+use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, compute_path};
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Ui};
 use form::SceneForm;
-use middle::Side;
+use middle::PictureSource;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::Replayed;
 use palpate_analysis::scene::{recorded, replay, scene_of};
 use palpate_haptics::scene::{Hand6, SceneSettings};
 use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
-use plan::Planned;
+use plan::PlannedScene;
 use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
 const TURN: [f64; 3] = [0.0, -0.5, 0.0];
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
-    purpose: "press into a piece of tissue and see it give way",
+    purpose: "press into a piece of tissue and see it deform",
     // Every number is taken: Ctrl+0 is the usual size of text.
     key: Key::E,
     open: |_| Box::new(SceneScreen::default()),
 };
 
-/// The screen's state.
 pub struct SceneScreen {
     form: SceneForm,
-    reading: Task<(SceneFile, Vec<String>)>,
-    /// Whether the file asked for has not come yet.
-    is_reading: bool,
-    ahead: Task<Ahead>,
+    reading: BackgroundTask<(SceneFile, Vec<String>)>,
+    computed: BackgroundTask<ComputedPath>,
     is_shown: bool,
-    touch: Option<Touch>,
+    live: Option<LiveScene>,
     /// What it is made of.
-    touched: SceneFile,
+    live_file: SceneFile,
     refusal: Option<String>,
     tape: TapePanel,
-    planned: Option<Planned>,
-    side: Side,
+    planned: Option<PlannedScene>,
+    side: PictureSource,
     view: SceneView,
     /// The length of the side that the view was made for, in mm.
     viewed_mm: f64,
@@ -70,16 +58,15 @@ impl Default for SceneScreen {
         let side = SceneFile::default().side_mm;
         Self {
             form,
-            reading: Task::default(),
-            is_reading: false,
-            ahead: Task::default(),
+            reading: BackgroundTask::default(),
+            computed: BackgroundTask::default(),
             is_shown: false,
-            touch: None,
-            touched: SceneFile::default(),
+            live: None,
+            live_file: SceneFile::default(),
             refusal: None,
             tape: TapePanel::default(),
             planned: None,
-            side: Side::Ahead,
+            side: PictureSource::Computed,
             view: SceneView::of([side; 2]),
             viewed_mm: side,
         }
@@ -87,31 +74,31 @@ impl Default for SceneScreen {
 }
 
 impl SceneScreen {
-    /// Whether the scene runs.
     pub fn is_running(&self) -> bool {
-        self.touch.as_ref().is_some_and(Touch::is_running)
+        self.live.as_ref().is_some_and(LiveScene::is_running)
     }
 
     /// The scene that runs or ran last.
-    pub fn touch(&self) -> Option<&Touch> {
-        self.touch.as_ref()
+    pub fn touch(&self) -> Option<&LiveScene> {
+        self.live.as_ref()
     }
 
     /// The path that was computed last.
-    pub fn ahead(&self) -> Option<&Result<Ahead, String>> {
-        self.ahead.answer()
+    pub fn ahead(&self) -> Option<&Result<ComputedPath, String>> {
+        self.computed.answer()
     }
 
-    /// Whether what stands in the form can be started.
+    /// Whether the scene of the form can start, or why not.
     fn verdict(&self, workbench: &Workbench) -> Result<(), String> {
         workbench.loop_verdict(SCREEN.name)?;
-        if self.is_running() {
-            return Err("the scene runs".into());
-        }
+        self.compute_verdict()
+    }
+
+    fn compute_verdict(&self) -> Result<(), String> {
+        require(!self.is_running(), "the scene runs")?;
         self.form.settings().map(|_| ())
     }
 
-    /// A recording that was computed again last.
     pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
         self.tape.replayed()
     }
@@ -122,22 +109,19 @@ impl SceneScreen {
             return;
         }
         let named = self.form.file.trim().to_owned();
-        self.is_reading = true;
         self.reading.start("scene-read", ctx, move |_| {
             scene_of((!named.is_empty()).then_some(Path::new(&named)))
         });
     }
 
-    /// Computes what stands in the form along its path.
+    /// Computes the scene of the form along its path.
     fn compute(&mut self, ctx: &Context) {
-        let Ok(settings) = self.form.settings() else {
-            return;
-        };
+        let Ok(settings) = self.form.settings() else { return };
         let path = self.form.path.unwrap_or(form::FIRST_PATH);
-        self.side = Side::Ahead;
+        self.side = PictureSource::Computed;
         self.look_at(&settings);
-        self.ahead.start("scene-ahead", ctx, move |progress| {
-            ahead(settings, path, &mut |share| progress.share(share, "the path"))
+        self.computed.start("scene-path", ctx, move |progress| {
+            compute_path(settings, path, &mut |share| progress.share(share, "the path"))
         });
     }
 
@@ -152,14 +136,14 @@ impl SceneScreen {
             let text = file.text();
             let begin = |folder: &Path| SceneRecorder::start(folder, &text, COLUMNS);
             let recorder = self.tape.begin(ctx, begin)?;
-            let touch = Touch::start(settings, self.form.path, recorder)?;
-            Ok((touch, file))
+            let live = LiveScene::start(settings, self.form.path, recorder)?;
+            Ok((live, file))
         });
         match started {
-            Ok((touch, file)) => {
-                self.touch = Some(touch);
-                self.touched = file;
-                self.side = Side::Live;
+            Ok((live, file)) => {
+                self.live = Some(live);
+                self.live_file = file;
+                self.side = PictureSource::Live;
                 self.refusal = None;
             }
             Err(reason) => {
@@ -169,7 +153,7 @@ impl SceneScreen {
         }
     }
 
-    /// Another piece of tissue is looked at anew.
+    /// Resets the camera where the size of the tissue has changed.
     fn look_at(&mut self, settings: &SceneSettings) {
         if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
             self.viewed_mm = settings.side_mm;
@@ -179,11 +163,13 @@ impl SceneScreen {
         }
     }
 
-    /// What is on the screen: the scene that runs or ran, or the path computed ahead.
-    fn seen(&self) -> Option<(&SceneSettings, &Moment)> {
-        match (self.side, &self.touch, self.ahead.answer()) {
-            (Side::Live, Some(touch), _) => Some((touch.settings(), touch.moment())),
-            (Side::Ahead, _, Some(Ok(ahead))) => Some((&ahead.settings, &ahead.deepest)),
+    /// What is on the screen: the scene that runs or ran, or the computed path.
+    fn seen(&self) -> Option<(&SceneSettings, &SceneInstant)> {
+        match (self.side, &self.live, self.computed.answer()) {
+            (PictureSource::Live, Some(live), _) => Some((live.settings(), live.moment())),
+            (PictureSource::Computed, _, Some(Ok(computed))) => {
+                Some((&computed.settings, &computed.deepest))
+            }
             _ => None,
         }
     }
@@ -191,38 +177,28 @@ impl SceneScreen {
 
 impl Screen for SceneScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        // What runs is not to be changed under a hand.
+        // A running scene keeps its settings.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
-            Some(form::Asked::Dialog) => commands.push(Command::Choose(Ask::Scene)),
-            Some(form::Asked::Read) => commands.push(Command::OpenScene),
+            Some(form::FileAction::Dialog) => commands.push(UiCommand::Choose(PathPurpose::Scene)),
+            Some(form::FileAction::Read) => commands.push(UiCommand::OpenScene),
             None => {}
         });
         if let Some(reason) = &self.refusal {
             alarm_ui(ui, reason);
         }
         ui.add_space(6.0);
-        let may = match is_running {
-            true => Err("the scene runs".into()),
-            false => self.form.settings().map(|_| ()),
-        };
-        work_ui(ui, "Compute the path  F6", &self.ahead, &may, commands);
+        let verdict = self.compute_verdict();
+        work_ui(ui, "Compute path  F6", &self.computed, &verdict, commands);
         section_ui(ui, "Touch");
-        let size = vec2(170.0, 34.0);
-        if is_running {
-            let stop = Button::new("Stop the scene").min_size(size);
-            if ui.add(stop).place("Stop the scene").clicked() {
-                commands.push(Command::SceneStop);
-            }
-        } else if reason_button(ui, "Start the scene", size, &self.verdict(workbench)) {
-            commands.push(Command::SceneStart);
-        }
-        let words = match self.touch.as_ref().is_some_and(Touch::is_led) {
-            true => "the path leads the hand; after it the pointer and the keys do",
+        let both = [UiCommand::SceneStart, UiCommand::SceneStop];
+        loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
+        let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
+            true => "The path leads the hand, and then the pointer and the keys do.",
             false => {
-                "in the picture: hold the left button to press, with the wheel deeper; drag with the right button to \
-                 turn, wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift with arrows turns, \
-                 + and - zoom, Home looks as at first"
+                "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
+                 button to rotate, turn the wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift \
+                 with arrows rotates, + and - zoom, Home resets the camera."
             }
         };
         quiet_ui(ui, words);
@@ -242,10 +218,8 @@ impl Screen for SceneScreen {
     fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
         self.form.check();
         self.tape.poll();
-        self.ahead.poll();
-        self.reading.poll();
-        if self.is_reading && self.reading.standing().is_none() {
-            self.is_reading = false;
+        self.computed.poll();
+        if self.reading.poll() {
             match self.reading.answer() {
                 Some(Ok((file, notes))) => {
                     self.refusal = None;
@@ -256,7 +230,7 @@ impl Screen for SceneScreen {
             }
         }
         let hand = Hand6 { at: self.view.hand().at(), turn: TURN };
-        if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
+        if let Some(Err(reason)) = self.live.as_mut().map(|live| live.poll(hand)) {
             self.refusal = Some(reason);
             self.tape.cut_off();
         }
@@ -264,32 +238,32 @@ impl Screen for SceneScreen {
     }
 
     fn shown(&mut self, ctx: &Context) {
-        // So that there is something to see.
+        // An example is on the screen from the start.
         if !std::mem::replace(&mut self.is_shown, true) {
             self.compute(ctx);
         }
     }
 
-    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::SceneStart if self.verdict(workbench).is_ok() => {
+            UiCommand::SceneStart if self.verdict(workbench).is_ok() => {
                 self.start(ctx);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            Command::SceneStart => {}
-            Command::SceneStop => self.stop(),
-            Command::OpenScene => self.read(ctx),
-            Command::Chosen(Ask::Scene, path) => {
+            UiCommand::SceneStart => {}
+            UiCommand::SceneStop => self.stop(),
+            UiCommand::OpenScene => self.read(ctx),
+            UiCommand::Chosen(PathPurpose::Scene, path) => {
                 self.form.file = path.display().to_string();
                 self.read(ctx);
             }
-            Command::ReplayScene(folder) => {
+            UiCommand::ReplayScene(folder) => {
                 self.tape.take(folder);
-                return Reply::Show;
+                return Reaction::Show;
             }
-            _ => return Reply::NotMine,
+            _ => return Reaction::NotMine,
         }
-        Reply::Done
+        Reaction::Done
     }
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
@@ -297,11 +271,11 @@ impl Screen for SceneScreen {
     }
 
     fn cancel(&mut self) {
-        self.ahead.cancel();
+        self.computed.cancel();
     }
 
     fn is_busy(&self) -> bool {
-        self.ahead.standing().is_some() || self.tape.is_busy() || self.is_running()
+        self.computed.is_busy() || self.tape.is_busy() || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
@@ -309,7 +283,7 @@ impl Screen for SceneScreen {
     }
 
     fn stop(&mut self) {
-        if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
+        if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
             self.tape.end(move || live.stop().and_then(recorded));
         }
     }
@@ -319,15 +293,12 @@ impl Screen for SceneScreen {
         self.tape.settle();
     }
 
-    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
-        let can_stop = match self.is_running() {
-            true => Ok(()),
-            false => Err("the scene does not run".to_owned()),
-        };
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
+        let can_stop = require(self.is_running(), "the scene does not run");
         let can_start = self.verdict(workbench);
         vec![
-            Action::new("Start the scene", "", Command::SceneStart).if_ok(can_start),
-            Action::new("Stop the scene", "", Command::SceneStop).if_ok(can_stop),
+            PaletteAction::new("Start the scene", "", UiCommand::SceneStart).if_ok(can_start),
+            PaletteAction::new("Stop the scene", "", UiCommand::SceneStop).if_ok(can_stop),
         ]
     }
 }

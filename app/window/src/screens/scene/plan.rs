@@ -1,12 +1,9 @@
-//! What the scene tolerates, and the cheapest way to play it that does.
+//! Tolerances of the scene, and the cheapest plan that meets them.
 
 use super::SceneScreen;
-use crate::command::{Command, Commands};
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::places::Place;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::workers::touch::Touch;
+use crate::command::{Commands, UiCommand};
+use crate::widgets::{NamedControl, alarm_ui, fact_ui, quiet_ui, reason_button, section_ui};
+use crate::workers::live_scene::LiveScene;
 use eframe::egui::{Ui, vec2};
 use palpate_analysis::report::scene::plan_text;
 use palpate_analysis::scene_bench::{made_after, planned, planned_again};
@@ -14,13 +11,13 @@ use palpate_haptics::surface::{NoPlan, SceneCurves, ScenePlan};
 use palpate_runner::haptics::scene_file::SceneFile;
 
 /// A plan, what it was made of, and what it answers.
-pub(super) struct Planned {
+pub(super) struct PlannedScene {
     file: SceneFile,
     curves: SceneCurves,
     plan: Result<ScenePlan, NoPlan>,
 }
 
-impl Planned {
+impl PlannedScene {
     fn of(file: SceneFile, curves: &SceneCurves) -> Self {
         Self { plan: planned(&file, curves, 1.0), curves: curves.clone(), file }
     }
@@ -38,7 +35,7 @@ impl SceneScreen {
             return;
         };
         if !self.planned.as_ref().is_some_and(|one| one.is_of(&file, curves)) {
-            self.planned = Some(Planned::of(file, curves));
+            self.planned = Some(PlannedScene::of(file, curves));
         }
     }
 
@@ -47,29 +44,30 @@ impl SceneScreen {
         section_ui(ui, "Tolerances and plan");
         if let Ok(file) = self.form.scene_file() {
             let one = &file.tolerances;
-            let force = format!("{} % of what a hand notices", one.force_percent);
+            let force =
+                format!("{} % of the smallest difference that a hand notices", one.force_percent);
             fact_ui(ui, "force", force);
             fact_ui(ui, "shape", format!("{} mm", one.shape_mm));
             fact_ui(ui, "tick", format!("{} µs", one.tick_us));
         }
         let verdict = match &self.planned {
-            None => Err("measure what a scene costs on the screen Trade first".to_owned()),
-            Some(Planned { plan: Err(none), .. }) => Err(none.why.clone()),
+            None => Err("measure the cost of a scene on the screen Trade first".to_owned()),
+            Some(PlannedScene { plan: Err(none), .. }) => Err(none.why.clone()),
             Some(_) if is_running => Err("the scene runs".to_owned()),
-            Some(Planned { plan: Ok(_), .. }) => Ok(()),
+            Some(PlannedScene { plan: Ok(_), .. }) => Ok(()),
         };
         if self.planned.is_none() {
             const NAME: &str = "Measure on Trade...";
-            if ui.button(NAME).place(NAME).clicked() {
-                commands.push(Command::MeasureScene);
+            if ui.button(NAME).named(NAME).clicked() {
+                commands.push(UiCommand::MeasureScene);
             }
         }
-        let is_taken = reason_button(ui, "Take the plan", vec2(170.0, 26.0), &verdict);
-        if let Some(Planned { file, plan: Ok(plan), .. }) = &self.planned {
+        let is_used = reason_button(ui, "Use plan", vec2(170.0, 26.0), &verdict);
+        if let Some(PlannedScene { file, plan: Ok(plan), .. }) = &self.planned {
             for line in plan_text(plan).lines() {
                 quiet_ui(ui, line);
             }
-            if is_taken {
+            if is_used {
                 self.form.take(made_after(file, plan));
             }
         }
@@ -78,23 +76,20 @@ impl SceneScreen {
 
     /// That ticks of the scene that runs or ran take longer than it grants them, if they do, and what follows for its plan.
     fn late_ui(&self, ui: &mut Ui) {
-        let kept = self.touch.as_ref().map(Touch::kept);
-        let Some(kept) = kept.filter(|kept| kept.work.count > 0) else {
-            return;
-        };
+        let timing = self.live.as_ref().map(LiveScene::kept);
+        let Some(timing) = timing.filter(|timing| timing.work.count > 0) else { return };
         // Of what ran, which need not be what stands in the form by now.
-        let file = &self.touched;
-        let (took, budget) = (1e6 * kept.work.p99_9.0, file.tolerances.tick_us);
+        let file = &self.live_file;
+        let (took, budget) = (1e6 * timing.work.p99_9.0, file.tolerances.tick_us);
         if took <= budget {
             return;
         }
-        alarm_ui(
-            ui,
-            &format!("one tick in a thousand took {took:.0} µs, over the budget of {budget} µs"),
-        );
+        let words =
+            format!("one tick in a thousand took {took:.0} µs, over the budget of {budget} µs");
+        alarm_ui(ui, words);
         let planned = self.planned.as_ref();
-        if let Some(Planned { curves, .. }) = planned {
-            alarm_ui(ui, &after_miss(file, curves, took));
+        if let Some(PlannedScene { curves, .. }) = planned {
+            alarm_ui(ui, after_miss(file, curves, took));
         }
     }
 }
@@ -108,9 +103,9 @@ fn after_miss(file: &SceneFile, curves: &SceneCurves, took: f64) -> String {
                 Ok(plan) => plan_text(&plan),
                 Err(none) => none.why,
             };
-            format!("planned again with that:\n{again}")
+            format!("planned again with that time:\n{again}")
         }
-        Ok(_) => "the scene that ran was not made after its plan; take that and start again".into(),
+        Ok(_) => "the scene that ran does not follow its plan; use the plan and start again".into(),
         Err(none) => none.why,
     }
 }
@@ -157,9 +152,9 @@ mod tests {
             words.contains("plan: 201 x 201 nodes") && words.contains("130.0 us a tick"),
             "{words}"
         );
-        // Of the time of a mesh that nobody planned nothing follows for those that were measured.
+        // Of the time of a mesh that was not planned nothing follows for those that were measured.
         let own = SceneFile { nodes: Some(801), ..fine };
         let words = after_miss(&own, &curves, 1000.0);
-        assert!(words.contains("not made after its plan"), "{words}");
+        assert!(words.contains("does not follow its plan"), "{words}");
     }
 }

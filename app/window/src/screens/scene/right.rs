@@ -1,28 +1,23 @@
-//! What is felt, why it is not more, and how the loop does.
+//! Force on the hand, its limits, and timing of the loop.
 
 use super::SceneScreen;
-use super::middle::Side;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::{fact_ui, section_ui};
-use crate::widgets::loop_times::loop_times_ui;
-use crate::workers::touch::{Touch, force_of, margin_of};
+use super::middle::PictureSource;
+use crate::widgets::{fact_ui, loop_times_ui, placeholder_ui, section_ui, small_ui, tokens_of};
+use crate::workers::live_scene::{LiveScene, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::margin_text;
 use palpate_haptics::scene::{SceneSettings, SceneTick};
 
 impl SceneScreen {
-    /// What is known.
     pub fn draw_right(&self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let Some((settings, moment)) = self.seen() else {
-            ui.label(RichText::new("nothing to feel yet").color(tokens.text_quiet));
-            return;
+        let Some((settings, instant)) = self.seen() else {
+            return placeholder_ui(ui, "no scene yet");
         };
-        force_ui(ui, &moment.tick);
-        guard_ui(ui, settings, &moment.tick);
-        let live = self.touch.as_ref().filter(|_| self.side == Side::Live);
-        if let Some(touch) = live {
-            loop_ui(ui, touch);
+        force_ui(ui, &instant.tick);
+        guard_ui(ui, settings, &instant.tick);
+        let live = self.live.as_ref().filter(|_| self.side == PictureSource::Live);
+        if let Some(live) = live {
+            loop_ui(ui, live);
         }
     }
 }
@@ -40,7 +35,7 @@ fn force_ui(ui: &mut Ui, tick: &SceneTick) {
 }
 
 fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     section_ui(ui, "Margin and guard");
     if tick.is_contact() {
         let margin = margin_text(&margin_of(settings, tick));
@@ -55,18 +50,18 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
     fact_ui(ui, "added", added);
     fact_ui(ui, "energy", format!("{:.2} mJ absorbed", tick.energy));
     for sentence in tick.flags.sentences() {
-        ui.add(Label::new(RichText::new(sentence).small()).wrap());
+        small_ui(ui, sentence);
     }
     if tick.is_buzzing {
-        let words = RichText::new("the loop swings by itself: buzz");
+        let words = RichText::new("limit cycle: the loop vibrates by itself");
         ui.label(words.strong().color(tokens.alarm_text));
     }
 }
 
-fn loop_ui(ui: &mut Ui, touch: &Touch) {
+fn loop_ui(ui: &mut Ui, live: &LiveScene) {
     section_ui(ui, "Loop");
-    let rate = touch.settings().period.hz();
-    fact_ui(ui, "wanted", format!("{rate:.0} ticks a second"));
-    fact_ui(ui, "priority", touch.priority());
-    loop_times_ui(ui, touch.kept());
+    let rate = live.settings().period.hz();
+    fact_ui(ui, "target", format!("{rate:.0} ticks a second"));
+    fact_ui(ui, "priority", live.priority());
+    loop_times_ui(ui, live.kept());
 }

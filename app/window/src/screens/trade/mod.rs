@@ -1,22 +1,16 @@
-//! What accuracy costs on this machine: what is wanted on the left, error over time in the middle, what to
-//! use on the right.
+//! What accuracy costs on this machine: requirements on the left, error over time in the middle, the recommendation on
+//! the right.
 
-mod shown;
+mod tables;
 
-use super::screen::{Reply, Screen, ScreenEntry};
-use crate::command::{Command, Commands};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
-use crate::theme::Tokens;
-use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
-use crate::widgets::remark::alarm_ui;
-use crate::widgets::table::table_ui;
-use crate::widgets::task_bar::work_ui;
-use crate::widgets::tick_box::tick_box;
-use crate::workbench::Workbench;
-use crate::workers::task::Task;
-use eframe::egui::{Context, Key, Label, RichText, TextEdit, Ui, vec2};
+use crate::widgets::{
+    NamedControl, QuantityField, alarm_ui, placeholder_ui, quantity_ui, quiet_ui, require,
+    section_ui, sentence_ui, small_alarm_ui, small_ui, table_ui, tick_box, tolerance_ui, work_ui,
+};
+use crate::workers::BackgroundTask;
+use eframe::egui::{Context, Key, Label, RichText, Ui, vec2};
 use palpate_analysis::report::scatter::Scatter;
 use palpate_analysis::report::text::capital;
 use palpate_analysis::trade::stored::{read_trade, trade_file, write_trade};
@@ -26,9 +20,9 @@ use palpate_haptics::surface::{Needs, NoPlan, SceneCurves, ScenePlan, plan};
 use palpate_model::units::Newtons;
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use palpate_rheology::trade::{Recommendation, TradeCurves};
-use shown::{Shown, cuts, families, fits, integrators, meshes, plan_lines, steps};
 use std::path::PathBuf;
 use std::sync::Arc;
+use tables::{TradeTable, cuts, families, fits, integrators, meshes, plan_lines, steps};
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.5;
@@ -39,7 +33,6 @@ const RATE_MAX: f64 = 1e9;
 const SHAPE_MAX: f64 = 1e3;
 const BUDGET_MAX: f64 = 1e6;
 
-/// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum View {
     Integrators,
@@ -60,22 +53,19 @@ const VIEWS: [(View, &str); 6] = [
 ];
 
 impl View {
-    /// Whether it shows curves of a scene.
     const fn is_scene(self) -> bool {
         matches!(self, Self::Mesh | Self::Cut | Self::Step)
     }
 }
 
-/// Curves measured or read.
-pub struct Known {
+/// Curves that were measured now or read from the library.
+struct TradeMeasurement {
     curves: TradeCurves,
-    /// Why not to rely on them.
     doubts: Vec<String>,
-    /// Where they are stored, or why they are not.
+    /// The file, or why there is none.
     stored: Result<String, String>,
 }
 
-/// The screen's line in the table.
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Trade",
     purpose: "what accuracy costs on this machine",
@@ -83,7 +73,6 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |workbench| Box::new(TradeScreen::new(workbench.library.clone())),
 };
 
-/// The screen's state.
 pub struct TradeScreen {
     library: Result<PathBuf, String>,
     tolerance: String,
@@ -91,11 +80,11 @@ pub struct TradeScreen {
     share: QuantityField,
     is_quick: bool,
     view: View,
-    task: Task<Known>,
+    task: BackgroundTask<TradeMeasurement>,
     is_read: bool,
     shape: QuantityField,
     budget: QuantityField,
-    scene: Task<Arc<SceneCurves>>,
+    scene: BackgroundTask<Arc<SceneCurves>>,
 }
 
 impl TradeScreen {
@@ -107,21 +96,19 @@ impl TradeScreen {
             share: QuantityField::new(10.0),
             is_quick: false,
             view: View::Integrators,
-            task: Task::default(),
+            task: BackgroundTask::default(),
             is_read: false,
             shape: QuantityField::new(0.5),
             budget: QuantityField::new(100.0),
-            scene: Task::default(),
+            scene: BackgroundTask::default(),
         }
     }
 
-    /// The curves on the screen.
     pub fn curves(&self) -> Option<&TradeCurves> {
-        let known = self.task.answer()?.as_ref().ok()?;
-        Some(&known.curves)
+        let measured = self.task.answer()?.as_ref().ok()?;
+        Some(&measured.curves)
     }
 
-    /// The curves of a scene.
     pub fn scene_curves(&self) -> Option<&SceneCurves> {
         self.scene_answer().map(Arc::as_ref)
     }
@@ -153,7 +140,7 @@ impl TradeScreen {
     }
 
     /// What the view shows and the level not to exceed in it, once that is measured.
-    fn drawn(&self) -> Result<Option<(Shown, Option<f64>)>, String> {
+    fn drawn(&self) -> Result<Option<(TradeTable, Option<f64>)>, String> {
         if self.view.is_scene() {
             let planned = self.planned().and_then(Result::ok);
             let curves = self.scene.answer().map(|answer| answer.as_ref());
@@ -170,11 +157,11 @@ impl TradeScreen {
                 _ => (meshes(curves, planned), shape),
             }));
         }
-        let known = self.task.answer().map(|answer| answer.as_ref());
-        let Some(known) = known.transpose().map_err(Clone::clone)? else {
+        let measured = self.task.answer().map(|answer| answer.as_ref());
+        let Some(measured) = measured.transpose().map_err(Clone::clone)? else {
             return Ok(None);
         };
-        let curves = &known.curves;
+        let curves = &measured.curves;
         let peak = Newtons(curves.peak.ramp_hold_n);
         let level = self.tolerance.parse::<Tolerance>().ok();
         let level = level.map(|tolerance| 100.0 * tolerance.in_newtons(peak).0 / peak.0);
@@ -185,31 +172,19 @@ impl TradeScreen {
         }))
     }
 
-    /// What a scene is to be made of.
     fn plan_ui(&self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let quiet = |ui: &mut Ui, words: &str| {
-            ui.label(RichText::new(words).color(tokens.text_quiet));
-        };
-        let lines = |ui: &mut Ui, plan: &ScenePlan| {
-            for line in plan_lines(plan) {
-                ui.add(Label::new(line).wrap());
-                ui.add_space(4.0);
-            }
-        };
         match self.planned() {
-            None if self.scene_curves().is_none() => quiet(ui, "measure first"),
-            None => quiet(ui, "the tolerance, shape or budget cannot be read"),
+            None if self.scene_curves().is_none() => placeholder_ui(ui, "measure first"),
+            None => placeholder_ui(ui, "the tolerance, shape or budget cannot be read"),
             Some(Ok(plan)) => {
-                ui.label(RichText::new("the cheapest that holds both").strong());
-                lines(ui, &plan);
+                ui.label(RichText::new("the cheapest that meets both").strong());
+                plan_lines(&plan).iter().for_each(|line| sentence_ui(ui, line));
             }
             Some(Err(none)) => {
-                let why = format!("no plan: {}", none.why);
-                alarm_ui(ui, &why);
+                alarm_ui(ui, format!("no plan: {}", none.why));
                 if let Some(plan) = &none.nearest {
                     section_ui(ui, "Nearest within the budget");
-                    lines(ui, plan);
+                    plan_lines(plan).iter().for_each(|line| sentence_ui(ui, line));
                 }
             }
         }
@@ -218,28 +193,12 @@ impl TradeScreen {
 
 impl Screen for TradeScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        section_ui(ui, "Wanted");
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "tolerance");
-            let input =
-                TextEdit::singleline(&mut self.tolerance).desired_width(96.0).char_limit(24);
-            ui.add(input).labelled_by(label.id).place("tolerance");
-        });
-        match self.tolerance.parse::<Tolerance>() {
-            Ok(tolerance) => {
-                let text = format!("an error of {tolerance} does not matter");
-                ui.label(RichText::new(text).color(tokens.text_quiet).small());
-            }
-            Err(reason) => {
-                let text = RichText::new(reason.to_string()).color(tokens.alarm_text);
-                ui.add(Label::new(text.small()).wrap());
-            }
-        }
+        section_ui(ui, "Requirements");
+        tolerance_ui(ui, &mut self.tolerance, None);
         let is_scene = self.view.is_scene();
         if is_scene {
             quantity_ui(ui, "shape", "mm of error", &mut self.shape);
-            quantity_ui(ui, "budget", "us of each tick", &mut self.budget);
+            quantity_ui(ui, "budget", "µs of each tick", &mut self.budget);
         } else {
             quantity_ui(ui, "rate", "updates a second", &mut self.rate);
             quantity_ui(ui, "share", "% of each period", &mut self.share);
@@ -252,54 +211,35 @@ impl Screen for TradeScreen {
             true => work_ui(ui, "Measure here  F6", &self.scene, &verdict, commands),
             false => work_ui(ui, "Measure here  F6", &self.task, &verdict, commands),
         }
-        if is_scene {
-            return;
-        }
-        let Some(Ok(known)) = self.task.answer() else {
-            return;
-        };
+        let Some(Ok(measured)) = self.task.answer().filter(|_| !is_scene) else { return };
         section_ui(ui, "Measured");
         let facts = [
-            known.curves.machine.words(),
-            format!("{} by palpate {}", known.curves.measured_at, known.curves.version),
+            measured.curves.machine.words(),
+            format!("{} by palpate {}", measured.curves.measured_at, measured.curves.version),
             format!(
                 "even and odd rounds differ by {} at most",
-                percent(known.curves.worst_halves())
+                percent(measured.curves.worst_halves())
             ),
         ];
-        for fact in facts {
-            ui.add(Label::new(RichText::new(fact).small()).wrap());
+        facts.into_iter().for_each(|fact| small_ui(ui, fact));
+        measured.doubts.iter().for_each(|doubt| small_alarm_ui(ui, doubt));
+        match &measured.stored {
+            Ok(file) => quiet_ui(ui, format!("stored in {file}")),
+            Err(reason) => small_alarm_ui(ui, format!("not stored: {reason}")),
         }
-        for doubt in &known.doubts {
-            let text = RichText::new(doubt).color(tokens.alarm_text);
-            ui.add(Label::new(text.small()).wrap());
-        }
-        let (text, ink) = match &known.stored {
-            Ok(file) => (format!("stored in {file}"), tokens.text_quiet),
-            Err(reason) => (format!("not stored: {reason}"), tokens.alarm_text),
-        };
-        ui.add(Label::new(RichText::new(text).small().color(ink)).wrap());
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             ui.label(RichText::new("Error over time").heading().strong());
             for (view, name) in VIEWS {
-                ui.selectable_value(&mut self.view, view, name).place(name);
+                ui.selectable_value(&mut self.view, view, name).named(name);
             }
         });
         let (shown, level) = match self.drawn() {
             Ok(Some(shown)) => shown,
-            Ok(None) => {
-                let text = "nothing measured on this machine yet";
-                ui.label(RichText::new(text).color(tokens.text_quiet));
-                return;
-            }
-            Err(reason) => {
-                alarm_ui(ui, &reason);
-                return;
-            }
+            Ok(None) => return placeholder_ui(ui, "nothing measured on this machine yet"),
+            Err(reason) => return alarm_ui(ui, reason),
         };
         let height = ui.available_height() * PLOT_SHARE;
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
@@ -316,8 +256,7 @@ impl Screen for TradeScreen {
     }
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        section_ui(ui, "What to use");
+        section_ui(ui, "Recommendation");
         if self.view.is_scene() {
             self.plan_ui(ui);
             return;
@@ -327,8 +266,7 @@ impl Screen for TradeScreen {
                 Err(_) => "the tolerance, rate or share cannot be read",
                 Ok(_) => "measure first",
             };
-            ui.label(RichText::new(text).color(tokens.text_quiet));
-            return;
+            return placeholder_ui(ui, text);
         };
         ui.add(Label::new(format!("For {}:", terms(&recommendation))).wrap());
         for (name, words) in advice(&recommendation) {
@@ -354,25 +292,27 @@ impl Screen for TradeScreen {
         if std::mem::replace(&mut self.is_read, true) {
             return;
         }
-        let Ok(library) = &self.library else {
-            return;
-        };
+        let Ok(library) = &self.library else { return };
         let file = trade_file(library, &trade::this_machine());
         if !file.exists() {
             return;
         }
         self.task.start("trade-read", ctx, move |_| {
             let curves = read_trade(&file).map_err(|err| err.to_string())?;
-            Ok(Known { doubts: doubts(&curves), stored: Ok(file.display().to_string()), curves })
+            Ok(TradeMeasurement {
+                doubts: doubts(&curves),
+                stored: Ok(file.display().to_string()),
+                curves,
+            })
         });
     }
 
-    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
         match command {
-            Command::MeasureScene => self.view = View::Mesh,
-            _ => return Reply::NotMine,
+            UiCommand::MeasureScene => self.view = View::Mesh,
+            _ => return Reaction::NotMine,
         }
-        Reply::Show
+        Reaction::Show
     }
 
     fn work(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -383,16 +323,16 @@ impl Screen for TradeScreen {
         if self.view.is_scene() {
             self.scene.start("scene-curves", ctx, move |progress| {
                 let curves = trade::measure_scene(extent, progress)?;
-                curves.map(Arc::new).ok_or_else(|| "ended before it was done".to_owned())
+                curves.map(Arc::new).ok_or_else(|| "cancelled before it was done".to_owned())
             });
             return;
         }
         let library = self.library.clone();
         self.task.start("trade", ctx, move |progress| {
-            let curves = trade::measure(extent, progress)?.ok_or("ended before it was done")?;
+            let curves = trade::measure(extent, progress)?.ok_or("cancelled before it was done")?;
             let stored = library
                 .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
-            Ok(Known {
+            Ok(TradeMeasurement {
                 doubts: doubts(&curves),
                 stored: stored.map(|file| file.display().to_string()),
                 curves,
@@ -401,23 +341,16 @@ impl Screen for TradeScreen {
     }
 
     fn cancel(&mut self) {
-        match self.view.is_scene() {
-            true => self.scene.cancel(),
-            false => self.task.cancel(),
-        }
+        if self.view.is_scene() { self.scene.cancel() } else { self.task.cancel() }
     }
 
     fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.scene.standing().is_some()
+        self.task.is_busy() || self.scene.is_busy()
     }
 }
 
 fn in_range(value: f64, high: f64) -> Result<(), String> {
-    if value > 0.0 && value <= high {
-        Ok(())
-    } else {
-        Err(format!("must be above 0 and at most {high}"))
-    }
+    require(value > 0.0 && value <= high, format!("must be above 0 and at most {high}"))
 }
 
 fn doubts(curves: &TradeCurves) -> Vec<String> {

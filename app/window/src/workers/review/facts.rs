@@ -1,7 +1,6 @@
-//! What is known of a session besides its samples.
+//! Facts of a session apart from its samples.
 
 use palpate_analysis::analysed::Passing;
-use palpate_model::about::About;
 use palpate_model::calibration::Calibration;
 use palpate_model::signal::track::Track;
 use palpate_protocols::engine::{Effect, Record};
@@ -13,79 +12,63 @@ use palpate_sessions::record::{EndRecord, Entry, EntryKind};
 use serde_json::Value;
 use std::path::Path;
 
-/// Something that happened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Event {
-    /// Samples before it.
+pub struct SessionEvent {
+    /// Number of samples before it.
     pub after_sample: usize,
-    /// What, in words.
     pub text: String,
-    /// Whether it needs attention.
     pub is_alarm: bool,
-    /// Whether a person wrote it.
+    /// A person wrote it.
     pub is_note: bool,
 }
 
 palpate_model::named! {
-    /// Where sessions laid over each other have their time zero.
+    /// The time zero of sessions that are laid over each other.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Leader {
-        /// The first sample.
+    pub enum TimeOrigin {
         #[default]
         Start = "session start",
-        /// Where contact was found first.
+        /// The first contact point found.
         Contact = "contact",
-        /// Where the first ramp begins.
+        /// The start of the first ramp.
         Ramp = "ramp start",
     }
 }
 
-/// What is known.
+/// Empty texts are names that the session does not have.
 #[derive(Clone, Debug)]
-pub struct Facts {
-    /// Who measured.
+pub struct SessionFacts {
     pub operator: String,
-    /// What was indented.
     pub specimen: String,
-    /// The probe.
     pub indenter: String,
-    /// What else was told.
-    pub about: About,
-    /// The protocol's name; empty where there is none.
     pub protocol: String,
-    /// The rig's name; empty for an imported session.
     pub rig: String,
     /// The calibration that the forces are made with.
     pub calibration: Option<Calibration>,
-    /// What it is worth and why.
+    /// With its reason.
     pub verdict: Option<(Verdict, String)>,
-    /// How it ended.
     pub end: Option<EndRecord>,
-    /// How the computer kept up.
     pub health: HealthSummary,
-    /// What happened, in order; phases are told elsewhere.
-    pub events: Vec<Event>,
+    /// In order, without phases.
+    pub events: Vec<SessionEvent>,
     /// Samples before the first contact found.
     pub contact: Option<usize>,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
     /// SHA-256 of each file it is made of.
     pub hashes: Vec<Input>,
-    /// What a reader must know, one sentence each.
+    /// Remarks of the reader, one sentence each.
     pub notes: Vec<String>,
-    /// Names of its analyses that count, each with what it is.
-    pub analyses: Vec<(String, &'static str)>,
 }
 
-impl Facts {
-    /// What a session that was read through says.
+impl SessionFacts {
     #[must_use]
     pub fn of(path: &Path, passing: &Passing) -> Self {
         let (outline, edits) = (&passing.edited.outline, &passing.edited.edits);
         let manifest = &outline.manifest;
         let mut notes = outline.notes.clone();
         let hashes = inputs_of(path).unwrap_or_else(|err| {
-            notes.push(format!("its files cannot be told by their hashes: {err}"));
+            notes.push(format!("the hashes of its files cannot be computed: {err}"));
             Vec::new()
         });
         let verdict = edits.verdict();
@@ -94,7 +77,6 @@ impl Facts {
             operator: manifest.operator.clone(),
             specimen: manifest.specimen.clone(),
             indenter: manifest.indenter.clone(),
-            about: manifest.about.clone(),
             protocol: manifest.plan["name"].as_str().unwrap_or_default().to_owned(),
             rig: manifest.rig.as_ref().map_or(String::new(), |rig| rig.name.clone()),
             calibration: serde_json::from_value(manifest.calibration.clone()).ok(),
@@ -106,11 +88,6 @@ impl Facts {
             left_out_s: passing.left_out_s.clone(),
             hashes,
             notes,
-            analyses: passing
-                .analyses
-                .counting()
-                .map(|one| (one.name.clone(), one.what.word()))
-                .collect(),
         }
     }
 
@@ -130,16 +107,16 @@ impl Facts {
         (words, is_well)
     }
 
-    /// Time of a sample that something came before, in s; none without samples.
+    /// Time of the first contact in s since the first sample.
     pub fn contact_time(&self, track: &Track) -> Option<f64> {
         track.time_of(self.contact?)
     }
 }
 
-/// An entry in words; none for what stands elsewhere in the picture.
-fn event(entry: &Entry) -> Option<Event> {
+/// An entry in words; none for entries that the plots show in another way.
+fn event(entry: &Entry) -> Option<SessionEvent> {
     let made = |text: String, is_alarm: bool, is_note: bool| {
-        Some(Event {
+        Some(SessionEvent {
             after_sample: usize::try_from(entry.after_sample).unwrap_or(usize::MAX),
             text,
             is_alarm,
@@ -176,13 +153,13 @@ fn event(entry: &Entry) -> Option<Event> {
     }
 }
 
-/// The words in what an entry says.
+/// The words in the body of an entry.
 fn words(value: &Value) -> String {
     match value {
         Value::String(text) => text.replace('_', " "),
         Value::Object(fields) => {
-            let told = fields.iter().filter(|(key, _)| *key != "input");
-            told.map(|(_, value)| words(value)).collect::<Vec<_>>().join(" ")
+            let others = fields.iter().filter(|(key, _)| *key != "input");
+            others.map(|(_, value)| words(value)).collect::<Vec<_>>().join(" ")
         }
         Value::Array(values) => values.iter().map(words).collect::<Vec<_>>().join(" "),
         Value::Null => String::new(),

@@ -1,4 +1,4 @@
-//! Fits of the sessions that are looked at, and what the fit of one foretells of another.
+//! Fits of the sessions shown, and the prediction of one session by the fit of another.
 
 use palpate_analysis::fit::{Fitted, IntervalsWanted, Recipe};
 use palpate_analysis::progress::Progress;
@@ -14,22 +14,20 @@ pub const MODELLED: usize = 0;
 /// Column of measured minus modelled force in mN; a gap where the force did not count.
 pub const RESIDUAL: usize = 1;
 
-/// Which session, how it is read, and when its ramp begins in s since its first sample.
+/// A session to fit, and how.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Subject {
-    /// Its folder.
+pub struct FitSubject {
     pub path: PathBuf,
-    /// The analysis it is read by.
+    /// The analysis by which it is read.
     pub analysis: Option<String>,
-    /// Key of the family to be fitted; none for the modified Kelvin body of third order.
+    /// Key of the model family; none for the modified Kelvin model of third order.
     pub family: Option<String>,
-    /// Take it though it was rejected.
     pub is_rejected_included: bool,
-    /// Time of the first sample that a fit takes.
+    /// Time in s since its first sample of the first one that is fitted.
     pub ramp_t: f64,
 }
 
-impl Subject {
+impl FitSubject {
     fn options(&self) -> Result<FitOptions, String> {
         match &self.family {
             Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
@@ -38,37 +36,35 @@ impl Subject {
     }
 }
 
-/// A fit to look at.
+/// The fit of a session.
 #[derive(Clone, Debug)]
 pub struct SessionFit {
-    /// What the fit found.
     pub report: FitReport,
     /// Intervals from the profile likelihood, or why there are none.
     pub profile: Result<Vec<ProfileInterval>, String>,
     /// Modelled force and residual over the session's time.
     pub track: Track,
-    /// What the reader of the session remarked.
+    /// Remarks of the reader of the session.
     pub notes: Vec<String>,
 }
 
-/// What the fit of one session says of another.
+/// The force of a session as the fit of another predicts it.
 #[derive(Clone, Debug)]
-pub struct Prediction {
-    /// The fit of the first, its track over the second's time: the force foretold, and what is left.
+pub struct SessionPrediction {
+    /// Of the first session.
     pub fit: FitReport,
-    /// The force foretold and what is left of the measured one.
+    /// Predicted force and residual over the time of the second session.
     pub track: Track,
-    /// Root mean square of what is left, in N.
+    /// RMSE.
     pub rms_n: f64,
-    /// The highest measured force in N.
+    /// The highest measured force.
     pub peak_n: f64,
-    /// The highest force foretold in N.
     pub predicted_peak_n: f64,
-    /// Samples compared.
+    /// Number of samples compared.
     pub samples: usize,
 }
 
-fn samples_of(subject: &Subject) -> Result<Fitted, String> {
+fn samples_of(subject: &FitSubject) -> Result<Fitted, String> {
     let is_rejected_included = subject.is_rejected_included;
     let wanted = Wanted { is_rejected_included, ..Wanted::default() };
     let recipe =
@@ -76,23 +72,22 @@ fn samples_of(subject: &Subject) -> Result<Fitted, String> {
     recipe.fit(&subject.path).map_err(|err| err.to_string())
 }
 
-/// Modelled forces and what is left, from the time at which the ramp begins.
+/// Modelled forces in N and residuals in mN, from the start of the ramp.
 fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
     let mut track = Track::default();
     for (samples, modelled) in samples.chunks(SEGMENT).zip(modelled.chunks(SEGMENT)) {
-        let left = samples.iter().zip(modelled).map(|(one, fit)| match one.is_measured() {
+        let residual = samples.iter().zip(modelled).map(|(one, fit)| match one.is_measured() {
             true => ((one.force.0 - fit.0) * 1e3) as f32,
             false => f32::NAN,
         });
-        let columns = [modelled.iter().map(|fit| fit.0 as f32).collect(), left.collect()];
+        let columns = [modelled.iter().map(|fit| fit.0 as f32).collect(), residual.collect()];
         let times = samples.iter().map(|one| ramp_t + one.t.0).collect();
         track.push(Arc::new(Segment::new(times, &columns)));
     }
     track
 }
 
-/// Fits one session.
-pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
+pub fn fit_session(subject: &FitSubject) -> Result<SessionFit, String> {
     let fitted = samples_of(subject)?;
     let report = fitted.result.clone().map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
@@ -108,12 +103,11 @@ pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
     })
 }
 
-/// What became of the fit of one session.
-pub type FitAnswer = (Subject, Result<Arc<SessionFit>, String>);
+pub type FitAnswer = (FitSubject, Result<Arc<SessionFit>, String>);
 
-/// Fits several, one after the other.
+/// Fits sessions one after the other.
 pub fn fit_sessions(
-    subjects: &[Subject],
+    subjects: &[FitSubject],
     progress: &dyn Progress,
 ) -> Result<Vec<FitAnswer>, String> {
     let mut answers = Vec::with_capacity(subjects.len());
@@ -128,14 +122,17 @@ pub fn fit_sessions(
     Ok(answers)
 }
 
-/// Fits the first session and lays what its body would answer to the second's depths over the second.
-pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Prediction, String> {
+/// Fits the first session and predicts the force at the depths of the second.
+pub fn predict(
+    pair: &[FitSubject; 2],
+    progress: &dyn Progress,
+) -> Result<SessionPrediction, String> {
     let [known, other] = pair;
     if progress.tell(0, 2, "fitting the first").is_break() {
         return Err("cancelled".into());
     }
     let fit = samples_of(known)?.result.map_err(|err| err.to_string())?;
-    if progress.tell(1, 2, "foretelling the second").is_break() {
+    if progress.tell(1, 2, "predicting the second").is_break() {
         return Err("cancelled".into());
     }
     let samples = samples_of(other)?.samples;
@@ -143,11 +140,11 @@ pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Predictio
     let pairs = || samples.iter().zip(&modelled).filter(|(one, _)| one.is_measured());
     let count = pairs().count();
     if count == 0 {
-        return Err("no force of the second session counts; there is nothing to compare".into());
+        return Err("no force of the second session counts, so there is nothing to compare".into());
     }
     let squares: f64 = pairs().map(|(one, fit)| (one.force.0 - fit.0).powi(2)).sum();
     let highest = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::NEG_INFINITY, f64::max);
-    Ok(Prediction {
+    Ok(SessionPrediction {
         track: track_of(&samples, &modelled, other.ramp_t),
         rms_n: (squares / count as f64).sqrt(),
         peak_n: highest(&mut pairs().map(|(one, _)| one.force.0)),
@@ -165,8 +162,8 @@ mod tests {
     use palpate_sessions::edits::Verdict;
     use std::path::Path;
 
-    fn recorded() -> Subject {
-        Subject {
+    fn recorded() -> FitSubject {
+        FitSubject {
             path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab"),
             analysis: None,
             family: None,
@@ -176,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_what_the_report_says() {
+    fn residuals_have_the_rmse_of_the_report() {
         let found = fit_session(&recorded()).unwrap();
         let values: Vec<f32> =
             found.track.segments().iter().flat_map(|one| one.values(RESIDUAL).to_vec()).collect();
@@ -199,7 +196,7 @@ mod tests {
         }
         let who = Who { by: "Ada".into(), reason: "a hair".into() };
         judge(&path, Verdict::Rejected, &who).unwrap();
-        let mut subject = Subject { path, ..recorded() };
+        let mut subject = FitSubject { path, ..recorded() };
         assert!(fit_session(&subject).unwrap_err().contains("a hair"));
         let pair = [recorded(), subject.clone()];
         assert!(predict(&pair, &Unwatched).unwrap_err().contains("a hair"));
@@ -208,12 +205,12 @@ mod tests {
     }
 
     #[test]
-    fn a_session_foretells_itself_as_well_as_it_is_fitted() {
+    fn a_session_predicts_itself_as_well_as_it_is_fitted() {
         let pair = [recorded(), recorded()];
         let found = predict(&pair, &Unwatched).unwrap();
         assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
         assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
-        let gone = Subject { path: "/nowhere/at-all".into(), ..recorded() };
+        let gone = FitSubject { path: "/nowhere/at-all".into(), ..recorded() };
         let refused = predict(&[gone.clone(), recorded()], &Unwatched);
         assert!(refused.unwrap_err().contains("/nowhere/at-all"));
         let answers = fit_sessions(&[gone, recorded()], &Unwatched).unwrap();

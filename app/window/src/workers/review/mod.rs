@@ -4,7 +4,7 @@ mod facts;
 pub mod fit;
 mod read;
 
-pub use facts::{Event, Facts, Leader};
+pub use facts::{SessionEvent, SessionFacts, TimeOrigin};
 pub use read::read;
 
 use eframe::egui::Context;
@@ -13,13 +13,12 @@ use palpate_model::signal::track::{Segment, Track};
 use palpate_sessions::log::Summary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
 palpate_model::named! {
-    /// A quantity of a session over time; its place is that of its column in a track.
+    /// A quantity of a session over time; its number is that of its column in a track.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
     pub enum Quantity {
-        /// Force above tare.
         Force = "Force",
         /// Depth below contact.
         Depth = "Depth",
@@ -31,7 +30,6 @@ palpate_model::named! {
 }
 
 impl Quantity {
-    /// What stands at its axis.
     #[must_use]
     pub const fn axis(self) -> &'static str {
         match self {
@@ -42,7 +40,6 @@ impl Quantity {
         }
     }
 
-    /// Its unit.
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -55,7 +52,7 @@ impl Quantity {
 
 /// Samples that have something in common, up to where the next ones begin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch<T> {
+pub struct TrackStretch<T> {
     /// Number of the first sample.
     pub first: usize,
     /// Its time in s since the first sample of the session.
@@ -64,135 +61,114 @@ pub struct Stretch<T> {
     pub what: T,
 }
 
-/// What a reader tells while it reads.
-pub enum News {
-    /// What the first and the last chunk say.
+/// A piece of a session, from the thread that reads it.
+pub enum ReadUpdate {
+    /// From the first and the last chunk.
     Head(Box<Summary>),
-    /// The next samples.
+    /// The next samples, and the phases and cycles that begin in them.
     Samples {
-        /// Those.
         segment: Arc<Segment>,
-        /// Phases that begin in it.
-        phases: Vec<Stretch<Phase>>,
-        /// Cycles that begin in it; 0 is none.
-        cycles: Vec<Stretch<u32>>,
+        phases: Vec<TrackStretch<Phase>>,
+        /// 0 for none.
+        cycles: Vec<TrackStretch<u32>>,
     },
-    /// Everything was there, and this is what is known besides.
-    Whole(Box<Facts>),
-    /// The session cannot be read.
+    /// The session is read to its end.
+    Whole(Box<SessionFacts>),
     Failed(String),
 }
 
-/// How far a session is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// How far a session is read.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Stage {
-    /// Not begun.
+    #[default]
     Waiting,
-    /// Being read.
     Reading,
-    /// All there.
     Whole,
-    /// Not read to its end because somebody wanted it so.
     Cancelled,
-    /// Cannot be read.
     Failed(String),
 }
 
 /// A session as far as it has been read.
-pub struct Recording {
-    /// Its folder.
+#[derive(Default)]
+pub struct ReviewRecording {
     pub path: PathBuf,
-    /// The analysis it is read by.
+    /// The analysis by which it is read.
     pub analysis: Option<String>,
-    /// Every sample so far.
     pub track: Track,
-    /// Phases so far.
-    pub phases: Vec<Stretch<Phase>>,
-    /// Cycles so far.
-    pub cycles: Vec<Stretch<u32>>,
-    /// What its ends say.
+    pub phases: Vec<TrackStretch<Phase>>,
+    pub cycles: Vec<TrackStretch<u32>>,
     pub head: Option<Box<Summary>>,
-    /// What is known once all was read.
-    pub facts: Option<Box<Facts>>,
-    /// How far it is.
+    /// Once it is read to its end.
+    pub facts: Option<Box<SessionFacts>>,
     pub stage: Stage,
-    /// Raised with everything that came.
+    /// Raised with every update.
     pub version: u64,
-    news: Option<Receiver<News>>,
+    updates: Option<Receiver<ReadUpdate>>,
 }
 
-/// Pieces that may wait for the window; the reader waits then.
+/// Updates that may wait for the window; with more the reader waits.
 const QUEUE: usize = 64;
 
-impl Recording {
-    /// A session that is not yet read.
+impl ReviewRecording {
     #[must_use]
     pub fn new(path: &Path, analysis: Option<&str>) -> Self {
-        Self {
-            path: path.to_owned(),
-            analysis: analysis.map(str::to_owned),
-            track: Track::default(),
-            phases: Vec::new(),
-            cycles: Vec::new(),
-            head: None,
-            facts: None,
-            stage: Stage::Waiting,
-            version: 0,
-            news: None,
-        }
+        Self { path: path.to_owned(), analysis: analysis.map(str::to_owned), ..Self::default() }
     }
 
-    /// Begins to read.
     pub fn start(&mut self, ctx: &Context) {
         let (sender, receiver) = sync_channel(QUEUE);
         let (path, analysis, wake) = (self.path.clone(), self.analysis.clone(), ctx.clone());
         let work = move || {
-            let tell = |news| told(&sender, news, &wake);
-            if let Err(reason) = read(&path, analysis.as_deref(), &tell) {
-                let _ = tell(News::Failed(reason));
+            let send = |update| {
+                let is_received = sender.send(update).is_ok();
+                wake.request_repaint();
+                is_received
+            };
+            if let Err(reason) = read(&path, analysis.as_deref(), &send) {
+                let _ = send(ReadUpdate::Failed(reason));
             }
         };
         let started = std::thread::Builder::new().name("review-read".into()).spawn(work);
         match started {
             Ok(_) => {
-                self.news = Some(receiver);
+                self.updates = Some(receiver);
                 self.stage = Stage::Reading;
             }
-            Err(err) => self.stage = Stage::Failed(format!("it cannot be read now: {err}")),
+            Err(err) => {
+                self.stage =
+                    Stage::Failed(format!("the thread that reads it cannot be started: {err}"))
+            }
         }
     }
 
-    /// Fetches what has come.
     pub fn poll(&mut self) {
-        let Some(news) = &self.news else {
-            return;
-        };
+        let Some(updates) = &self.updates else { return };
         loop {
-            let piece = match news.try_recv() {
-                Ok(piece) => piece,
+            let update = match updates.try_recv() {
+                Ok(update) => update,
                 Err(TryRecvError::Empty) => return,
                 Err(TryRecvError::Disconnected) => {
                     if self.stage == Stage::Reading {
                         let gone = "reading ended unexpectedly; show the session again, and report it if it happens twice";
                         self.stage = Stage::Failed(gone.into());
                     }
-                    self.news = None;
+                    self.updates = None;
                     return;
                 }
             };
             self.version += 1;
-            match piece {
-                News::Head(head) => self.head = Some(head),
-                News::Samples { segment, phases, cycles } => {
+            match update {
+                ReadUpdate::Head(head) => self.head = Some(head),
+                ReadUpdate::Samples { segment, phases, cycles } => {
                     self.track.push(segment);
                     self.phases.extend(phases);
                     self.cycles.extend(cycles);
                 }
-                News::Whole(facts) => {
+                ReadUpdate::Whole(facts) => {
                     self.facts = Some(facts);
                     self.stage = Stage::Whole;
                 }
-                News::Failed(reason) => self.stage = Stage::Failed(reason),
+                ReadUpdate::Failed(reason) => self.stage = Stage::Failed(reason),
             }
         }
     }
@@ -200,12 +176,11 @@ impl Recording {
     /// Ends the reading; what has come stays.
     pub fn cancel(&mut self) {
         if matches!(self.stage, Stage::Reading | Stage::Waiting) {
-            self.news = None;
+            self.updates = None;
             self.stage = Stage::Cancelled;
         }
     }
 
-    /// Whether it is being read.
     pub fn is_reading(&self) -> bool {
         self.stage == Stage::Reading
     }
@@ -230,7 +205,7 @@ impl Recording {
         [own[0], own[1].max(expected)]
     }
 
-    /// What it is called: its session's name without what all names have.
+    /// Its session's identifier, or the name of its folder until that is read.
     pub fn name(&self) -> String {
         let own = self.head.as_ref().map(|head| head.manifest.session_id.clone());
         own.unwrap_or_else(|| {
@@ -245,21 +220,12 @@ impl Recording {
         found.map(|one| one.t)
     }
 
-    /// Stretches with their ends, the last one up to what has come.
+    /// Start, end and value of each stretch; the last one ends at `end`.
     pub fn ended<T: Copy>(
-        stretches: &[Stretch<T>],
+        stretches: &[TrackStretch<T>],
         end: f64,
     ) -> impl Iterator<Item = (f64, f64, T)> {
         let ends = stretches.iter().skip(1).map(|next| next.t).chain([end]);
         stretches.iter().zip(ends).map(|(one, end)| (one.t, end, one.what))
     }
-}
-
-/// Hands a piece over; false once nobody listens.
-fn told(sender: &SyncSender<News>, news: News, wake: &Context) -> bool {
-    let is_heard = sender.send(news).is_ok();
-    if is_heard {
-        wake.request_repaint();
-    }
-    is_heard
 }

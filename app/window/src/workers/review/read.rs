@@ -1,11 +1,11 @@
 //! Reads a session through once, or twice where its edits or an analysis change its samples, and never holds
 //! more than one block of rows.
 //!
-//! What a sample costs in memory is told at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
+//! The memory of a sample is described at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
 //! force, depth, signal and position, 267 MB for ten million samples.
 
-use super::facts::Facts;
-use super::{News, Quantity, Stretch};
+use super::facts::SessionFacts;
+use super::{Quantity, ReadUpdate, TrackStretch};
 use palpate_analysis::analysed;
 use palpate_model::rig::Phase;
 use palpate_model::signal::track::{SEGMENT, Segment};
@@ -20,21 +20,21 @@ use std::sync::Arc;
 /// Samples of the first piece: enough for a picture, and there at once.
 const FIRST: usize = 1 << 12;
 
-/// Reads a session as an analysis has it and tells what comes; `tell` says whether anybody listens still.
+/// Reads a session as an analysis has it and sends it in pieces; `send` returns whether the receiver is still there.
 pub fn read(
     path: &Path,
     analysis: Option<&str>,
-    tell: &dyn Fn(News) -> bool,
+    send: &dyn Fn(ReadUpdate) -> bool,
 ) -> Result<(), String> {
     let summary = Summary::read(path).map_err(|err| err.to_string())?;
     let manifest = summary.manifest.clone();
     let edits = Edits::read(path, &manifest.session_id).map_err(|err| err.to_string())?;
     let is_moved = |change: &Change| matches!(change, Change::Contact { .. });
     let is_as_recorded = analysis.is_none() && !edits.all.iter().any(|edit| is_moved(&edit.change));
-    if !tell(News::Head(Box::new(summary))) {
+    if !send(ReadUpdate::Head(Box::new(summary))) {
         return Ok(());
     }
-    let builder = RefCell::new(Builder::new(&manifest, tell));
+    let builder = RefCell::new(Builder::new(&manifest, send));
     let passing = if is_as_recorded {
         let outline = Session::scan(path, &mut |block| {
             let mut builder = builder.borrow_mut();
@@ -52,8 +52,8 @@ pub fn read(
     }
     let mut builder = builder.into_inner();
     builder.hand_over();
-    if builder.is_heard {
-        tell(News::Whole(Box::new(Facts::of(path, &passing))));
+    if builder.is_received {
+        send(ReadUpdate::Whole(Box::new(SessionFacts::of(path, &passing))));
     }
     Ok(())
 }
@@ -61,26 +61,26 @@ pub fn read(
 /// Rows on their way into segments.
 struct Builder<'a> {
     manifest: &'a Manifest,
-    tell: &'a dyn Fn(News) -> bool,
+    send: &'a dyn Fn(ReadUpdate) -> bool,
     mm_per_pulse: f64,
     first_tick: Option<u64>,
     times: Vec<f64>,
     columns: Vec<Vec<f32>>,
-    phases: Vec<Stretch<Phase>>,
-    cycles: Vec<Stretch<u32>>,
+    phases: Vec<TrackStretch<Phase>>,
+    cycles: Vec<TrackStretch<u32>>,
     phase: Option<Phase>,
     cycle: Option<u32>,
     samples: usize,
-    /// When the samples are handed over.
+    /// Samples that are handed over together.
     room: usize,
-    is_heard: bool,
+    is_received: bool,
 }
 
 impl<'a> Builder<'a> {
-    fn new(manifest: &'a Manifest, tell: &'a dyn Fn(News) -> bool) -> Self {
+    fn new(manifest: &'a Manifest, send: &'a dyn Fn(ReadUpdate) -> bool) -> Self {
         Self {
             manifest,
-            tell,
+            send,
             mm_per_pulse: manifest.rig.as_ref().map_or(0.0, |rig| rig.mm_per_pulse),
             first_tick: None,
             times: Vec::new(),
@@ -91,23 +91,23 @@ impl<'a> Builder<'a> {
             cycle: None,
             samples: 0,
             room: FIRST,
-            is_heard: true,
+            is_received: true,
         }
     }
 
     fn take(&mut self, row: &Row) {
-        // Nobody wants the rest; what is read on the way to its end is thrown away.
-        if !self.is_heard {
+        // The receiver is gone; the rest is read and dropped.
+        if !self.is_received {
             return;
         }
         let first = *self.first_tick.get_or_insert(row.tick);
         let t = self.manifest.time_of(row.tick.wrapping_sub(first) as i64).0;
         let (number, gap) = (self.samples, f64::NAN);
         if self.phase.replace(row.phase) != Some(row.phase) {
-            self.phases.push(Stretch { first: number, t, what: row.phase });
+            self.phases.push(TrackStretch { first: number, t, what: row.phase });
         }
         if self.cycle.replace(row.cycle) != Some(row.cycle) {
-            self.cycles.push(Stretch { first: number, t, what: row.cycle });
+            self.cycles.push(TrackStretch { first: number, t, what: row.cycle });
         }
         self.samples += 1;
         self.times.push(t);
@@ -130,7 +130,7 @@ impl<'a> Builder<'a> {
         let times = std::mem::take(&mut self.times);
         let segment = Arc::new(Segment::new(times, &self.columns));
         self.columns.iter_mut().for_each(Vec::clear);
-        self.is_heard = (self.tell)(News::Samples {
+        self.is_received = (self.send)(ReadUpdate::Samples {
             segment,
             phases: std::mem::take(&mut self.phases),
             cycles: std::mem::take(&mut self.cycles),
@@ -140,7 +140,7 @@ impl<'a> Builder<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Recording;
+    use super::super::ReviewRecording;
     use super::*;
     use eframe::egui::Context;
     use palpate_model::signal::track::Track;
@@ -154,23 +154,23 @@ mod tests {
     fn every_sample_of_a_session_arrives_as_it_was_recorded() {
         let path = recorded("ramp-hold-lab");
         let session = Session::open(&path).unwrap();
-        let news = RefCell::new(Vec::new());
+        let updates = RefCell::new(Vec::new());
         read(&path, None, &|piece| {
-            news.borrow_mut().push(piece);
+            updates.borrow_mut().push(piece);
             true
         })
         .unwrap();
         let (mut track, mut phases) = (Track::default(), Vec::new());
         let mut facts = None;
-        for piece in news.into_inner() {
+        for piece in updates.into_inner() {
             match piece {
-                News::Samples { segment, phases: own, .. } => {
+                ReadUpdate::Samples { segment, phases: own, .. } => {
                     track.push(segment);
                     phases.extend(own);
                 }
-                News::Whole(whole) => facts = Some(whole),
-                News::Head(head) => assert_eq!(head.samples, session.rows.len() as u64),
-                News::Failed(reason) => panic!("{reason}"),
+                ReadUpdate::Whole(whole) => facts = Some(whole),
+                ReadUpdate::Head(head) => assert_eq!(head.samples, session.rows.len() as u64),
+                ReadUpdate::Failed(reason) => panic!("{reason}"),
             }
         }
         assert_eq!(track.len(), session.rows.len());
@@ -203,30 +203,30 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_says_why_and_what_nobody_wants_ends() {
+    fn an_unreadable_session_has_a_reason_and_a_cancelled_one_ends() {
         let ctx = Context::default();
-        let finish = |recording: &mut Recording| {
+        let finish = |recording: &mut ReviewRecording| {
             let is_read = || {
                 recording.poll();
                 (!recording.is_reading()).then_some(())
             };
             palpate_test_support::wait::until(is_read, || "the end of reading".into());
         };
-        let mut missing = Recording::new(Path::new("/nowhere/at-all"), None);
+        let mut missing = ReviewRecording::new(Path::new("/nowhere/at-all"), None);
         missing.start(&ctx);
         finish(&mut missing);
         assert!(
             matches!(&missing.stage, super::super::Stage::Failed(reason) if reason.contains("/nowhere/at-all"))
         );
-        let mut unknown = Recording::new(&recorded("ramp-hold-lab"), Some("no such"));
+        let mut unknown = ReviewRecording::new(&recorded("ramp-hold-lab"), Some("no such"));
         unknown.start(&ctx);
         finish(&mut unknown);
         assert!(
             matches!(&unknown.stage, super::super::Stage::Failed(reason) if reason.contains("no such"))
         );
-        let mut left = Recording::new(&recorded("ramp-hold-lab"), None);
-        left.start(&ctx);
-        left.cancel();
-        assert!(left.stage == super::super::Stage::Cancelled && left.share() < 1.0);
+        let mut cancelled = ReviewRecording::new(&recorded("ramp-hold-lab"), None);
+        cancelled.start(&ctx);
+        cancelled.cancel();
+        assert!(cancelled.stage == super::super::Stage::Cancelled && cancelled.share() < 1.0);
     }
 }

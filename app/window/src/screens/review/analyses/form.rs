@@ -1,17 +1,15 @@
 //! The analysis to be made, as typed.
 
-use crate::widgets::model_choice::ModelChoice;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::text_row::text_row;
-use crate::widgets::tick_box::tick_box;
-use eframe::egui::{ComboBox, Ui, vec2};
+use crate::widgets::{
+    ModelChoice, NamedControl, QuantityField, choice_ui, quantity_ui, reason_button, require,
+    text_row, tick_box,
+};
+use eframe::egui::{Ui, vec2};
 use palpate_analysis::analyses::{Deed, FitWanted, Known};
 use palpate_analysis::report::dossier::Wanted;
 use std::path::PathBuf;
 
-/// What can be made.
+/// The kind of analysis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Kind {
     #[default]
@@ -25,15 +23,15 @@ impl Kind {
         [(Self::Fit, "Fit"), (Self::Recalibration, "Other calibration"), (Self::Mask, "Leave out")];
 }
 
-/// The form.
-pub(super) struct Form {
+#[derive(Default)]
+pub(super) struct AnalysisForm {
     kind: Kind,
     name: String,
     model: ModelChoice,
     with_unload: bool,
     with_profile: bool,
     is_together: bool,
-    /// Id of one of the library.
+    /// Identifier of a calibration of the library.
     calibration: Option<String>,
     file: String,
     /// Where the cursors stand in s, once both are set.
@@ -41,35 +39,16 @@ pub(super) struct Form {
     span: [QuantityField; 2],
 }
 
-impl Default for Form {
-    fn default() -> Self {
-        Self {
-            kind: Kind::default(),
-            name: String::new(),
-            model: ModelChoice::default(),
-            with_unload: false,
-            with_profile: false,
-            is_together: false,
-            calibration: None,
-            file: String::new(),
-            cursors: None,
-            span: [0.0, 0.0].map(QuantityField::new),
-        }
-    }
-}
-
-impl Form {
-    /// Whether fits take a session though it was rejected.
+impl AnalysisForm {
     pub fn is_rejected_included(&self) -> bool {
         self.model.is_rejected_included
     }
 
-    /// What was made needs another name next time.
+    /// A name is used once.
     pub fn forget(&mut self) {
         self.name.clear();
     }
 
-    /// A stretch to be left out.
     pub fn propose_span(&mut self, from: f64, until: f64) {
         self.kind = Kind::Mask;
         // A millisecond is what rigs sample.
@@ -77,7 +56,7 @@ impl Form {
         self.span = [from.min(until), from.max(until)].map(field);
     }
 
-    /// Draws the form; what it asks for, or why it asks for nothing. `others` are shown beside the session.
+    /// Draws the form. Returns the analysis to make, or why there is none. `others` are the other sessions shown.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
@@ -87,7 +66,7 @@ impl Form {
     ) -> Result<Deed, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
-                ui.selectable_value(&mut self.kind, kind, words).place(words);
+                ui.selectable_value(&mut self.kind, kind, words).named(words);
             }
         });
         text_row(ui, "name", "of the new analysis", &mut self.name);
@@ -95,10 +74,9 @@ impl Form {
             Kind::Fit => self.fit_ui(ui, others.len()),
             Kind::Recalibration => self.calibration_ui(ui, known),
             Kind::Mask => {
-                let verdict = self.cursors.map(|_| ());
-                let verdict = verdict.ok_or("set cursors A and B on the plot".to_owned());
-                let size = vec2(170.0, 26.0);
-                if reason_button(ui, "Between the cursors", size, &verdict)
+                let verdict =
+                    require(self.cursors.is_some(), "set the cursors A and B on the plot");
+                if reason_button(ui, "Between the cursors", vec2(170.0, 26.0), &verdict)
                     && let Some([a, b]) = self.cursors
                 {
                     self.propose_span(a, b);
@@ -110,65 +88,45 @@ impl Form {
                 }
             }
         }
-        self.deed(known, read_by, others)
+        self.action(known, read_by, others)
     }
 
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
         self.model.ui(ui, "model", "even if the session is rejected");
         if self.model.family.is_some() {
-            tick_box(ui, &mut self.with_unload, "the way back too, where recorded");
+            tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
         }
         tick_box(ui, &mut self.with_profile, "profile intervals too");
         if others > 0 {
             let words = match others {
-                1 => "one body for this and the other shown".to_owned(),
-                _ => format!("one body for this and the {others} others shown"),
+                1 => "one material for this and the other session shown".to_owned(),
+                _ => format!("one material for this and the {others} other sessions shown"),
             };
             tick_box(ui, &mut self.is_together, &words);
         }
     }
 
     fn calibration_ui(&mut self, ui: &mut Ui, known: &Known) {
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "from library");
-            let chosen = self.calibration.as_deref();
-            let words = match (chosen, known.calibrations.is_empty()) {
-                (Some(id), _) => id,
-                (None, true) => "it has none",
-                (None, false) => "none chosen",
-            };
-            ComboBox::from_id_salt("analysis_calibration")
-                .selected_text(words)
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    ui.selectable_value(&mut self.calibration, None, "none");
-                    for (id, _) in &known.calibrations {
-                        ui.selectable_value(&mut self.calibration, Some(id.clone()), id);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("from library");
-        });
+        let none = if known.calibrations.is_empty() { "no calibration there" } else { "none" };
+        let all = known.calibrations.iter().map(|(id, _)| (Some(id.clone()), id.as_str()));
+        let all: Vec<_> = std::iter::once((None, none)).chain(all).collect();
+        choice_ui(ui, "from library", &mut self.calibration, &all);
         text_row(ui, "or file", "a calibration's document", &mut self.file);
     }
 
-    fn deed(
+    fn action(
         &self,
         known: &Known,
         read_by: Option<&str>,
         others: &[Wanted],
     ) -> Result<Deed, String> {
         let name = self.name.trim().to_owned();
-        if name.is_empty() {
-            return Err("give the new analysis a name".to_owned());
-        }
-        if known.analyses.all.iter().any(|one| one.name == name) {
-            return Err(format!(
-                "there is an analysis '{name}' already, and a name is never used twice; choose another"
-            ));
-        }
-        let is_together = self.is_together && !others.is_empty();
+        require(!name.is_empty(), "give the new analysis a name")?;
+        let is_used = known.analyses.all.iter().any(|one| one.name == name);
+        let taken = format!(
+            "there is an analysis '{name}' already, and a name is used only once; type another"
+        );
+        require(!is_used, taken)?;
         match self.kind {
             Kind::Fit => Ok(Deed::Fit {
                 name,
@@ -178,20 +136,15 @@ impl Form {
                     is_rejected_included: self.model.is_rejected_included,
                     with_profile: self.with_profile,
                     based_on: read_by.map(str::to_owned),
-                    together_with: match is_together {
-                        true => others.to_vec(),
-                        false => Vec::new(),
-                    },
+                    together_with: if self.is_together { others.to_vec() } else { Vec::new() },
                 },
             }),
             Kind::Recalibration => self.recalibration(known, name),
             Kind::Mask => {
                 let [from, until] = self.span.each_ref().map(|field| field.value.clone());
                 let (from, until) = (from?, until?);
-                match from < until {
-                    true => Ok(Deed::Mask { name, left_out_s: vec![[from, until]] }),
-                    false => Err("give two times, the earlier first".to_owned()),
-                }
+                require(from < until, "type two times, the earlier first")?;
+                Ok(Deed::Mask { name, left_out_s: vec![[from, until]] })
             }
         }
     }
@@ -203,13 +156,11 @@ impl Form {
             found.map(|(_, calibration)| calibration.clone())
         });
         match (chosen, file) {
-            (Some(_), file) if !file.is_empty() => {
-                Err("choose one of the library or name a file, not both".to_owned())
-            }
-            (Some(calibration), _) => {
+            (Some(calibration), "") => {
                 Ok(Deed::Recalibrate { name, calibration: Box::new(calibration) })
             }
-            (None, "") => Err("choose a calibration, or name its file".to_owned()),
+            (Some(_), _) => Err("choose a calibration or type a file, not both".to_owned()),
+            (None, "") => Err("choose a calibration, or type its file".to_owned()),
             (None, file) => Ok(Deed::RecalibrateFrom { name, file: PathBuf::from(file) }),
         }
     }

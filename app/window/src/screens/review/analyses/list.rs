@@ -1,72 +1,66 @@
 //! The analyses there are, and what the one chosen found.
 
 use super::super::Looked;
-use super::Own;
-use crate::theme::Tokens;
-use crate::widgets::fact_row::fact_ui;
-use crate::widgets::places::Place;
-use crate::widgets::reason_button::reason_button;
-use crate::widgets::remark::quiet_ui;
+use super::OwnFit;
+use crate::widgets::{
+    NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
+};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::analyses::{Deed, Known};
 use palpate_analysis::report::said;
 use palpate_analysis::report::{kept, text};
 use palpate_sessions::analyses::{Analysed, Analysis};
 
-/// How the session is read without any analysis.
 const AS_MEASURED: &str = "as measured";
 
-/// Draws the list and the analysis chosen; true when the session's own fit is asked for.
-pub(super) fn list_ui(ui: &mut Ui, known: &Known, looked: &mut Looked, own: Option<&Own>) -> bool {
-    ui.radio_value(&mut looked.analysis, None, AS_MEASURED).place(AS_MEASURED);
+/// Draws the list and the analysis chosen; true when "Compare" is pressed.
+pub(super) fn list_ui(
+    ui: &mut Ui,
+    known: &Known,
+    source: &mut Looked,
+    own: Option<&OwnFit>,
+) -> bool {
+    ui.radio_value(&mut source.analysis, None, AS_MEASURED).named(AS_MEASURED);
     for one in &known.analyses.all {
         if one.what != Analysed::Withdrawal {
-            line_ui(ui, known, one, looked);
+            line_ui(ui, known, one, source);
         }
     }
-    let chosen = looked.analysis.as_deref();
+    let chosen = source.analysis.as_deref();
     let chosen = chosen.and_then(|name| known.analyses.get(name).ok());
     chosen.is_some_and(|one| found_ui(ui, one, own))
 }
 
-fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, looked: &mut Looked) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, source: &mut Looked) {
+    let tokens = tokens_of(ui);
     match kept::withdrawn(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());
-            ui.radio_value(&mut looked.analysis, choice, &one.name).place(&one.name);
+            ui.radio_value(&mut source.analysis, choice, &one.name).named(&one.name);
         }
         Some(words) => {
             let name = RichText::new(&one.name).strikethrough();
             ui.add(Label::new(name.color(tokens.text_quiet)).wrap());
-            quiet_ui(ui, &words);
+            quiet_ui(ui, words);
         }
     }
-    let why = match one.reason.as_str() {
-        "" => String::new(),
-        reason => format!(": {reason}"),
-    };
+    let colon = if one.reason.is_empty() { "" } else { ": " };
     let (what, at) = (one.what.word(), said::at(&one.at));
-    quiet_ui(ui, &format!("{what}, {at} by {}{why}", one.by));
+    quiet_ui(ui, format!("{what}, {at} by {}{colon}{}", one.by, one.reason));
 }
 
-/// What an analysis found, beside the session's own fit; true when that is asked for.
-fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
+/// The result of an analysis next to the session's own fit; true when "Compare" is pressed.
+fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.add_space(4.0);
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
-    quiet_ui(ui, &kept::deed(&one.what));
-    let Analysed::Fit { results, .. } = &one.what else {
-        return false;
-    };
+    quiet_ui(ui, kept::deed(&one.what));
+    let Analysed::Fit { results, .. } = &one.what else { return false };
     for parameter in kept::parameters(results) {
         let unit = text::typeset(&parameter.unit);
         fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(&parameter)));
-        let own = own.and_then(|own| {
-            let same = own.parameters.iter().find(|own| own.name == parameter.name)?;
-            Some(text::cell(same))
-        });
-        if let Some(own) = own {
-            fact_ui(ui, "", format!("session: {own}"));
+        let mut own = own.iter().flat_map(|own| &own.parameters);
+        if let Some(same) = own.find(|own| own.name == parameter.name) {
+            fact_ui(ui, "", format!("session: {}", text::cell(same)));
         }
     }
     if let Some(profile) = results["profile"].as_array() {
@@ -82,13 +76,13 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
         }
     }
     for sentence in kept::sentences(results) {
-        ui.add(Label::new(RichText::new(sentence).small()).wrap());
+        small_ui(ui, sentence);
     }
     match own {
         None => ui.button("Compare with the session's own fit").clicked(),
         Some(own) => {
             if !own.sentences.is_empty() {
-                quiet_ui(ui, "of the session's own fit:");
+                quiet_ui(ui, "the session's own fit:");
             }
             for sentence in &own.sentences {
                 quiet_ui(ui, sentence);
@@ -98,30 +92,25 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
     }
 }
 
-/// Draws what takes an analysis back.
+/// Draws the buttons that withdraw an analysis.
 pub(super) fn withdraw_ui(
     ui: &mut Ui,
     known: &Known,
-    looked: &Looked,
+    source: &Looked,
     verdict: &Result<(), String>,
 ) -> Option<Deed> {
     ui.add_space(4.0);
-    let chosen = looked.analysis.clone();
-    let own = match &chosen {
-        Some(_) => verdict.clone(),
-        None => Err("choose the analysis to withdraw in the list".to_owned()),
-    };
+    let chosen = source.analysis.clone();
+    let own = require(chosen.is_some(), "choose the analysis to withdraw in the list");
+    let own = own.and(verdict.clone());
     let size = vec2(170.0, 26.0);
-    if reason_button(ui, "Withdraw the chosen", size, &own) {
+    if reason_button(ui, "Withdraw analysis", size, &own) {
         return chosen.map(|name| Deed::Withdraw { name });
     }
     let last = known.analyses.counting().last();
-    let own = match last {
-        Some(_) => verdict.clone(),
-        None => Err("there is nothing to undo".to_owned()),
-    };
-    let is_pressed = reason_button(ui, "Undo the last", size, &own);
+    let own = require(last.is_some(), "there is no analysis to withdraw").and(verdict.clone());
+    let is_pressed = reason_button(ui, "Withdraw last analysis", size, &own);
     let last = last?;
-    quiet_ui(ui, &format!("the last is '{}', by {}", last.name, last.by));
+    quiet_ui(ui, format!("the last is '{}', by {}", last.name, last.by));
     is_pressed.then(|| Deed::Withdraw { name: last.name.clone() })
 }

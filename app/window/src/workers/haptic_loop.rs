@@ -1,6 +1,6 @@
-//! The haptic loop as the window runs it: a thread of its own that ticks, and what was seen of it so far.
+//! The haptic loop of the window: a thread that ticks, and its past for the plots.
 
-use super::trail::{LOOK_S, forget_old};
+use super::trail::{TIMING_S, forget_old};
 use palpate_haptics::Flags;
 use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
@@ -9,25 +9,25 @@ use palpate_runner::haptics::timing::Kept;
 use palpate_runner::haptics::{Beat, Lead, Led, TrailPoint};
 use std::collections::VecDeque;
 
-/// For how long a cause of less force stays on the screen, in s.
+/// Time in s for which a cause of less force stays on the screen.
 const CAUSE_S: f64 = 0.3;
 
-/// A loop that runs or ran, and what was seen of it.
-pub struct Feel {
+/// A loop that runs or ran last.
+pub struct HapticLoop {
     beat: Option<Beat<TapedLed>>,
     lead: Lead,
-    known: u64,
+    points_read: u64,
     trail: VecDeque<TrailPoint>,
     last: SimulationTick,
-    kept: Kept,
-    looked: f64,
-    /// Ticks missed between the last two looks.
+    timing: Kept,
+    timing_read_at: f64,
+    /// Ticks missed between the last two readings of the timing.
     missed: u64,
     rate_hz: f64,
     priority: String,
 }
 
-impl Feel {
+impl HapticLoop {
     /// Starts the loop; the hand moves at `speed` where it is led.
     pub fn start(
         settings: &SimulationSettings,
@@ -43,11 +43,11 @@ impl Feel {
             .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
         Ok(Self {
             lead,
-            known: 0,
+            points_read: 0,
             trail: VecDeque::new(),
             last,
-            kept: beat.kept(),
-            looked: 0.0,
+            timing: beat.kept(),
+            timing_read_at: 0.0,
             missed: 0,
             rate_hz: period.hz(),
             priority: beat.granted().to_string(),
@@ -55,22 +55,22 @@ impl Feel {
         })
     }
 
-    /// Takes over what is new. An error: the loop has ended by itself.
+    /// Reads new points. An error: the loop has ended by itself.
     pub fn poll(&mut self) -> Result<(), String> {
         let Some(beat) = &mut self.beat else {
             return Ok(());
         };
         let live = beat.seen();
-        self.trail.extend(live.since(self.known).copied());
-        self.known = live.count();
+        self.trail.extend(live.since(self.points_read).copied());
+        self.points_read = live.count();
         self.last = live.last;
         let now = self.last.t.0;
         forget_old(&mut self.trail, now, |point| point.t);
-        if now - self.looked >= LOOK_S {
-            let kept = beat.kept();
-            self.missed = kept.missed - self.kept.missed;
-            self.kept = kept;
-            self.looked = now;
+        if now - self.timing_read_at >= TIMING_S {
+            let timing = beat.kept();
+            self.missed = timing.missed - self.timing.missed;
+            self.timing = timing;
+            self.timing_read_at = now;
         }
         if beat.is_alive() {
             return Ok(());
@@ -79,15 +79,14 @@ impl Feel {
         Err("the loop ended unexpectedly; start it again, and report it if it happens twice".into())
     }
 
-    /// Whether it ticks.
     pub fn is_running(&self) -> bool {
         self.beat.is_some()
     }
 
-    /// What is still to be ended, whose recording waits for the disk; what was seen stays.
+    /// Takes the thread out to be ended, as its recording waits for the disk.
     pub fn stop(&mut self) -> Option<Beat<TapedLed>> {
         let beat = self.beat.take()?;
-        self.kept = beat.kept();
+        self.timing = beat.kept();
         Some(beat)
     }
 
@@ -96,24 +95,22 @@ impl Feel {
         self.lead.to(place_mm);
     }
 
-    /// Where it is led, in mm.
+    /// The target of the hand in mm.
     pub fn place(&self) -> f64 {
         self.lead.place()
     }
 
-    /// The past, 250 points a second.
+    /// 250 points a second.
     pub fn trail(&self) -> impl Iterator<Item = &TrailPoint> + Clone {
         self.trail.iter()
     }
 
-    /// The newest tick.
     pub fn last(&self) -> &SimulationTick {
         &self.last
     }
 
-    /// How the loop kept its time.
     pub fn kept(&self) -> &Kept {
-        &self.kept
+        &self.timing
     }
 
     /// Ticks missed in the last half second or so.
@@ -121,17 +118,17 @@ impl Feel {
         self.missed
     }
 
-    /// Ticks a second that are wanted.
+    /// Target rate.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// The priority that the system gave.
+    /// As granted by the system.
     pub fn priority(&self) -> &str {
         &self.priority
     }
 
-    /// What was special a moment ago and is still worth saying.
+    /// Flags of the last moment.
     pub fn flags(&self) -> Flags {
         let late = self.trail.iter().rev();
         late.take_while(|point| point.t > self.last.t.0 - CAUSE_S)

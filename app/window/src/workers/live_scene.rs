@@ -1,6 +1,6 @@
-//! The scene as the window has it: computed ahead along a path, or in a loop of its own, and what was seen of it.
+//! The scene of the window: computed along a path, or in a loop of its own, and its past for the plots.
 
-use super::trail::{LOOK_S, forget_old};
+use super::trail::{TIMING_S, forget_old};
 use palpate_haptics::LawSettings;
 use palpate_haptics::margin::{Device, Margin, Watch};
 use palpate_haptics::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
@@ -11,13 +11,13 @@ use palpate_runner::haptics::scene::SceneRecorder;
 use palpate_runner::haptics::timing::Kept;
 use std::collections::VecDeque;
 
-/// Ticks between two looks at a scene that is computed ahead.
-const AHEAD_TICKS: u64 = 10;
+/// Ticks between two points of a computed path.
+const TICKS_PER_POINT: u64 = 10;
 
 /// Force and depth at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TouchPoint {
-    /// Since the start, in s.
+pub struct ForcePoint {
+    /// In s since the start.
     pub t: f64,
     /// Length of the force on the hand in N.
     pub force: f64,
@@ -25,7 +25,7 @@ pub struct TouchPoint {
     pub depth: f64,
 }
 
-impl TouchPoint {
+impl ForcePoint {
     fn of(tick: &SceneTick, settings: &SceneSettings) -> Self {
         Self {
             t: settings.period.time_of(tick.tick).seconds().0,
@@ -42,17 +42,16 @@ pub fn force_of(tick: &SceneTick) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-/// A scene at one moment.
+/// A tick of a scene, and its surface then.
 #[derive(Clone, Debug)]
-pub struct Moment {
-    /// Its tick.
+pub struct SceneInstant {
     pub tick: SceneTick,
     grid: Grid,
     heights: Vec<f64>,
     rest: Vec<f64>,
 }
 
-impl Moment {
+impl SceneInstant {
     fn of(scene: &Scene) -> Self {
         let field = scene.field();
         Self {
@@ -64,7 +63,6 @@ impl Moment {
         }
     }
 
-    /// The surface.
     pub fn now(&self) -> Result<Heights<'_>, MeshError> {
         Heights::new(self.grid, &self.heights)
     }
@@ -93,62 +91,59 @@ pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
     watch.at(Depth(tick.depth), MmPerS(tick.speed))
 }
 
-/// A scene that was computed along a path, and not in real time.
+/// A scene computed along a path, not in real time.
 #[derive(Clone, Debug)]
-pub struct Ahead {
-    /// What it is made of.
+pub struct ComputedPath {
     pub settings: SceneSettings,
-    /// The path.
     pub path: ScenePath,
-    /// Where it was deepest.
-    pub deepest: Moment,
-    /// Force and depth over time.
-    pub trail: Vec<TouchPoint>,
+    /// Of the greatest depth.
+    pub deepest: SceneInstant,
+    pub trail: Vec<ForcePoint>,
 }
 
-/// Computes a scene along a path. `is_going` hears the share done and ends it early.
-pub fn ahead(
+/// Computes a scene along a path. `is_going` receives the share done, and cancels by returning false.
+pub fn compute_path(
     settings: SceneSettings,
     path: ScenePath,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Ahead, String> {
+) -> Result<ComputedPath, String> {
     let mut led = LedScene::new(settings).map_err(|err| err.to_string())?;
-    let mut deepest = Moment::of(&led.scene);
+    let mut deepest = SceneInstant::of(&led.scene);
     let mut trail = Vec::new();
     let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
     for tick in 1..=ticks {
         let t = settings.period.time_of(tick).seconds().0;
-        let told = led.tick(path.at(t, &settings));
-        if !tick.is_multiple_of(AHEAD_TICKS) {
+        let tick_now = led.tick(path.at(t, &settings));
+        if !tick.is_multiple_of(TICKS_PER_POINT) {
             continue;
         }
-        trail.push(TouchPoint::of(&told, &settings));
-        if told.depth > deepest.tick.depth {
-            deepest.tick = told;
+        trail.push(ForcePoint::of(&tick_now, &settings));
+        if tick_now.depth > deepest.tick.depth {
+            deepest.tick = tick_now;
             let now = led.scene.field().heights();
             deepest.heights.copy_from_slice(now);
         }
         if !is_going(tick as f64 / ticks as f64) {
-            return Err("ended before it was done".into());
+            return Err("cancelled before it was done".into());
         }
     }
-    Ok(Ahead { settings, path, deepest, trail })
+    Ok(ComputedPath { settings, path, deepest, trail })
 }
 
-/// A scene that runs or ran, and what was seen of it.
+/// A scene that runs or ran last.
 #[derive(Debug)]
-pub struct Touch {
+pub struct LiveScene {
     live: Option<SceneLoop>,
     settings: SceneSettings,
-    moment: Moment,
-    trail: VecDeque<TouchPoint>,
-    kept: Kept,
-    looked: f64,
+    moment: SceneInstant,
+    trail: VecDeque<ForcePoint>,
+    timing: Kept,
+    timing_read_at: f64,
     is_led: bool,
     priority: String,
 }
 
-impl Touch {
+impl LiveScene {
     /// Starts the loop; the hand goes along `path` and then where it is pointed.
     pub fn start(
         settings: SceneSettings,
@@ -156,21 +151,21 @@ impl Touch {
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
         let scene = Scene::new(settings).map_err(|err| err.to_string())?;
-        let moment = Moment::of(&scene);
+        let moment = SceneInstant::of(&scene);
         let live = SceneLoop::start(scene, path, recorder)?;
         Ok(Self {
             settings,
             moment,
             trail: VecDeque::new(),
-            kept: live.timing(),
-            looked: 0.0,
+            timing: live.timing(),
+            timing_read_at: 0.0,
             is_led: path.is_some(),
             priority: live.granted().to_string(),
             live: Some(live),
         })
     }
 
-    /// Points the hand and takes over what is new. An error: the loop has ended by itself.
+    /// Moves the hand and reads the newest tick. An error: the loop has ended by itself.
     pub fn poll(&mut self, hand: Hand6) -> Result<(), String> {
         let Some(live) = &mut self.live else {
             return Ok(());
@@ -187,14 +182,14 @@ impl Touch {
             let heights = frame.heights.iter().copied().map(f64::from);
             self.moment.heights.extend(heights);
             self.moment.rest.resize(frame.heights.len(), 0.0);
-            self.trail.push_back(TouchPoint::of(&frame.tick, &self.settings));
+            self.trail.push_back(ForcePoint::of(&frame.tick, &self.settings));
         }
         let period = self.settings.period;
         let now = period.time_of(self.moment.tick.tick).seconds().0;
         forget_old(&mut self.trail, now, |point| point.t);
-        if now - self.looked >= LOOK_S {
-            self.kept = live.timing();
-            self.looked = now;
+        if now - self.timing_read_at >= TIMING_S {
+            self.timing = live.timing();
+            self.timing_read_at = now;
         }
         if live.is_alive() {
             return Ok(());
@@ -204,50 +199,45 @@ impl Touch {
             .into())
     }
 
-    /// Whether it ticks.
     pub fn is_running(&self) -> bool {
         self.live.is_some()
     }
 
-    /// Whether a path leads the hand, and not who sits here.
+    /// Whether a path leads the hand, and not pointer and keys.
     pub fn is_led(&self) -> bool {
         self.is_running() && self.is_led
     }
 
-    /// What is still to be ended, whose recording waits for the disk; what was seen stays.
+    /// Takes the loop out to be ended, as its recording waits for the disk.
     pub fn stop(&mut self) -> Option<SceneLoop> {
         let live = self.live.take()?;
-        self.kept = live.timing();
+        self.timing = live.timing();
         Some(live)
     }
 
-    /// What it is made of.
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
     }
 
-    /// What was seen last.
-    pub fn moment(&self) -> &Moment {
+    pub fn moment(&self) -> &SceneInstant {
         &self.moment
     }
 
-    /// The time of it in s.
+    /// In s since the start.
     pub fn now(&self) -> f64 {
         let period = self.settings.period;
         period.time_of(self.moment.tick.tick).seconds().0
     }
 
-    /// The past as it was seen.
-    pub fn trail(&self) -> impl Iterator<Item = &TouchPoint> + Clone {
+    pub fn trail(&self) -> impl Iterator<Item = &ForcePoint> + Clone {
         self.trail.iter()
     }
 
-    /// How the loop kept its time.
     pub fn kept(&self) -> &Kept {
-        &self.kept
+        &self.timing
     }
 
-    /// The priority that the system gave.
+    /// As granted by the system.
     pub fn priority(&self) -> &str {
         &self.priority
     }
@@ -258,9 +248,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_poke_computed_ahead_is_as_deep_as_the_hand_goes_and_ends_above() {
+    fn a_computed_poke_is_as_deep_as_the_hand_and_ends_above() {
         let settings = SceneSettings { nodes: 41, max_shear_mm: 1.5, ..SceneSettings::default() };
-        let poke = || ahead(settings, ScenePath::Poke, &mut |_| true).unwrap();
+        let poke = || compute_path(settings, ScenePath::Poke, &mut |_| true).unwrap();
         let one = poke();
         let deepest = &one.deepest.tick;
         // The hand goes 8 mm deep; the force holds the stylus back.
@@ -274,7 +264,7 @@ mod tests {
         let again = poke();
         assert_eq!(one.trail, again.trail);
         assert_eq!(one.deepest.heights, again.deepest.heights);
-        let cut = ahead(settings, ScenePath::Poke, &mut |share| share < 0.5);
+        let cut = compute_path(settings, ScenePath::Poke, &mut |share| share < 0.5);
         assert!(cut.unwrap_err().contains("before it was done"));
     }
 }

@@ -1,13 +1,13 @@
-//! Files dropped on the window go where they belong.
+//! Files that are dropped on the window, passed to the screen that they are for.
 
-use crate::command::{Command, Commands};
+use crate::command::{Commands, UiCommand};
 use crate::screens::{models, run, scene};
-use crate::workers::path_dialog::Ask;
+use crate::workers::PathPurpose;
 use palpate_analysis::haptics_tape::is_tape;
 use palpate_sessions::ticks::TICKS;
 use std::path::{Path, PathBuf};
 
-/// Asks for what files and folders are good for; `shown` is the screen that they were dropped on.
+/// Pushes a command for each dropped file or folder; `shown` is the screen in front.
 pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
     let (protocols, others): (Vec<_>, Vec<_>) =
         paths.into_iter().partition(|path| ends(path, "toml"));
@@ -17,29 +17,29 @@ pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
         folders.into_iter().partition(|path| path.join(TICKS).is_file());
     match protocols.into_iter().next() {
         Some(path) if shown == scene::SCREEN.name => {
-            commands.push(Command::Chosen(Ask::Scene, path));
+            commands.push(UiCommand::Chosen(PathPurpose::Scene, path));
         }
         Some(path) => {
-            commands.push(Command::Show(run::SCREEN.name));
-            commands.push(Command::Chosen(Ask::Protocol, path));
+            commands.push(UiCommand::Show(run::SCREEN.name));
+            commands.push(UiCommand::Chosen(PathPurpose::Protocol, path));
         }
         None => {}
     }
     if shown == models::SCREEN.name {
         let chosen = tables.into_iter();
-        chosen.for_each(|path| commands.push(Command::Chosen(Ask::Table, path)));
+        chosen.for_each(|path| commands.push(UiCommand::Chosen(PathPurpose::Table, path)));
     } else if !tables.is_empty() {
-        commands.push(Command::Import(tables));
+        commands.push(UiCommand::Import(tables));
     }
     if let Some(folder) = recordings.into_iter().next() {
-        // What is of neither is told to be so on the scene's.
+        // A recording of neither loop is refused with a reason on the screen of scenes.
         commands.push(match is_tape(&folder).unwrap_or(false) {
-            true => Command::ReplayLoop(folder),
-            false => Command::ReplayScene(folder),
+            true => UiCommand::ReplayLoop(folder),
+            false => UiCommand::ReplayScene(folder),
         });
     }
     if !sessions.is_empty() {
-        commands.push(Command::Review(sessions.into_iter().map(session_of).collect()));
+        commands.push(UiCommand::Review(sessions.into_iter().map(session_of).collect()));
     }
 }
 
@@ -60,7 +60,7 @@ fn session_of(path: PathBuf) -> PathBuf {
 mod tests {
     use super::*;
 
-    fn dropped(paths: &[&Path], shown: &str) -> Vec<Command> {
+    fn dropped(paths: &[&Path], shown: &str) -> Vec<UiCommand> {
         let mut commands = Commands::default();
         let paths = paths.iter().map(|path| path.to_path_buf()).collect();
         push_dropped(paths, shown, &mut commands);
@@ -78,22 +78,28 @@ mod tests {
         let log = session.join("log.mcap");
         std::fs::write(&log, "").unwrap();
         let all: [&Path; 3] = [&protocol, &table, &log];
-        let review = Command::Review(vec![session.clone()]);
+        let review = UiCommand::Review(vec![session.clone()]);
         assert_eq!(
             dropped(&all, "Rig"),
             [
-                Command::Show("Run"),
-                Command::Chosen(Ask::Protocol, protocol.clone()),
-                Command::Import(vec![table.clone()]),
+                UiCommand::Show("Run"),
+                UiCommand::Chosen(PathPurpose::Protocol, protocol.clone()),
+                UiCommand::Import(vec![table.clone()]),
                 review.clone(),
             ]
         );
-        assert_eq!(dropped(&all, "Models")[2..], [Command::Chosen(Ask::Table, table), review]);
-        assert_eq!(dropped(&[&protocol], "Scene"), [Command::Chosen(Ask::Scene, protocol)]);
-        // Ticks of no known loop are told to be so on the scene's screen.
+        assert_eq!(
+            dropped(&all, "Models")[2..],
+            [UiCommand::Chosen(PathPurpose::Table, table), review]
+        );
+        assert_eq!(
+            dropped(&[&protocol], "Scene"),
+            [UiCommand::Chosen(PathPurpose::Scene, protocol)]
+        );
+        // Ticks of no known loop are refused on the screen of scenes.
         let ticks = at("ticks");
         std::fs::create_dir(&ticks).unwrap();
         std::fs::write(ticks.join(TICKS), "").unwrap();
-        assert_eq!(dropped(&[&ticks], "Run"), [Command::ReplayScene(ticks)]);
+        assert_eq!(dropped(&[&ticks], "Run"), [UiCommand::ReplayScene(ticks)]);
     }
 }

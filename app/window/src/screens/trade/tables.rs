@@ -1,22 +1,22 @@
-//! Tables of what was measured, as points and as rows.
+//! The curves of accuracy over cost as points and table rows.
 
-use crate::widgets::table::{Column, Row, RowLook};
+use crate::widgets::{Column, Emphasis, TableRow};
 use palpate_analysis::report::scatter::Mark;
 use palpate_analysis::trade::text::{digits, plain, time};
 use palpate_haptics::surface::{SceneCurves, ScenePlan};
 use palpate_rheology::trade::{TradeCurves, front};
 
-/// One table as points and rows.
-pub(super) struct Shown {
+/// A curve as points and table rows.
+pub(super) struct TradeTable {
     pub axes: [&'static str; 2],
     pub marks: Vec<Mark>,
     pub columns: Vec<Column>,
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// The mark of what is recommended.
     pub chosen: Option<usize>,
 }
 
-impl Shown {
+impl TradeTable {
     fn new(axes: [&'static str; 2], heads: &[&str]) -> Self {
         let column = |(index, head): (usize, &&str)| match index {
             0 => Column::words(head, 250.0),
@@ -42,23 +42,23 @@ impl Shown {
         if let [Some(cost), Some(error)] = at {
             self.marks.push(Mark { at: [cost, error], label: [String::new(), cells.join("\n")] });
         }
-        let look = match (is_front, at[1]) {
-            (true, _) => RowLook::Marked,
-            (false, None) => RowLook::Quiet,
-            (false, Some(_)) => RowLook::Plain,
+        let emphasis = match (is_front, at[1]) {
+            (true, _) => Emphasis::Marked,
+            (false, None) => Emphasis::Quiet,
+            (false, Some(_)) => Emphasis::Plain,
         };
-        self.rows.push(Row { cells, look, hint });
+        self.rows.push(TableRow { cells, emphasis, hint });
     }
 
     /// With the front's rows first.
     fn finished(mut self) -> Self {
-        self.rows.sort_by_key(|row| row.look != RowLook::Marked);
+        self.rows.sort_by_key(|row| row.emphasis != Emphasis::Marked);
         self
     }
 }
 
-pub(super) fn integrators(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
+pub(super) fn integrators(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
         ["ns a second of simulated time", "error (% of peak force)"],
         &["integrator", "step (ms)", "a step", "error (%)"],
     );
@@ -75,10 +75,10 @@ pub(super) fn integrators(curves: &TradeCurves) -> Shown {
     shown.finished()
 }
 
-pub(super) fn families(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
+pub(super) fn families(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
         ["ns a step", "error (% of peak force)"],
-        &["family and what it stands for", "a step", "error (%)"],
+        &["family and its target", "a step", "error (%)"],
     );
     for row in &curves.families {
         let error = 100.0 * row.error_n / row.peak_n;
@@ -87,15 +87,17 @@ pub(super) fn families(curves: &TradeCurves) -> Shown {
         // Fronts belong to one target each and would cross in one picture.
         shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
         if let Some(last) = shown.rows.last_mut().filter(|_| row.front) {
-            last.look = RowLook::Marked;
+            last.emphasis = Emphasis::Marked;
         }
     }
     shown.finished()
 }
 
-pub(super) fn fits(curves: &TradeCurves) -> Shown {
-    let mut shown =
-        Shown::new(["ns a fit", "error of tau (%)"], &["recording or live fit", "time", "tau (%)"]);
+pub(super) fn fits(curves: &TradeCurves) -> TradeTable {
+    let mut shown = TradeTable::new(
+        ["ns a fit", "error of tau (%)"],
+        &["recording or live fit", "time", "tau (%)"],
+    );
     for row in &curves.fit {
         let error = 100.0 * row.tau_error;
         let cells = vec![
@@ -118,7 +120,7 @@ pub(super) fn fits(curves: &TradeCurves) -> Shown {
     shown.finished()
 }
 
-/// One curve of a scene: what each point is, its cost and error, and whether it is the plan's.
+/// One point of a curve of a scene.
 struct ScenePoint {
     words: String,
     cost: f64,
@@ -126,40 +128,42 @@ struct ScenePoint {
     is_planned: bool,
 }
 
-/// Draws points of a scene: those exact to the last digit have no place over a logarithm and stand in the table alone.
-fn scene_shown(axes: [&'static str; 2], head: &str, points: &[ScenePoint]) -> Shown {
-    let mut shown = Shown::new(axes, &[head, axes[0], axes[1]]);
+/// Points with no error at all have no place on a logarithmic axis and are in the table alone.
+fn scene_table(
+    axes: [&'static str; 2],
+    head: &str,
+    points: impl Iterator<Item = ScenePoint>,
+) -> TradeTable {
+    let mut table = TradeTable::new(axes, &[head, axes[0], axes[1]]);
+    let points: Vec<ScenePoint> = points.collect();
     let places: Vec<[f64; 2]> = points.iter().map(|one| [one.cost, one.error]).collect();
     let best = front(&places);
-    for (index, one) in points.iter().enumerate() {
-        let is_drawn = one.error > 0.0;
-        let cells = vec![one.words.clone(), digits(one.cost), digits(one.error)];
-        let at = [Some(one.cost), is_drawn.then_some(one.error)];
-        shown.add(at, best.contains(&index), cells, None);
-        if one.is_planned && is_drawn {
-            shown.chosen = Some(shown.marks.len() - 1);
+    for (index, mut one) in points.into_iter().enumerate() {
+        if one.is_planned {
+            one.words.push_str(" (planned)");
         }
-        if let (true, Some(last)) = (one.is_planned, shown.rows.last_mut()) {
-            last.cells[0].push_str(" (planned)");
+        let error = Some(one.error).filter(|error| *error > 0.0);
+        let cells = vec![one.words, digits(one.cost), digits(one.error)];
+        table.add([Some(one.cost), error], best.contains(&index), cells, None);
+        if one.is_planned && error.is_some() {
+            table.chosen = Some(table.marks.len() - 1);
         }
     }
-    shown.finished()
+    table.finished()
 }
 
-/// Meshes of a scene.
-pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.meshes.iter().map(|point| ScenePoint {
         words: format!("{0} x {0} nodes", point.nodes),
         cost: point.cost_us,
         error: point.error_mm,
         is_planned: planned.is_some_and(|plan| plan.mesh == *point),
     });
-    let points: Vec<ScenePoint> = points.collect();
-    scene_shown(["us a tick", "error of shape (mm)"], "mesh", &points)
+    scene_table(["µs a tick", "error of shape (mm)"], "mesh", points)
 }
 
 /// Cuts of the influence of a contact.
-pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.cuts.iter().map(|point| ScenePoint {
         words: match (point.range, point.threshold_mm > 0.0) {
             (None, false) => "no cut".to_owned(),
@@ -169,23 +173,21 @@ pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
         error: point.error_mm,
         is_planned: planned.is_some_and(|plan| plan.cut == *point),
     });
-    let points: Vec<ScenePoint> = points.collect();
-    scene_shown(["% of the time", "error of shape (mm)"], "influence ends", &points)
+    scene_table(["% of the time", "error of shape (mm)"], "influence ends", points)
 }
 
-/// Integrators and steps of a scene.
-pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+/// Integrators and time steps of a scene.
+pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTable {
     let points = curves.steps.iter().map(|point| ScenePoint {
         words: format!("{}, {} ms", point.scheme.name(), plain(1e3 * point.step_s)),
         cost: point.cost_us,
         error: point.error_n,
         is_planned: planned.is_some_and(|plan| plan.step == *point),
     });
-    let points: Vec<ScenePoint> = points.collect();
-    scene_shown(["us a tick", "error of force (N)"], "integrator and step", &points)
+    scene_table(["µs a tick", "error of force (N)"], "integrator and step", points)
 }
 
-/// A plan in words: what is used, what it costs, what was left out, what has no effect.
+/// A plan in words.
 pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
     let cut = match (plan.cut.range, plan.cut.threshold_mm > 0.0) {
         (None, false) => "without a cut".to_owned(),
@@ -200,7 +202,7 @@ pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
             plan.family.family
         ),
         format!(
-            "a tick takes {} us; the shape is off by {} mm and the force by {} N at most",
+            "a tick takes {} µs; the shape error is at most {} mm and the force error {} N",
             digits(plan.cost_us),
             digits(plan.shape_error_mm),
             digits(plan.force_error_n)
@@ -208,7 +210,7 @@ pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
     ];
     lines.extend(plan.dropped.iter().map(|one| {
         format!(
-            "left out: {}: {} {} of error, {} us saved",
+            "left out: {}: {} {} of error, {} µs saved",
             one.what,
             digits(one.error),
             one.unit,
@@ -232,13 +234,13 @@ mod tests {
     }
 
     #[test]
-    fn the_front_stands_first_and_what_is_exact_is_told_but_not_drawn() {
+    fn the_front_comes_first_and_exact_points_are_listed_but_not_drawn() {
         // The second is dearer and worse than the third; the last is exact.
-        let all = curves(&[(51, 0.5, 1.0), (101, 0.4, 5.0), (201, 0.2, 4.0), (401, 0.0, 9.0)]);
-        let shown = meshes(&all, None);
+        let measured = curves(&[(51, 0.5, 1.0), (101, 0.4, 5.0), (201, 0.2, 4.0), (401, 0.0, 9.0)]);
+        let shown = meshes(&measured, None);
         assert_eq!(shown.marks.len(), 3);
-        let looks: Vec<RowLook> = shown.rows.iter().map(|row| row.look).collect();
-        let marked = looks.iter().filter(|look| **look == RowLook::Marked).count();
+        let all: Vec<Emphasis> = shown.rows.iter().map(|row| row.emphasis).collect();
+        let marked = all.iter().filter(|one| **one == Emphasis::Marked).count();
         assert_eq!(marked, 3, "{:?}", shown.rows);
         assert!(shown.rows[3].cells[0].starts_with("101 x 101"));
         assert_eq!(shown.chosen, None);

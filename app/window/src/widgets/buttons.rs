@@ -1,6 +1,29 @@
-//! Controls that stay who they are while other things come and go above them.
+//! Buttons that say why they cannot be pressed, and keep their identity while lines come and go above them.
 
-use eframe::egui::{AsIdSalt, Ui, UiBuilder};
+use super::places::NamedControl;
+use super::text::quiet_ui;
+use eframe::egui::{AsIdSalt, Button, Ui, UiBuilder, Vec2};
+
+/// Nothing where a condition holds, otherwise the reason why something cannot be done.
+pub fn require(condition: bool, reason: impl Into<String>) -> Result<(), String> {
+    if condition { Ok(()) } else { Err(reason.into()) }
+}
+
+/// Draws the button; `verdict` both enables it and gives the reason. True when pressed.
+pub fn reason_button(
+    ui: &mut Ui,
+    text: &str,
+    min_size: Vec2,
+    verdict: &Result<(), String>,
+) -> bool {
+    let is_pressed = steady(ui, text, |ui| {
+        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size)).named(text).clicked()
+    });
+    if let Err(reason) = verdict {
+        quiet_ui(ui, reason);
+    }
+    is_pressed
+}
 
 /// Draws a control whose identity is its name and not its place among its neighbours.
 ///

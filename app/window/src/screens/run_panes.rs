@@ -1,13 +1,11 @@
 //! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
 
-use super::form::{Checked, ProtocolForm};
-use super::protocol_panel::ProtocolFacts;
-use crate::command::{Command, Commands};
+use super::form::{CheckedPlan, ProtocolForm};
+use crate::command::{Commands, UiCommand};
 use crate::plots::course::{CourseLimits, course_ui};
-use crate::theme::Tokens;
-use crate::widgets::places::Place;
-use crate::workers::Job;
-use crate::workers::path_dialog::Ask;
+use crate::widgets::{NamedControl, heading_ui, placeholder_ui, tokens_of};
+use crate::workbench::Workbench;
+use crate::workers::{Job, PathPurpose};
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
 use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
@@ -16,40 +14,35 @@ use palpate_runner::RunView;
 use palpate_sessions::text::read_if_present;
 use std::path::{Path, PathBuf};
 
-/// What stands in the middle of the run screen.
+/// A view in the middle of the run screen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Middle {
-    /// The list of protocols.
+pub enum RunPane {
     Choose,
-    /// Depth and force as they are expected.
     #[default]
     Course,
-    /// What was measured.
     Measured,
-    /// One weight after the other.
     Weighing,
-    /// The search for the surface.
     Approach,
 }
 
 /// Views and their names.
-const VIEWS: [(Middle, &str); 5] = [
-    (Middle::Choose, "Protocols"),
-    (Middle::Course, "Expected course"),
-    (Middle::Measured, "Measured"),
-    (Middle::Weighing, "Weights"),
-    (Middle::Approach, "Surface"),
+const VIEWS: [(RunPane, &str); 5] = [
+    (RunPane::Choose, "Protocols"),
+    (RunPane::Course, "Expected course"),
+    (RunPane::Measured, "Measured"),
+    (RunPane::Weighing, "Weights"),
+    (RunPane::Approach, "Surface"),
 ];
 
 /// Draws the switch between the views.
-pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mut Commands) {
+pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &mut Commands) {
     ui.horizontal(|ui| {
         for (view, name) in VIEWS {
             if !is_offered(view, run) {
                 continue;
             }
-            if ui.selectable_label(shown == view, name).place(name).clicked() {
-                commands.push(Command::View(view));
+            if ui.selectable_label(shown == view, name).named(name).clicked() {
+                commands.push(UiCommand::View(view));
             }
         }
     });
@@ -58,11 +51,11 @@ pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mu
 
 /// Whether a view has anything to show.
 #[must_use]
-pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
+pub fn is_offered(view: RunPane, run: Option<&RunView>) -> bool {
     match view {
-        Middle::Choose | Middle::Course | Middle::Measured => true,
-        Middle::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
-        Middle::Approach => {
+        RunPane::Choose | RunPane::Course | RunPane::Measured => true,
+        RunPane::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
+        RunPane::Approach => {
             run.is_some_and(|run| run.phase == Phase::Contact || !run.touches.is_empty())
         }
     }
@@ -70,17 +63,17 @@ pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
 
 /// The view that shows most of a run that begins.
 #[must_use]
-pub fn first_view(plan: &Plan) -> Middle {
+pub fn first_view(plan: &Plan) -> RunPane {
     let has = |is: fn(&Step) -> bool| plan.steps.iter().any(|planned| is(&planned.step));
     if has(|step| matches!(step, Step::Weigh(_))) {
-        Middle::Weighing
+        RunPane::Weighing
     } else if has(|step| matches!(step, Step::FindContact(_) | Step::FindBase(_)))
         && !has(|step| matches!(step, Step::Ramp(_) | Step::LoadTo(_) | Step::Sine(_)))
     {
         // It looks for the surface and no more.
-        Middle::Approach
+        RunPane::Approach
     } else {
-        Middle::Measured
+        RunPane::Measured
     }
 }
 
@@ -115,19 +108,17 @@ impl Chooser {
     /// Reads a file on a thread of its own.
     pub fn read(&mut self, path: &Path, ctx: &Context) -> std::io::Result<()> {
         self.typed = path.display().to_string();
-        let (path, ctx) = (path.to_owned(), ctx.clone());
+        let path = path.to_owned();
         let work = move || {
+            let name = path.display();
             let text = match read_if_present(&path) {
                 Ok(Some(text)) => Ok(text),
-                Ok(None) => Err(format!("there is no file {}; choose another", path.display())),
-                Err(err) => {
-                    Err(format!("{} cannot be read ({err}); give a text file", path.display()))
-                }
+                Ok(None) => Err(format!("there is no file {name}; choose another")),
+                Err(err) => Err(format!("{name} cannot be read ({err}); choose a text file")),
             };
             (path, text)
         };
-        let done = move || ctx.request_repaint();
-        self.reading.start("protocol-file", work, done)
+        self.reading.start("protocol-file", ctx, work)
     }
 
     /// A file that was read, once.
@@ -136,21 +127,16 @@ impl Chooser {
     }
 
     /// Draws the list, the field for a file and what is wrong with the file chosen.
-    pub fn ui(
-        &mut self,
-        ui: &mut Ui,
-        form: &ProtocolForm,
-        facts: &ProtocolFacts<'_>,
-        commands: &mut Commands,
-    ) {
-        if facts.is_busy {
-            ui.label("A run is in progress; another protocol can be chosen when it has ended.");
+    pub fn ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
+        let (form, is_busy) = (&workbench.form, workbench.is_busy());
+        if is_busy {
+            ui.label("A run is in progress. Choose another protocol when it has ended.");
         }
         ScrollArea::vertical().id_salt("protocols").auto_shrink(false).show(ui, |ui| {
-            if facts.is_busy {
+            if is_busy {
                 ui.disable();
             }
-            self.file_ui(ui, facts.is_dialog_open, commands);
+            self.file_ui(ui, workbench.dialog.is_open(), commands);
             if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
                 mistakes_ui(ui, file, form);
             }
@@ -166,7 +152,7 @@ impl Chooser {
     }
 
     fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut Commands) {
-        ui.label(RichText::new("A protocol of your own").heading().strong());
+        heading_ui(ui, "Your own protocol");
         ui.horizontal(|ui| {
             let label = ui.label("protocol file");
             let width = (ui.available_width() - 250.0).max(120.0);
@@ -174,56 +160,51 @@ impl Chooser {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("a TOML file");
-            ui.add(input).labelled_by(label.id).place("protocol file");
+            ui.add(input).labelled_by(label.id).named("protocol file");
             let can_open = !self.typed.trim().is_empty() && !self.reading.is_busy();
             if ui.add_enabled(can_open, Button::new("Open")).clicked() {
-                commands.push(Command::OpenProtocol);
+                commands.push(UiCommand::OpenProtocol);
             }
             let button = Button::new("Open a protocol file...");
             if ui.add_enabled(!is_dialog_open, button).clicked() {
-                commands.push(Command::Choose(Ask::Protocol));
+                commands.push(UiCommand::Choose(PathPurpose::Protocol));
             }
         });
     }
 }
 
 fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let head = format!("{} cannot run as it is:", file.display());
+    let tokens = tokens_of(ui);
+    let head = format!("{} cannot run:", file.display());
     ui.label(RichText::new(head).strong());
     for problem in form.problems() {
         let text = RichText::new(problem.to_string()).color(tokens.alarm_text);
         ui.add(Label::new(text).wrap());
     }
     let words = "Correct the file and press Open again.";
-    ui.label(RichText::new(words).color(tokens.text_quiet));
+    placeholder_ui(ui, words);
 }
 
 fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let tokens = tokens_of(ui);
     let name = BUILT_IN.iter().find(|(name, _)| *name == protocol.name);
     ui.add_space(4.0);
     let button = Button::selectable(is_chosen, RichText::new(&protocol.title).strong())
         .min_size(vec2(280.0, 24.0));
     if let (true, Some((name, _))) = (ui.add(button).clicked(), name) {
-        commands.push(Command::TakeProtocol(name));
+        commands.push(UiCommand::TakeProtocol(name));
     }
     let about = RichText::new(&protocol.about).color(tokens.text_quiet);
     ui.add(Label::new(about).wrap()).on_hover_text(&protocol.source);
 }
 
-/// Draws what the plan is expected to do.
-pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>, limits: CourseLimits) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
+/// Draws the expected course of the plan.
+pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLimits) {
     match checked {
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
-            let words = "this protocol does not indent; there is no depth or force to draw";
-            ui.label(RichText::new(words).color(tokens.text_quiet));
+            placeholder_ui(ui, "this protocol does not indent; there is no depth or force to draw");
         }
         Some(checked) => course_ui(ui, &checked.outline, limits),
-        None => {
-            let words = "nothing to draw until the protocol and its values are right";
-            ui.label(RichText::new(words).color(tokens.text_quiet));
-        }
+        None => placeholder_ui(ui, "correct the protocol and its values to see the course"),
     }
 }

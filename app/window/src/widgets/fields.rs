@@ -1,0 +1,217 @@
+//! Fields of a form: numbers, texts, boxes to tick and lists, each behind its label and known to the palette by its name.
+
+use super::buttons::steady;
+use super::places::NamedControl;
+use super::text::{quiet_ui, small_alarm_ui, tokens_of};
+use eframe::egui::{
+    Align, Align2, ComboBox, Key, Label, Layout, Response, RichText, TextEdit, Ui, vec2,
+};
+use palpate_haptics::Period;
+use palpate_rheology::families;
+use palpate_rheology::tolerance::Tolerance;
+
+/// A number as it is typed, and what it means.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QuantityField {
+    pub text: String,
+    /// The number, or what is wrong in one sentence.
+    pub value: Result<f64, String>,
+}
+
+impl Default for QuantityField {
+    fn default() -> Self {
+        Self::new(0.0)
+    }
+}
+
+impl QuantityField {
+    /// A field that holds a number.
+    #[must_use]
+    pub fn new(value: f64) -> Self {
+        Self { text: value.to_string(), value: Ok(value) }
+    }
+
+    /// The number, or its name and what is wrong.
+    pub fn named_value(&self, name: &str) -> Result<f64, String> {
+        self.value.clone().map_err(|reason| format!("{name}: {reason}"))
+    }
+
+    /// Reads the text again and checks the number.
+    pub fn check(&mut self, check: impl FnOnce(f64) -> Result<(), String>) {
+        self.value = parse(&self.text).and_then(|value| check(value).map(|()| value));
+    }
+}
+
+/// Whether a loop can have this rate in Hz, or why not.
+pub fn check_rate(rate: f64) -> Result<(), String> {
+    Period::of_rate(rate).map(|_| ()).map_err(|err| err.to_string())
+}
+
+/// A finite number, or one sentence.
+fn parse(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Err("a number is missing here; write it like 0.75".into());
+    }
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ if text.contains(',') => {
+            Err(format!("'{text}' is not a number; write it with a point, like 0.75"))
+        }
+        _ => Err(format!("'{text}' is not a finite number; write it like 0.75")),
+    }
+}
+
+/// Width in points of the labels in front of the inputs of a form.
+const LABEL_WIDTH: f32 = 74.0;
+
+/// Draws a labelled input with its unit; true when the text changed.
+pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {
+    let tokens = tokens_of(ui);
+    let row = |ui: &mut Ui| {
+        let label = form_label(ui, name);
+        let input = TextEdit::singleline(&mut field.text).desired_width(76.0).char_limit(24);
+        let input = ui.add(input.align(Align2::RIGHT_CENTER));
+        ui.label(RichText::new(unit).color(tokens.text_quiet));
+        input.labelled_by(label.id).named(name).changed()
+    };
+    let has_changed = steady(ui, name, |ui| ui.horizontal(row).inner);
+    if let Err(reason) = &field.value {
+        small_alarm_ui(ui, reason);
+    }
+    has_changed
+}
+
+/// A label of fixed width, so that inputs stand in one column.
+pub fn form_label(ui: &mut Ui, name: &str) -> Response {
+    let size = vec2(LABEL_WIDTH, ui.spacing().interact_size.y);
+    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(LABEL_WIDTH);
+        ui.add(Label::new(name))
+    })
+    .inner
+}
+
+/// Longest text taken: a path.
+const TEXT_MAX: usize = 4096;
+
+/// Draws the field behind its label; true when it was left with Enter.
+pub fn text_row(ui: &mut Ui, name: &str, hint: &str, text: &mut String) -> bool {
+    let row = |ui: &mut Ui| {
+        let label = form_label(ui, name);
+        let input = TextEdit::singleline(text)
+            .desired_width(ui.available_width() - 8.0)
+            .char_limit(TEXT_MAX)
+            .hint_text(hint);
+        let typed = ui.add(input).labelled_by(label.id).named(name);
+        typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
+    };
+    steady(ui, name, |ui| ui.horizontal(row).inner)
+}
+
+/// Draws the field of a tolerance and its meaning, which is `without` for an empty field where that is allowed.
+pub fn tolerance_ui(ui: &mut Ui, text: &mut String, without: Option<&str>) {
+    ui.horizontal(|ui| {
+        let label = form_label(ui, "tolerance");
+        let input = TextEdit::singleline(text).desired_width(96.0).char_limit(24);
+        let hint = without.map_or("", |_| "none");
+        ui.add(input.hint_text(hint)).labelled_by(label.id).named("tolerance");
+    });
+    match (text.trim(), without, text.parse::<Tolerance>()) {
+        ("", Some(words), _) => quiet_ui(ui, words),
+        (_, _, Ok(tolerance)) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
+        (_, _, Err(reason)) => small_alarm_ui(ui, reason.to_string()),
+    }
+}
+
+/// Draws a box to tick that the palette leads to by its words.
+pub fn tick_box(ui: &mut Ui, is_on: &mut bool, words: &str) -> Response {
+    ui.checkbox(is_on, words).named(words)
+}
+
+/// Draws the list behind its label. `choices`: what there is, with its words.
+pub fn choice_ui<T: Clone + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut T,
+    choices: &[(T, &str)],
+) {
+    ui.horizontal(|ui| {
+        let label = form_label(ui, name);
+        let chosen = choices.iter().find(|(one, _)| one == value);
+        ComboBox::from_id_salt(("list", name))
+            .selected_text(chosen.map_or("", |(_, words)| *words))
+            .width(ui.available_width() - 16.0)
+            .show_ui(ui, |ui| {
+                for (one, words) in choices {
+                    ui.selectable_value(value, one.clone(), *words);
+                }
+            })
+            .response
+            .labelled_by(label.id)
+            .named(name);
+    });
+}
+
+/// The family that is fitted where none is chosen.
+const OWN_MODEL: &str = "modified Kelvin";
+
+/// A choice among all families.
+pub struct ModelChoice {
+    keys: Vec<String>,
+    /// Key of the chosen one; none for the modified Kelvin body of third order.
+    pub family: Option<String>,
+    /// Take sessions though they were rejected.
+    pub is_rejected_included: bool,
+}
+
+impl Default for ModelChoice {
+    fn default() -> Self {
+        let keys = families::all().iter().map(|one| one.key()).collect();
+        Self { keys, family: None, is_rejected_included: false }
+    }
+}
+
+impl ModelChoice {
+    /// Draws the choice and the box for rejected sessions, under names that nothing else on the screen has.
+    pub fn ui(&mut self, ui: &mut Ui, name: &'static str, include_rejected: &str) {
+        let keys = self.keys.iter();
+        let keys = keys.map(|key| (Some(key.clone()), key.as_str()));
+        let all: Vec<_> = std::iter::once((None, OWN_MODEL)).chain(keys).collect();
+        choice_ui(ui, name, &mut self.family, &all);
+        tick_box(ui, &mut self.is_rejected_included, include_rejected);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_finite_numbers_pass_and_the_sentence_says_why() {
+        for (text, wanted) in [
+            ("0.75", Ok(0.75)),
+            (" 30 ", Ok(30.0)),
+            ("1e1", Ok(10.0)),
+            ("", Err("missing")),
+            ("0,75", Err("with a point")),
+            ("fast", Err("'fast' is not a finite number")),
+            ("nan", Err("not a finite number")),
+            ("inf", Err("not a finite number")),
+        ] {
+            match (parse(text), wanted) {
+                (Ok(value), Ok(wanted)) => assert!((value - wanted).abs() < 1e-12),
+                (Err(reason), Err(words)) => assert!(reason.contains(words), "{reason}"),
+                (got, _) => panic!("'{text}' gave {got:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_failed_check_replaces_the_value() {
+        let mut field = QuantityField::new(0.75);
+        field.text = "99".into();
+        field.check(|value| if value > 15.0 { Err("too fast".into()) } else { Ok(()) });
+        assert_eq!(field.value, Err("too fast".into()));
+    }
+}
