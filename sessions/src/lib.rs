@@ -37,12 +37,12 @@ pub mod shelf;
 pub mod text;
 pub mod ticks;
 
-pub use analyses::{ANALYSES_FILE, Analyses};
+pub use analyses::{ANALYSES_FILE, Analyses, AnalysisError};
 pub use block::Block;
 pub use calibrations::{Shelf, read_calibration};
 pub use catalog::Catalog;
 pub use chain::{ChainError, ChainHead};
-pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
+pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
@@ -57,4 +57,4 @@ pub use log::{
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use raw::RawBlock;
 pub use record::{EndRecord, Entry, EntryKind, Row};
-pub use shelf::{age_days, save, supersede};
+pub use shelf::{LibraryError, age_days, save, supersede};
